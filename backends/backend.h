@@ -1,0 +1,81 @@
+// One physics engine (or none) behind one interface. Public functions check arguments once and call the private hooks;
+// adapters never repeat the checks. Not thread-safe: one backend per thread. After construction nothing allocates in
+// step().
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "backends/scene.h"
+#include "core/contact.h"
+#include "core/outcome.h"
+#include "core/robot_state.h"
+
+namespace duet {
+
+// Everything that a continuation depends on, as the engine stores it. Only for the same engine, scene and binary.
+struct Snapshot {
+  std::vector<double> values;
+};
+
+// The 24 joints of the partner at an instant, and their velocities, as columns [m], [m/s], frame W.
+using HumanJoints = Eigen::Matrix<double, 3, 24>;
+
+class Backend {
+ public:
+  explicit Backend(Scene scene);  // throws std::invalid_argument: no robot, dt not in (0, 0.02], friction < 0
+  virtual ~Backend() = default;
+  Backend(const Backend&) = delete;
+  Backend& operator=(const Backend&) = delete;
+
+  [[nodiscard]] virtual std::string_view name() const = 0;  // "mujoco", "playback", ...
+  [[nodiscard]] virtual std::string version() const = 0;    // the engine's own
+  [[nodiscard]] const Scene& scene() const { return scene_; }
+
+  // Puts the robot into `state`, clears contacts and warm starts: the same state gives bitwise the same continuation.
+  void reset(const RobotState& state);
+  // Partner joints now; each following step moves them on at `velocities` until the next call.
+  void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
+  // The reference being tracked. Engines ignore it; playback moves the robot there.
+  void follow(const Reference& reference);
+  // One physics step of scene().dt with the torque law of JointCommand evaluated inside it. kDiverged is final until
+  // reset.
+  Outcome step(const JointCommand& command);
+
+  [[nodiscard]] const RobotState& state() const { return state_; }
+  // Contacts of the last step, in an order that does not depend on addresses. Valid until the next call.
+  [[nodiscard]] std::span<const Contact> contacts() const { return contacts_; }
+  // Torques that the joints received in the last step. [N m]
+  [[nodiscard]] const Eigen::VectorXd& torques() const { return torques_; }
+  [[nodiscard]] double time() const { return static_cast<double>(steps_) * scene_.dt; }  // since reset [s]
+
+  [[nodiscard]] Snapshot snapshot() const;
+  void restore(const Snapshot& snapshot);  // throws std::invalid_argument for another scene's size
+
+  // Adds a force on a link at a point for the following steps until called again with zero. [N], frame W.
+  void push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W);
+
+ protected:
+  RobotState state_;               // hooks leave it at the state after the call
+  std::vector<Contact> contacts_;  // reserved by the adapter for its largest number
+  Eigen::VectorXd torques_;
+
+ private:
+  virtual void do_reset() = 0;  // from state_
+  virtual void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) = 0;
+  virtual void do_follow(const Reference&) {}
+  virtual Outcome do_step(const JointCommand& command) = 0;
+  virtual void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) = 0;
+  virtual void do_snapshot(Snapshot& snapshot) const = 0;  // appends its values
+  virtual void do_restore(std::span<const double> values) = 0;
+
+  Scene scene_;
+  long steps_ = 0;
+  bool diverged_ = false;
+};
+
+}  // namespace duet

@@ -1,0 +1,59 @@
+# duet_add_module(<room> SOURCES ... LINK ...): the library duet_<room>. One room = one folder = one target.
+# duet_add_test(<room> SOURCES ... LINK ...): the GoogleTest program <room>_test, each TEST known to ctest.
+# duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `fuzz`).
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(fmt REQUIRED)
+find_package(Threads REQUIRED)
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+find_program(DUET_CCACHE ccache)
+if(DUET_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${DUET_CCACHE})
+endif()
+
+add_library(duet_options INTERFACE)
+target_include_directories(duet_options INTERFACE ${CMAKE_SOURCE_DIR})
+# Contraction is off so that the same source gives the same bits whatever the optimiser chooses; wider instruction sets
+# appear only in kernel files that dispatch at run time.
+target_compile_options(duet_options INTERFACE -Wall -Wextra -march=x86-64-v2 -ffp-contract=off)
+target_link_libraries(duet_options INTERFACE Eigen3::Eigen fmt::fmt Threads::Threads)
+if(DUET_WERROR)
+  target_compile_options(duet_options INTERFACE -Werror)
+endif()
+if(DUET_SANITIZE)
+  target_compile_options(duet_options INTERFACE -fsanitize=address,undefined -fno-omit-frame-pointer -O1)
+  target_link_options(duet_options INTERFACE -fsanitize=address,undefined)
+endif()
+if(DUET_FUZZ)
+  target_compile_options(duet_options INTERFACE -fsanitize=address,undefined,fuzzer-no-link)
+  target_link_options(duet_options INTERFACE -fsanitize=address,undefined)
+endif()
+
+function(duet_add_module room)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_library(duet_${room} STATIC ${ARG_SOURCES})
+  target_link_libraries(duet_${room} PUBLIC duet_options ${ARG_LINK})
+endfunction()
+
+function(duet_add_test room)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  find_package(GTest REQUIRED)
+  include(GoogleTest)
+  add_executable(${room}_test ${ARG_SOURCES})
+  target_link_libraries(${room}_test PRIVATE duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  # A test whose data are not there says "not run: ... absent" and counts as skipped.
+  gtest_discover_tests(${room}_test TEST_PREFIX "${room}/" DISCOVERY_TIMEOUT 60
+                       WORKING_DIRECTORY ${CMAKE_SOURCE_DIR} PROPERTIES TIMEOUT 300)
+endfunction()
+
+function(duet_add_fuzzer name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(fuzz_${name} ${ARG_SOURCES})
+  target_link_libraries(fuzz_${name} PRIVATE duet_options ${ARG_LINK})
+  target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+endfunction()

@@ -1,0 +1,18 @@
+// Names that people type: the nearest known one, and the sentence that refuses an unknown one. Thread-safe.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+// The candidate with the smallest Damerau-Levenshtein distance (ignoring case, and '-' equal to '_'), or "" where none
+// is within a third of the name's length (at least 2).
+std::string closest_name(std::string_view name, std::span<const std::string> candidates);
+
+// "unknown task 'hugg': did you mean 'hug'? Known: hug, handshake, ..." (the question only where there is a near name).
+std::string unknown_name_message(std::string_view kind, std::string_view name, std::span<const std::string> candidates);
+
+}  // namespace duet

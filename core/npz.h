@@ -1,0 +1,64 @@
+// NPY arrays and NPZ archives (NumPy's formats, version 1.0; zip through libzip, deflated or stored). `numpy.load`
+// opens what is written here. The same arrays give the same bytes on every run (fixed time stamps, sorted names).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/point_tracks.h"
+
+namespace duet {
+
+// Row-major values with a shape; an empty shape is a scalar. Read from: f4, f8 -> double; i1..i8, u1..u4, b1 -> int64;
+// U, S -> strings. Both byte orders and both memory orders are read; little-endian C order is written (<f8, <i8, <U).
+struct NpyArray {
+  using Values = std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::string>>;
+  std::vector<std::size_t> shape;
+  Values values;
+};
+
+class Npz {
+ public:
+  // Throws InputError naming `path`, the entry and what is wrong: not a zip, truncated, an object array (never
+  // executed), an unknown type, a size that does not match the shape, an entry above 1 GiB.
+  static Npz load(const std::string& path);
+  static Npz parse(std::string_view bytes, const std::string& name);  // `name` stands in messages
+  // Atomic (core/file.h). Throws InputError.
+  void save(const std::string& path) const;
+  [[nodiscard]] std::string bytes() const;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] bool contains(const std::string& key) const { return arrays_.contains(key); }
+  [[nodiscard]] std::vector<std::string> keys() const;
+
+  // Each getter throws InputError naming the archive, the key, the expected and the found shape or type, the missing
+  // key (with the keys that are there), or the first index that is not finite. -1 in `shape` accepts any size.
+  [[nodiscard]] const NpyArray& array(const std::string& key) const;
+  [[nodiscard]] std::vector<double> numbers(const std::string& key, const std::vector<long>& shape) const;
+  [[nodiscard]] std::vector<std::int64_t> integers(const std::string& key, const std::vector<long>& shape) const;
+  [[nodiscard]] std::vector<std::string> strings(const std::string& key, const std::vector<long>& shape) const;
+  [[nodiscard]] double number(const std::string& key) const;
+  [[nodiscard]] std::int64_t integer(const std::string& key) const;
+  [[nodiscard]] std::string text(const std::string& key) const;
+  [[nodiscard]] PointTracks tracks(const std::string& key, int points) const;  // (T, points, 3); points = -1: any
+
+  void set(const std::string& key, NpyArray array);  // throws std::invalid_argument where size and shape disagree
+  void set(const std::string& key, std::vector<double> values, std::vector<std::size_t> shape);
+  void set(const std::string& key, std::vector<std::int64_t> values, std::vector<std::size_t> shape);
+  void set(const std::string& key, std::vector<std::string> values);  // 1-D
+  void set_number(const std::string& key, double value);
+  void set_integer(const std::string& key, std::int64_t value);
+  void set_text(const std::string& key, const std::string& value);
+  void set(const std::string& key, const PointTracks& tracks);
+
+ private:
+  std::string name_ = "(new archive)";
+  std::map<std::string, NpyArray> arrays_;
+};
+
+}  // namespace duet

@@ -1,0 +1,32 @@
+// The one check for misuse. Files, engines and devices throw std::runtime_error instead; what an experiment may measure
+// is a value (core/outcome.h). Thread-safe.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace duet {
+
+// Throws std::invalid_argument(message) unless `condition` holds. The message names the object, what was expected and
+// what was found.
+inline void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+inline void require(bool condition, const char* message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+
+// A file, an engine or a device that cannot do what was asked of it. The command line answers with exit code 2.
+class InputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+// Something this build or this machine lacks (an engine, an asset, a device). The command line answers with exit
+// code 4.
+class MissingError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace duet

@@ -1,0 +1,25 @@
+// Every figure that duet prints: name, unit, direction, source. One table; names in files and reports come from here.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace duet {
+
+enum class Direction { kLower, kHigher, kNone };
+enum class MetricGroup { kRetargeting, kController, kEpisode };
+
+struct MetricInfo {
+  std::string_view name;  // "jpe", "contact_f1_0.35", "hf_ratio", ...
+  std::string_view unit;  // "m", "1", "m/s^3", ...
+  Direction direction;
+  MetricGroup group;
+  std::string_view title;   // for tables and plots: "Joint position error"
+  std::string_view source;  // "supplement C.2.1"
+};
+
+std::span<const MetricInfo> metric_catalogue();
+// Throws std::invalid_argument for an unknown name, with the nearest.
+const MetricInfo& metric_info(std::string_view name);
+
+}  // namespace duet

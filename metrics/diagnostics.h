@@ -1,0 +1,37 @@
+// Controller-space jitter diagnostics (supplement A.4.6, Table S4).
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "core/recording.h"
+#include "metrics/readings.h"
+
+namespace duet {
+
+// (joints, T) [rad] at rate_hz; `v` (same shape, rad/s) only for VelocitySource::kGiven. Fraction in [0, 1].
+double hf_ratio(const Eigen::MatrixXd& q, double rate_hz = 50.0, const DiagnosticReadings& readings = {},
+                const Eigen::MatrixXd& v = {});
+double dof_jerk(const Eigen::MatrixXd& q, double rate_hz = 50.0, const DiagnosticReadings& readings = {});  // [rad/s^3]
+double root_jerk(const Eigen::Matrix3Xd& p, double rate_hz = 50.0, const DiagnosticReadings& readings = {});  // [m/s^3]
+
+struct RootError {
+  double position = 0.0;  // [m]
+  double angle_deg = 0.0;
+};
+RootError root_error(const std::vector<Pose>& X_WB, const std::vector<Pose>& reference);
+
+struct DofError {
+  double position = 0.0;  // [rad]
+  double velocity = 0.0;  // [rad/s]
+};
+DofError dof_error(const Eigen::MatrixXd& q, const Eigen::MatrixXd& q_ref, const Eigen::MatrixXd& v,
+                   const Eigen::MatrixXd& v_ref, const DiagnosticReadings& readings = {});
+
+// Of a recording, by catalogue name: hf_ratio, dof_jerk, root_jerk, root_error, root_angle_error, dof_error,
+// dof_velocity_error (executed against reference), and hf_ratio_reference, dof_jerk_reference, root_jerk_reference
+// (before the controller). Joint velocity of the reference by central differences. Needs 4 frames or more.
+std::map<std::string, double> controller_diagnostics(const Recording& recording,
+                                                     const DiagnosticReadings& readings = {});
+
+}  // namespace duet

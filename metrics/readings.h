@@ -1,0 +1,110 @@
+// The named readings of reference/metrics.md: one struct of choices per family, the first value of each the default.
+// Text names are exactly those of that page ("independent_frame", "closest_pair", ...).
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace duet {
+
+enum class JpeFrame { kWorld, kPelvis };
+enum class AwdEntries { kFull, kOffdiag, kCross, kWithin };
+enum class HandMatching {
+  kIndependentFrame,
+  kSourceFrame,
+  kIndependentSequence,
+  kSourceSequence,
+  kIndependentBottleneck
+};
+enum class Compare { kLt, kLe };
+enum class ZeroDivision { kNan, kZero, kOne };
+enum class LargeAngle { kFrameAny, kEntry, kFrameMean, kFrameAll };
+enum class AngleStd { kPooled, kMeanOfJoints };
+enum class JerkScheme { kDiff, kCentral, kGradient };
+
+struct MetricReadings {
+  JpeFrame jpe_frame = JpeFrame::kWorld;
+  AwdEntries awd_entries = AwdEntries::kFull;
+  HandMatching matching = HandMatching::kIndependentFrame;
+  Compare contact_compare = Compare::kLt;
+  ZeroDivision zero_division = ZeroDivision::kNan;
+  int min_frames = 1;
+  LargeAngle large_angle = LargeAngle::kFrameAny;
+  AngleStd angle_std = AngleStd::kPooled;
+  int ddof = 0;
+  JerkScheme jerk_scheme = JerkScheme::kDiff;
+};
+
+enum class HugSingle { kAnyHand, kSameHand, kExactlyOne, kOff };
+enum class HugShoulder { kBothHands, kAnyHand, kTorsoBoth, kTorsoAny, kOff };
+enum class HandshakeDistance { kHandToRoot, kAgentRoots };
+enum class HandshakeActive { kPerformerHand, kPartnerHand };
+enum class HandshakeStability { kWhole, kRollingAll, kRollingAny };
+enum class StabilityFrames { kRaw, kValidated };
+enum class HighFiveHeight { kClosestPair, kPerformerClosest, kPartnerClosest, kAnyHand, kPerformerAny, kOff };
+enum class WavePlane { kXy, kLateralUp, kPca };
+enum class WaveDisplacement { kStep, kBothSteps, kSinceLast, kNone };
+enum class WaveAmplitude { kMaxAxis, kDiagonal, kDiameter, kHorizontal };
+enum class WaveHeight { kAnyHandMax, kActiveMax, kActiveMean, kActiveMedian };
+enum class MotionFrame { kWorld, kRoot };
+enum class BendFrames { kCount, kConsecutive };
+enum class BendDirection { kAny, kForward };
+enum class FlyKissOrder { kWhole, kAfterClosest, kAfterFirstClose };
+enum class FlyKissDirection { kSpace, kHorizontal };
+
+struct DetectorReadings {
+  HugSingle hug_single = HugSingle::kAnyHand;
+  HugShoulder hug_shoulder = HugShoulder::kBothHands;
+  HandshakeDistance handshake_distance = HandshakeDistance::kHandToRoot;
+  HandshakeActive handshake_active = HandshakeActive::kPerformerHand;
+  HandshakeStability handshake_stability = HandshakeStability::kWhole;
+  StabilityFrames handshake_stability_frames = StabilityFrames::kRaw;
+  int handshake_ddof = 0;
+  HighFiveHeight high_five_height = HighFiveHeight::kClosestPair;
+  WavePlane wave_plane = WavePlane::kXy;
+  WaveDisplacement wave_displacement = WaveDisplacement::kStep;
+  WaveAmplitude wave_amplitude = WaveAmplitude::kMaxAxis;
+  WaveHeight wave_height = WaveHeight::kAnyHandMax;
+  MotionFrame wave_frame = MotionFrame::kWorld;
+  BendFrames bend_frames = BendFrames::kCount;
+  BendDirection bend_direction = BendDirection::kAny;
+  FlyKissOrder fly_kiss_order = FlyKissOrder::kWhole;
+  FlyKissDirection fly_kiss_dir = FlyKissDirection::kSpace;
+  MotionFrame fly_kiss_frame = MotionFrame::kWorld;
+};
+
+enum class VelocitySource { kDiff, kGradient, kGiven };
+enum class Spectrum { kPeriodogram, kHann, kWelch, kButterworth };
+enum class MeanHandling { kKeep, kRemove };
+enum class EdgeBin { kAbove, kAtOrAbove };
+enum class Pool { kEnergy, kMeanOfJoints };
+enum class JerkNorm { kMeanAbs, kMeanNorm, kRms };  // root_jerk: kMeanNorm (default) or kRms
+enum class DofErrorNorm { kMeanAbs, kMeanNorm, kRms };
+
+struct DiagnosticReadings {
+  VelocitySource velocity = VelocitySource::kDiff;
+  Spectrum spectrum = Spectrum::kPeriodogram;
+  MeanHandling mean = MeanHandling::kKeep;
+  EdgeBin edge = EdgeBin::kAbove;
+  Pool pool = Pool::kEnergy;
+  JerkNorm dof_jerk = JerkNorm::kMeanAbs;
+  JerkNorm root_jerk = JerkNorm::kMeanNorm;
+  JerkScheme jerk_scheme = JerkScheme::kDiff;
+  DofErrorNorm dof_error = DofErrorNorm::kMeanAbs;
+};
+
+struct Readings {
+  MetricReadings metrics;
+  DetectorReadings detectors;
+  DiagnosticReadings diagnostics;
+};
+
+// Sets "family.option" (families: metrics, hug, handshake, high_five, wave, bend, fly_kiss, diagnostics; options as in
+// reference/metrics.md) to a reading by its text name. Throws std::invalid_argument for an unknown option or reading
+// and lists the known ones.
+void set_reading(Readings& readings, const std::string& option, const std::string& value);
+std::string reading(const Readings& readings, const std::string& option);
+std::vector<std::string> reading_names();                            // every "family.option"
+std::vector<std::string> reading_values(const std::string& option);  // default first
+
+}  // namespace duet

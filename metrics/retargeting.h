@@ -1,0 +1,72 @@
+// The 18 retargeting metrics of supplement C.2.1. Inputs are raw tracks so that any retargeter can be scored; the last
+// function takes duet's own PairedMotion.
+#pragma once
+
+#include <array>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/point_tracks.h"
+#include "metrics/readings.h"
+#include "motion/paired_motion.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+// All throw std::invalid_argument naming the argument: shapes that disagree, too few frames, a value that is not
+// finite.
+
+// (T, P, 3) each. Mean distance [m]. With kPelvis the first point of each is subtracted per frame.
+double jpe(const PointTracks& robot, const PointTracks& reshaped, JpeFrame frame = JpeFrame::kWorld);
+
+// (T, K, 3) each; N = 2K. Mean absolute difference of the N x N distance matrices [m].
+double awd(const PointTracks& source_initiator, const PointTracks& source_responder, const PointTracks& new_initiator,
+           const PointTracks& robot, AwdEntries entries = AwdEntries::kFull);
+
+struct ContactCounts {
+  long tp = 0, fp = 0, fn = 0, tn = 0;
+  ContactCounts& operator+=(const ContactCounts& other);
+};
+// (T, 2, 3) each, left hand then right; truth is the source pair. threshold [m].
+ContactCounts contact_counts(const PointTracks& source_initiator, const PointTracks& source_responder,
+                             const PointTracks& new_initiator, const PointTracks& robot, double threshold,
+                             const MetricReadings& readings = {});
+struct Classification {
+  double precision = 0.0, recall = 0.0, f1 = 0.0, accuracy = 0.0;
+};
+Classification classification(const ContactCounts& counts, ZeroDivision zero_division = ZeroDivision::kNan);
+
+// Magnitudes (J, T) [rad].
+Eigen::MatrixXd hinge_magnitudes(const Eigen::MatrixXd& q);  // |q|
+// Each group of hinges (q row, axis in the preceding link's frame, in order) as one rotation.
+struct HingeGroup {
+  std::vector<int> rows;
+  std::vector<Eigen::Vector3d> axes;
+};
+Eigen::MatrixXd grouped_magnitudes(const Eigen::MatrixXd& q, const std::vector<HingeGroup>& groups);
+Eigen::MatrixXd rotvec_magnitudes(const PointTracks& rotvecs);
+
+double large_angle_ratio(const Eigen::MatrixXd& magnitudes, LargeAngle reading = LargeAngle::kFrameAny,
+                         double limit = 0.5);
+double angle_std(const Eigen::MatrixXd& magnitudes, AngleStd reading = AngleStd::kPooled, int ddof = 0);
+
+struct Jerk {
+  double mean = 0.0, std = 0.0;  // [m/s^3], pooled over frames and joints
+};
+Jerk jerk(const PointTracks& positions, double rate_hz, JerkScheme scheme = JerkScheme::kDiff, int ddof = 0);
+
+// Hinges of the G1 that make one anatomical rotation (hips, shoulders, waist, wrists; the rest alone), by joint names.
+std::vector<HingeGroup> hinge_groups(const RobotModel& robot);
+
+// All 18, by catalogue name: jpe, awd, contact_{precision,recall,f1,accuracy}_{0.2,0.35,0.5}, large_angle_ratio,
+// angle_std, jerk_mean, jerk_std. NaN where undefined (no contact in the source). Jerk is of the robot's 16 pair
+// points.
+std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
+                                                  const MetricReadings& readings = {});
+// The contact counts behind them per threshold, to be added over clips (micro average).
+std::array<ContactCounts, 3> retargeting_contact_counts(const PairedMotion& motion, const RobotModel& robot,
+                                                        const MetricReadings& readings = {});
+inline constexpr std::array<double, 3> kContactThresholds = {0.2, 0.35, 0.5};
+
+}  // namespace duet

@@ -1,0 +1,52 @@
+// BVH motion capture: a strict reader of one file, and the import of a *pair* of files (CMU's joint names) as SMPL-24.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "motion/interaction_clip.h"
+
+namespace duet {
+
+struct BvhJoint {
+  std::string name;  // "End Site" of joint X is named "X/end"
+  int parent = -1;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // in file units
+  std::vector<int> channels;                         // 0..2 = X,Y,Z position, 3..5 = X,Y,Z rotation, in file order
+};
+
+struct Bvh {
+  std::string name;  // file name, for messages
+  std::vector<BvhJoint> joints;
+  double frame_time = 0.0;  // [s]
+  int frames = 0;
+  std::vector<double> values;  // (frames, channels), file units and degrees
+};
+
+// Throws InputError naming file, line, expected and found: truncated or empty text, an unknown channel, a frame with
+// too few numbers, a number that is not finite, a frame time that is not positive, no frames.
+Bvh parse_bvh(std::string_view text, const std::string& name);
+Bvh read_bvh(const std::string& path);
+
+enum class UpAxis { kY, kZ };
+
+struct BvhOptions {  // empty = detected; the verdict says what was found and from what
+  std::optional<double> metres_per_unit;
+  std::optional<UpAxis> up;
+  std::optional<double> rate_hz;    // overrides the frame time
+  std::optional<bool> drop_t_pose;  // an added T pose in frame 0
+  double output_rate_hz = 50.0;
+};
+
+struct BvhImport {
+  InteractionClip clip;
+  std::vector<std::string> verdict;  // one line per detected or overridden fact, for the user to read
+};
+
+// Person A from the first file, B from the second. Missing joints, different lengths or frame times: InputError.
+BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, Task task,
+                          const BvhOptions& options = {});
+
+}  // namespace duet

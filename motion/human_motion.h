@@ -1,0 +1,41 @@
+// One person's motion: SMPL-24 joint positions at a fixed rate, with global joint rotations where the source has them.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/point_tracks.h"
+#include "core/skeleton.h"
+
+namespace duet {
+
+struct HumanMotion {
+  double rate_hz = 50.0;
+  PointTracks joints;                         // (T, 24, 3) [m], frame W, z up
+  std::vector<Eigen::Quaterniond> rotations;  // R_WJ, T * 24 entries in (T, 24) order, unit; empty where unknown
+
+  [[nodiscard]] int frames() const { return joints.frames(); }
+};
+
+// Throws std::invalid_argument naming `what`, the place (frame, joint) and what is wrong: not 24 joints, fewer than two
+// frames, a value that is not finite, a rotation that is not unit (1e-6) or their number, a bone shorter than 1 mm.
+void validate(const HumanMotion& motion, const std::string& what);
+
+// Length of the bone from each joint to its parent, mean over frames; entry 0 is 0. [m]
+std::array<double, kSmplJoints> bone_lengths(const HumanMotion& motion);
+
+// Heading of the person at a frame: the horizontal direction at right angles to the line of hips and shoulders, rotated
+// to point forward. [rad] about z, 0 = x axis. Throws std::invalid_argument where hips and shoulders are all vertical.
+double heading(const PointTracks& joints, int frame);
+
+// Resamples to `rate_hz`, first and last instants kept (the last is the last multiple of the new period inside the
+// motion). Positions linear, rotations slerp; never skips frames. Throws std::invalid_argument for a rate that is not
+// positive.
+HumanMotion resample(const HumanMotion& motion, double rate_hz);
+
+// Frames [begin, end).
+HumanMotion slice(const HumanMotion& motion, int begin, int end);
+
+}  // namespace duet

@@ -1,0 +1,52 @@
+// Two people, one task: the input of the benchmark. Both share world frame, clock, rate and length.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/task.h"
+#include "motion/human_motion.h"
+
+namespace duet {
+
+enum class Person { kA, kB };
+
+// Frames [begin, end) during which two joints are meant to be in touch; joints are SMPL-24 indices.
+struct ContactWindow {
+  int begin = 0;
+  int end = 0;
+  int joint_a = 0;
+  int joint_b = 0;
+  bool operator==(const ContactWindow&) const = default;
+};
+
+struct InteractionClip {
+  std::string id;  // names the clip in files, seeds and tables
+  Task task = Task::kHug;
+  HumanMotion a;
+  HumanMotion b;
+  Phases phases;
+  Person reactor = Person::kB;                // who the robot replaces (H_s); the other stays human (H_p). Decision 1.
+  std::vector<ContactWindow> contacts;        // known by construction for synthetic clips, else empty
+  std::map<std::string, std::string> source;  // provenance: files, seed, detected units, ...
+
+  [[nodiscard]] int frames() const { return a.frames(); }
+  [[nodiscard]] double rate_hz() const { return a.rate_hz; }
+  [[nodiscard]] const HumanMotion& reactor_motion() const { return reactor == Person::kA ? a : b; }
+  [[nodiscard]] const HumanMotion& actor_motion() const { return reactor == Person::kA ? b : a; }
+};
+
+// Throws std::invalid_argument: what validate(HumanMotion) says of either, different lengths or rates, phases or
+// contact windows outside the clip.
+void validate(const InteractionClip& clip);
+
+// NPZ with the keys of docs/file-formats.md. Loading validates. Throw InputError naming the file, the key and the
+// fault.
+void save_clip(const InteractionClip& clip, const std::string& path);
+InteractionClip load_clip(const std::string& path);
+
+// Mirror image in the plane y = 0 with left and right joints exchanged.
+InteractionClip mirrored(const InteractionClip& clip);
+
+}  // namespace duet

@@ -1,0 +1,35 @@
+// What retargeting makes of a clip: the robot's motion, the adapted human partner, what they came from, and how it
+// went.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/robot_motion.h"
+#include "motion/interaction_clip.h"
+
+namespace duet {
+
+struct PairedMotion {
+  std::string clip_id;
+  Task task = Task::kHug;
+  Phases phases;
+  Person reactor = Person::kB;
+  RobotMotion robot;           // replaces the reactor, H_s
+  HumanMotion partner;         // adapted H_p
+  HumanMotion source_partner;  // H_p as in the clip
+  HumanMotion source_reactor;  // H_s as in the clip
+  PointTracks reshaped;        // (T, 16, 3): Reshaped(H_s) at the 16 pairs of A.1.1
+  std::map<std::string, std::vector<double>>
+      loss;  // per term ("total", "kin", "con", "hum", "temp", "pose"), one per iteration
+  std::map<std::string, std::string> settings;  // every option of the solver, kernel and robot, as text
+
+  [[nodiscard]] int frames() const { return robot.frames(); }
+};
+
+// NPZ with the keys of docs/file-formats.md. Throw InputError naming file, key and fault.
+void save_paired_motion(const PairedMotion& motion, const std::string& path);
+PairedMotion load_paired_motion(const std::string& path);
+
+}  // namespace duet

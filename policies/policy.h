@@ -1,0 +1,68 @@
+// A policy: what it sees of itself and the partner -> five anchors over the next two seconds, at 5 Hz (supplement
+// A.3.1, F).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/point_tracks.h"
+#include "core/robot_state.h"
+#include "core/task.h"
+#include "motion/paired_motion.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+inline constexpr int kHistoryFrames = 12;      // observation history, the current frame included, at 50 Hz
+inline constexpr int kAnchors = 5;             // at t + {0, 0.5, 1, 1.5, 2} s
+inline constexpr double kAnchorSpacing = 0.5;  // [s]
+inline constexpr int kTicksPerPlan = 10;       // 5 Hz on the 50 Hz clock
+inline constexpr int kObservationSize = 149;   // human root 3, SMPL joints 72, robot 74 (supplement A.2.1)
+
+// One frame as sensed. The 149-D vector of supplement A.2.1 is built from it by to_vector.
+struct ObservationFrame {
+  Eigen::Matrix<double, 3, 24> partner;  // SMPL-24 joints [m], frame W; column 0 is the root
+  RobotState robot;
+};
+
+// Named layout: human root (3), human joints (72), base linear and angular velocity in B (3 + 3), gravity in B (3), q,
+// v (n each), root translation since the episode's start (3), root orientation wxyz (4): 149 for 29 joints.
+Eigen::VectorXd to_vector(const ObservationFrame& frame, const Eigen::Vector3d& start_position);
+
+struct Observation {
+  std::span<const ObservationFrame> history;  // oldest first, kHistoryFrames entries (the first repeated at the start)
+  int tick = 0;                               // 50 Hz ticks since the episode's start
+  [[nodiscard]] const ObservationFrame& now() const { return history.back(); }
+};
+
+using Anchors = std::array<Reference, kAnchors>;
+
+// What a policy may know when an episode starts. Only `replay` looks at `hindsight`.
+struct EpisodeContext {
+  Task task = Task::kHug;
+  std::string prompt;  // the language command
+  RobotState start;
+  const RobotMotion* hindsight = nullptr;  // the reference motion of this episode at 50 Hz, frame 0 = tick 0
+  std::uint64_t seed = 0;
+};
+
+class Policy {
+ public:
+  virtual ~Policy() = default;
+  [[nodiscard]] virtual std::string_view name() const = 0;
+  virtual void reset(const EpisodeContext& context) = 0;
+  // Anchors at observation.tick / 50 + {0, ..., 2} s.
+  virtual Anchors act(const Observation& observation) = 0;
+};
+
+// "replay" (the retargeted motion with hindsight), "null" (holds the neutral pose where it stands).
+// Throws std::invalid_argument for an unknown name (with the nearest and all known).
+std::vector<std::string> policy_names();
+std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot);
+
+}  // namespace duet

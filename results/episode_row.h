@@ -1,0 +1,57 @@
+// One episode as one JSON line: the only thing that is stored; every table is derived from rows.
+// reference/suite.md 4.3.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/outcome.h"
+
+namespace duet {
+
+inline constexpr int kRowSchema = 1;
+
+struct Verdict {           // of one detector
+  std::string version;     // "paper", "robot"
+  std::string thresholds;  // "paper", "strict"
+  bool success = false;
+  std::map<std::string, bool> parts;
+  std::map<std::string, double> values;
+  std::map<std::string, double> margins;
+  int frames = 0;  // number of evidence frames
+};
+
+struct EpisodeRow {
+  std::string key;  // SHA-256 of what makes the episode what it is (episode_key)
+  std::string suite, suite_version, suite_hash;
+  std::string task, clip;
+  int episode = 0;
+  std::uint64_t seed = 0;
+  std::string engine, engine_version, controller, policy, perturbation = "clean", robot_digest;
+  std::string arm = "main";  // "main", "null", "oracle"
+  Outcome outcome = Outcome::kOk;
+  std::string message;          // why, where outcome is not ok
+  std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok and fell
+  std::vector<Verdict> verdicts;
+  std::map<std::string, double> metrics;  // finite values only; undefined ones are absent
+  bool fell = false;
+  int frames = 0;
+  double sim_s = 0.0, wall_s = 0.0;
+  double contact_peak_n = 0.0, contact_impulse_ns = 0.0;  // of the human on the robot
+  int late_plans = 0;
+  std::string state_hash;  // SHA-256 over the state trajectory
+  std::string started_at;  // UTC, ISO 8601
+};
+
+// SHA-256 over suite hash, task, clip, policy, controller, engine, perturbation, episode.
+std::string episode_key(const EpisodeRow& row);
+
+nlohmann::json to_json(const EpisodeRow& row);
+// Throws InputError naming the key and the fault; unknown keys are refused.
+EpisodeRow row_from_json(const nlohmann::json& json);
+
+}  // namespace duet

@@ -1,0 +1,44 @@
+// The self-contained HTML report: opens from disk, no network; interval bars, loss curves, key frames as stick figures.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "results/leaderboard.h"
+
+namespace duet {
+
+struct StickFigure {
+  std::string label;                       // "human", "robot", "source"
+  std::vector<Eigen::Vector3d> points;     // [m], frame W
+  std::vector<std::pair<int, int>> bones;  // indices in points
+};
+struct KeyFrame {
+  std::string label;  // "start", "act", "end", with its time
+  std::vector<StickFigure> figures;
+};
+struct ClipStory {  // one retargeted clip or rolled-out episode
+  std::string title, task;
+  std::vector<KeyFrame> frames;
+  std::map<std::string, std::vector<double>> loss;  // term -> value per iteration
+  std::map<std::string, double> metrics;            // catalogue names
+};
+struct MetricColumn {
+  std::string name, title, unit, direction;  // direction: "lower", "higher", ""
+};
+struct ReportContent {
+  std::string title;
+  nlohmann::json environment;
+  std::vector<std::string> notes;  // options and caveats printed with the tables
+  std::vector<LeaderboardEntry> entries;
+  std::vector<MetricColumn> columns;                                 // how to head metric columns
+  std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
+  std::vector<ClipStory> stories;
+};
+
+std::string html_report(const ReportContent& content);
+
+}  // namespace duet

@@ -1,0 +1,58 @@
+// Tables from rows: success per group with intervals beside the null arm, metrics, comparison of two runs.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "results/episode_row.h"
+#include "results/statistics.h"
+
+namespace duet {
+
+struct LeaderboardOptions {
+  double level = 0.95;
+  int resamples = 10000;
+  std::uint64_t seed = 1;
+};
+
+// Success of one (engine, controller, policy, perturbation) over one task, or over all ("all", micro average).
+struct LeaderboardEntry {
+  std::string engine, controller, policy, perturbation, task;
+  long n = 0, k = 0;  // headline: main detector
+  double success = 0.0;
+  Interval interval;                            // Wilson
+  double null_success = 0.0;                    // same episodes under the null arm; NaN where not run
+  double lift = 0.0;                            // success - null_success
+  Interval lift_interval;                       // paired Newcombe
+  std::map<std::string, double> other_success;  // "paper/paper", "robot/strict", ... -> rate
+  long fell = 0, diverged = 0, timed_out = 0, errors = 0;
+  std::map<std::string, double> metrics;  // mean over episodes that have it
+};
+
+// Sorted by engine, controller, policy, perturbation, task (order of kTasks, "all" last).
+std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options = {});
+
+std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries);
+std::string leaderboard_csv(const std::vector<LeaderboardEntry>& entries);
+std::string leaderboard_latex(const std::vector<LeaderboardEntry>& entries);
+nlohmann::json leaderboard_json(const std::vector<LeaderboardEntry>& entries);
+
+struct Comparison {
+  std::string group;  // "engine/controller/policy task"
+  long pairs = 0, both = 0, only_a = 0, only_b = 0, neither = 0;
+  double difference = 0.0;       // success of A minus success of B
+  Interval interval;             // paired Newcombe
+  Interval cluster_interval;     // bootstrap over clips
+  double p = 1.0, p_holm = 1.0;  // exact McNemar
+  double minimum_detectable = 0.0;
+};
+
+// Pairs rows by task, clip, episode and the group fields they share; per task and over all. Throws InputError where
+// nothing pairs (it says what differs).
+std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
+                                     const LeaderboardOptions& options = {});
+std::string comparison_markdown(const std::vector<Comparison>& comparisons);
+nlohmann::json comparison_json(const std::vector<Comparison>& comparisons);
+
+}  // namespace duet

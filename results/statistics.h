@@ -1,0 +1,41 @@
+// The statistics of leaderboards: intervals, paired tests, the smallest difference that a run can see. Pure functions;
+// any randomness is a seed argument.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace duet {
+
+struct Interval {
+  double low = 0.0, high = 0.0;
+};
+
+// Wilson score interval of k successes in n. n = 0: [0, 1]. Throws std::invalid_argument for k not in [0, n].
+Interval wilson(long k, long n, double level = 0.95);
+
+// Newcombe's interval (method 10, paired) of p_a - p_b from the paired table: both, only a, only b, neither.
+Interval newcombe_paired(long both, long only_a, long only_b, long neither, double level = 0.95);
+
+// Exact two-sided McNemar p-value from the discordant counts.
+double mcnemar_exact(long only_a, long only_b);
+
+// Percentile interval of the mean by resampling clusters with replacement. `cluster` has one id per value.
+Interval cluster_bootstrap(std::span<const double> values, std::span<const int> cluster, int resamples,
+                           std::uint64_t seed, double level = 0.95);
+
+// Holm's step-down adjustment, in the order given.
+std::vector<double> holm(std::span<const double> p_values);
+
+// Smallest difference of two proportions that n (pairs, or episodes per arm) shows with the power given.
+double minimum_detectable_difference(double p, long n, double alpha = 0.05, double power = 0.8);
+// The same for a paired design with the discordance rate given.
+double minimum_detectable_difference_paired(double discordance, long n, double alpha = 0.05, double power = 0.8);
+
+// Quantile of the standard normal distribution. p in (0, 1).
+double normal_quantile(double p);
+
+}  // namespace duet

@@ -1,0 +1,60 @@
+// Options of PAIR: the weights and schedule of supplement A.1.2, and every reading where the text leaves a gap. Names
+// and defaults as in docs/deviations.md; the defaults are the `paper` mode.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace duet {
+
+struct PairWeights {  // supplement A.1.2, stage 1
+  double kin = 1.0;
+  double con = 0.25;
+  double hum = 0.25;
+  double temp = 5.0;
+  double acceleration = 1.0;  // w_a of L_temp, not given in the text
+  double pose = 0.02;
+};
+
+struct PairSchedule {
+  int stage1_iterations = 150;
+  double stage1_rate = 0.02;  // Adam's learning rate
+  int stage2_iterations = 50;
+  double stage2_rate = 0.005;
+  double stage2_contact_scale = 10.0;
+  bool keep_moments = true;  // Adam's moments across the stages
+};
+
+enum class KinLoss { kSquared, kMeanNorm };                  // sum of squares over pairs, 1/T | PHC's mean norm
+enum class ContactReduction { kFrobenius, kMean };           // printed, 1/T | 1/(T N^2)
+enum class ContactBlocks { kFull, kCrossAndHuman, kCross };  // N x N | without robot-robot | robot-human only
+enum class RootTranslation { kConstantOffset, kPerFrame, kFixed };
+enum class ContactKeypoints {
+  kNine,
+  kEleven,
+  kSeven
+};  // head, shoulders, elbows, wrists, hands | + hips | without hands
+enum class KernelKind { kAuto, kScalar, kV2, kV3, kV4 };  // double reference | float lanes: x86-64-v2, AVX2, AVX-512
+
+struct PairOptions {
+  PairWeights weights;
+  PairSchedule schedule;
+  KinLoss kin_loss = KinLoss::kSquared;
+  ContactReduction contact_reduction = ContactReduction::kFrobenius;
+  ContactBlocks contact_blocks = ContactBlocks::kFull;
+  RootTranslation root_translation = RootTranslation::kConstantOffset;
+  ContactKeypoints keypoints = ContactKeypoints::kNine;
+  bool filter = true;       // Gaussian, kernel 5, sigma 0.75, replicate padding, once at the end
+  bool adapt_human = true;  // false keeps the partner as it is
+  KernelKind kernel = KernelKind::kAuto;
+  std::string smpl_path;  // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
+};
+
+// Text forms for the command line and for PairedMotion::settings. The setter throws std::invalid_argument for an
+// unknown name or value and lists the known ones ("pair option 'root' has no value 'free': constant-offset, per-frame,
+// fixed").
+std::vector<std::string> pair_option_names();
+void set_pair_option(PairOptions& options, const std::string& name, const std::string& value);
+std::string pair_option(const PairOptions& options, const std::string& name);
+
+}  // namespace duet

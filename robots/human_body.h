@@ -1,0 +1,29 @@
+// The human partner as a kinematic body of capsules between SMPL-24 joints, with body-part regions (the regions follow
+// ISO/TS 15066's list as far as capsules tell them apart). Sized from bone lengths.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+namespace duet {
+
+struct HumanCapsule {
+  std::string name;    // "left_forearm"
+  std::string region;  // "head", "neck", "chest", "abdomen", "back", "pelvis", "upper_arm", "forearm", "hand", "thigh",
+                       // "shin", "foot"
+  int joint_a = 0;     // SMPL-24 joints at its two ends
+  int joint_b = 0;
+  double radius = 0.0;  // [m]
+};
+
+struct HumanBody {
+  std::vector<HumanCapsule> capsules;
+};
+
+// `bone_lengths` as from duet::bone_lengths (entry j: joint j to its parent). Throws std::invalid_argument naming a
+// bone that is not finite or not positive.
+HumanBody make_human_body(const std::array<double, 24>& bone_lengths);
+
+}  // namespace duet
