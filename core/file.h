@@ -2,7 +2,7 @@
 // system's reason.
 #pragma once
 
-#include <functional>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -27,8 +27,13 @@ class LineAppender {
   void append(std::string_view line);
 
  private:
+  void cut_back();
+
   std::string path_;
   int descriptor_ = -1;
+  std::int64_t size_ = 0;  // of the complete lines
+  bool complete_ = true;   // nothing but complete lines is in the file
+  bool regular_ = true;    // a device or a pipe cannot be cut
 };
 
 }  // namespace duet

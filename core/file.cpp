@@ -1,0 +1,206 @@
+#include "core/file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+std::string reason(int error) { return std::generic_category().message(error); }
+
+[[noreturn]] void fail(const char* action, const std::string& path, int error) {
+  throw InputError(fmt::format("cannot {} '{}': {}", action, path, reason(error)));
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(int value) : value_(value) {}
+  ~Descriptor() {
+    if (value_ >= 0) ::close(value_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int get() const { return value_; }
+  int release() { return std::exchange(value_, -1); }
+  // 0, or the error that closing reports (a network file system may tell here that the disk is full).
+  int close() { return ::close(std::exchange(value_, -1)) == 0 ? 0 : errno; }
+
+ private:
+  int value_;
+};
+
+int open_file(const std::string& path, int flags, mode_t mode = 0) {
+  int descriptor = -1;
+  do descriptor = ::open(path.c_str(), flags | O_CLOEXEC, mode);
+  while (descriptor < 0 && errno == EINTR);
+  return descriptor;
+}
+
+// 0, or the error number. What was written before the error stays written.
+int write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return 0;
+}
+
+// 0, or the error number. Devices and pipes have nothing to sync and answer EINVAL.
+int sync_data(int descriptor) { return ::fsync(descriptor) == 0 || errno == EINVAL || errno == ENOTSUP ? 0 : errno; }
+
+std::filesystem::path parent_folder(const std::string& path) {
+  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+  return parent.empty() ? std::filesystem::path(".") : parent;
+}
+
+void create_parent(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(parent_folder(path), error);
+  if (error) fail("write", path, error.value());
+}
+
+// Makes a rename or a new name durable. Some file systems cannot sync a folder: the file's content is safe by then.
+void sync_parent(const std::string& path) {
+  const Descriptor folder(open_file(parent_folder(path).string(), O_RDONLY | O_DIRECTORY));
+  if (folder.get() >= 0) sync_data(folder.get());
+}
+
+// A device or a pipe (/dev/stdout) must be written to, not replaced by a file of that name.
+void write_in_place(const std::string& path, std::string_view bytes) {
+  Descriptor file(open_file(path, O_WRONLY));
+  if (file.get() < 0) fail("write", path, errno);
+  if (const int error = write_all(file.get(), bytes); error != 0) fail("write", path, error);
+  if (const int error = file.close(); error != 0) fail("write", path, error);
+}
+
+struct TemporaryFile {
+  std::string path;
+  int descriptor;
+};
+
+// A new file beside `path` that no other process or thread has.
+TemporaryFile create_beside(const std::string& path) {
+  for (int n = 0;; ++n) {
+    std::string candidate = fmt::format("{}.part-{}-{}", path, ::getpid(), n);
+    const int descriptor = open_file(candidate, O_WRONLY | O_CREAT | O_EXCL, 0666);
+    if (descriptor >= 0) return {std::move(candidate), descriptor};
+    if (errno != EEXIST) fail("write", path, errno);
+  }
+}
+
+// Writes `temporary` and puts it in the place of `path`: 0, or the error number with `path` untouched.
+int fill_and_rename(Descriptor& file, const std::string& temporary, const std::string& path, std::string_view bytes,
+                    std::optional<mode_t> mode) {
+  if (mode && ::fchmod(file.get(), *mode) != 0) return errno;
+  if (const int error = write_all(file.get(), bytes); error != 0) return error;
+  if (const int error = sync_data(file.get()); error != 0) return error;
+  if (const int error = file.close(); error != 0) return error;
+  return ::rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
+}
+
+void replace_file(const std::string& path, std::string_view bytes, std::optional<mode_t> mode) {
+  const TemporaryFile temporary = create_beside(path);
+  Descriptor file(temporary.descriptor);
+  if (const int error = fill_and_rename(file, temporary.path, path, bytes, mode); error != 0) {
+    ::unlink(temporary.path.c_str());
+    fail("write", path, error);
+  }
+  sync_parent(path);
+}
+
+// Size of the file up to and including its last newline.
+off_t complete_size(int descriptor, off_t size) {
+  char buffer[4096];
+  for (off_t end = size; end > 0;) {
+    const off_t begin = std::max<off_t>(0, end - static_cast<off_t>(sizeof buffer));
+    const ssize_t count = ::pread(descriptor, buffer, static_cast<std::size_t>(end - begin), begin);
+    if (count <= 0) return size;  // unreadable: leave it whole
+    const std::size_t newline = std::string_view(buffer, static_cast<std::size_t>(count)).rfind('\n');
+    if (newline != std::string_view::npos) return begin + static_cast<off_t>(newline) + 1;
+    end = begin;
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  const Descriptor file(open_file(path, O_RDONLY));
+  if (file.get() < 0) fail("read", path, errno);
+  std::string bytes;
+  struct stat status{};
+  if (::fstat(file.get(), &status) == 0 && S_ISREG(status.st_mode)) bytes.reserve(status.st_size);
+  char buffer[1 << 16];
+  for (;;) {
+    const ssize_t count = ::read(file.get(), buffer, sizeof buffer);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail("read", path, errno);
+    if (count == 0) return bytes;
+    bytes.append(buffer, static_cast<std::size_t>(count));
+  }
+}
+
+void write_file(const std::string& path, std::string_view bytes) {
+  struct stat status{};
+  if (::stat(path.c_str(), &status) != 0) {
+    create_parent(path);
+    return replace_file(path, bytes, std::nullopt);
+  }
+  if (S_ISDIR(status.st_mode)) fail("write", path, EISDIR);
+  if (!S_ISREG(status.st_mode)) return write_in_place(path, bytes);
+  // Through a link the file that it points to is replaced, not the link.
+  replace_file(std::filesystem::canonical(path).string(), bytes, status.st_mode & 07777);
+}
+
+LineAppender::LineAppender(const std::string& path) : path_(path) {
+  create_parent(path);
+  Descriptor file(open_file(path, O_RDWR | O_CREAT | O_APPEND, 0666));
+  if (file.get() < 0) fail("write", path, errno);
+  struct stat status{};
+  if (::fstat(file.get(), &status) != 0) fail("write", path, errno);
+  regular_ = S_ISREG(status.st_mode);
+  if (regular_) {
+    size_ = complete_size(file.get(), status.st_size);
+    if (size_ != status.st_size && ::ftruncate(file.get(), size_) != 0) fail("write", path, errno);
+    sync_parent(path);
+  }
+  descriptor_ = file.release();
+}
+
+LineAppender::~LineAppender() { ::close(descriptor_); }
+
+void LineAppender::append(std::string_view line) {
+  require(line.find('\n') == std::string_view::npos, fmt::format("'{}': a line must not hold a newline", path_));
+  if (!complete_) cut_back();
+  const std::string text = std::string(line) + '\n';
+  complete_ = false;
+  int error = write_all(descriptor_, text);
+  if (error == 0) error = sync_data(descriptor_);
+  if (error != 0) {
+    if (regular_ && ::ftruncate(descriptor_, size_) == 0) complete_ = true;
+    fail("write", path_, error);
+  }
+  complete_ = true;
+  size_ += static_cast<std::int64_t>(text.size());
+}
+
+// A part of a line that could not be cut off when its write failed.
+void LineAppender::cut_back() {
+  if (regular_ && ::ftruncate(descriptor_, size_) != 0) fail("write", path_, errno);
+  complete_ = true;
+}
+
+}  // namespace duet

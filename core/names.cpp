@@ -1,0 +1,61 @@
+#include "core/names.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <numeric>
+
+namespace duet {
+namespace {
+
+std::string folded(std::string_view name) {
+  std::string text(name);
+  for (char& c : text) c = c == '-' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+// Damerau-Levenshtein distance (optimal string alignment: no part is edited twice).
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> before(b.size() + 1), previous(b.size() + 1), current(b.size() + 1);
+  std::iota(previous.begin(), previous.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    current[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      current[j] = std::min({previous[j] + 1, current[j - 1] + 1, replaced});
+      const bool swapped = i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1];
+      if (swapped) current[j] = std::min(current[j], before[j - 2] + 1);
+    }
+    std::swap(before, previous);
+    std::swap(previous, current);
+  }
+  return previous[b.size()];
+}
+
+}  // namespace
+
+std::string closest_name(std::string_view name, std::span<const std::string> candidates) {
+  const std::string wanted = folded(name);
+  std::size_t best = std::max<std::size_t>(2, wanted.size() / 3) + 1;
+  std::string closest;
+  for (const std::string& candidate : candidates) {
+    // A distance of the whole length means that nothing is shared: no help to anyone.
+    const std::size_t distance = edit_distance(wanted, folded(candidate));
+    if (distance >= best || distance >= std::max(wanted.size(), candidate.size())) continue;
+    best = distance;
+    closest = candidate;
+  }
+  return closest;
+}
+
+std::string unknown_name_message(std::string_view kind, std::string_view name,
+                                 std::span<const std::string> candidates) {
+  const std::string closest = closest_name(name, candidates);
+  const std::string question = closest.empty() ? "." : fmt::format(": did you mean '{}'?", closest);
+  const std::string known = candidates.empty() ? "none" : fmt::format("{}", fmt::join(candidates, ", "));
+  return fmt::format("unknown {} '{}'{} Known: {}", kind, name, question, known);
+}
+
+}  // namespace duet

@@ -1,0 +1,48 @@
+#include "core/robot_motion.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr double kUnitTolerance = 1e-6;
+
+void validate_sizes(const RobotMotion& motion, const std::string& what) {
+  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
+          fmt::format("{}: expected a rate above 0 Hz, found {}", what, motion.rate_hz));
+  require(motion.q.cols() == static_cast<Eigen::Index>(motion.root.size()),
+          fmt::format("{}: expected as many frames of joints as of the root ({}), found {}", what, motion.root.size(),
+                      motion.q.cols()));
+  require(motion.q.rows() == static_cast<Eigen::Index>(motion.joint_names.size()),
+          fmt::format("{}: expected {} joints as named, found {} rows of joint angles", what, motion.joint_names.size(),
+                      motion.q.rows()));
+}
+
+// Messages are made only on failure: a motion has many numbers.
+void validate_root(const Pose& X_WB, int frame, const std::string& what) {
+  if (!X_WB.p.allFinite())
+    throw std::invalid_argument(fmt::format("{}: root position of frame {} is not finite", what, frame));
+  const double norm = X_WB.R.norm();
+  if (!(std::abs(norm - 1.0) <= kUnitTolerance))  // also where the norm is not a number
+    throw std::invalid_argument(
+        fmt::format("{}: root quaternion of frame {}: expected norm 1, found {}", what, frame, norm));
+}
+
+}  // namespace
+
+void validate(const RobotMotion& motion, const std::string& what) {
+  validate_sizes(motion, what);
+  for (int t = 0; t < motion.frames(); ++t) {
+    validate_root(motion.root[static_cast<std::size_t>(t)], t, what);
+    for (Eigen::Index j = 0; j < motion.q.rows(); ++j)
+      if (!std::isfinite(motion.q(j, t)))
+        throw std::invalid_argument(fmt::format("{}: angle of joint '{}' in frame {} is not finite", what,
+                                                motion.joint_names[static_cast<std::size_t>(j)], t));
+  }
+}
+
+}  // namespace duet
