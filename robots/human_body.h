@@ -16,6 +16,13 @@ struct HumanCapsule {
   int joint_a = 0;     // SMPL-24 joints at its two ends
   int joint_b = 0;
   double radius = 0.0;  // [m]
+  // The axis runs from a + begin (b - a) to a + end (b - a): a head reaches beyond its joint, a hand beyond the
+  // knuckles.
+  double begin = 0.0;
+  double end = 1.0;
+
+  // Ends of the axis for joint positions (3, 24). [m], in their frame.
+  [[nodiscard]] std::array<Eigen::Vector3d, 2> ends(const Eigen::Ref<const Eigen::Matrix3Xd>& joints) const;
 };
 
 struct HumanBody {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -71,12 +72,14 @@ struct RobotModel {
   std::vector<RobotJoint> joints;  // in the card's order
   std::vector<RobotFrame> frames;
   std::vector<RobotShape> shapes;
-  std::vector<RetargetPair> pairs;  // the 16 of A.1.1, in its order
-  std::vector<Keypoint> keypoints;  // card order: head, shoulders, elbows, wrists, hands; left before right
-  std::vector<int> feet;            // shapes that are the soles' contact sites (left foot's first)
-  Eigen::VectorXd neutral;          // neutral pose of A.4.4 with the standing legs [rad]
-  double standing_height = 0.0;     // of the base over flat ground in the neutral pose [m]
-  std::string digest;               // SHA-256 over URDF and card
+  std::vector<RetargetPair> pairs;    // the 16 of A.1.1, in its order
+  std::vector<Keypoint> keypoints;    // card order: head, shoulders, elbows, wrists, hands; left before right
+  std::map<std::string, int> tracks;  // frames that detectors follow: "head", "lhand", "rhand", "torso", "lshoulder",
+                                      // "rshoulder" (those that the card names)
+  std::vector<int> feet;              // shapes that are the soles' contact sites (left foot's first)
+  Eigen::VectorXd neutral;            // neutral pose of A.4.4 with the standing legs [rad]
+  double standing_height = 0.0;  // of the base over flat ground in the neutral pose [m]; 0 where no shape is a sole
+  std::string digest;            // SHA-256 over URDF and card
 
   [[nodiscard]] int dof() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] std::vector<std::string> joint_names() const;
@@ -86,6 +89,7 @@ struct RobotModel {
   [[nodiscard]] int joint_index(std::string_view name) const;
   [[nodiscard]] int frame_index(std::string_view name) const;
   [[nodiscard]] int keypoint_index(std::string_view name) const;
+  [[nodiscard]] int track_frame(std::string_view name) const;  // index in frames of one of `tracks`
   [[nodiscard]] double total_mass() const;
   // Standing in the neutral pose at `X_WB`'s x, y and yaw, at rest, soles on the ground z = 0.
   [[nodiscard]] RobotState standing_state(const Pose& X_WB = {}) const;
