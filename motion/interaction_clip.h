@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/task.h"
@@ -42,11 +43,14 @@ struct InteractionClip {
 void validate(const InteractionClip& clip);
 
 // NPZ with the keys of docs/file-formats.md. Loading validates. Throw InputError naming the file, the key and the
-// fault.
+// fault. Saving validates first (std::invalid_argument).
 void save_clip(const InteractionClip& clip, const std::string& path);
 InteractionClip load_clip(const std::string& path);
+// The same without a file; `name` stands in messages.
+std::string clip_bytes(const InteractionClip& clip);
+InteractionClip parse_clip(std::string_view bytes, const std::string& name);
 
-// Mirror image in the plane y = 0 with left and right joints exchanged.
+// Mirror image in the plane y = 0 with left and right joints (also of the contact windows) exchanged.
 InteractionClip mirrored(const InteractionClip& clip);
 
 }  // namespace duet

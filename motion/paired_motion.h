@@ -4,6 +4,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/robot_motion.h"
@@ -28,8 +29,16 @@ struct PairedMotion {
   [[nodiscard]] int frames() const { return robot.frames(); }
 };
 
-// NPZ with the keys of docs/file-formats.md. Throw InputError naming file, key and fault.
+// Throws std::invalid_argument naming the part: what the validations of the four motions say, different lengths or
+// rates, phases outside.
+void validate(const PairedMotion& motion);
+
+// NPZ with the keys of docs/file-formats.md. Throw InputError naming file, key and fault. Saving validates first
+// (std::invalid_argument).
 void save_paired_motion(const PairedMotion& motion, const std::string& path);
 PairedMotion load_paired_motion(const std::string& path);
+// The same without a file; `name` stands in messages.
+std::string paired_motion_bytes(const PairedMotion& motion);
+PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name);
 
 }  // namespace duet

@@ -1,0 +1,137 @@
+#include "motion/human_motion.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr double kUnitTolerance = 1e-6;
+constexpr double kShortestBone = 1e-3;        // [m]
+constexpr double kShortestHorizontal = 1e-3;  // of the sum of hip and shoulder lines [m]
+// Instants closer than this fraction of a source period coincide: 2.4 * 5 is a frame of the source, not nearly one.
+constexpr double kSameInstant = 1e-9;
+
+std::string place(const std::string& what, int frame, int joint) {
+  return fmt::format("{}: frame {}, joint '{}'", what, frame, kSmplNames[joint]);
+}
+
+void check_sizes(const HumanMotion& motion, const std::string& what) {
+  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
+          fmt::format("{}: expected a positive rate, found {} Hz", what, motion.rate_hz));
+  require(motion.joints.points() == kSmplJoints,
+          fmt::format("{}: expected {} joints, found {}", what, kSmplJoints, motion.joints.points()));
+  require(motion.frames() >= 2, fmt::format("{}: expected at least 2 frames, found {}", what, motion.frames()));
+  const std::size_t expected = static_cast<std::size_t>(motion.frames()) * kSmplJoints;
+  require(motion.rotations.empty() || motion.rotations.size() == expected,
+          fmt::format("{}: expected {} rotations (frames x joints) or none, found {}", what, expected,
+                      motion.rotations.size()));
+}
+
+void check_positions(const HumanMotion& motion, const std::string& what) {
+  for (int t = 0; t < motion.frames(); ++t) {
+    const PointTracks::ConstFrame points = motion.joints.frame(t);
+    for (int j = 0; j < kSmplJoints; ++j)
+      if (!points.col(j).allFinite()) throw std::invalid_argument(place(what, t, j) + ": the position is not finite");
+    for (int j = 1; j < kSmplJoints; ++j) {
+      const double length = (points.col(j) - points.col(kSmplParents[j])).norm();
+      if (length < kShortestBone)
+        throw std::invalid_argument(fmt::format("{}: the bone to '{}' is {:.3g} m long, expected at least {} m",
+                                                place(what, t, j), kSmplNames[kSmplParents[j]], length, kShortestBone));
+    }
+  }
+}
+
+void check_rotations(const HumanMotion& motion, const std::string& what) {
+  for (std::size_t i = 0; i < motion.rotations.size(); ++i) {
+    const double norm = motion.rotations[i].norm();
+    if (std::abs(norm - 1.0) <= kUnitTolerance) continue;  // false for NaN
+    throw std::invalid_argument(fmt::format("{}: expected a unit quaternion, found length {}",
+                                            place(what, static_cast<int>(i / kSmplJoints), i % kSmplJoints), norm));
+  }
+}
+
+struct Instant {
+  int frame = 0;      // of the source, at or before
+  double part = 0.0;  // of the way to the next frame, [0, 1)
+};
+
+Instant instant(double index, int frames) {
+  const double nearest = std::round(index);
+  if (std::abs(index - nearest) <= kSameInstant * std::max(1.0, nearest)) return {static_cast<int>(nearest), 0.0};
+  const int frame = std::min(static_cast<int>(index), frames - 2);
+  return {frame, index - frame};
+}
+
+}  // namespace
+
+void validate(const HumanMotion& motion, const std::string& what) {
+  check_sizes(motion, what);
+  check_positions(motion, what);
+  check_rotations(motion, what);
+}
+
+std::array<double, kSmplJoints> bone_lengths(const HumanMotion& motion) {
+  require(motion.joints.points() == kSmplJoints && motion.frames() > 0,
+          fmt::format("bone lengths: expected {} joints and at least one frame, found {} and {}", kSmplJoints,
+                      motion.joints.points(), motion.frames()));
+  std::array<double, kSmplJoints> lengths{};
+  for (int t = 0; t < motion.frames(); ++t)
+    for (int j = 1; j < kSmplJoints; ++j)
+      lengths[j] += (motion.joints.at(t, j) - motion.joints.at(t, kSmplParents[j])).norm();
+  for (double& length : lengths) length /= motion.frames();
+  return lengths;
+}
+
+double heading(const PointTracks& joints, int frame) {
+  const Eigen::Vector3d left = joints.at(frame, kLeftHip) - joints.at(frame, kRightHip) +
+                               joints.at(frame, kLeftShoulder) - joints.at(frame, kRightShoulder);
+  if (!(left.head<2>().norm() >= kShortestHorizontal))
+    throw std::invalid_argument(fmt::format(
+        "heading at frame {}: the lines of hips and shoulders have no horizontal part (sum ({:.3g}, {:.3g}) m)", frame,
+        left.x(), left.y()));
+  return std::atan2(-left.x(), left.y());
+}
+
+HumanMotion resample(const HumanMotion& motion, double rate_hz) {
+  require(std::isfinite(rate_hz) && rate_hz > 0.0,
+          fmt::format("resample: expected a positive rate, found {}", rate_hz));
+  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
+          fmt::format("resample: expected a source with a positive rate, found {}", motion.rate_hz));
+  require(motion.frames() > 0, "resample: the motion has no frames");
+  const int points = motion.joints.points();
+  const double last = (motion.frames() - 1) * (rate_hz / motion.rate_hz);
+  require(last < 1e9, fmt::format("resample: {} Hz gives more than 1e9 frames", rate_hz));
+  const int frames = static_cast<int>(std::floor(last * (1.0 + kSameInstant))) + 1;
+
+  HumanMotion result{.rate_hz = rate_hz, .joints = PointTracks(frames, points), .rotations = {}};
+  result.rotations.reserve(motion.rotations.empty() ? 0 : static_cast<std::size_t>(frames) * points);
+  for (int t = 0; t < frames; ++t) {
+    const Instant at = instant(t * (motion.rate_hz / rate_hz), motion.frames());
+    const int next = at.part > 0.0 ? at.frame + 1 : at.frame;
+    const PointTracks::ConstFrame before = motion.joints.frame(at.frame);
+    result.joints.frame(t) = before;
+    if (at.part > 0.0) result.joints.frame(t) += at.part * (motion.joints.frame(next) - before);
+    for (int j = 0; j < (motion.rotations.empty() ? 0 : points); ++j) {
+      const Eigen::Quaterniond& R = motion.rotations[static_cast<std::size_t>(at.frame) * points + j];
+      const Eigen::Quaterniond& R_next = motion.rotations[static_cast<std::size_t>(next) * points + j];
+      result.rotations.push_back(at.part > 0.0 ? R.slerp(at.part, R_next).normalized() : R);
+    }
+  }
+  return result;
+}
+
+HumanMotion slice(const HumanMotion& motion, int begin, int end) {
+  HumanMotion result{.rate_hz = motion.rate_hz, .joints = motion.joints.slice(begin, end), .rotations = {}};
+  if (!motion.rotations.empty()) {
+    const int points = motion.joints.points();
+    result.rotations.assign(motion.rotations.begin() + static_cast<std::ptrdiff_t>(begin) * points,
+                            motion.rotations.begin() + static_cast<std::ptrdiff_t>(end) * points);
+  }
+  return result;
+}
+
+}  // namespace duet

@@ -1,0 +1,136 @@
+#include "motion/interaction_clip.h"
+
+#include <fmt/format.h>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "motion/npz_fields.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kSchema = "duet.interaction_clip";
+constexpr std::int64_t kSchemaVersion = 1;
+
+void check_contact(const InteractionClip& clip, const ContactWindow& window, std::size_t index) {
+  require(0 <= window.begin && window.begin < window.end && window.end <= clip.frames(),
+          fmt::format("clip '{}': contact window {}: expected 0 <= begin < end <= {} frames, found [{}, {})", clip.id,
+                      index, clip.frames(), window.begin, window.end));
+  for (const int joint : {window.joint_a, window.joint_b})
+    require(0 <= joint && joint < kSmplJoints,
+            fmt::format("clip '{}': contact window {}: expected joints 0..{}, found {}", clip.id, index,
+                        kSmplJoints - 1, joint));
+}
+
+void put_contacts(Npz& npz, const std::vector<ContactWindow>& contacts) {
+  std::vector<std::int64_t> values;
+  for (const ContactWindow& window : contacts)
+    values.insert(values.end(), {window.begin, window.end, window.joint_a, window.joint_b});
+  npz.set("contacts", std::move(values), {contacts.size(), 4});
+}
+
+// The joint numbers of the file count its own columns.
+std::vector<ContactWindow> get_contacts(const Npz& npz, const std::vector<int>& columns) {
+  std::vector<ContactWindow> contacts;
+  if (!npz.contains("contacts")) return contacts;
+  std::vector<int> joint_of_column(kSmplJoints);
+  for (int joint = 0; joint < kSmplJoints; ++joint) joint_of_column[columns[joint]] = joint;
+  const std::vector<std::int64_t> values = npz.integers("contacts", {-1, 4});
+  for (std::size_t i = 0; i + 3 < values.size(); i += 4) {
+    for (std::size_t k = 0; k < 4; ++k)
+      if (values[i + k] < 0 || values[i + k] >= (k < 2 ? std::int64_t{1} << 30 : kSmplJoints))
+        throw InputError(fmt::format("'{}': key 'contacts': row {}, column {}: {} is out of range", npz.name(), i / 4,
+                                     k, values[i + k]));
+    contacts.push_back({.begin = static_cast<int>(values[i]),
+                        .end = static_cast<int>(values[i + 1]),
+                        .joint_a = joint_of_column[values[i + 2]],
+                        .joint_b = joint_of_column[values[i + 3]]});
+  }
+  return contacts;
+}
+
+InteractionClip read(const Npz& npz) {
+  check_schema(npz, kSchema, kSchemaVersion,
+               {"id", "task", "reactor", "phases", "rate_hz", "human_joint_names", "a_joints", "a_rotations_wxyz",
+                "b_joints", "b_rotations_wxyz", "contacts", "source_names", "source_values"},
+               {});
+  const double rate_hz = get_rate(npz);
+  const std::vector<int> columns = get_joint_columns(npz);
+  InteractionClip clip{.id = npz.text("id"),
+                       .task = get_task(npz),
+                       .a = get_motion(npz, "a", rate_hz, columns),
+                       .b = get_motion(npz, "b", rate_hz, columns),
+                       .phases = get_phases(npz),
+                       .reactor = get_reactor(npz),
+                       .contacts = get_contacts(npz, columns),
+                       .source = get_texts(npz, "source")};
+  check_archive(npz, [&] { validate(clip); });
+  return clip;
+}
+
+HumanMotion mirrored(const HumanMotion& motion) {
+  HumanMotion result = motion;
+  for (int t = 0; t < motion.frames(); ++t) {
+    for (int j = 0; j < kSmplJoints; ++j) {
+      result.joints.at(t, j) = motion.joints.at(t, kSmplMirror[j]);
+      result.joints.at(t, j).y() *= -1.0;
+    }
+    for (int j = 0; j < (motion.rotations.empty() ? 0 : kSmplJoints); ++j) {
+      const std::size_t row = static_cast<std::size_t>(t) * kSmplJoints;
+      const Eigen::Quaterniond& R = motion.rotations[row + kSmplMirror[j]];
+      result.rotations[row + j] = Eigen::Quaterniond(R.w(), -R.x(), R.y(), -R.z());  // S R S, S = diag(1, -1, 1)
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+void validate(const InteractionClip& clip) {
+  validate(clip.a, fmt::format("clip '{}', person A", clip.id));
+  validate(clip.b, fmt::format("clip '{}', person B", clip.id));
+  require(clip.a.frames() == clip.b.frames(),
+          fmt::format("clip '{}': expected two people of the same length, found {} and {} frames", clip.id,
+                      clip.a.frames(), clip.b.frames()));
+  require(clip.a.rate_hz == clip.b.rate_hz,
+          fmt::format("clip '{}': expected two people at the same rate, found {} and {} Hz", clip.id, clip.a.rate_hz,
+                      clip.b.rate_hz));
+  require(0 <= clip.phases.act_begin && clip.phases.act_begin <= clip.phases.act_end &&
+              clip.phases.act_end <= clip.frames(),
+          fmt::format("clip '{}': expected phases with 0 <= act_begin <= act_end <= {} frames, found [{}, {})", clip.id,
+                      clip.frames(), clip.phases.act_begin, clip.phases.act_end));
+  for (std::size_t i = 0; i < clip.contacts.size(); ++i) check_contact(clip, clip.contacts[i], i);
+}
+
+std::string clip_bytes(const InteractionClip& clip) {
+  validate(clip);
+  Npz npz;
+  put_schema(npz, kSchema, kSchemaVersion);
+  npz.set_text("id", clip.id);
+  put_task(npz, clip.task, clip.reactor, clip.phases, clip.rate_hz());
+  put_joint_names(npz);
+  put_motion(npz, "a", clip.a);
+  put_motion(npz, "b", clip.b);
+  put_contacts(npz, clip.contacts);
+  put_texts(npz, "source", clip.source);
+  return npz.bytes();
+}
+
+InteractionClip parse_clip(std::string_view bytes, const std::string& name) { return read(Npz::parse(bytes, name)); }
+
+void save_clip(const InteractionClip& clip, const std::string& path) { write_file(path, clip_bytes(clip)); }
+
+InteractionClip load_clip(const std::string& path) { return read(Npz::load(path)); }
+
+InteractionClip mirrored(const InteractionClip& clip) {
+  InteractionClip result = clip;
+  result.a = mirrored(clip.a);
+  result.b = mirrored(clip.b);
+  for (ContactWindow& window : result.contacts) {
+    window.joint_a = kSmplMirror[window.joint_a];
+    window.joint_b = kSmplMirror[window.joint_b];
+  }
+  return result;
+}
+
+}  // namespace duet
