@@ -141,7 +141,7 @@ std::string read_file(const std::string& path) {
   const Descriptor file(open_file(path, O_RDONLY));
   if (file.get() < 0) fail("read", path, errno);
   std::string bytes;
-  struct stat status{};
+  struct stat status {};
   if (::fstat(file.get(), &status) == 0 && S_ISREG(status.st_mode)) bytes.reserve(status.st_size);
   char buffer[1 << 16];
   for (;;) {
@@ -154,7 +154,7 @@ std::string read_file(const std::string& path) {
 }
 
 void write_file(const std::string& path, std::string_view bytes) {
-  struct stat status{};
+  struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     create_parent(path);
     return replace_file(path, bytes, std::nullopt);
@@ -169,7 +169,7 @@ LineAppender::LineAppender(const std::string& path) : path_(path) {
   create_parent(path);
   Descriptor file(open_file(path, O_RDWR | O_CREAT | O_APPEND, 0666));
   if (file.get() < 0) fail("write", path, errno);
-  struct stat status{};
+  struct stat status {};
   if (::fstat(file.get(), &status) != 0) fail("write", path, errno);
   regular_ = S_ISREG(status.st_mode);
   if (regular_) {

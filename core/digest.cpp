@@ -1,0 +1,77 @@
+#include "core/digest.h"
+
+#include <fmt/format.h>
+#include <openssl/evp.h>
+
+#include <array>
+#include <stdexcept>
+
+#include "core/file.h"
+
+namespace duet {
+namespace {
+
+struct FreeContext {
+  void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+};
+
+void check(bool ok) {
+  if (!ok) throw std::runtime_error("OpenSSL refuses SHA-256");
+}
+
+}  // namespace
+
+struct Sha256::Context {
+  std::unique_ptr<EVP_MD_CTX, FreeContext> evp{EVP_MD_CTX_new()};
+};
+
+Sha256::Sha256() : context_(std::make_unique<Context>()) {
+  check(context_->evp != nullptr && EVP_DigestInit_ex(context_->evp.get(), EVP_sha256(), nullptr) == 1);
+}
+
+Sha256::~Sha256() = default;
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256& Sha256::operator=(Sha256&&) noexcept = default;
+
+void Sha256::update(std::span<const std::byte> bytes) {
+  check(EVP_DigestUpdate(context_->evp.get(), bytes.data(), bytes.size()) == 1);
+}
+
+void Sha256::update(std::string_view text) { update(std::as_bytes(std::span(text.data(), text.size()))); }
+
+void Sha256::update(std::span<const double> values) { update(std::as_bytes(values)); }
+
+void Sha256::update(const RobotState& state) {
+  const Eigen::Quaterniond& R = state.X_WB.R;
+  const Eigen::Vector3d& p = state.X_WB.p;
+  const std::array<double, 7> quat_wxyz_position = {R.w(), R.x(), R.y(), R.z(), p.x(), p.y(), p.z()};
+  const auto span_of = [](const auto& vector) {
+    return std::span<const double>(vector.data(), static_cast<std::size_t>(vector.size()));
+  };
+  update(std::span<const double>(quat_wxyz_position));
+  update(span_of(state.v_WB));
+  update(span_of(state.w_WB_B));
+  update(span_of(state.q));
+  update(span_of(state.v));
+}
+
+std::string Sha256::hex() const {
+  const std::unique_ptr<EVP_MD_CTX, FreeContext> copy(EVP_MD_CTX_new());
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  check(copy != nullptr && EVP_MD_CTX_copy_ex(copy.get(), context_->evp.get()) == 1 &&
+        EVP_DigestFinal_ex(copy.get(), digest.data(), &size) == 1);
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
+  return text;
+}
+
+std::string sha256_hex(std::string_view text) {
+  Sha256 hash;
+  hash.update(text);
+  return hash.hex();
+}
+
+std::string sha256_file(const std::string& path) { return sha256_hex(read_file(path)); }
+
+}  // namespace duet

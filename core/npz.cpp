@@ -1,0 +1,189 @@
+#include "core/npz.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+
+#include "core/file.h"
+#include "core/npy.h"
+#include "core/npy_header.h"
+#include "core/require.h"
+#include "core/zip.h"
+
+namespace duet {
+namespace {
+
+constexpr std::string_view kSuffix = ".npy";
+
+const char* type_name(const NpyArray& array) {
+  constexpr const char* kNames[] = {"numbers", "integers", "strings"};
+  return kNames[array.values.index()];
+}
+
+std::string expected_shape_text(const std::vector<long>& shape) {
+  std::vector<std::string> sizes;
+  sizes.reserve(shape.size());
+  for (const long size : shape) sizes.push_back(size < 0 ? "any" : fmt::format("{}", size));
+  return fmt::format("({}{})", fmt::join(sizes, ", "), shape.size() == 1 ? "," : "");
+}
+
+bool fits(const std::vector<std::size_t>& found, const std::vector<long>& expected) {
+  if (found.size() != expected.size()) return false;
+  for (std::size_t d = 0; d < found.size(); ++d)
+    if (expected[d] >= 0 && found[d] != static_cast<std::size_t>(expected[d])) return false;
+  return true;
+}
+
+std::vector<std::size_t> index_of(std::size_t flat, const std::vector<std::size_t>& shape) {
+  std::vector<std::size_t> index(shape.size());
+  for (std::size_t d = shape.size(); d-- > 0; flat /= shape[d]) index[d] = flat % shape[d];
+  return index;
+}
+
+[[noreturn]] void refuse(const Npz& npz, const std::string& key, const std::string& problem) {
+  throw InputError(fmt::format("'{}': array '{}': {}", npz.name(), key, problem));
+}
+
+const NpyArray& shaped_array(const Npz& npz, const std::string& key, const std::vector<long>& shape) {
+  const NpyArray& array = npz.array(key);
+  if (!fits(array.shape, shape))
+    refuse(npz, key, fmt::format("expected shape {}, found {}", expected_shape_text(shape), shape_text(array.shape)));
+  return array;
+}
+
+// The values where they are of type T.
+template <typename T>
+const std::vector<T>& typed(const Npz& npz, const std::string& key, const NpyArray& array, const char* expected) {
+  const auto* values = std::get_if<std::vector<T>>(&array.values);
+  if (values == nullptr) refuse(npz, key, fmt::format("expected {}, found {}", expected, type_name(array)));
+  return *values;
+}
+
+// A scalar is stored as shape () or, by some writers, as (1,).
+std::vector<long> scalar_shape(const Npz& npz, const std::string& key) {
+  const NpyArray& array = npz.array(key);
+  return array.shape == std::vector<std::size_t>{1} ? std::vector<long>{1} : std::vector<long>{};
+}
+
+}  // namespace
+
+Npz Npz::load(const std::string& path) { return parse(read_file(path), path); }
+
+Npz Npz::parse(std::string_view bytes, const std::string& name) {
+  Npz npz;
+  npz.name_ = name;
+  read_zip(bytes, name, kMaxEntryBytes, [&](const std::string& entry, const std::string& content) {
+    if (!entry.ends_with(kSuffix) || entry.size() == kSuffix.size())
+      throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name, entry));
+    const std::string key = entry.substr(0, entry.size() - kSuffix.size());
+    try {
+      if (!npz.arrays_.emplace(key, parse_npy(content)).second) throw InputError("stands in the archive twice");
+    } catch (const InputError& error) {
+      refuse(npz, key, error.what());
+    }
+  });
+  return npz;
+}
+
+void Npz::save(const std::string& path) const { write_file(path, bytes()); }
+
+std::string Npz::bytes() const {
+  std::vector<ZipEntry> entries;
+  for (const auto& [key, array] : arrays_) {
+    try {
+      entries.push_back({key + std::string(kSuffix), npy_bytes(array)});
+    } catch (const InputError& error) {
+      refuse(*this, key, error.what());
+    }
+  }
+  return zip_bytes(entries);
+}
+
+std::vector<std::string> Npz::keys() const {
+  std::vector<std::string> keys;
+  keys.reserve(arrays_.size());
+  for (const auto& [key, array] : arrays_) keys.push_back(key);
+  return keys;
+}
+
+const NpyArray& Npz::array(const std::string& key) const {
+  const auto found = arrays_.find(key);
+  if (found == arrays_.end())
+    throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key, fmt::join(keys(), ", ")));
+  return found->second;
+}
+
+std::vector<double> Npz::numbers(const std::string& key, const std::vector<long>& shape) const {
+  const NpyArray& array = shaped_array(*this, key, shape);
+  if (const auto* integers = std::get_if<std::vector<std::int64_t>>(&array.values))
+    return {integers->begin(), integers->end()};
+  const std::vector<double>& values = typed<double>(*this, key, array, "numbers");
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      refuse(*this, key,
+             fmt::format("expected finite numbers, found {} at index {}", values[i],
+                         shape_text(index_of(i, array.shape))));
+  return values;
+}
+
+std::vector<std::int64_t> Npz::integers(const std::string& key, const std::vector<long>& shape) const {
+  return typed<std::int64_t>(*this, key, shaped_array(*this, key, shape), "integers");
+}
+
+std::vector<std::string> Npz::strings(const std::string& key, const std::vector<long>& shape) const {
+  return typed<std::string>(*this, key, shaped_array(*this, key, shape), "strings");
+}
+
+double Npz::number(const std::string& key) const { return numbers(key, scalar_shape(*this, key)).front(); }
+
+std::int64_t Npz::integer(const std::string& key) const { return integers(key, scalar_shape(*this, key)).front(); }
+
+std::string Npz::text(const std::string& key) const { return strings(key, scalar_shape(*this, key)).front(); }
+
+PointTracks Npz::tracks(const std::string& key, int points) const {
+  std::vector<double> values = numbers(key, {-1, points, 3});
+  const std::vector<std::size_t>& shape = array(key).shape;  // no size is above 2^27 (kMaxArrayValues)
+  return {static_cast<int>(shape[0]), static_cast<int>(shape[1]), std::move(values)};
+}
+
+void Npz::set(const std::string& key, NpyArray array) {
+  require(!key.empty(), "an array of an archive needs a name");
+  const std::size_t found = std::visit([](const auto& values) { return values.size(); }, array.values);
+  std::size_t expected = 1;
+  for (const std::size_t size : array.shape) expected *= size;
+  require(found == expected,
+          fmt::format("array '{}': shape {} needs {} values, found {}", key, shape_text(array.shape), expected, found));
+  if (const auto* strings = std::get_if<std::vector<std::string>>(&array.values))
+    for (const std::string& value : *strings) decode_utf8(value);  // refused here rather than at the write
+  arrays_.insert_or_assign(key, std::move(array));
+}
+
+void Npz::set(const std::string& key, std::vector<double> values, std::vector<std::size_t> shape) {
+  set(key, NpyArray{std::move(shape), std::move(values)});
+}
+
+void Npz::set(const std::string& key, std::vector<std::int64_t> values, std::vector<std::size_t> shape) {
+  set(key, NpyArray{std::move(shape), std::move(values)});
+}
+
+void Npz::set(const std::string& key, std::vector<std::string> values) {
+  const std::size_t size = values.size();
+  set(key, NpyArray{{size}, std::move(values)});
+}
+
+void Npz::set_number(const std::string& key, double value) { set(key, NpyArray{{}, std::vector<double>{value}}); }
+
+void Npz::set_integer(const std::string& key, std::int64_t value) {
+  set(key, NpyArray{{}, std::vector<std::int64_t>{value}});
+}
+
+void Npz::set_text(const std::string& key, const std::string& value) {
+  set(key, NpyArray{{}, std::vector<std::string>{value}});
+}
+
+void Npz::set(const std::string& key, const PointTracks& tracks) {
+  set(key, tracks.data(), {static_cast<std::size_t>(tracks.frames()), static_cast<std::size_t>(tracks.points()), 3});
+}
+
+}  // namespace duet
