@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/require.h"
@@ -14,6 +15,7 @@ constexpr double kShortestBone = 1e-3;        // [m]
 constexpr double kShortestHorizontal = 1e-3;  // of the sum of hip and shoulder lines [m]
 // Instants closer than this fraction of a source period coincide: 2.4 * 5 is a frame of the source, not nearly one.
 constexpr double kSameInstant = 1e-9;
+constexpr double kMostFrames = 2e6;  // eleven hours at 50 Hz
 
 std::string place(const std::string& what, int frame, int joint) {
   return fmt::format("{}: frame {}, joint '{}'", what, frame, kSmplNames[joint]);
@@ -103,9 +105,7 @@ HumanMotion resample(const HumanMotion& motion, double rate_hz) {
           fmt::format("resample: expected a source with a positive rate, found {}", motion.rate_hz));
   require(motion.frames() > 0, "resample: the motion has no frames");
   const int points = motion.joints.points();
-  const double last = (motion.frames() - 1) * (rate_hz / motion.rate_hz);
-  require(last < 1e9, fmt::format("resample: {} Hz gives more than 1e9 frames", rate_hz));
-  const int frames = static_cast<int>(std::floor(last * (1.0 + kSameInstant))) + 1;
+  const int frames = resampled_frames(motion.frames(), motion.rate_hz, rate_hz);
 
   HumanMotion result{.rate_hz = rate_hz, .joints = PointTracks(frames, points), .rotations = {}};
   result.rotations.reserve(motion.rotations.empty() ? 0 : static_cast<std::size_t>(frames) * points);
@@ -122,6 +122,13 @@ HumanMotion resample(const HumanMotion& motion, double rate_hz) {
     }
   }
   return result;
+}
+
+int resampled_frames(int frames, double rate_hz, double new_rate_hz) {
+  const double last = (frames - 1) * (new_rate_hz / rate_hz);
+  require(last < kMostFrames, fmt::format("resample: {} frames at {} Hz are more than {:g} frames at {} Hz", frames,
+                                          rate_hz, kMostFrames, new_rate_hz));
+  return static_cast<int>(std::floor(last * (1.0 + kSameInstant))) + 1;
 }
 
 HumanMotion slice(const HumanMotion& motion, int begin, int end) {

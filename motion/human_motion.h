@@ -13,8 +13,10 @@ namespace duet {
 
 struct HumanMotion {
   double rate_hz = 50.0;
-  PointTracks joints;                         // (T, 24, 3) [m], frame W, z up
-  std::vector<Eigen::Quaterniond> rotations;  // R_WJ, T * 24 entries in (T, 24) order, unit; empty where unknown
+  PointTracks joints;  // (T, 24, 3) [m], frame W, z up
+  // R_WJ, T * 24 entries in (T, 24) order, unit; empty where unknown. J is turned with the body segment at the joint
+  // and has the axes of W while the person stands in the reference posture (T pose, facing +x).
+  std::vector<Eigen::Quaterniond> rotations;
 
   [[nodiscard]] int frames() const { return joints.frames(); }
 };
@@ -34,6 +36,9 @@ double heading(const PointTracks& joints, int frame);
 // motion). Positions linear, rotations slerp; never skips frames. Throws std::invalid_argument for a rate that is not
 // positive.
 HumanMotion resample(const HumanMotion& motion, double rate_hz);
+
+// How many frames resample gives for `frames` at `rate_hz` (both positive).
+int resampled_frames(int frames, double rate_hz, double new_rate_hz);
 
 // Frames [begin, end).
 HumanMotion slice(const HumanMotion& motion, int begin, int end);

@@ -1,0 +1,227 @@
+#include "motion/bvh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "core/file.h"
+#include "core/names.h"
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr std::size_t kMostJoints = 10'000;
+const std::array<std::string_view, 6> kChannelNames = {"Xposition", "Yposition", "Zposition",
+                                                       "Xrotation", "Yrotation", "Zrotation"};
+
+bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r'; }
+
+// Words of a text with the line that each stands on.
+class Words {
+ public:
+  Words(std::string_view text, std::string name) : rest_(text), name_(std::move(name)) {}
+
+  // The next word, "" at the end of the text.
+  std::string_view next() {
+    while (!rest_.empty() && (is_space(rest_.front()) || rest_.front() == '\n')) {
+      line_ += rest_.front() == '\n';
+      rest_.remove_prefix(1);
+    }
+    return take_word();
+  }
+  // The next word of the same line, "" at its end.
+  std::string_view next_on_line() {
+    while (!rest_.empty() && is_space(rest_.front())) rest_.remove_prefix(1);
+    return take_word();
+  }
+  // Goes on to the next line that has a word; false at the end of the text.
+  bool next_line() {
+    const std::string_view before = next();
+    if (before.empty()) return false;
+    rest_ = {before.data(), before.size() + rest_.size()};
+    return true;
+  }
+
+  void expect(std::string_view word, const std::string& where) { check(next(), word, where); }
+
+  double number(std::string_view word, const std::string& what) const {
+    double value = 0.0;
+    const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
+      fail(fmt::format("{}: '{}' is not finite", what, shown(word)));
+    if (word.empty() || error != std::errc() || end != digits.data() + digits.size())
+      fail(fmt::format("{}: expected a number, found {}", what, found(word)));
+    return value;
+  }
+
+  void check(std::string_view word, std::string_view expected, const std::string& where) const {
+    if (word != expected) fail(fmt::format("{}: expected '{}', found {}", where, expected, found(word)));
+  }
+  [[noreturn]] void fail(const std::string& fault) const {
+    throw InputError(fmt::format("{}:{}: {}", name_, line_, fault));
+  }
+  static std::string found(std::string_view word) {
+    return word.empty() ? "the end of the text" : "'" + shown(word) + "'";
+  }
+  // Not more of a word than a message can show, and nothing that a terminal would act on.
+  static std::string shown(std::string_view word) {
+    std::string text(word.substr(0, 40));
+    std::replace_if(
+        text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
+    return text;
+  }
+
+ private:
+  std::string_view take_word() {
+    std::size_t size = 0;
+    while (size < rest_.size() && !is_space(rest_[size]) && rest_[size] != '\n') ++size;
+    const std::string_view word = rest_.substr(0, size);
+    rest_.remove_prefix(size);
+    return word;
+  }
+
+  std::string_view rest_;
+  std::string name_;
+  int line_ = 1;
+};
+
+std::string channel_fault(const Words& words, std::string_view word) {
+  if (word.empty()) return "expected a channel, found the end of the text";
+  return unknown_name_message("channel", words.shown(word),
+                              std::vector<std::string>(kChannelNames.begin(), kChannelNames.end()));
+}
+
+void read_offset(Words& words, BvhJoint& joint) {
+  const std::string where = "OFFSET of '" + joint.name + "'";
+  for (int axis = 0; axis < 3; ++axis) joint.offset[axis] = words.number(words.next(), where);
+}
+
+void read_channels(Words& words, BvhJoint& joint) {
+  const std::string where = "CHANNELS of '" + joint.name + "'";
+  const double count = words.number(words.next(), where);
+  if (!(count >= 0.0 && count <= 6.0 && count == std::floor(count)))
+    words.fail(fmt::format("{}: expected 0 to 6 channels, found {}", where, count));
+  for (int i = 0; i < static_cast<int>(count); ++i) {
+    const std::string_view word = words.next();
+    const auto known = std::find(kChannelNames.begin(), kChannelNames.end(), word);
+    if (known == kChannelNames.end()) words.fail(where + ": " + channel_fault(words, word));
+    const int channel = static_cast<int>(known - kChannelNames.begin());
+    if (std::find(joint.channels.begin(), joint.channels.end(), channel) != joint.channels.end())
+      words.fail(fmt::format("{}: '{}' is there twice", where, word));
+    joint.channels.push_back(channel);
+  }
+}
+
+// One joint of the file while its braces are open.
+struct OpenJoint {
+  int index = 0;
+  bool end_site = false;
+  bool has_offset = false;
+  bool has_channels = false;
+};
+
+class HierarchyReader {
+ public:
+  explicit HierarchyReader(Words& words) : words_(words) {}
+
+  std::vector<BvhJoint> read() {
+    words_.expect("HIERARCHY", "start of the file");
+    words_.expect("ROOT", "HIERARCHY");
+    open(std::string(words_.next()), false);
+    while (!open_.empty()) read_item(words_.next());
+    return std::move(joints_);
+  }
+
+ private:
+  void read_item(std::string_view word) {
+    OpenJoint& top = open_.back();
+    BvhJoint& joint = joints_[top.index];
+    if (word == "OFFSET" && !top.has_offset) {
+      top.has_offset = true;
+      read_offset(words_, joint);
+    } else if (word == "CHANNELS" && !top.has_channels && !top.end_site) {
+      top.has_channels = true;
+      read_channels(words_, joint);
+    } else if (word == "JOINT" && !top.end_site) {
+      open(std::string(words_.next()), false);
+    } else if (word == "End" && !top.end_site) {
+      words_.expect("Site", "End");
+      open(joint.name + "/end", true);
+    } else if (word == "}") {
+      if (!top.has_offset) words_.fail(fmt::format("joint '{}' has no OFFSET", joint.name));
+      open_.pop_back();
+    } else {
+      words_.fail(fmt::format("inside joint '{}': expected {}, found {}", joint.name,
+                              top.end_site ? "OFFSET or '}'" : "OFFSET, CHANNELS, JOINT, End Site or '}'",
+                              Words::found(word)));
+    }
+  }
+
+  void open(const std::string& name, bool end_site) {
+    if (name.empty() || name == "{") words_.fail("expected the name of a joint, found " + Words::found(name));
+    const auto same = [&](const BvhJoint& joint) { return joint.name == name; };
+    if (std::any_of(joints_.begin(), joints_.end(), same))
+      words_.fail(fmt::format("joint '{}' is there twice", Words::shown(name)));
+    if (joints_.size() >= kMostJoints) words_.fail(fmt::format("more than {} joints", kMostJoints));
+    words_.expect("{", "joint '" + Words::shown(name) + "'");
+    const int parent = open_.empty() ? -1 : open_.back().index;
+    open_.push_back({.index = static_cast<int>(joints_.size()), .end_site = end_site});
+    joints_.push_back({.name = name, .parent = parent, .offset = Eigen::Vector3d::Zero(), .channels = {}});
+  }
+
+  Words& words_;
+  std::vector<BvhJoint> joints_;
+  std::vector<OpenJoint> open_;
+};
+
+void read_frame(Words& words, std::size_t channels, Bvh& bvh, int frame) {
+  const std::string where = fmt::format("frame {}", frame);
+  std::size_t count = 0;
+  for (std::string_view word = words.next_on_line(); !word.empty(); word = words.next_on_line(), ++count)
+    if (count < channels) bvh.values.push_back(words.number(word, where));
+  if (count != channels)
+    words.fail(fmt::format("{}: expected {} numbers on the line, found {}", where, channels, count));
+}
+
+void read_motion(Words& words, Bvh& bvh) {
+  words.expect("MOTION", "after the hierarchy");
+  words.expect("Frames:", "MOTION");
+  const double frames = words.number(words.next(), "Frames:");
+  if (!(frames >= 1.0 && frames <= 1e8 && frames == std::floor(frames)))
+    words.fail(fmt::format("Frames: expected a whole number of at least 1, found {}", frames));
+  words.expect("Frame", "after Frames");
+  words.expect("Time:", "after Frames");
+  bvh.frame_time = words.number(words.next(), "Frame Time:");
+  if (!(bvh.frame_time > 0.0)) words.fail(fmt::format("Frame Time: expected above 0 s, found {}", bvh.frame_time));
+  if (const std::string_view word = words.next_on_line(); !word.empty())
+    words.fail("after Frame Time: expected a new line, found " + Words::found(word));
+
+  std::size_t channels = 0;
+  for (const BvhJoint& joint : bvh.joints) channels += joint.channels.size();
+  for (bvh.frames = 0; bvh.frames < static_cast<int>(frames); ++bvh.frames) {
+    if (!words.next_line()) words.fail(fmt::format("expected {} frames as announced, found {}", frames, bvh.frames));
+    read_frame(words, channels, bvh, bvh.frames);
+  }
+  if (const std::string_view word = words.next(); !word.empty())
+    words.fail(fmt::format("expected nothing after the {} announced frames, found {}", frames, Words::found(word)));
+}
+
+}  // namespace
+
+Bvh parse_bvh(std::string_view text, const std::string& name) {
+  Words words(text, name);
+  Bvh bvh;
+  bvh.name = name;
+  bvh.joints = HierarchyReader(words).read();
+  read_motion(words, bvh);
+  return bvh;
+}
+
+Bvh read_bvh(const std::string& path) { return parse_bvh(read_file(path), path); }
+
+}  // namespace duet

@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "core/require.h"
+#include "motion/bvh.h"
+#include "motion/bvh_detection.h"
+#include "motion/bvh_kinematics.h"
+#include "motion/phase_proposal.h"
+
+namespace duet {
+namespace {
+
+struct Conversion {
+  Eigen::Quaterniond R_WF;  // from the file's axes to W
+  double metres_per_unit = 1.0;
+  int first_frame = 0;
+  double rate_hz = 0.0;
+  double output_rate_hz = 0.0;
+  int output_frames = 0;
+};
+
+BvhPerson read_person(const std::string& path) {
+  BvhPerson person{.bvh = read_bvh(path), .skeleton = {}};
+  person.skeleton = find_smpl_joints(person.bvh);
+  return person;
+}
+
+void check_same_clock(const Bvh& a, const Bvh& b) {
+  if (a.frames != b.frames)
+    throw InputError(fmt::format("'{}' has {} frames and '{}' {}: expected two people of the same length", a.name,
+                                 a.frames, b.name, b.frames));
+  if (std::abs(a.frame_time - b.frame_time) > 1e-6 * a.frame_time)
+    throw InputError(fmt::format("'{}' has a frame time of {} s and '{}' {} s: expected two people at the same rate",
+                                 a.name, a.frame_time, b.name, b.frame_time));
+}
+
+void put_positions(HumanMotion& motion, int t, const SmplPositions& positions, const Conversion& to) {
+  motion.joints.frame(t) = to.metres_per_unit * (to.R_WF.toRotationMatrix() * positions);
+}
+
+// Rotations are counted from the hierarchy's own posture turned to face +x, the convention of docs/conventions.md.
+Eigen::Quaterniond reference_facing(const BvhPerson& person, const Conversion& to) {
+  PointTracks rest(1, kSmplJoints);
+  rest.frame(0) = to.R_WF.toRotationMatrix() *
+                  smpl_positions(person.skeleton, global_poses(person.bvh, zero_local_poses(person.bvh)));
+  return yaw_rotation(heading(rest, 0));
+}
+
+HumanMotion convert(const BvhPerson& person, const Conversion& to) {
+  HumanMotion motion{
+      .rate_hz = to.output_rate_hz, .joints = PointTracks(to.output_frames, kSmplJoints), .rotations = {}};
+  motion.rotations.reserve(static_cast<std::size_t>(to.output_frames) * kSmplJoints);
+  const Eigen::Quaterniond R_FR = to.R_WF.conjugate() * reference_facing(person, to);
+  for (int t = 0; t < to.output_frames; ++t) {
+    const double index = to.first_frame + t * (to.rate_hz / to.output_rate_hz);
+    const std::vector<Pose> poses = global_poses(person.bvh, local_poses_at(person.bvh, index));
+    put_positions(motion, t, smpl_positions(person.skeleton, poses), to);
+    for (const BvhPoint& point : person.skeleton.points)
+      motion.rotations.push_back((to.R_WF * poses[point.rotation].R * R_FR).normalized());
+  }
+  return motion;
+}
+
+double lowest_toe(const HumanMotion& motion) {
+  double lowest = motion.joints.at(0, kLeftToe).z();
+  for (int t = 0; t < motion.frames(); ++t)
+    for (const int toe : {kLeftToe, kRightToe}) lowest = std::min(lowest, motion.joints.at(t, toe).z());
+  return lowest;
+}
+
+Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& options, std::vector<std::string>& verdict) {
+  require(std::isfinite(options.output_rate_hz) && options.output_rate_hz > 0.0,
+          fmt::format("BVH import: expected a positive output rate, found {} Hz", options.output_rate_hz));
+  const BvhFinding<UpAxis> up = find_up_axis(a, b, options);
+  const BvhFinding<bool> t_pose = find_t_pose(a, b, up.value, options);
+  const BvhFinding<double> rate = find_rate(a, options);
+  const BvhFinding<double> unit = find_metres_per_unit(a, b, options);
+  const int first = t_pose.value ? 1 : 0;
+  const int frames = a.bvh.frames - first;
+  if (frames < 2)
+    throw InputError(fmt::format("'{}': expected at least 2 frames of motion, found {}", a.bvh.name, frames));
+  verdict = {
+      fmt::format("joint names: {} ('{}'), {} ('{}')", a.skeleton.naming, a.bvh.name, b.skeleton.naming, b.bvh.name),
+      up.sentence, t_pose.sentence, rate.sentence, unit.sentence};
+  const Eigen::Quaterniond R_WF(
+      Eigen::AngleAxisd(up.value == UpAxis::kY ? 0.5 * std::numbers::pi : 0.0, Eigen::Vector3d::UnitX()));
+  const Conversion to{.R_WF = R_WF,
+                      .metres_per_unit = unit.value,
+                      .first_frame = first,
+                      .rate_hz = rate.value,
+                      .output_rate_hz = options.output_rate_hz,
+                      .output_frames = resampled_frames(frames, rate.value, options.output_rate_hz)};
+  if (to.output_frames < 2)
+    throw InputError(fmt::format("'{}': {} frames at {:g} Hz are fewer than 2 frames at {:g} Hz", a.bvh.name, frames,
+                                 rate.value, options.output_rate_hz));
+  verdict.push_back(fmt::format("resampled: {} frames at {:g} Hz -> {} frames at {:g} Hz", frames, rate.value,
+                                to.output_frames, options.output_rate_hz));
+  return to;
+}
+
+std::string stem(const std::string& path) { return std::filesystem::path(path).stem().string(); }
+std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
+
+}  // namespace
+
+BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, Task task, const BvhOptions& options) {
+  const BvhPerson a = read_person(path_a);
+  const BvhPerson b = read_person(path_b);
+  check_same_clock(a.bvh, b.bvh);
+  BvhImport result;
+  const Conversion to = plan(a, b, options, result.verdict);
+  InteractionClip& clip = result.clip;
+  try {
+    clip.id = stem(path_a) + "-" + stem(path_b);
+    clip.task = task;
+    clip.a = convert(a, to);
+    clip.b = convert(b, to);
+    validate(clip);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(fmt::format("'{}', '{}': {}", path_a, path_b, error.what()));
+  }
+  clip.phases = propose_phases(clip.a, clip.b, task);
+  clip.source = {{"format", "BVH"},
+                 {"file_a", file_name(path_a)},
+                 {"file_b", file_name(path_b)},
+                 {"metres_per_unit", fmt::format("{}", to.metres_per_unit)},
+                 {"source_rate_hz", fmt::format("{}", to.rate_hz)},
+                 {"first_frame", fmt::format("{}", to.first_frame)},
+                 {"phases", "proposed"}};
+  result.verdict.push_back(fmt::format("floor: lowest toe joint at {:.3f} m (A) and {:.3f} m (B); heights kept",
+                                       lowest_toe(clip.a), lowest_toe(clip.b)));
+  result.verdict.push_back(fmt::format("phases: act [{}, {}) of {} frames (proposed)", clip.phases.act_begin,
+                                       clip.phases.act_end, clip.frames()));
+  return result;
+}
+
+}  // namespace duet

@@ -1,0 +1,39 @@
+// Where the 24 SMPL joints are in a BVH skeleton: CMU's joint names, or the common ones (Mixamo, LAFAN1, OptiTrack).
+// The choice of points is written down in docs/conventions.md. Thread-safe.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/pose.h"
+#include "core/skeleton.h"
+#include "motion/bvh.h"
+
+namespace duet {
+
+// A point on the way from one joint of the file to another, and the joint whose rotation it has.
+struct BvhPoint {
+  int from = 0;
+  int toward = 0;
+  double part = 0.0;  // 0 = at `from`, 1 = at `toward`
+  int rotation = 0;
+};
+
+struct BvhSkeleton {
+  std::string naming;  // "CMU" or "common"
+  std::array<BvhPoint, kSmplJoints> points;
+};
+
+// Throws InputError naming the file, the joint that is missing, the SMPL joint that it is for, and the nearest name.
+BvhSkeleton find_smpl_joints(const Bvh& bvh);
+
+using SmplPositions = Eigen::Matrix<double, 3, kSmplJoints>;
+
+// Positions of the SMPL joints from the poses of the file's joints (bvh_kinematics.h), in the file's axes and units.
+SmplPositions smpl_positions(const BvhSkeleton& skeleton, const std::vector<Pose>& global);
+
+// Length of the bones from head through pelvis, hip and knee to the ankle, mean of both sides, in file units.
+double stature(const SmplPositions& positions);
+
+}  // namespace duet
