@@ -37,7 +37,12 @@ class Kinematics {
   const RobotModel* model_;
   std::vector<Eigen::Matrix3d> R_WL_;
   std::vector<Eigen::Vector3d> p_WL_;
-  std::vector<Eigen::Matrix3d> R_PL0_;  // rotation to the parent at q = 0
+  struct Hinge {
+    Eigen::Matrix3d R_PL0;  // rotation to the parent at q = 0
+    bool turned;            // R_PL0 is not the identity
+    int principal;          // 0, 1, 2 where the hinge axis is +x, +y, +z of the link; else -1
+  };
+  std::vector<Hinge> hinges_;  // of links; the base's is unused
 };
 
 // Positions over time of chosen frames (indices in RobotModel::frames): (T, frames, 3).

@@ -1,0 +1,98 @@
+#include "robots/robot_model.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "core/names.h"
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+template <typename Entries>
+std::vector<std::string> names_of(const Entries& entries) {
+  std::vector<std::string> names;
+  for (const auto& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
+template <typename Entries>
+int index_of(const Entries& entries, const char* kind, std::string_view name) {
+  for (size_t i = 0; i < entries.size(); ++i)
+    if (entries[i].name == name) return static_cast<int>(i);
+  throw std::invalid_argument(unknown_name_message(kind, name, names_of(entries)));
+}
+
+}  // namespace
+
+std::vector<std::string> RobotModel::joint_names() const { return names_of(joints); }
+
+Eigen::VectorXd RobotModel::lower() const {
+  Eigen::VectorXd values(dof());
+  for (int j = 0; j < dof(); ++j) values[j] = joints[j].lower;
+  return values;
+}
+
+Eigen::VectorXd RobotModel::upper() const {
+  Eigen::VectorXd values(dof());
+  for (int j = 0; j < dof(); ++j) values[j] = joints[j].upper;
+  return values;
+}
+
+int RobotModel::joint_index(std::string_view joint) const { return index_of(joints, "joint", joint); }
+int RobotModel::frame_index(std::string_view frame) const { return index_of(frames, "frame", frame); }
+int RobotModel::keypoint_index(std::string_view keypoint) const { return index_of(keypoints, "keypoint", keypoint); }
+
+int RobotModel::track_frame(std::string_view track) const {
+  const auto it = tracks.find(std::string(track));
+  if (it != tracks.end()) return it->second;
+  std::vector<std::string> known;
+  for (const auto& [known_name, frame] : tracks) known.push_back(known_name);
+  throw std::invalid_argument(unknown_name_message("track", track, known));
+}
+
+double RobotModel::total_mass() const {
+  double mass = 0.0;
+  for (const RobotLink& link : links) mass += link.mass;
+  return mass;
+}
+
+RobotState RobotModel::standing_state(const Pose& X_WB) const {
+  RobotState state;
+  state.X_WB = {yaw_rotation(yaw_of(X_WB.R)), {X_WB.p.x(), X_WB.p.y(), standing_height}};
+  state.q = neutral;
+  state.v = Eigen::VectorXd::Zero(dof());
+  return state;
+}
+
+JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const {
+  require(q_target.size() == dof(),
+          fmt::format("default command of '{}': expected {} joint targets, found {}", name, dof(), q_target.size()));
+  JointCommand command{q_target, Eigen::VectorXd(dof()), Eigen::VectorXd(dof()), Eigen::VectorXd::Zero(dof())};
+  for (int j = 0; j < dof(); ++j) {
+    command.kp[j] = joints[j].kp;
+    command.kd[j] = joints[j].kd;
+  }
+  return command;
+}
+
+std::string default_card_path() {
+  namespace fs = std::filesystem;
+  const fs::path card = fs::path("robots") / "g1" / "g1.yaml";
+  std::vector<std::string> places;
+  if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0')
+    places.push_back((fs::path(share) / card).string());
+  places.push_back((fs::path(DUET_SOURCE_DIR) / card).string());
+  std::error_code ignored;
+  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
+  if (!program.empty())
+    places.push_back((program.parent_path() / ".." / "share" / "duet" / card).lexically_normal().string());
+  for (const std::string& place : places)
+    if (fs::exists(place, ignored)) return place;
+  throw MissingError(fmt::format("no robot card: looked at {}", fmt::join(places, ", ")));
+}
+
+}  // namespace duet

@@ -1,0 +1,220 @@
+#include "robots/urdf.h"
+
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <functional>
+#include <mutex>
+#include <numbers>
+#include <set>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+// urdfdom reports through a process-wide handler that prints to the console. Its errors are collected here instead.
+class Collector final : public console_bridge::OutputHandler {
+ public:
+  void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/, int /*line*/) override {
+    if (level == console_bridge::CONSOLE_BRIDGE_LOG_ERROR) errors.push_back(text);
+  }
+  std::vector<std::string> errors;
+};
+
+// The handler is global to the process: one parse at a time. The reason for this function's static.
+std::mutex& console_bridge_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+void check_xml(const std::string& text, const std::string& file) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos)
+    throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
+  TiXmlDocument document;
+  document.Parse(text.c_str());
+  if (document.Error())
+    throw InputError(
+        fmt::format("{}:{}: expected well-formed XML, found: {}", file, document.ErrorRow(), document.ErrorDesc()));
+  if (document.FirstChildElement("robot") == nullptr)
+    throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+}
+
+[[noreturn]] void refuse(const std::string& file, std::vector<std::string> errors) {
+  for (std::string& error : errors) {
+    while (!error.empty() && (error.back() == '.' || std::isspace(static_cast<unsigned char>(error.back()))))
+      error.pop_back();
+    if (error.find("No root link found") != std::string::npos)
+      error = "expected one link that is no joint's child (the root), found none: the joints form a cycle";
+    if (error.find("Two root links found") != std::string::npos) error = "expected one root link. " + error;
+  }
+  // Parsers report from the inside out and may say the same twice.
+  std::vector<std::string> unique;
+  for (const std::string& error : errors)
+    if (std::find(unique.begin(), unique.end(), error) == unique.end()) unique.push_back(error);
+  throw InputError(fmt::format("{}: not a valid URDF: {}", file, fmt::join(unique, "; ")));
+}
+
+urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& file) {
+  const std::scoped_lock lock(console_bridge_mutex());
+  Collector collector;
+  console_bridge::OutputHandler* const previous = console_bridge::getOutputHandler();
+  const console_bridge::LogLevel level = console_bridge::getLogLevel();
+  console_bridge::useOutputHandler(&collector);
+  console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_ERROR);
+  urdf::ModelInterfaceSharedPtr model;
+  try {
+    model = urdf::parseURDF(text);
+  } catch (const std::exception& error) {
+    collector.errors.emplace_back(error.what());
+  }
+  console_bridge::useOutputHandler(previous);
+  console_bridge::setLogLevel(level);
+  if (!model || !model->getRoot()) refuse(file, collector.errors);
+  return model;
+}
+
+Pose to_pose(const urdf::Pose& pose) {
+  double x = 0.0, y = 0.0, z = 0.0, w = 1.0;
+  pose.rotation.getQuaternion(x, y, z, w);
+  return {Eigen::Quaterniond(w, x, y, z).normalized(), {pose.position.x, pose.position.y, pose.position.z}};
+}
+
+void check_finite(const Pose& X, const std::string& file, const std::string& element) {
+  if (!X.p.allFinite() || !X.R.coeffs().allFinite())
+    throw InputError(fmt::format("{}: {}: expected a finite origin, found one that is not", file, element));
+}
+
+UrdfLink to_link(const urdf::Link& source, const std::string& file) {
+  UrdfLink link;
+  link.name = source.name;
+  if (!source.inertial) return link;
+  const urdf::Inertial& inertial = *source.inertial;
+  const std::string element = fmt::format("link '{}'", source.name);
+  if (!std::isfinite(inertial.mass) || inertial.mass < 0.0)
+    throw InputError(fmt::format("{}: {}: expected a mass >= 0, found {}", file, element, inertial.mass));
+  const Pose X_LI = to_pose(inertial.origin);
+  check_finite(X_LI, file, element + " inertial");
+  Eigen::Matrix3d I;
+  I << inertial.ixx, inertial.ixy, inertial.ixz,  //
+      inertial.ixy, inertial.iyy, inertial.iyz,   //
+      inertial.ixz, inertial.iyz, inertial.izz;
+  if (!I.allFinite()) throw InputError(fmt::format("{}: {}: expected a finite inertia", file, element));
+  // An all-zero inertia is a point mass; what the links become after merging is checked by the loader.
+  const double least = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(I, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  if (least < -1e-12)
+    throw InputError(
+        fmt::format("{}: {}: expected an inertia with principal moments >= 0, found {:.3g}", file, element, least));
+  link.mass = inertial.mass;
+  link.com = X_LI.p;
+  const Eigen::Matrix3d R = X_LI.R.toRotationMatrix();
+  link.inertia = R * I * R.transpose();
+  return link;
+}
+
+UrdfJointType to_type(const urdf::Joint& joint, const std::string& file) {
+  switch (joint.type) {
+    case urdf::Joint::FIXED:
+      return UrdfJointType::kFixed;
+    case urdf::Joint::REVOLUTE:
+      return UrdfJointType::kRevolute;
+    case urdf::Joint::CONTINUOUS:
+      return UrdfJointType::kContinuous;
+    case urdf::Joint::PRISMATIC:
+      return UrdfJointType::kPrismatic;
+    case urdf::Joint::FLOATING:
+      return UrdfJointType::kFloating;
+    case urdf::Joint::PLANAR:
+      return UrdfJointType::kPlanar;
+    default:
+      throw InputError(fmt::format("{}: joint '{}': expected a known type, found none", file, joint.name));
+  }
+}
+
+void read_limits(const urdf::Joint& source, const std::string& file, UrdfJoint& joint) {
+  if (source.limits) {
+    joint.lower = source.limits->lower;
+    joint.upper = source.limits->upper;
+    joint.effort = source.limits->effort;
+    joint.velocity = source.limits->velocity;
+  }
+  if (joint.type == UrdfJointType::kContinuous) {
+    joint.lower = -2.0 * std::numbers::pi;
+    joint.upper = 2.0 * std::numbers::pi;
+  }
+  for (const double value : {joint.lower, joint.upper, joint.effort, joint.velocity})
+    if (!std::isfinite(value))
+      throw InputError(fmt::format("{}: joint '{}': expected finite limits", file, joint.name));
+}
+
+UrdfJoint to_joint(const urdf::Joint& source, const std::string& file) {
+  UrdfJoint joint;
+  joint.name = source.name;
+  joint.type = to_type(source, file);
+  const std::string element = fmt::format("joint '{}'", source.name);
+  joint.X_PC = to_pose(source.parent_to_joint_origin_transform);
+  check_finite(joint.X_PC, file, element);
+  if (joint.type == UrdfJointType::kFixed || joint.type == UrdfJointType::kFloating) return joint;
+  const Eigen::Vector3d axis(source.axis.x, source.axis.y, source.axis.z);
+  if (!axis.allFinite() || axis.norm() < 1e-9)
+    throw InputError(fmt::format("{}: {}: expected an axis with a direction, found ({}, {}, {})", file, element,
+                                 axis.x(), axis.y(), axis.z()));
+  joint.axis = axis.normalized();
+  if (source.mimic)
+    throw InputError(fmt::format("{}: {}: expected an independent joint, found one that mimics '{}'", file, element,
+                                 source.mimic->joint_name));
+  read_limits(source, file, joint);
+  return joint;
+}
+
+}  // namespace
+
+const char* to_string(UrdfJointType type) {
+  switch (type) {
+    case UrdfJointType::kFixed:
+      return "fixed";
+    case UrdfJointType::kRevolute:
+      return "revolute";
+    case UrdfJointType::kContinuous:
+      return "continuous";
+    case UrdfJointType::kPrismatic:
+      return "prismatic";
+    case UrdfJointType::kFloating:
+      return "floating";
+    case UrdfJointType::kPlanar:
+      return "planar";
+  }
+  return "unknown";
+}
+
+UrdfModel parse_urdf(const std::string& text, const std::string& file) {
+  check_xml(text, file);
+  const urdf::ModelInterfaceSharedPtr source = parse(text, file);
+  UrdfModel model;
+  std::set<std::string> visited;
+  const std::function<void(const urdf::Link&)> visit = [&](const urdf::Link& link) {
+    if (!visited.insert(link.name).second)
+      throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, link.name));
+    const int index = static_cast<int>(model.links.size());
+    model.links.push_back(to_link(link, file));
+    for (const urdf::JointSharedPtr& child : link.child_joints) {
+      UrdfJoint joint = to_joint(*child, file);
+      joint.parent = index;
+      joint.child = static_cast<int>(model.links.size());
+      model.joints.push_back(joint);
+      visit(*source->getLink(child->child_link_name));
+    }
+  };
+  visit(*source->getRoot());
+  for (const auto& [name, link] : source->links_)
+    if (!visited.contains(name))
+      throw InputError(fmt::format("{}: link '{}': expected a path to the root '{}', found a cycle of joints", file,
+                                   name, source->getRoot()->name));
+  return model;
+}
+
+}  // namespace duet

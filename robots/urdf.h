@@ -1,0 +1,42 @@
+// A URDF as the loader needs it: links with inertia and joints in a tree, checked. Geometry, meshes, materials and
+// transmissions are not looked at.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/pose.h"
+
+namespace duet {
+
+enum class UrdfJointType { kFixed, kRevolute, kContinuous, kPrismatic, kFloating, kPlanar };
+const char* to_string(UrdfJointType type);
+
+struct UrdfLink {
+  std::string name;
+  double mass = 0.0;                                  // [kg], 0 where the link has no inertial element
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();      // p_LCom [m]
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about the centre of mass, axes of L [kg m^2]
+};
+
+struct UrdfJoint {
+  std::string name;
+  UrdfJointType type = UrdfJointType::kFixed;
+  int parent = 0;  // links
+  int child = 0;
+  Pose X_PC;                                        // child in parent at q = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // in the child, unit
+  double lower = 0.0, upper = 0.0;                  // [rad] or [m]; +-2 pi for a continuous joint
+  double effort = 0.0, velocity = 0.0;              // 0 where a continuous joint gives none
+};
+
+struct UrdfModel {
+  std::vector<UrdfLink> links;    // links[0] is the root; parents come first
+  std::vector<UrdfJoint> joints;  // joints[i] moves links[i + 1]
+};
+
+// Throws InputError naming file, element, expected and found. Thread-safe.
+UrdfModel parse_urdf(const std::string& text, const std::string& file);
+
+}  // namespace duet

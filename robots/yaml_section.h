@@ -1,0 +1,56 @@
+// Strict reading of one YAML mapping: every key must be known, every value of its type and finite. All errors are
+// InputError with file, line, expected and found.
+#pragma once
+
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Core>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+class YamlSection {
+ public:
+  // `where` names the mapping in messages ("joint 'left_knee_joint'"). Throws for a node that is not a mapping, a key
+  // that is not in `known` (with the nearest one) and a key given twice.
+  YamlSection(std::string file, YAML::Node node, std::string where, std::initializer_list<const char*> known);
+
+  [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
+  [[nodiscard]] int line() const { return line_of(node_); }
+  [[nodiscard]] int line(const char* key) const { return line_of(node_[key]); }
+
+  // A missing key throws, naming it.
+  [[nodiscard]] std::string text(const char* key) const;
+  [[nodiscard]] double number(const char* key) const;
+  [[nodiscard]] std::optional<double> optional_number(const char* key) const;
+  [[nodiscard]] bool flag_or(const char* key, bool fallback) const;
+  [[nodiscard]] Eigen::Vector3d vector3(const char* key) const;
+  [[nodiscard]] std::vector<std::string> texts(const char* key) const;
+  // Elements of a list; none where the key is absent.
+  [[nodiscard]] std::vector<YAML::Node> items(const char* key) const;
+  // The node itself; throws where it is absent.
+  [[nodiscard]] YAML::Node node(const char* key) const;
+
+  // Throws InputError("FILE:LINE: WHERE: MESSAGE").
+  [[noreturn]] void fail(int line, const std::string& message) const;
+
+ private:
+  [[nodiscard]] static int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
+  [[nodiscard]] double finite(const YAML::Node& node, std::string_view what) const;
+
+  std::string file_;
+  YAML::Node node_;
+  std::string where_;
+};
+
+// The document of `text`; throws InputError with file and line for text that is not YAML.
+YAML::Node parse_yaml(const std::string& text, const std::string& file);
+
+// What a node holds, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".
+std::string describe(const YAML::Node& node);
+
+}  // namespace duet
