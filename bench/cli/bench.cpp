@@ -1,0 +1,108 @@
+// duet bench: figures of this code on this machine, in Google Benchmark's form.
+#include <fmt/format.h>
+
+#include <ctime>
+
+#include "bench/benchmarks/benchmark.h"
+#include "bench/cli/command.h"
+#include "bench/parallel.h"
+#include "bench/version.h"
+#include "core/names.h"
+#include "core/require.h"
+#include "results/environment.h"
+
+namespace duet::cli {
+namespace {
+
+struct BenchArguments {
+  std::vector<std::string> names;
+  BenchmarkOptions options;
+  int clips = 200;
+  bool strict = false;
+};
+
+// A name stands for itself and for everything below it: "pair" is every benchmark "pair/...".
+bool chosen(const std::string& benchmark, const std::vector<std::string>& names) {
+  if (names.empty()) return true;
+  for (const std::string& name : names)
+    if (benchmark == name || benchmark.starts_with(name + "/")) return true;
+  return false;
+}
+
+void check_names(const std::vector<std::string>& names) {
+  std::vector<std::string> known = {"detectors"};
+  for (const Benchmark& benchmark : benchmarks()) known.push_back(benchmark.name);
+  for (const std::string& name : names) {
+    bool found = name == "detectors";
+    for (const Benchmark& benchmark : benchmarks()) found = found || chosen(benchmark.name, {name});
+    require(found, unknown_name_message("benchmark", name, known));
+  }
+}
+
+nlohmann::json to_json(const Figure& figure) {
+  nlohmann::json json = {{"name", figure.name}, {"value", figure.value}, {"unit", figure.unit}};
+  if (!figure.target.empty()) {
+    json["target"] = figure.target;
+    json["reached"] = figure.reached;
+  }
+  return json;
+}
+
+std::string line(const Figure& figure) {
+  const std::string target =
+      figure.target.empty() ? "" : fmt::format("{} ({})", figure.target, figure.reached ? "reached" : "NOT reached");
+  return fmt::format("{:<44} {:>12.5g} {:<10} {}\n", figure.name, figure.value, figure.unit, target);
+}
+
+void print_confusion(const Session& session, const BenchArguments& arguments) {
+  const ConfusionTable table = detector_confusion(arguments.clips, arguments.options.threads, arguments.strict);
+  std::string text = fmt::format("{} synthetic clips a task, person against person, {} thresholds; fraction accepted\n{:<16}",
+                                 table.clips, arguments.strict ? "strict" : "paper", "clips \\ detector");
+  nlohmann::json json = {{"clips_per_task", table.clips}, {"rate", nlohmann::json::object()}};
+  for (const std::string& task : table.tasks) text += fmt::format(" {:>10}", task);
+  text += "\n";
+  for (size_t i = 0; i < table.tasks.size(); ++i) {
+    text += fmt::format("{:<16}", table.tasks[i]);
+    for (size_t j = 0; j < table.tasks.size(); ++j) {
+      text += fmt::format(" {:>9.1f}%", 100.0 * table.rate[i][j]);
+      json["rate"][table.tasks[i]][table.tasks[j]] = table.rate[i][j];
+    }
+    text += "\n";
+  }
+  print(session, text, json);
+}
+
+void run_bench(const Session& session, const BenchArguments& arguments) {
+  check_names(arguments.names);
+  if (arguments.names == std::vector<std::string>{"detectors"}) return print_confusion(session, arguments);
+  nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
+  json["context"]["duet_version"] = kVersion;
+  json["context"]["machine"] = describe_machine();
+  if (!session.json) fmt::print("{}\n{}\n", version_text(), describe_machine());
+  for (const Benchmark& benchmark : benchmarks()) {
+    if (!chosen(benchmark.name, arguments.names)) continue;
+    note(session, "measuring " + benchmark.name);
+    for (const Figure& figure : benchmark.run(arguments.options)) {
+      json["benchmarks"].push_back(to_json(figure));
+      if (!session.json) fmt::print("{}", line(figure));
+    }
+  }
+  if (session.json) print(session, "", json);
+}
+
+}  // namespace
+
+void add_bench(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "bench", "measure this code on this machine; `bench detectors` prints the confusion table",
+                                  "duet bench pair/paper backend --json\n  duet bench detectors --clips 200");
+  auto arguments = std::make_shared<BenchArguments>();
+  arguments->options.threads = default_threads();
+  command->add_option("names", arguments->names, "which, by path; `duet list benchmarks` shows all (default: all)");
+  command->add_option("--seconds", arguments->options.seconds, "measuring time of one figure")->capture_default_str();
+  command->add_option("-j,--threads", arguments->options.threads, "threads of the scaling figures")->capture_default_str();
+  command->add_option("--clips", arguments->clips, "synthetic clips a task for `detectors`")->capture_default_str();
+  command->add_flag("--strict", arguments->strict, "the strict thresholds for `detectors`");
+  command->callback([&session, arguments] { run_bench(session, *arguments); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,59 @@
+// What every command of the `duet` program shares: options, output, exit codes (docs/command-line.md).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "bench/progress.h"
+
+namespace duet::cli {
+
+enum ExitCode : int {
+  kExitOk = 0,
+  kExitGate = 1,           // a gate, regression check or comparison failed
+  kExitUsage = 2,          // usage, configuration or input
+  kExitErrors = 3,         // finished, with errored episodes
+  kExitMissing = 4,        // engine, asset or device that is not there
+  kExitDeterminism = 5,    // verify: other hashes
+  kExitResumable = 75,     // stopped early (time limit, SIGTERM): the same command goes on
+  kExitInterrupted = 130,  // Ctrl-C: the same command goes on
+};
+
+struct Session {
+  bool json = false;       // machines read standard output
+  bool quiet = false;      // no progress
+  int exit_code = kExitOk;
+  std::vector<std::string> argv;
+
+  [[nodiscard]] Progress::Style progress() const { return quiet ? Progress::Style::kQuiet : Progress::Style::kAuto; }
+};
+
+// A subcommand with its description, its example under --help, and --json / --quiet.
+CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& description,
+                      const std::string& example);
+
+// `text` on standard output, or `json` with --json.
+void print(const Session& session, const std::string& text, const nlohmann::json& json);
+// A message for the person, on standard error, unless quiet.
+void note(const Session& session, const std::string& text);
+
+// "a=b" -> {a, b}; throws std::invalid_argument.
+std::pair<std::string, std::string> split_assignment(const std::string& text);
+
+void add_doctor(CLI::App& app, Session& session);
+void add_list(CLI::App& app, Session& session);
+void add_synth(CLI::App& app, Session& session);
+void add_import(CLI::App& app, Session& session);
+void add_retarget(CLI::App& app, Session& session);
+void add_score(CLI::App& app, Session& session);
+void add_run(CLI::App& app, Session& session);
+void add_report(CLI::App& app, Session& session);
+void add_compare(CLI::App& app, Session& session);
+void add_check(CLI::App& app, Session& session);
+void add_bless(CLI::App& app, Session& session);
+void add_verify(CLI::App& app, Session& session);
+void add_bench(CLI::App& app, Session& session);
+
+}  // namespace duet::cli

@@ -1,0 +1,75 @@
+// duet doctor: what this build and this machine can do.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "backends/factory.h"
+#include "bench/cli/command.h"
+#include "bench/parallel.h"
+#include "bench/version.h"
+#include "core/require.h"
+#include "results/environment.h"
+#include "retarget/pair.h"
+#include "robots/robot_model.h"
+
+namespace duet::cli {
+namespace {
+
+struct Finding {
+  std::string part;
+  bool present = false;
+  std::string detail;
+};
+
+Finding robot_finding() {
+  try {
+    const std::string card = default_card_path();
+    const RobotModel robot = load_robot(card);
+    return {"robot", true, fmt::format("{}: {} joints, {:.4f} kg, card {}", robot.name, robot.dof(), robot.total_mass(), card)};
+  } catch (const std::exception& error) {
+    return {"robot", false, error.what()};
+  }
+}
+
+std::vector<Finding> findings() {
+  std::vector<Finding> list;
+  for (const EngineInfo& engine : engines())
+    list.push_back({"engine " + engine.name, engine.available, engine.available ? engine.version : engine.reason});
+  std::string kernels;
+  for (const KernelKind kernel : available_kernels()) kernels += fmt::format("{}{}", kernels.empty() ? "" : ", ", to_string(kernel));
+  list.push_back({"PAIR kernels", true, kernels});
+  list.push_back(robot_finding());
+  list.push_back({"machine", true, describe_machine()});
+  return list;
+}
+
+void run_doctor(Session& session, const std::vector<std::string>& needed) {
+  const std::vector<Finding> list = findings();
+  nlohmann::json json = {{"version", kVersion}, {"parts", nlohmann::json::array()}};
+  std::string text = version_text() + "\n";
+  for (const Finding& finding : list) {
+    json["parts"].push_back({{"part", finding.part}, {"present", finding.present}, {"detail", finding.detail}});
+    text += fmt::format("  {:<6} {:<16} {}\n", finding.present ? "ok" : "absent", finding.part, finding.detail);
+  }
+  json["environment"] = capture_environment();
+  print(session, text, json);
+  for (const std::string& engine : needed) {
+    for (const EngineInfo& info : engines()) {
+      if (info.name == engine && !info.available) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
+    }
+    Scene scene;   // an unknown name is refused with the nearest one
+    scene.robot = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+    make_backend(engine, scene);
+  }
+}
+
+}  // namespace
+
+void add_doctor(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "doctor", "what this build and this machine can do", "duet doctor --need mujoco");
+  auto needed = std::make_shared<std::vector<std::string>>();
+  command->add_option("--need", *needed, "engines that must be there (exit code 4 if not)")->delimiter(',');
+  command->callback([&session, needed] { run_doctor(session, *needed); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,133 @@
+// duet import: motion files of others -> duet's NPZ. A pair of BVH files becomes a clip, a pickled robot motion a recording.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "bench/cli/command.h"
+#include "bench/rollout.h"
+#include "core/require.h"
+#include "motion/bvh.h"
+#include "motion/pickle.h"
+#include "robots/kinematics.h"
+
+namespace duet::cli {
+namespace {
+
+struct ImportArguments {
+  std::vector<std::string> files;
+  std::string output, task, reactor = "B", up, robot;
+  bool drop_t_pose = false, keep_t_pose = false;
+  BvhOptions bvh;
+};
+
+std::string bulleted(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const std::string& line : lines) text += "  " + line + "\n";
+  return text;
+}
+
+void import_people(const Session& session, ImportArguments arguments) {
+  require(!arguments.task.empty(), "--task is needed to import a pair of BVH files (hug, handshake, ...)");
+  require(arguments.reactor == "A" || arguments.reactor == "B",
+          fmt::format("--robot: expected A or B, found '{}'", arguments.reactor));
+  if (!arguments.up.empty()) {
+    require(arguments.up == "y" || arguments.up == "z", fmt::format("--up: expected y or z, found '{}'", arguments.up));
+    arguments.bvh.up = arguments.up == "y" ? UpAxis::kY : UpAxis::kZ;
+  }
+  require(!(arguments.drop_t_pose && arguments.keep_t_pose), "--drop-t-pose and --keep-t-pose exclude each other");
+  if (arguments.drop_t_pose) arguments.bvh.drop_t_pose = true;
+  if (arguments.keep_t_pose) arguments.bvh.drop_t_pose = false;
+  BvhImport imported = import_bvh_pair(arguments.files[0], arguments.files[1], parse_task(arguments.task), arguments.bvh);
+  imported.clip.reactor = arguments.reactor == "A" ? Person::kA : Person::kB;
+  save_clip(imported.clip, arguments.output);
+  const Phases& phases = imported.clip.phases;
+  print(session,
+        fmt::format("{}  phases (proposed): act is frames {} to {} of {}\n{}: clip '{}'", bulleted(imported.verdict),
+                    phases.act_begin, phases.act_end, imported.clip.frames(), arguments.output, imported.clip.id),
+        {{"file", arguments.output},
+         {"clip", imported.clip.id},
+         {"verdict", imported.verdict},
+         {"frames", imported.clip.frames()},
+         {"act", {phases.act_begin, phases.act_end}}});
+}
+
+// A whole-body pickle names no joints; its columns are taken in the order of the robot card, which must fit.
+Recording play_pickle(const PickledMotion& pickled, const std::string& file, const std::shared_ptr<const RobotModel>& robot) {
+  RobotMotion motion = pickled.motion;
+  if (motion.q.rows() != robot->dof()) {
+    throw InputError(fmt::format("{}: expected {} joints for robot '{}', found {} (another card: --card)", file, robot->dof(),
+                                 robot->name, motion.q.rows()));
+  }
+  motion.joint_names = robot->joint_names();
+  return play_back(motion, {}, Task::kHug, {0, motion.frames()}, robot);
+}
+
+// Worst distance between the file's own body positions and our forward kinematics, over bodies that the robot has. [m]
+double kinematics_error(const PickledMotion& pickled, const RobotModel& robot) {
+  double worst = 0.0;
+  Kinematics kinematics(robot);
+  for (int t = 0; t < pickled.local_body_pos.frames(); ++t) {
+    kinematics.update(Pose(), pickled.motion.q.col(t));
+    for (size_t b = 0; b < pickled.link_body_list.size(); ++b) {
+      for (size_t f = 0; f < robot.frames.size(); ++f) {
+        if (robot.frames[f].name != pickled.link_body_list[b]) continue;
+        worst = std::max(worst, (kinematics.frame_position(f) - pickled.local_body_pos.at(t, b)).norm());
+        break;
+      }
+    }
+  }
+  return worst;
+}
+
+void import_robot(const Session& session, const ImportArguments& arguments) {
+  const auto robot = std::make_shared<const RobotModel>(
+      load_robot(arguments.robot.empty() ? default_card_path() : arguments.robot));
+  const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
+  const Recording recording = play_pickle(pickled, arguments.files[0], robot);
+  save_recording(recording, arguments.output);
+  const double error = kinematics_error(pickled, *robot);
+  print(session,
+        fmt::format("{}  largest difference between its body positions and our kinematics: {:.2e} m\n{}: recording of {} frames",
+                    bulleted(pickled.verdict), error, arguments.output, recording.frames()),
+        {{"file", arguments.output},
+         {"frames", recording.frames()},
+         {"kinematics_error_m", error},
+         {"verdict", pickled.verdict}});
+}
+
+void run_import(const Session& session, const ImportArguments& arguments) {
+  const std::string extension = std::filesystem::path(arguments.files[0]).extension().string();
+  if (extension == ".pkl") {
+    require(arguments.files.size() == 1, "a robot motion (.pkl) is imported alone");
+    import_robot(session, arguments);
+  } else if (extension == ".bvh") {
+    require(arguments.files.size() == 2, fmt::format("expected a pair of BVH files, one a person, found {}", arguments.files.size()));
+    import_people(session, arguments);
+  } else {
+    throw std::invalid_argument(fmt::format("'{}': expected a pair of .bvh files or one .pkl", arguments.files[0]));
+  }
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "import", "read motion files of others",
+                                  "duet import 18_01.bvh 19_01.bvh --task handshake --output handshake.npz\n"
+                                  "  duet import walk_001.pkl --output walk.npz");
+  auto arguments = std::make_shared<ImportArguments>();
+  command->add_option("files", arguments->files, "two BVH files, person A then B; or one pickled robot motion")->required();
+  command->add_option("-o,--output", arguments->output, "clip or recording to write (NPZ)")->required();
+  command->add_option("--task", arguments->task, "task of the clip");
+  command->add_option("--robot", arguments->reactor, "who the robot replaces: A or B")->capture_default_str();
+  command->add_option("--card", arguments->robot, "robot card of a pickled motion (default: the G1 that ships with duet)");
+  command->add_option_function<double>("--units", [arguments](double v) { arguments->bvh.metres_per_unit = v; },
+                                       "metres per unit of the file (default: detected)");
+  command->add_option("--up", arguments->up, "up axis, y or z (default: detected)");
+  command->add_option_function<double>("--rate", [arguments](double v) { arguments->bvh.rate_hz = v; },
+                                       "frames per second (default: the file's frame time)");
+  command->add_flag("--drop-t-pose", arguments->drop_t_pose, "frame 0 is an added T pose: drop it (default: detected)");
+  command->add_flag("--keep-t-pose", arguments->keep_t_pose, "keep frame 0 whatever it is");
+  command->callback([&session, arguments] { run_import(session, *arguments); });
+}
+
+}  // namespace duet::cli

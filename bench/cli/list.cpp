@@ -1,0 +1,128 @@
+// duet list: everything that can be named.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <functional>
+
+#include "backends/factory.h"
+#include "bench/benchmarks/benchmark.h"
+#include "bench/cli/command.h"
+#include "controllers/controller.h"
+#include "core/names.h"
+#include "core/require.h"
+#include "metrics/catalogue.h"
+#include "metrics/detector.h"
+#include "metrics/readings.h"
+#include "policies/policy.h"
+#include "retarget/options.h"
+#include "retarget/pair.h"
+#include "robots/robot_model.h"
+
+namespace duet::cli {
+namespace {
+
+struct Listed {
+  std::string name, detail;
+};
+using Listing = std::function<std::vector<Listed>()>;
+
+std::vector<Listed> list_tasks() {
+  std::vector<Listed> list;
+  for (const Task task : kTasks) {
+    std::vector<std::string> limits;
+    for (const auto& [name, value] : thresholds(task)) limits.push_back(fmt::format("{} {:g}", name, value));
+    list.push_back({std::string(to_string(task)), fmt::format("thresholds: {}", fmt::join(limits, ", "))});
+  }
+  return list;
+}
+
+std::vector<Listed> list_engines() {
+  std::vector<Listed> list;
+  for (const EngineInfo& engine : engines())
+    list.push_back({engine.name, engine.available ? engine.version : "absent: " + engine.reason});
+  return list;
+}
+
+std::vector<Listed> named(const std::vector<std::string>& names) {
+  std::vector<Listed> list;
+  for (const std::string& name : names) list.push_back({name, ""});
+  return list;
+}
+
+std::vector<Listed> list_metrics() {
+  std::vector<Listed> list;
+  for (const MetricInfo& metric : metric_catalogue()) {
+    const char* better = metric.direction == Direction::kLower    ? "lower is better"
+                         : metric.direction == Direction::kHigher ? "higher is better"
+                                                                  : "no direction";
+    list.push_back({std::string(metric.name), fmt::format("{} [{}], {}; {}", metric.title, metric.unit, better, metric.source)});
+  }
+  return list;
+}
+
+std::vector<Listed> list_readings() {
+  std::vector<Listed> list;
+  for (const std::string& option : reading_names()) list.push_back({option, fmt::format("{}", fmt::join(reading_values(option), ", "))});
+  return list;
+}
+
+std::vector<Listed> list_pair_options() {
+  std::vector<Listed> list;
+  for (const std::string& name : pair_option_names()) list.push_back({name, "default " + pair_option(PairOptions(), name)});
+  return list;
+}
+
+std::vector<Listed> list_robots() {
+  const RobotModel robot = load_robot(default_card_path());
+  return {{robot.name, fmt::format("{} joints, {:.4f} kg, {}", robot.dof(), robot.total_mass(), default_card_path())}};
+}
+
+std::vector<Listed> list_benchmarks() {
+  std::vector<Listed> list;
+  for (const Benchmark& benchmark : benchmarks()) list.push_back({benchmark.name, benchmark.description});
+  return list;
+}
+
+const std::vector<std::pair<std::string, Listing>>& listings() {
+  static const std::vector<std::pair<std::string, Listing>> table = {
+      {"tasks", list_tasks},
+      {"engines", list_engines},
+      {"controllers", [] { return named(controller_names()); }},
+      {"policies", [] { return named(policy_names()); }},
+      {"metrics", list_metrics},
+      {"readings", list_readings},
+      {"pair-options", list_pair_options},
+      {"robots", list_robots},
+      {"benchmarks", list_benchmarks},
+  };
+  return table;
+}
+
+void run_list(const Session& session, const std::string& what) {
+  std::vector<std::string> known;
+  for (const auto& [name, listing] : listings()) known.push_back(name);
+  for (const auto& [name, listing] : listings()) {
+    if (name != what) continue;
+    nlohmann::json json = nlohmann::json::array();
+    std::string text;
+    for (const Listed& entry : listing()) {
+      json.push_back({{"name", entry.name}, {"detail", entry.detail}});
+      text += entry.detail.empty() ? entry.name + "\n" : fmt::format("{:<32} {}\n", entry.name, entry.detail);
+    }
+    print(session, text, json);
+    return;
+  }
+  throw std::invalid_argument(unknown_name_message("list", what, known));
+}
+
+}  // namespace
+
+void add_list(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
+  auto what = std::make_shared<std::string>();
+  command->add_option("what", *what, "tasks, engines, controllers, policies, metrics, readings, pair-options, robots, benchmarks")
+      ->required();
+  command->callback([&session, what] { run_list(session, *what); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,111 @@
+// duet run: a suite, rolled out into a run directory.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "bench/cli/command.h"
+#include "bench/clips.h"
+#include "bench/interrupt.h"
+#include "bench/parallel.h"
+#include "bench/runner.h"
+#include "core/require.h"
+#include "results/leaderboard.h"
+
+namespace duet::cli {
+namespace {
+
+struct RunArguments {
+  std::string suite, output, start, partner;
+  std::vector<std::string> overrides, clips;
+  bool dry_run = false;
+  RunOptions options;
+};
+
+// Clips given on the command line take the place of the suite's; a task without clips is left out.
+void use_clips(const std::vector<std::string>& paths, Suite& suite) {
+  if (paths.empty()) return;
+  suite.clips = {};
+  suite.clips.files = find_motion_files(paths);
+}
+
+Suite read_suite(const RunArguments& arguments) {
+  Overrides overrides;
+  for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));
+  if (!arguments.start.empty()) overrides.emplace_back("start", arguments.start);
+  if (!arguments.partner.empty()) overrides.emplace_back("partner", arguments.partner);
+  Suite suite = load_suite(arguments.suite, overrides);
+  use_clips(arguments.clips, suite);
+  return suite;
+}
+
+int exit_code(const RunSummary& summary) {
+  switch (summary.end) {
+    case RunEnd::kInterrupted: return kExitInterrupted;
+    case RunEnd::kTerminated:
+    case RunEnd::kTimeLimit: return kExitResumable;
+    case RunEnd::kComplete: break;
+  }
+  return summary.outcomes.contains("error") ? kExitErrors : kExitOk;
+}
+
+std::string describe(const RunSummary& summary, const Suite& suite, const std::string& output) {
+  std::vector<std::string> outcomes;
+  for (const auto& [outcome, count] : summary.outcomes) outcomes.push_back(fmt::format("{} {}", count, outcome));
+  std::string text = fmt::format("{} of {} episodes in {} ({} were there, {} run now{}{}); start: {}, partner: {}\n",
+                                 summary.already_there + summary.run, summary.planned, output, summary.already_there, summary.run,
+                                 outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "), to_string(suite.start),
+                                 to_string(suite.partner));
+  if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
+  return text;
+}
+
+void run_run(Session& session, RunArguments arguments) {
+  const Suite suite = read_suite(arguments);
+  if (arguments.dry_run) {
+    const std::string hash = suite_hash(suite);
+    print(session, fmt::format("{}# hash: {}", resolved_yaml(suite), hash), {{"suite", resolved_yaml(suite)}, {"hash", hash}});
+    return;
+  }
+  require(!arguments.output.empty(), "--output is needed: the run directory");
+  catch_interrupts();
+  arguments.options.argv = session.argv;
+  Progress progress(session.progress());
+  const RunSummary summary = run_suite(suite, arguments.output, arguments.options, progress);
+  session.exit_code = exit_code(summary);
+  note(session, describe(summary, suite, arguments.output));
+  const std::vector<LeaderboardEntry> entries = leaderboard(load_run(arguments.output).rows);
+  print(session, leaderboard_markdown(entries),
+        {{"run", arguments.output},
+         {"planned", summary.planned},
+         {"already_there", summary.already_there},
+         {"run_now", summary.run},
+         {"outcomes", summary.outcomes},
+         {"complete", summary.end == RunEnd::kComplete},
+         {"leaderboard", leaderboard_json(entries)}});
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "run", "roll a suite out in its engines, with the null arm; resumes by itself",
+                                  "duet run suites/core.yaml --output runs/core\n"
+                                  "  duet run suites/core.yaml --clips handshake_paired.npz --output runs/cmu");
+  auto arguments = std::make_shared<RunArguments>();
+  arguments->options.threads = default_threads();
+  RunOptions& options = arguments->options;
+  command->add_option("suite", arguments->suite, "suite file (YAML)")->required();
+  command->add_option("-o,--output", arguments->output, "run directory; an unfinished run of the same suite is resumed");
+  command->add_option("--clips", arguments->clips, "clips or paired motions (NPZ, folders) in the place of the suite's");
+  command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
+  command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
+  command->add_option("--partner", arguments->partner, "ghost or solid");
+  command->add_option("--engines", options.engines, "only these")->delimiter(',');
+  command->add_option("--controllers", options.controllers, "only these")->delimiter(',');
+  command->add_option("--policies", options.policies, "only these (the null arm always runs)")->delimiter(',');
+  command->add_option("--tasks", options.tasks, "only these")->delimiter(',');
+  command->add_option("-j,--threads", options.threads, "threads")->capture_default_str()->check(CLI::Range(1, 1024));
+  command->add_option("--time-limit", options.time_limit, "of the run [s]; stops resumable (exit code 75)");
+  command->add_flag("--dry-run", arguments->dry_run, "print the resolved suite and its hash, run nothing");
+  command->callback([&session, arguments] { run_run(session, *arguments); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,82 @@
+// duet synth: two-person clips made from nothing.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "bench/cli/command.h"
+#include "bench/parallel.h"
+#include "core/digest.h"
+#include "core/require.h"
+#include "motion/synthesis.h"
+
+namespace duet::cli {
+namespace {
+
+struct SynthArguments {
+  std::string task;
+  int count = 1;
+  std::string output;
+  std::string side;
+  int threads = default_threads();
+  SynthesisOptions options;
+};
+
+std::vector<Task> chosen_tasks(const std::string& name) {
+  if (name == "all") return {kTasks.begin(), kTasks.end()};
+  return {parse_task(name)};
+}
+
+void run_synth(const Session& session, SynthArguments arguments) {
+  if (!arguments.side.empty()) {
+    require(arguments.side == "left" || arguments.side == "right",
+            fmt::format("--side: expected left or right, found '{}'", arguments.side));
+    arguments.options.side = arguments.side == "left" ? Side::kLeft : Side::kRight;
+  }
+  require(arguments.count >= 1, fmt::format("--count: expected 1 or more, found {}", arguments.count));
+  const std::vector<Task> tasks = chosen_tasks(arguments.task);
+  const int total = static_cast<int>(tasks.size()) * arguments.count;
+  std::vector<nlohmann::json> written(total);
+  Progress progress(session.progress());
+  progress.start("synthesising", total, "clips");
+  parallel_for_each(total, arguments.threads, [&](int i) {
+    SynthesisOptions options = arguments.options;
+    options.index = arguments.options.index + i % arguments.count;
+    const InteractionClip clip = synthesize(tasks[i / arguments.count], options);
+    const std::string path = (std::filesystem::path(arguments.output) / (clip.id + ".npz")).string();
+    save_clip(clip, path);
+    written[i] = {{"file", path},     {"task", to_string(clip.task)}, {"seconds", clip.frames() / clip.rate_hz()},
+                  {"frames", clip.frames()}, {"sha256", sha256_file(path)}};
+    progress.advance();
+  });
+  progress.finish();
+  print(session, fmt::format("{} clips in {}", total, arguments.output), {{"clips", written}});
+}
+
+}  // namespace
+
+void add_synth(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "synth", "synthesise two-person clips of a task, or of all six",
+                                  "duet synth handshake --count 20 --seed 7 --output clips");
+  auto arguments = std::make_shared<SynthArguments>();
+  command->add_option("task", arguments->task, "hug, handshake, high_five, wave, bend, fly_kiss, or all")->required();
+  command->add_option("-o,--output", arguments->output, "folder for the clips (NPZ)")->required();
+  command->add_option("-n,--count", arguments->count, "clips of each task")->capture_default_str();
+  command->add_option("--seed", arguments->options.seed, "of everything that is drawn")->capture_default_str();
+  command->add_option("--first", arguments->options.index, "index of the first clip")->capture_default_str();
+  command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
+  const auto fixed = [&](const std::string& name, std::optional<double>& value, const std::string& what) {
+    command->add_option_function<double>(name, [&value](double v) { value = v; }, what + " (default: drawn)");
+  };
+  fixed("--height-a", arguments->options.height_a, "height of person A [m]");
+  fixed("--height-b", arguments->options.height_b, "height of person B [m]");
+  fixed("--distance", arguments->options.distance, "distance at the start [m]");
+  fixed("--angle", arguments->options.angle, "angle at which B stands off A's path [rad]");
+  fixed("--target-height", arguments->options.target_height, "height of the contact or gesture [m]");
+  fixed("--speed", arguments->options.speed, "walking speed [m/s]");
+  fixed("--style", arguments->options.style, "0 restrained to 1 expansive");
+  fixed("--duration", arguments->options.duration, "of the whole clip [s]");
+  command->add_option("--side", arguments->side, "hand of the act: left or right (default: drawn)");
+  command->callback([&session, arguments] { run_synth(session, *arguments); });
+}
+
+}  // namespace duet::cli

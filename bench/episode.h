@@ -1,0 +1,28 @@
+// One episode: what is run, and the plan of all episodes of a suite.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bench/suite.h"
+#include "motion/paired_motion.h"
+#include "results/episode_row.h"
+
+namespace duet {
+
+struct EpisodeSpec {
+  const PairedMotion* clip = nullptr;
+  std::string engine, controller, policy;
+  std::string arm = "main";          // "null" for the control arm: policy `null`
+  int episode = 0;
+  std::uint64_t seed = 0;            // of the episode, the same for every engine, controller and policy
+};
+
+// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine and controller.
+std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips);
+
+// A row with everything that is known before the episode runs, its key included.
+EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const RobotModel& robot);
+
+}  // namespace duet

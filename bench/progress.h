@@ -1,0 +1,37 @@
+// Progress on standard error: a bar with rate and time left on a terminal, plain lines otherwise, nothing when quiet. Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <mutex>
+#include <string>
+
+namespace duet {
+
+class Progress {
+ public:
+  enum class Style { kAuto, kBar, kLines, kQuiet };
+  explicit Progress(Style style = Style::kAuto);
+
+  // Starts a stage of `total` items ("retargeting", 30, "clips"); ends the stage before.
+  void start(const std::string& title, int total, const std::string& unit);
+  void advance(int items = 1);
+  // Prints the stage's last line: items, seconds, rate.
+  void finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void draw(bool last);
+  [[nodiscard]] std::string line(double elapsed) const;
+
+  Style style_;
+  std::mutex mutex_;
+  std::string title_, unit_;
+  int total_ = 0, done_ = 0;
+  bool active_ = false;
+  Clock::time_point begin_, drawn_;
+};
+
+// "4 s", "2 min 05 s", "1 h 02 min".
+std::string format_duration(double seconds);
+
+}  // namespace duet

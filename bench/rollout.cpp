@@ -1,0 +1,175 @@
+#include "bench/rollout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+
+#include "backends/factory.h"
+#include "core/digest.h"
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// The last kHistoryFrames frames, oldest first; the first one is repeated until there are enough.
+class History {
+ public:
+  void add(const ObservationFrame& frame) {
+    if (frames_.empty()) {
+      frames_.assign(kHistoryFrames, frame);
+    } else {
+      std::rotate(frames_.begin(), frames_.begin() + 1, frames_.end());
+      frames_.back() = frame;
+    }
+  }
+  [[nodiscard]] Observation at(int tick) const { return {frames_, tick}; }
+
+ private:
+  std::vector<ObservationFrame> frames_;
+};
+
+void record_tick(Recording& recording, int tick, const Backend& backend, const HumanJoints& partner,
+                 const Reference& reference, const JointCommand& command) {
+  recording.robot.push_back(backend.state());
+  recording.reference.push_back(reference);
+  recording.q_target.push_back(command.q_target);
+  if (!recording.partner.empty()) recording.partner.frame(tick) = partner;
+  for (const Contact& contact : backend.contacts()) recording.contacts.push_back({tick, contact});
+}
+
+// Contact forces of the human over one physics step.
+void add_human_contacts(const Backend& backend, Rollout& rollout) {
+  for (const Contact& contact : backend.contacts()) {
+    if (contact.side != ContactSide::kHuman) continue;
+    const double force = contact.f_W.norm();
+    rollout.contact_peak = std::max(rollout.contact_peak, force);
+    rollout.contact_impulse += force * backend.scene().dt;
+  }
+}
+
+Outcome advance(Backend& backend, const JointCommand& command, int steps, Rollout& rollout) {
+  for (int i = 0; i < steps; ++i) {
+    const Outcome outcome = backend.step(command);
+    if (outcome != Outcome::kOk) return outcome;
+    add_human_contacts(backend, rollout);
+  }
+  return has_fallen(backend.state()) ? Outcome::kFell : Outcome::kOk;
+}
+
+void trim(Recording& recording, int frames) {
+  if (!recording.partner.empty() && frames < recording.partner.frames())
+    recording.partner = recording.partner.slice(0, frames);
+}
+
+std::string describe(Outcome outcome, int tick) {
+  switch (outcome) {
+    case Outcome::kFell: return fmt::format("the robot fell at {:.2f} s", tick / kControlRate);
+    case Outcome::kDiverged: return fmt::format("the engine's state diverged at {:.2f} s", tick / kControlRate);
+    case Outcome::kTimedOut: return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kControlRate);
+    default: return "";
+  }
+}
+
+}  // namespace
+
+bool has_fallen(const RobotState& state) {
+  const double cos_tilt = (state.X_WB.R * Eigen::Vector3d::UnitZ()).z();
+  return state.X_WB.p.z() < 0.45 || cos_tilt < 0.7;
+}
+
+HumanJoints partner_joints(const PointTracks& joints, int frame) {
+  return joints.frame(std::clamp(frame, 0, joints.frames() - 1));
+}
+
+HumanJoints partner_velocities(const PointTracks& joints, int frame, double rate_hz) {
+  return (partner_joints(joints, frame + 1) - partner_joints(joints, frame)) * rate_hz;
+}
+
+Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy) {
+  const PointTracks& people = setup.clip->partner.joints;
+  const int ticks = setup.reference.motion.frames();
+  const int steps_per_tick = static_cast<int>(std::lround(1.0 / (kControlRate * backend.scene().dt)));
+  const Clock::time_point deadline =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(setup.wall_limit));
+
+  Rollout rollout;
+  Recording& recording = rollout.recording;
+  recording.task = setup.clip->task;
+  recording.phases = setup.reference.phases;
+  recording.partner = PointTracks(ticks, kSmplJoints);
+
+  backend.reset(setup.start);
+  controller.reset(setup.start);
+  policy.reset({setup.clip->task, std::string(to_string(setup.clip->task)), setup.start, &setup.reference.motion, setup.seed});
+  Scheduler scheduler;
+  scheduler.reset({setup.start.X_WB, setup.start.q});
+  History history;
+  Sha256 hash;
+  JointCommand command = backend.scene().robot->default_command(setup.start.q);
+
+  int tick = 0;
+  for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
+    const HumanJoints partner = partner_joints(people, setup.reference.clip_frame + tick);
+    const HumanJoints velocities = partner_velocities(people, setup.reference.clip_frame + tick, kControlRate);
+    history.add({partner, backend.state()});
+    if (tick % kTicksPerPlan == 0) scheduler.push(policy.act(history.at(tick)), tick);
+    const Reference& reference = scheduler.at(tick);
+    controller.act(backend.state(), reference, command);
+
+    record_tick(recording, tick, backend, partner, reference, command);
+    hash.update(backend.state());
+    backend.set_partner(partner, velocities);
+    backend.follow(reference);
+    recording.outcome = advance(backend, command, steps_per_tick, rollout);
+    if (recording.outcome == Outcome::kOk && Clock::now() > deadline) recording.outcome = Outcome::kTimedOut;
+    if (setup.stop_asked && setup.stop_asked()) {
+      rollout.interrupted = true;
+      recording.outcome = Outcome::kTimedOut;
+    }
+  }
+  trim(recording, tick);
+  recording.message = describe(recording.outcome, tick);
+  rollout.late_plans = scheduler.late_ticks();
+  rollout.state_hash = hash.hex();
+  return rollout;
+}
+
+Recording play_back(const RobotMotion& motion, const PointTracks& partner, Task task, const Phases& phases,
+                    std::shared_ptr<const RobotModel> robot) {
+  require(motion.frames() >= 2, fmt::format("playback needs 2 frames or more, found {}", motion.frames()));
+  require(partner.empty() || partner.frames() == motion.frames(),
+          fmt::format("playback: {} frames of the robot but {} of the partner", motion.frames(), partner.frames()));
+  Scene scene;
+  scene.robot = robot;
+  scene.partner = PartnerMode::kNone;
+  scene.dt = 1.0 / motion.rate_hz;
+  const std::unique_ptr<Backend> backend = make_backend("playback", scene);
+
+  Recording recording;
+  recording.task = task;
+  recording.phases = phases;
+  recording.rate_hz = motion.rate_hz;
+  recording.partner = partner;
+  RobotState start = robot->standing_state(motion.root[0]);
+  start.X_WB = motion.root[0];
+  start.q = motion.q.col(0);
+  backend->reset(start);
+  const JointCommand command = robot->default_command(start.q);
+  for (int t = 0; t < motion.frames(); ++t) {
+    const Reference reference = motion.reference(t);
+    if (t > 0) {
+      backend->follow(reference);
+      backend->step(command);
+    }
+    recording.robot.push_back(backend->state());
+    recording.reference.push_back(reference);
+    recording.q_target.push_back(reference.q);
+  }
+  return recording;
+}
+
+}  // namespace duet

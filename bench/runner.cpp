@@ -1,0 +1,191 @@
+#include "bench/runner.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+
+#include "backends/factory.h"
+#include "bench/clips.h"
+#include "bench/interrupt.h"
+#include "bench/parallel.h"
+#include "bench/scoring.h"
+#include "core/require.h"
+#include "results/environment.h"
+
+namespace duet {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+
+StartMode start_mode(const Suite& suite, bool walks) {
+  switch (suite.start) {
+    case SuiteStart::kClip: return StartMode::kClip;
+    case SuiteStart::kApproach: return StartMode::kApproach;
+    case SuiteStart::kAct: return StartMode::kAct;
+    case SuiteStart::kAuto: break;
+  }
+  return walks ? StartMode::kApproach : StartMode::kAct;
+}
+
+bool chosen(const std::vector<std::string>& filter, const std::string& name) {
+  return filter.empty() || std::find(filter.begin(), filter.end(), name) != filter.end();
+}
+
+bool selected(const RunOptions& options, const EpisodeSpec& spec) {
+  return chosen(options.engines, spec.engine) && chosen(options.controllers, spec.controller) &&
+         (spec.arm == "null" || chosen(options.policies, spec.policy)) &&
+         chosen(options.tasks, std::string(to_string(spec.clip->task)));
+}
+
+// The part of a filter that the suite does not have is a mistake of the user, not an empty run.
+void check_filter(const std::vector<std::string>& filter, const std::vector<std::string>& known, const char* kind) {
+  for (const std::string& name : filter)
+    require(std::find(known.begin(), known.end(), name) != known.end(),
+            fmt::format("the suite has no {} '{}'; it has: {}", kind, name, fmt::join(known, ", ")));
+}
+
+void check_filters(const RunOptions& options, const Suite& suite) {
+  std::vector<std::string> tasks;
+  for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
+  check_filter(options.engines, suite.engines, "engine");
+  check_filter(options.controllers, suite.controllers, "controller");
+  check_filter(options.policies, suite.policies, "policy");
+  check_filter(options.tasks, tasks, "task");
+}
+
+void check_engines(const Suite& suite) {
+  for (const EngineInfo& engine : engines()) {
+    if (!engine.available && std::find(suite.engines.begin(), suite.engines.end(), engine.name) != suite.engines.end())
+      throw MissingError(fmt::format("engine '{}' is absent: {}", engine.name, engine.reason));
+  }
+}
+
+std::string trajectory_path(const std::string& folder, const EpisodeRow& row) {
+  return (std::filesystem::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
+}
+
+bool keep_trajectory(const Suite& suite, const EpisodeRow& row) {
+  if (suite.record == RecordTrajectories::kAll) return true;
+  return suite.record == RecordTrajectories::kFailures && !row.success.value_or(false);
+}
+
+void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
+              const std::string& trajectory_folder, EpisodeRow& row) {
+  Scene scene;
+  scene.robot = robot;
+  scene.human = make_human_body(bone_lengths(spec.clip->partner));
+  scene.partner = suite.partner;
+  scene.dt = suite.dt;
+  const std::unique_ptr<Backend> backend = make_backend(spec.engine, scene);
+  const std::unique_ptr<Controller> controller = make_controller(spec.controller, robot);
+  const std::unique_ptr<Policy> policy = make_policy(spec.policy, robot);
+  row.engine_version = backend->version();
+  const RolloutSetup setup = episode_setup(spec, suite, *robot, controller->walks());
+  const Rollout rollout = roll_out(setup, *backend, *controller, *policy);
+  if (rollout.interrupted) throw EpisodeInterrupted();
+  score_rollout(rollout, setup, suite, readings_of(suite), *robot, row);
+  if (!trajectory_folder.empty() && keep_trajectory(suite, row))
+    save_recording(rollout.recording, trajectory_path(trajectory_folder, row));
+}
+
+// What stops a run early, asked between episodes and at every tick.
+class StopSign {
+ public:
+  explicit StopSign(double time_limit) : limit_(time_limit), begin_(Clock::now()) {}
+  [[nodiscard]] RunEnd end() const {
+    switch (interrupt()) {
+      case Interrupt::kInterrupted: return RunEnd::kInterrupted;
+      case Interrupt::kTerminated: return RunEnd::kTerminated;
+      case Interrupt::kNone: break;
+    }
+    const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+    return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
+  }
+
+ private:
+  double limit_;
+  Clock::time_point begin_;
+};
+
+}  // namespace
+
+RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks) {
+  AdaptationOptions options;
+  options.start = start_mode(suite, walks);
+  options.start_radius = suite.start_radius;
+  RolloutSetup setup;
+  setup.clip = spec.clip;
+  setup.reference = adapt_by_phase(spec.clip->robot, spec.clip->phases, robot, options, spec.seed);
+  setup.start = robot.standing_state(setup.reference.motion.root.front());
+  setup.seed = spec.seed;
+  setup.wall_limit = suite.wall_limit;
+  setup.stop_asked = [] { return interrupt() != Interrupt::kNone; };
+  return setup;
+}
+
+EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
+                       std::shared_ptr<const RobotModel> robot, const std::string& trajectory_folder) {
+  EpisodeRow row = row_for(spec, suite, hash, *robot);
+  row.started_at = utc_now();
+  const Clock::time_point begin = Clock::now();
+  try {
+    simulate(spec, suite, robot, trajectory_folder, row);
+  } catch (const std::exception& error) {
+    row.outcome = Outcome::kError;
+    row.message = error.what();
+    row.success = false;
+  }
+  row.wall_s = std::chrono::duration<double>(Clock::now() - begin).count();
+  return row;
+}
+
+RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
+  check_filters(options, suite);
+  check_engines(suite);
+  const std::string hash = suite_hash(suite);
+  const auto robot = std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  RunDirectory run = RunDirectory::open(
+      directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv, utc_now(), capture_environment()});
+  const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
+
+  RunSummary summary;
+  std::vector<EpisodeSpec> missing;
+  for (const EpisodeSpec& spec : plan_episodes(suite, clips)) {
+    if (!selected(options, spec)) continue;
+    ++summary.planned;
+    if (run.has(row_for(spec, suite, hash, *robot).key)) {
+      ++summary.already_there;
+    } else {
+      missing.push_back(spec);
+    }
+  }
+  const std::string trajectories =
+      suite.record == RecordTrajectories::kNone ? "" : (std::filesystem::path(directory) / "trajectories").string();
+  const StopSign stop(options.time_limit);
+  std::mutex mutex;
+  progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
+  parallel_for_each(static_cast<int>(missing.size()), options.threads, [&](int i) {
+    if (stop.end() != RunEnd::kComplete) return;
+    try {
+      const EpisodeRow row = run_episode(missing[i], suite, hash, robot, trajectories);
+      const std::lock_guard lock(mutex);
+      run.append(row);
+      ++summary.run;
+      ++summary.outcomes[std::string(to_string(row.outcome))];
+      progress.advance();
+    } catch (const EpisodeInterrupted&) {
+      return;
+    }
+  });
+  progress.finish();
+  if (summary.already_there + summary.run < summary.planned) summary.end = stop.end();
+  return summary;
+}
+
+}  // namespace duet

@@ -1,0 +1,44 @@
+// Runs a suite on all cores into a run directory: resumable, with time limits; a stopped run has lost nothing.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bench/episode.h"
+#include "bench/progress.h"
+#include "bench/rollout.h"
+#include "bench/suite.h"
+#include "results/run_directory.h"
+
+namespace duet {
+
+struct RunOptions {
+  int threads = 1;
+  double time_limit = 0.0;                         // of the whole run [s]; 0 = none
+  std::vector<std::string> engines, controllers, policies;   // where not empty: only these
+  std::vector<std::string> tasks;
+  std::vector<std::string> argv;
+};
+
+enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
+
+struct RunSummary {
+  int planned = 0, already_there = 0, run = 0;
+  std::map<std::string, int> outcomes;             // of those run now
+  RunEnd end = RunEnd::kComplete;
+};
+
+// Throws InputError (suite, clips, run directory, a full disk), MissingError (an engine that is absent), std::invalid_argument.
+RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
+
+// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`.
+RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks);
+EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
+                       std::shared_ptr<const RobotModel> robot, const std::string& trajectory_folder = "");
+
+// Thrown by run_episode when the user stopped the run: the episode leaves no row and runs again on resume.
+struct EpisodeInterrupted {};
+
+}  // namespace duet

@@ -1,0 +1,22 @@
+// From a rollout to an episode row: verdicts of the detectors, controller diagnostics, the 18 metrics of the executed motion.
+#pragma once
+
+#include "bench/rollout.h"
+#include "bench/suite.h"
+#include "metrics/readings.h"
+#include "results/episode_row.h"
+
+namespace duet {
+
+// Fills outcome, success, verdicts, metrics, contacts and hashes of `row`. Success is false for every outcome but ok.
+void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
+                   const RobotModel& robot, EpisodeRow& row);
+
+// The executed motion in the place of the retargeted one: the 18 metrics then say what the engine and the controller cost.
+PairedMotion executed_motion(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot);
+
+Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);
+
+Readings readings_of(const Suite& suite);
+
+}  // namespace duet

@@ -1,0 +1,110 @@
+#include "bench/story.h"
+
+#include <fmt/format.h>
+
+#include "bench/clips.h"
+#include "bench/parallel.h"
+#include "bench/progress.h"
+#include "bench/scoring.h"
+#include "metrics/catalogue.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+namespace {
+
+StickFigure human_figure(const std::string& label, const HumanMotion& motion, int frame) {
+  StickFigure figure{label, {}, {}};
+  for (int j = 0; j < kSmplJoints; ++j) {
+    figure.points.emplace_back(motion.joints.at(frame, j));
+    if (kSmplParents[j] >= 0) figure.bones.emplace_back(kSmplParents[j], j);
+  }
+  return figure;
+}
+
+// Links as a tree, and the virtual frames (head, hands, toes) that the card hangs on them.
+StickFigure robot_figure(const RobotModel& robot, const RobotMotion& motion, int frame) {
+  Kinematics kinematics(robot);
+  kinematics.update(motion.root[frame], motion.q.col(frame));
+  StickFigure figure{"robot", {}, {}};
+  for (size_t i = 0; i < robot.links.size(); ++i) {
+    figure.points.push_back(kinematics.p_WL(static_cast<int>(i)));
+    if (robot.links[i].parent >= 0) figure.bones.emplace_back(robot.links[i].parent, static_cast<int>(i));
+  }
+  for (const RetargetPair& pair : robot.pairs) {
+    figure.bones.emplace_back(robot.frames[pair.frame].link, static_cast<int>(figure.points.size()));
+    figure.points.push_back(kinematics.frame_position(pair.frame));
+  }
+  return figure;
+}
+
+KeyFrame key_frame(const std::string& label, const PairedMotion& motion, const RobotModel& robot, int frame) {
+  return {fmt::format("{} ({:.1f} s)", label, frame / motion.robot.rate_hz),
+          {human_figure("source", motion.source_reactor, frame), human_figure("human", motion.partner, frame),
+           robot_figure(robot, motion.robot, frame)}};
+}
+
+std::vector<MetricColumn> metric_columns() {
+  std::vector<MetricColumn> columns;
+  for (const MetricInfo& metric : metric_catalogue()) {
+    const char* direction = metric.direction == Direction::kLower    ? "lower"
+                            : metric.direction == Direction::kHigher ? "higher"
+                                                                     : "";
+    columns.push_back({std::string(metric.name), std::string(metric.title), std::string(metric.unit), direction});
+  }
+  return columns;
+}
+
+std::vector<std::string> notes_of(const Suite& suite) {
+  return {
+      fmt::format("Suite {} {}: start `{}`, partner `{}`, physics step {:g} ms, headline detector version `{}` with `{}` thresholds.",
+                  suite.name, suite.version, to_string(suite.start), to_string(suite.partner), 1000.0 * suite.dt,
+                  to_string(suite.detector), to_string(suite.thresholds)),
+      "Start `auto` means: a controller that cannot walk starts at the act position; one that walks approaches.",
+      "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the same episodes.",
+      "Episodes that fell, diverged, timed out or failed with an error count as failures.",
+  };
+}
+
+}  // namespace
+
+ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot) {
+  ClipStory story;
+  story.title = motion.clip_id;
+  story.task = to_string(motion.task);
+  const int middle = (motion.phases.act_begin + motion.phases.act_end) / 2;
+  story.frames = {key_frame("start", motion, robot, 0), key_frame("act", motion, robot, middle),
+                  key_frame("end", motion, robot, motion.frames() - 1)};
+  story.loss = motion.loss;
+  story.metrics = score.metrics;
+  return story;
+}
+
+ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int threads, Progress& progress) {
+  ReportContent content;
+  std::vector<EpisodeRow> rows;
+  for (const Run& run : runs) rows.insert(rows.end(), run.rows.begin(), run.rows.end());
+  const Suite suite = parse_suite(runs.front().info.suite_yaml, "suite.yaml");
+  content.title = fmt::format("{} {}", suite.name, suite.version);
+  content.environment = runs.front().info.environment;
+  content.notes = notes_of(suite);
+  content.entries = leaderboard(rows);
+  content.columns = metric_columns();
+  if (!with_clips) return content;
+
+  const auto robot = std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);
+  const Readings readings = readings_of(suite);
+  std::vector<ClipScore> scores(clips.size());
+  content.stories.resize(clips.size());
+  progress.start("drawing", static_cast<int>(clips.size()), "clips");
+  parallel_for_each(static_cast<int>(clips.size()), threads, [&](int i) {
+    scores[i] = score_clip(clips[i], robot, readings);
+    content.stories[i] = clip_story(clips[i], scores[i], *robot);
+    progress.advance();
+  });
+  progress.finish();
+  content.retargeting = summarize_scores(scores, readings.metrics);
+  return content;
+}
+
+}  // namespace duet

@@ -1,0 +1,19 @@
+#include "bench/version.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <vector>
+
+#include "backends/factory.h"
+
+namespace duet {
+
+std::string version_text() {
+  std::vector<std::string> parts;
+  for (const EngineInfo& engine : engines())
+    if (engine.available) parts.push_back(engine.name + (engine.version.empty() ? "" : " " + engine.version));
+  return fmt::format("duet {} ({})", kVersion, fmt::join(parts, ", "));
+}
+
+}  // namespace duet
