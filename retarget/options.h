@@ -57,4 +57,7 @@ std::vector<std::string> pair_option_names();
 void set_pair_option(PairOptions& options, const std::string& name, const std::string& value);
 std::string pair_option(const PairOptions& options, const std::string& name);
 
+// Throws std::invalid_argument naming the option: a number that is negative or not finite, no iteration at all.
+void validate(const PairOptions& options);
+
 }  // namespace duet

@@ -1,0 +1,24 @@
+// The PAIR kernel for AVX-512. Compiled with -march=x86-64-v4 (retarget/CMakeLists.txt); chosen at run time.
+#include <immintrin.h>
+
+#include "retarget/kernel_types.h"
+
+namespace duet::pair_kernel {
+namespace {
+
+constexpr int kWidth = 16;
+typedef float V __attribute__((vector_size(4 * kWidth)));
+typedef int VI __attribute__((vector_size(4 * kWidth)));
+
+inline V square_root(V x) { return _mm512_maskz_sqrt_ps(0xffff, x); }
+
+}  // namespace
+}  // namespace duet::pair_kernel
+
+#include "retarget/kernel_body.h"
+
+namespace duet::pair_kernel {
+
+void sweep_v4(const Sweep& sweep) { sweep_blocks(sweep); }
+
+}  // namespace duet::pair_kernel

@@ -1,0 +1,164 @@
+#include "retarget/pair.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/skeleton.h"
+#include "retarget/gaussian_filter.h"
+#include "retarget/pair_kernel.h"
+#include "retarget/pair_problem.h"
+#include "retarget/pair_solver.h"
+
+namespace duet {
+
+namespace {
+
+constexpr double kRate = 50.0;  // supplement A.1.1
+
+int scaled_frame(int frame, double ratio, int frames) {
+  return std::clamp(static_cast<int>(std::lround(frame * ratio)), 0, frames);
+}
+
+// Phases and contact windows keep their instants.
+InteractionClip at_50_hz(const InteractionClip& clip) {
+  if (clip.rate_hz() == kRate) return clip;
+  InteractionClip out = clip;
+  out.a = resample(clip.a, kRate);
+  out.b = resample(clip.b, kRate);
+  const double ratio = kRate / clip.rate_hz();
+  out.phases.act_begin = scaled_frame(clip.phases.act_begin, ratio, out.frames());
+  out.phases.act_end = scaled_frame(clip.phases.act_end, ratio, out.frames());
+  for (ContactWindow& window : out.contacts) {
+    window.begin = scaled_frame(window.begin, ratio, out.frames());
+    window.end = scaled_frame(window.end, ratio, out.frames());
+  }
+  return out;
+}
+
+RobotMotion robot_motion(const RobotModel& robot, const PairProblem& problem, const PairOptions& options,
+                         const PairVariables& x) {
+  const int dof = problem.chain.dof();
+  RobotMotion motion;
+  motion.rate_hz = kRate;
+  for (const RobotJoint& joint : robot.joints) motion.joint_names.push_back(joint.name);
+  motion.q = x.frames.topRows(dof);
+  if (options.filter) motion.q = gaussian_filter(motion.q);
+  for (int j = 0; j < dof; ++j) {  // a float's limit may lie an ulp outside
+    motion.q.row(j) = motion.q.row(j).cwiseMax(problem.chain.joints[j].lower).cwiseMin(problem.chain.joints[j].upper);
+  }
+  for (int t = 0; t < problem.frames(); ++t) {
+    Eigen::Quaterniond R(root_rotation(problem.yaw[t], x.frames.col(t).segment<3>(dof)));
+    R.normalize();
+    if (t > 0 && R.dot(motion.root.back().R) < 0.0) R.coeffs() = -R.coeffs();
+    motion.root.push_back({R, problem.root.col(t) + x.offset + x.frames.col(t).tail<3>()});
+  }
+  return motion;
+}
+
+// Turns the rotation of each joint whose bone moved by the smallest rotation that carries the old bone to the new.
+void turn_bones(const HumanMotion& source, HumanMotion& adapted) {
+  constexpr std::array<std::array<int, 2>, 6> kBones = {{{kLeftCollar, kLeftShoulder},
+                                                         {kRightCollar, kRightShoulder},
+                                                         {kLeftShoulder, kLeftElbow},
+                                                         {kRightShoulder, kRightElbow},
+                                                         {kLeftElbow, kLeftWrist},
+                                                         {kRightElbow, kRightWrist}}};
+  for (int t = 0; t < source.frames(); ++t) {
+    for (const auto& [joint, child] : kBones) {
+      const Eigen::Vector3d before = source.joints.at(t, child) - source.joints.at(t, joint);
+      const Eigen::Vector3d after = adapted.joints.at(t, child) - adapted.joints.at(t, joint);
+      Eigen::Quaterniond& R = adapted.rotations[static_cast<std::size_t>(t) * kSmplJoints + joint];
+      R = (Eigen::Quaterniond::FromTwoVectors(before, after) * R).normalized();
+    }
+  }
+}
+
+HumanMotion adapted_partner(const HumanMotion& source, int dof, const PairOptions& options, const PairVariables& x) {
+  HumanMotion adapted = source;
+  if (!options.adapt_human) return adapted;
+  for (int t = 0; t < source.frames(); ++t) {
+    for (int joint = 0; joint < kSmplJoints; ++joint) {
+      const int offset = human_offset_of(joint);
+      if (offset >= 0) adapted.joints.at(t, joint) += x.frames.col(t).segment<3>(dof + 3 + 3L * offset);
+    }
+  }
+  if (!adapted.rotations.empty()) turn_bones(source, adapted);
+  return adapted;
+}
+
+std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solution) {
+  std::map<std::string, std::vector<double>> curves;
+  curves["total"] = solution.total;
+  for (const PairTerms& terms : solution.terms) {
+    curves["kin"].push_back(terms.kin);
+    curves["con"].push_back(terms.con);
+    curves["hum"].push_back(terms.hum);
+    curves["temp"].push_back(terms.temp);
+    curves["pose"].push_back(terms.pose);
+  }
+  return curves;
+}
+
+std::map<std::string, std::string> describe(const InteractionClip& clip, const RobotModel& robot,
+                                            const PairOptions& options, KernelKind used) {
+  std::map<std::string, std::string> settings;
+  for (const std::string& name : pair_option_names()) settings[name] = pair_option(options, name);
+  settings["kernel-used"] = to_string(used);
+  settings["robot"] = robot.name;
+  settings["robot-digest"] = robot.digest;
+  settings["source-rate-hz"] = fmt::format("{}", clip.rate_hz());
+  return settings;
+}
+
+}  // namespace
+
+PairedMotion retarget(const InteractionClip& clip, const RobotModel& robot, const PairOptions& options) {
+  validate(clip);
+  validate(options);
+  const InteractionClip resampled = at_50_hz(clip);
+  const PairProblem problem = make_pair_problem(resampled, robot, options);
+  const PairSolution solution = solve_pair(problem, options);
+
+  PairedMotion out;
+  out.clip_id = clip.id;
+  out.task = clip.task;
+  out.phases = resampled.phases;
+  out.reactor = clip.reactor;
+  out.robot = robot_motion(robot, problem, options, solution.x);
+  out.source_partner = resampled.actor_motion();
+  out.source_reactor = resampled.reactor_motion();
+  out.partner = adapted_partner(out.source_partner, problem.chain.dof(), options, solution.x);
+  out.reshaped = problem.targets;
+  out.loss = loss_curves(solution);
+  out.settings = describe(clip, robot, options, solution.kernel);
+  return out;
+}
+
+std::vector<KernelKind> available_kernels() {
+  std::vector<KernelKind> kernels;
+  for (const KernelKind kind : {KernelKind::kV4, KernelKind::kV3, KernelKind::kV2}) {
+    if (kernel_runs_here(kind)) kernels.push_back(kind);
+  }
+  kernels.push_back(KernelKind::kScalar);
+  return kernels;
+}
+
+std::string_view to_string(KernelKind kernel) {
+  switch (kernel) {
+    case KernelKind::kScalar:
+      return "scalar";
+    case KernelKind::kV2:
+      return "v2";
+    case KernelKind::kV3:
+      return "v3";
+    case KernelKind::kV4:
+      return "v4";
+    default:
+      return "auto";
+  }
+}
+
+}  // namespace duet

@@ -1,0 +1,150 @@
+#include "retarget/pair_chain.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+
+#include "core/require.h"
+#include "core/skeleton.h"
+
+namespace duet {
+
+namespace {
+
+bool is_hand(int smpl) { return smpl == kLeftHand || smpl == kRightHand; }
+
+void check_pairs(const RobotModel& robot) {
+  require(robot.pairs.size() == kRetargetPairs,
+          fmt::format("robot '{}': expected the 16 retarget pairs of A.1.1, found {}", robot.name, robot.pairs.size()));
+  require(robot.pairs.front().smpl == kPelvis,
+          fmt::format("robot '{}': expected the pelvis as the first retarget pair, found SMPL joint {}", robot.name,
+                      robot.pairs.front().smpl));
+  for (int i = 0; i < kRetargetPairs; ++i) {
+    const RetargetPair& pair = robot.pairs[i];
+    const bool inside = pair.frame >= 0 && pair.frame < static_cast<int>(robot.frames.size()) && pair.smpl >= 0 &&
+                        pair.smpl < kSmplJoints;
+    require(inside, fmt::format("robot '{}': retarget pair {} names frame {} and SMPL joint {}, which do not exist",
+                                robot.name, i, pair.frame, pair.smpl));
+    for (int k = 0; k < i; ++k) {
+      require(robot.pairs[k].smpl != pair.smpl,
+              fmt::format("robot '{}': retarget pairs {} and {} name the same SMPL joint", robot.name, k, i));
+    }
+  }
+}
+
+void check_links(const RobotModel& robot) {
+  require(robot.links.size() == robot.joints.size() + 1,
+          fmt::format("robot '{}': expected one link more than joints, found {} links and {} joints", robot.name,
+                      robot.links.size(), robot.joints.size()));
+  for (std::size_t i = 1; i < robot.links.size(); ++i) {
+    const int parent = robot.links[i].parent;
+    require(parent >= 0 && parent < static_cast<int>(i),
+            fmt::format("robot '{}': link '{}' comes before its parent", robot.name, robot.links[i].name));
+  }
+}
+
+// A rotation after which the hinge axis is a coordinate axis: the identity where it already is one.
+Eigen::Matrix3d align_axis(const Eigen::Vector3d& axis, int& index) {
+  for (index = 0; index < 3; ++index) {
+    if (axis == Eigen::Vector3d(Eigen::Vector3d::Unit(index))) return Eigen::Matrix3d::Identity();
+  }
+  index = 2;
+  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+}
+
+// `turns[l]`: rotation of the chain's frame of link l in the model's.
+std::vector<ChainJoint> make_joints(const RobotModel& robot, std::vector<Eigen::Matrix3d>& turns) {
+  turns.assign(robot.links.size(), Eigen::Matrix3d::Identity());
+  std::vector<ChainJoint> joints;
+  for (std::size_t i = 1; i < robot.links.size(); ++i) {
+    const RobotLink& link = robot.links[i];
+    ChainJoint joint;
+    joint.parent = link.parent;
+    turns[i] = align_axis(link.axis, joint.axis);
+    joint.offset = turns[link.parent].transpose() * link.X_PL.p;
+    joint.rotation = turns[link.parent].transpose() * link.X_PL.R.toRotationMatrix() * turns[i];
+    joint.turned = joint.rotation != Eigen::Matrix3d::Identity();
+    joint.lower = robot.joints[i - 1].lower;
+    joint.upper = robot.joints[i - 1].upper;
+    require(joint.lower <= joint.upper, fmt::format("robot '{}': joint '{}' has its lower limit above its upper",
+                                                    robot.name, robot.joints[i - 1].name));
+    joints.push_back(joint);
+  }
+  return joints;
+}
+
+struct FrameAndJoint {
+  int frame = 0;
+  int smpl = 0;
+};
+
+std::vector<FrameAndJoint> choose_keypoints(const RobotModel& robot, ContactKeypoints choice) {
+  std::vector<FrameAndJoint> chosen;
+  for (const Keypoint& key : robot.keypoints) {
+    if (choice != ContactKeypoints::kSeven || !is_hand(key.smpl)) chosen.push_back({key.frame, key.smpl});
+  }
+  if (choice == ContactKeypoints::kEleven) {
+    for (const RetargetPair& pair : robot.pairs) {
+      if (pair.smpl == kLeftHip || pair.smpl == kRightHip) chosen.push_back({pair.frame, pair.smpl});
+    }
+  }
+  const int expected = choice == ContactKeypoints::kSeven ? 7 : choice == ContactKeypoints::kNine ? 9 : 11;
+  require(static_cast<int>(chosen.size()) == expected,
+          fmt::format("robot '{}': expected {} interaction keypoints (head, shoulders, elbows, wrists, ...), found {}",
+                      robot.name, expected, chosen.size()));
+  for (const FrameAndJoint& key : chosen) {
+    const bool inside =
+        key.frame >= 0 && key.frame < static_cast<int>(robot.frames.size()) && key.smpl >= 0 && key.smpl < kSmplJoints;
+    require(inside, fmt::format("robot '{}': a keypoint names frame {} and SMPL joint {}, which do not exist",
+                                robot.name, key.frame, key.smpl));
+  }
+  return chosen;
+}
+
+}  // namespace
+
+PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints) {
+  check_links(robot);
+  check_pairs(robot);
+  std::vector<Eigen::Matrix3d> turns;
+  PairChain chain;
+  chain.joints = make_joints(robot, turns);
+
+  std::vector<int> point_of_frame(robot.frames.size(), -1);
+  const auto point = [&](int frame) {
+    if (point_of_frame[frame] >= 0) return point_of_frame[frame];
+    const RobotFrame& f = robot.frames[frame];
+    chain.points.push_back({f.link, turns.at(f.link).transpose() * f.X_LF.p});
+    return point_of_frame[frame] = static_cast<int>(chain.points.size()) - 1;
+  };
+  for (const RetargetPair& pair : robot.pairs) chain.pair_points.push_back(point(pair.frame));
+  for (const FrameAndJoint& key : choose_keypoints(robot, keypoints)) {
+    chain.key_points.push_back(point(key.frame));
+    chain.key_smpl.push_back(key.smpl);
+  }
+  return chain;
+}
+
+void forward(const PairChain& chain, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& p_WB,
+             const Eigen::Ref<const Eigen::VectorXd>& q, ChainPose& pose) {
+  const std::size_t links = chain.joints.size() + 1;
+  pose.R_WL.resize(links);
+  pose.p_WL.resize(links);
+  pose.points.resize(3, static_cast<Eigen::Index>(chain.points.size()));
+  pose.R_WL[0] = R_WB;
+  pose.p_WL[0] = p_WB;
+  for (std::size_t j = 0; j + 1 < links; ++j) {
+    const ChainJoint& joint = chain.joints[j];
+    const Eigen::Matrix3d& R_WP = pose.R_WL[joint.parent];
+    const Eigen::Matrix3d R_at_zero = R_WP * joint.rotation;
+    pose.p_WL[j + 1] = pose.p_WL[joint.parent] + R_WP * joint.offset;
+    pose.R_WL[j + 1] =
+        R_at_zero * Eigen::AngleAxisd(q[static_cast<Eigen::Index>(j)], Eigen::Vector3d::Unit(joint.axis));
+  }
+  for (std::size_t k = 0; k < chain.points.size(); ++k) {
+    const ChainPoint& point = chain.points[k];
+    pose.points.col(static_cast<Eigen::Index>(k)) = pose.p_WL[point.link] + pose.R_WL[point.link] * point.offset;
+  }
+}
+
+}  // namespace duet

@@ -1,0 +1,55 @@
+// The robot as PAIR's solvers see it: a tree of hinges whose axes are coordinate axes, and the points of it that enter
+// the objective. Built once per robot; immutable.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "retarget/options.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+inline constexpr int kRetargetPairs = 16;  // supplement A.1.1
+
+// Joint j moves link j + 1; link 0 is the base.
+struct ChainJoint {
+  int parent = 0;                                          // link
+  int axis = 2;                                            // of the link's own frame: 0 x, 1 y, 2 z
+  bool turned = false;                                     // `rotation` is not the identity
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();        // of the link in its parent [m]
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  // of the link in its parent at q = 0
+  double lower = 0.0, upper = 0.0;                         // [rad]
+};
+
+struct ChainPoint {
+  int link = 0;
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // in the link [m]
+};
+
+struct PairChain {
+  std::vector<ChainJoint> joints;
+  std::vector<ChainPoint> points;
+  std::vector<int> pair_points;  // index in points per retarget pair, 16
+  std::vector<int> key_points;   // index in points per interaction keypoint, K
+  std::vector<int> key_smpl;     // the SMPL-24 joint of each keypoint, K
+
+  [[nodiscard]] int dof() const { return static_cast<int>(joints.size()); }
+  [[nodiscard]] int keys() const { return static_cast<int>(key_points.size()); }
+};
+
+struct ChainPose {
+  std::vector<Eigen::Matrix3d> R_WL;
+  std::vector<Eigen::Vector3d> p_WL;
+  Eigen::Matrix3Xd points;  // (3, points) [m], W
+};
+
+// Throws std::invalid_argument: a robot without the 16 pairs (the pelvis first), without keypoints, without hands or
+// hips where `keypoints` asks for them, or with indices out of range.
+PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints);
+
+// Poses of all links and points. `pose` is resized where it must be.
+void forward(const PairChain& chain, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& p_WB,
+             const Eigen::Ref<const Eigen::VectorXd>& q, ChainPose& pose);
+
+}  // namespace duet

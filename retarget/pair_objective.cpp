@@ -1,0 +1,211 @@
+#include "retarget/pair_objective.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace duet {
+
+namespace {
+
+// exp of a rotation vector and the coefficients of its left Jacobian J = a I + b [w]x + c w w^T.
+struct RotationMap {
+  double a = 1.0, b = 0.5, c = 1.0 / 6.0;
+};
+
+RotationMap rotation_map(const Eigen::Vector3d& w) {
+  const double square = w.squaredNorm();
+  if (square < 1e-8) return {1.0 - square / 6.0, 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0};
+  const double angle = std::sqrt(square);
+  const double a = std::sin(angle) / angle;
+  return {a, (1.0 - std::cos(angle)) / square, (1.0 - a) / square};
+}
+
+// Everything about one frame that its terms and their gradients share.
+struct FrameWork {
+  ChainPose pose;
+  Eigen::Matrix3Xd point_force;  // d objective / d point
+  Eigen::Matrix3Xd keys;         // 2 K keypoints, robot's first
+  Eigen::Matrix3Xd key_force;
+  std::vector<Eigen::Vector3d> force, moment;  // per link, about the world's origin
+};
+
+struct Scales {
+  PairWeights weights;
+  ContactFactors contact;
+  KinLoss kin_loss = KinLoss::kSquared;
+  double frames = 1.0;
+};
+
+double kin_term(const PairProblem& problem, const Scales& s, int t, FrameWork& work) {
+  double sum = 0.0;
+  for (int i = 0; i < kRetargetPairs; ++i) {
+    const int point = problem.chain.pair_points[i];
+    const Eigen::Vector3d d = work.pose.points.col(point) - problem.targets.at(t, i);
+    if (s.kin_loss == KinLoss::kSquared) {
+      sum += d.squaredNorm() / s.frames;
+      work.point_force.col(point) += 2.0 * s.weights.kin / s.frames * d;
+    } else {
+      const double norm = std::sqrt(d.squaredNorm() + kDistanceGuard);
+      const double share = 1.0 / (kRetargetPairs * s.frames);
+      sum += share * norm;
+      work.point_force.col(point) += s.weights.kin * share / norm * d;
+    }
+  }
+  return sum;
+}
+
+double con_term(const PairProblem& problem, const Scales& s, int t, FrameWork& work) {
+  const int keys = problem.chain.keys();
+  double sum = 0.0;
+  Eigen::Index row = 0;
+  work.key_force.setZero(3, 2L * keys);
+  for (int i = 0; i < 2 * keys; ++i) {
+    for (int j = i + 1; j < 2 * keys; ++j, ++row) {
+      const double factor = (j < keys ? s.contact.robot : i < keys ? s.contact.cross : s.contact.human) * s.contact.all;
+      if (factor == 0.0) continue;
+      const Eigen::Vector3d d = work.keys.col(i) - work.keys.col(j);
+      const double distance = std::sqrt(d.squaredNorm() + kDistanceGuard);
+      const double error = distance - problem.distances(row, t);
+      sum += 2.0 * factor / s.frames * error * error;  // both triangles of the matrix
+      const Eigen::Vector3d force = 4.0 * s.weights.con * factor / s.frames * error / distance * d;
+      work.key_force.col(i) += force;
+      work.key_force.col(j) -= force;
+    }
+  }
+  return sum;
+}
+
+void place_keypoints(const PairProblem& problem, int t, const Eigen::Ref<const Eigen::VectorXd>& x, FrameWork& work) {
+  const int keys = problem.chain.keys();
+  const int first = problem.chain.dof() + 3;
+  work.keys.resize(3, 2L * keys);
+  for (int k = 0; k < keys; ++k) {
+    work.keys.col(k) = work.pose.points.col(problem.chain.key_points[k]);
+    work.keys.col(keys + k) = problem.human.at(t, k);
+    const int offset = problem.human_offset[k];
+    if (offset >= 0) work.keys.col(keys + k) += x.segment<3>(first + 3 * offset);
+  }
+}
+
+// Pulls forces on points back to joints, root rotation and root position.
+void pull_back(const PairProblem& problem, const Eigen::Vector3d& w, FrameWork& work, Eigen::Ref<Eigen::VectorXd> g,
+               Eigen::Vector3d& root_force) {
+  const PairChain& chain = problem.chain;
+  work.force.assign(chain.joints.size() + 1, Eigen::Vector3d::Zero());
+  work.moment.assign(chain.joints.size() + 1, Eigen::Vector3d::Zero());
+  for (std::size_t k = 0; k < chain.points.size(); ++k) {
+    const Eigen::Vector3d force = work.point_force.col(static_cast<Eigen::Index>(k));
+    const Eigen::Vector3d p = work.pose.points.col(static_cast<Eigen::Index>(k));
+    work.force[chain.points[k].link] += force;
+    work.moment[chain.points[k].link] += p.cross(force);
+  }
+  for (int j = chain.dof() - 1; j >= 0; --j) {
+    const ChainJoint& joint = chain.joints[j];
+    const Eigen::Vector3d axis = work.pose.R_WL[j + 1].col(joint.axis);
+    const Eigen::Vector3d& p = work.pose.p_WL[j + 1];
+    g[j] += axis.dot(work.moment[j + 1] - p.cross(work.force[j + 1]));
+    work.force[joint.parent] += work.force[j + 1];
+    work.moment[joint.parent] += work.moment[j + 1];
+  }
+  root_force = work.force[0];
+  const Eigen::Vector3d torque = work.moment[0] - work.pose.p_WL[0].cross(root_force);
+  const RotationMap map = rotation_map(w);
+  g.segment<3>(chain.dof()) += map.a * torque - map.b * w.cross(torque) + map.c * w.dot(torque) * w;
+}
+
+// kin, con, hum and pose of one frame; their gradient is added to that frame's column.
+PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, const Scales& s, const PairVariables& x,
+                      int t, FrameWork& work, PairVariables* gradient) {
+  const int dof = problem.chain.dof();
+  const int keys = problem.chain.keys();
+  const Eigen::VectorXd column = x.frames.col(t);
+  const Eigen::Vector3d w = column.segment<3>(dof);
+  const Eigen::Vector3d p_WB = problem.root.col(t) + x.offset + column.tail<3>();
+  forward(problem.chain, root_rotation(problem.yaw[t], w), p_WB, column.head(dof), work.pose);
+  work.point_force.setZero(3, work.pose.points.cols());
+  place_keypoints(problem, t, column, work);
+
+  PairTerms terms;
+  terms.kin = kin_term(problem, s, t, work);
+  terms.con = con_term(problem, s, t, work);
+  const auto offsets = column.segment<3 * kHumanOffsets>(dof + 3);
+  terms.hum = offsets.squaredNorm() / s.frames;
+  terms.pose = column.head(dof).squaredNorm() / (s.frames * dof);
+  if (gradient == nullptr) return terms;
+
+  Eigen::VectorXd g = Eigen::VectorXd::Zero(column.size());
+  g.head(dof) = 2.0 * s.weights.pose / (s.frames * dof) * column.head(dof);
+  for (int k = 0; k < keys; ++k) work.point_force.col(problem.chain.key_points[k]) += work.key_force.col(k);
+  Eigen::Vector3d root_force;
+  pull_back(problem, w, work, g, root_force);
+  if (options.adapt_human) {
+    g.segment<3 * kHumanOffsets>(dof + 3) = 2.0 * s.weights.hum / s.frames * offsets;
+    for (int k = 0; k < keys; ++k) {
+      const int offset = problem.human_offset[k];
+      if (offset >= 0) g.segment<3>(dof + 3 + 3L * offset) += work.key_force.col(keys + k);
+    }
+  }
+  if (options.root_translation == RootTranslation::kPerFrame) g.tail<3>() = root_force;
+  if (options.root_translation == RootTranslation::kConstantOffset) gradient->offset += root_force;
+  gradient->frames.col(t) += g;
+  return terms;
+}
+
+double temporal_term(const PairProblem& problem, const PairWeights& weights, const PairVariables& x,
+                     PairVariables* gradient) {
+  const int dof = problem.chain.dof();
+  const Eigen::Index frames = x.frames.cols();
+  const auto q = x.frames.topRows(dof);
+  const Eigen::MatrixXd v = q.rightCols(frames - 1) - q.leftCols(frames - 1);
+  const Eigen::MatrixXd a = v.rightCols(frames - 2) - v.leftCols(frames - 2);
+  const double per_v = 1.0 / static_cast<double>(frames - 1);
+  const double per_a = weights.acceleration / static_cast<double>(frames - 2);
+  if (gradient != nullptr) {
+    auto g = gradient->frames.topRows(dof);
+    const double gv = 2.0 * weights.temp * per_v;
+    const double ga = 2.0 * weights.temp * per_a;
+    g.rightCols(frames - 1) += gv * v;
+    g.leftCols(frames - 1) -= gv * v;
+    g.rightCols(frames - 2) += ga * a;
+    g.middleCols(1, frames - 2) -= 2.0 * ga * a;
+    g.leftCols(frames - 2) += ga * a;
+  }
+  return per_v * v.squaredNorm() + per_a * a.squaredNorm();
+}
+
+}  // namespace
+
+ContactFactors contact_factors(const PairOptions& options, int keys) {
+  ContactFactors f;
+  if (options.contact_blocks != ContactBlocks::kFull) f.robot = 0.0;
+  if (options.contact_blocks == ContactBlocks::kCross) f.human = 0.0;
+  if (options.contact_reduction == ContactReduction::kMean) f.all = 1.0 / (4.0 * keys * keys);
+  return f;
+}
+
+PairTerms evaluate(const PairProblem& problem, const PairOptions& options, const PairWeights& weights,
+                   const PairVariables& x, PairVariables* gradient) {
+  const Scales scales{weights, contact_factors(options, problem.chain.keys()), options.kin_loss,
+                      static_cast<double>(problem.frames())};
+  if (gradient != nullptr) *gradient = PairVariables::zero(problem.chain.dof(), problem.frames());
+  PairTerms sum;
+  FrameWork work;
+  for (int t = 0; t < problem.frames(); ++t) {
+    const PairTerms terms = frame_terms(problem, options, scales, x, t, work, gradient);
+    sum.kin += terms.kin;
+    sum.con += terms.con;
+    sum.hum += terms.hum;
+    sum.pose += terms.pose;
+  }
+  sum.temp = temporal_term(problem, weights, x, gradient);
+  return sum;
+}
+
+Eigen::Matrix3d root_rotation(double yaw, const Eigen::Vector3d& rotation_vector) {
+  const double angle = rotation_vector.norm();
+  const Eigen::Matrix3d heading = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  if (angle < 1e-12) return heading;
+  return Eigen::AngleAxisd(angle, rotation_vector / angle).toRotationMatrix() * heading;
+}
+
+}  // namespace duet

@@ -1,0 +1,47 @@
+// One PAIR optimisation, ready to be solved: what stays constant (PairProblem) and what is sought (PairVariables).
+// The same values feed the double reference, the SIMD kernels and the libtorch peer.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/point_tracks.h"
+#include "motion/interaction_clip.h"
+#include "retarget/options.h"
+#include "retarget/pair_chain.h"
+
+namespace duet {
+
+inline constexpr int kHumanOffsets = 6;          // shoulders, elbows, wrists; left before right
+inline constexpr double kDistanceGuard = 1e-12;  // [m^2] added to squared distances, so that their root has a slope
+
+struct PairProblem {
+  PairChain chain;
+  Eigen::VectorXd yaw;            // heading of the source person per frame [rad]: R_WB before optimisation
+  Eigen::Matrix3Xd root;          // p_WB before optimisation, (3, T): the reshaped pelvis [m]
+  PointTracks targets;            // (T, 16, 3): Reshaped(H_s)
+  PointTracks human;              // (T, K, 3): keypoints of the original partner
+  std::vector<int> human_offset;  // per keypoint of the partner: which of the 6 offsets moves it, -1 for none
+  Eigen::MatrixXd distances;      // (pairs i < j of the 2 K keypoints, robot's first, row by row; T): D_orig [m]
+
+  [[nodiscard]] int frames() const { return static_cast<int>(yaw.size()); }
+};
+
+// Rows of PairVariables::frames: q | rotation vector of the root | human offsets, 3 each | translation of the root.
+struct PairVariables {
+  Eigen::MatrixXd frames;                            // (dof + 24, T)
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // of the root, the same in all frames [m]
+
+  [[nodiscard]] static PairVariables zero(int dof, int frames) {
+    return {Eigen::MatrixXd::Zero(dof + 6 + 3 * kHumanOffsets, frames), Eigen::Vector3d::Zero()};
+  }
+};
+
+// Offset of a joint of the partner: 0..5, or -1 for a joint that stays. Hands follow wrists.
+int human_offset_of(int smpl);
+
+// `clip` must be valid and at 50 Hz. Throws std::invalid_argument for fewer than 5 frames and for what make_chain,
+// reshape and heading refuse; InputError for a broken SMPL file.
+PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& robot, const PairOptions& options);
+
+}  // namespace duet
