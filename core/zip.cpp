@@ -93,6 +93,7 @@ std::string read_source(zip_source_t* source) {
 
 void read_zip(std::string_view bytes, const std::string& name, std::size_t limit,
               const std::function<void(const std::string& entry, const std::string& content)>& take) {
+  if (bytes.empty()) fail(name, "empty, expected a zip archive");  // libzip takes it for an archive of nothing
   const Archive archive = open_archive(bytes, name);
   const zip_int64_t count = zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < count; ++i) {

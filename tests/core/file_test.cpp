@@ -1,0 +1,189 @@
+#include "core/file.h"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <fstream>
+#include <vector>
+
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::ScratchFolder;
+using test::thrown_message;
+
+// While it lives no file of this process may grow above `bytes`: writes beyond fail with EFBIG, as a full disk's do
+// with ENOSPC.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit limit{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  void (*handler_)(int);
+  rlimit old_{};
+};
+
+std::vector<std::string> names_in(const ScratchFolder& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "")) names.push_back(entry.path().filename());
+  return names;
+}
+
+TEST(ReadFile, ReturnsEveryByte) {
+  const ScratchFolder folder;
+  std::string bytes;
+  for (int i = 0; i < 300000; ++i) bytes += static_cast<char>(i * 7);
+  write_file(folder / "bytes", bytes);
+  EXPECT_EQ(read_file(folder / "bytes"), bytes);
+  write_file(folder / "empty", "");
+  EXPECT_EQ(read_file(folder / "empty"), "");
+}
+
+TEST(ReadFile, NamesPathAndReason) {
+  const ScratchFolder folder;
+  EXPECT_EQ(thrown_message<InputError>([&] { read_file(folder / "x.bvh"); }),
+            "cannot read '" + (folder / "x.bvh") + "': No such file or directory");
+  EXPECT_EQ(thrown_message<InputError>([&] { read_file(folder / ""); }),
+            "cannot read '" + (folder / "") + "': Is a directory");
+}
+
+TEST(WriteFile, CreatesParentsAndLeavesNoTemporaryFile) {
+  const ScratchFolder folder;
+  write_file(folder / "a/b/c.json", "1");
+  write_file(folder / "a/b/c.json", "2");
+  EXPECT_EQ(read_file(folder / "a/b/c.json"), "2");
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "a/b")) count += entry.exists() ? 1 : 0;
+  EXPECT_EQ(count, 1);
+}
+
+TEST(WriteFile, WorksWithoutAFolderInThePath) {
+  const ScratchFolder folder;
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder / "");
+  write_file("plain.txt", "x");
+  std::filesystem::current_path(before);
+  EXPECT_EQ(read_file(folder / "plain.txt"), "x");
+}
+
+TEST(WriteFile, FullDiskLeavesTheOldFileAndNoTemporaryFile) {
+  const ScratchFolder folder;
+  write_file(folder / "run.json", "old");
+  std::string message;
+  {
+    const FileSizeLimit limit(1000);
+    message = thrown_message<InputError>([&] { write_file(folder / "run.json", std::string(5000, 'x')); });
+  }
+  EXPECT_EQ(message, "cannot write '" + (folder / "run.json") + "': File too large");
+  EXPECT_EQ(read_file(folder / "run.json"), "old");
+  EXPECT_EQ(names_in(folder), std::vector<std::string>{"run.json"});
+}
+
+TEST(WriteFile, FullDiskLeavesNothingOfANewFile) {
+  const ScratchFolder folder;
+  {
+    const FileSizeLimit limit(1000);
+    EXPECT_THROW(write_file(folder / "new.json", std::string(5000, 'x')), InputError);
+  }
+  EXPECT_TRUE(names_in(folder).empty());
+}
+
+TEST(WriteFile, WritesToADeviceInsteadOfReplacingIt) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "not run: /dev/full absent";
+  EXPECT_EQ(thrown_message<InputError>([] { write_file("/dev/full", "x"); }),
+            "cannot write '/dev/full': No space left on device");
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
+TEST(WriteFile, NamesPathAndReason) {
+  const ScratchFolder folder;
+  write_file(folder / "file", "x");
+  EXPECT_EQ(thrown_message<InputError>([&] { write_file(folder / "file/y", "1"); }),
+            "cannot write '" + (folder / "file/y") + "': Not a directory");
+  std::filesystem::create_directory(folder / "d");
+  EXPECT_EQ(thrown_message<InputError>([&] { write_file(folder / "d", "1"); }),
+            "cannot write '" + (folder / "d") + "': Is a directory");
+}
+
+TEST(WriteFile, KeepsPermissionsAndLinks) {
+  const ScratchFolder folder;
+  write_file(folder / "file", "old");
+  ASSERT_EQ(chmod((folder / "file").c_str(), 0640), 0);
+  std::filesystem::create_symlink("file", folder / "link");
+  write_file(folder / "link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "file"), "new");
+  struct stat status {};
+  ASSERT_EQ(stat((folder / "file").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0640u);
+}
+
+TEST(LineAppender, EachLineIsThereWhenAppendReturns) {
+  const ScratchFolder folder;
+  LineAppender lines(folder / "runs/episodes.jsonl");
+  EXPECT_EQ(read_file(folder / "runs/episodes.jsonl"), "");
+  lines.append("{\"a\":1}");
+  EXPECT_EQ(read_file(folder / "runs/episodes.jsonl"), "{\"a\":1}\n");
+  lines.append("");
+  EXPECT_EQ(read_file(folder / "runs/episodes.jsonl"), "{\"a\":1}\n\n");
+}
+
+TEST(LineAppender, ContinuesAndCutsAPartOfALine) {
+  const ScratchFolder folder;
+  const std::string part(10000, 'x');  // longer than one block of the search for the last newline
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", ""}, {"one\n", "one\n"}, {"one\ntw", "one\n"}, {"tw", ""}, {"one\ntwo\n" + part, "one\ntwo\n"}, {part, ""}};
+  for (const auto& [before, kept] : cases) {
+    write_file(folder / "lines", before);
+    LineAppender(folder / "lines").append("next");
+    EXPECT_EQ(read_file(folder / "lines"), kept + "next\n");
+  }
+}
+
+TEST(LineAppender, CutsALineThatTheDiskDidNotTakeWhole) {
+  const ScratchFolder folder;
+  LineAppender lines(folder / "lines");
+  lines.append("first");
+  std::string message;
+  {
+    const FileSizeLimit limit(100);
+    message = thrown_message<InputError>([&] { lines.append(std::string(500, 'x')); });
+    EXPECT_EQ(read_file(folder / "lines"), "first\n");
+  }
+  EXPECT_EQ(message, "cannot write '" + (folder / "lines") + "': File too large");
+  lines.append("second");
+  EXPECT_EQ(read_file(folder / "lines"), "first\nsecond\n");
+}
+
+TEST(LineAppender, NamesAFullDisk) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "not run: /dev/full absent";
+  LineAppender lines("/dev/full");
+  EXPECT_EQ(thrown_message<InputError>([&] { lines.append("x"); }),
+            "cannot write '/dev/full': No space left on device");
+}
+
+TEST(LineAppender, RefusesANewlineAndAFolder) {
+  const ScratchFolder folder;
+  LineAppender lines(folder / "lines");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { lines.append("a\nb"); }),
+            "'" + (folder / "lines") + "': a line must not hold a newline");
+  EXPECT_EQ(thrown_message<InputError>([&] { LineAppender appender(folder / ""); }),
+            "cannot write '" + (folder / "") + "': Is a directory");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,50 @@
+#include "core/names.h"
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+const std::vector<std::string> kKnown = {"hug", "handshake", "high_five", "wave", "bend", "fly_kiss"};
+
+TEST(ClosestName, FindsOneSlipOfEachKind) {
+  EXPECT_EQ(closest_name("hugg", kKnown), "hug");
+  EXPECT_EQ(closest_name("handshke", kKnown), "handshake");
+  EXPECT_EQ(closest_name("wabe", kKnown), "wave");
+  EXPECT_EQ(closest_name("bned", kKnown), "bend");
+}
+
+TEST(ClosestName, IgnoresCaseAndTheKindOfDash) {
+  EXPECT_EQ(closest_name("HIGH-FIVE", kKnown), "high_five");
+  EXPECT_EQ(closest_name("Fly-Kis", kKnown), "fly_kiss");
+}
+
+TEST(ClosestName, CountsASwapOfNeighboursOnce) {
+  // Without it "abcdef" <- "badcfe" would be 6 edits and out of reach; with it there are 3, which is above 6 / 3.
+  EXPECT_EQ(closest_name("badcef", std::vector<std::string>{"abcdef"}), "abcdef");
+  EXPECT_EQ(closest_name("badcfe", std::vector<std::string>{"abcdef"}), "");
+}
+
+TEST(ClosestName, IsEmptyWhereNothingIsNear) {
+  EXPECT_EQ(closest_name("somersault", kKnown), "");
+  EXPECT_EQ(closest_name("", kKnown), "");
+  EXPECT_EQ(closest_name("hug", {}), "");
+  EXPECT_EQ(closest_name("zz", std::vector<std::string>{"ab"}), "");  // two edits, and nothing shared
+}
+
+TEST(ClosestName, ReachesAThirdOfTheLength) {
+  const std::vector<std::string> known = {"abcdefghijkl"};
+  EXPECT_EQ(closest_name("abcdefghXXXX", known), "abcdefghijkl");  // 4 of 12
+  EXPECT_EQ(closest_name("abcdefgXXXXX", known), "");              // 5 of 12
+}
+
+TEST(UnknownNameMessage, AsksOnlyWhereANameIsNear) {
+  EXPECT_EQ(unknown_name_message("task", "hugg", kKnown),
+            "unknown task 'hugg': did you mean 'hug'? Known: hug, handshake, high_five, wave, bend, fly_kiss");
+  EXPECT_EQ(unknown_name_message("task", "somersault", kKnown),
+            "unknown task 'somersault'. Known: hug, handshake, high_five, wave, bend, fly_kiss");
+  EXPECT_EQ(unknown_name_message("engine", "x", {}), "unknown engine 'x'. Known: none");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,59 @@
+#include "core/robot_motion.h"
+
+#include <functional>
+#include <limits>
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+RobotMotion valid_motion() {
+  return {.rate_hz = 50.0,
+          .joint_names = {"left_knee", "right_knee"},
+          .root = std::vector<Pose>(3),
+          .q = Eigen::MatrixXd::Zero(2, 3)};
+}
+
+std::string message_after(const std::function<void(RobotMotion&)>& change) {
+  RobotMotion motion = valid_motion();
+  change(motion);
+  return test::thrown_message<std::invalid_argument>([&] { validate(motion, "walk.npz"); });
+}
+
+TEST(RobotMotion, ValidOnesPass) {
+  EXPECT_NO_THROW(validate(valid_motion(), "m"));
+  EXPECT_NO_THROW(validate({}, "m"));
+  RobotMotion motion = valid_motion();
+  motion.root[1].R.coeffs() *= 1.0 + 5e-7;  // inside the tolerance
+  EXPECT_NO_THROW(validate(motion, "m"));
+}
+
+TEST(RobotMotion, ReferenceIsAFrame) {
+  RobotMotion motion = valid_motion();
+  motion.q.col(1) << 0.1, 0.2;
+  motion.root[1].p.x() = 3.0;
+  EXPECT_EQ(motion.reference(1).q, Eigen::Vector2d(0.1, 0.2));
+  EXPECT_EQ(motion.reference(1).X_WB.p.x(), 3.0);
+}
+
+TEST(RobotMotion, RefusesEachKindOfFault) {
+  static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.rate_hz = 0.0; }), "walk.npz: expected a rate above 0 Hz, found 0");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.rate_hz = kNan; }), "walk.npz: expected a rate above 0 Hz, found nan");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.root.pop_back(); }),
+            "walk.npz: expected as many frames of joints as of the root (2), found 3");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.joint_names.pop_back(); }),
+            "walk.npz: expected 1 joints as named, found 2 rows of joint angles");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[1].p.z() = kNan; }),
+            "walk.npz: root position of frame 1 is not finite");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[2].R.coeffs() *= 2.0; }),
+            "walk.npz: root quaternion of frame 2: expected norm 1, found 2");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.root[2].R.x() = kNan; }),
+            "walk.npz: root quaternion of frame 2: expected norm 1, found nan");
+  EXPECT_EQ(message_after([](RobotMotion& m) { m.q(1, 2) = std::numeric_limits<double>::infinity(); }),
+            "walk.npz: angle of joint 'right_knee' in frame 2 is not finite");
+}
+
+}  // namespace
+}  // namespace duet
