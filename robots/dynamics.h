@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "robots/kinematics.h"
 
@@ -10,11 +11,48 @@ namespace duet {
 
 inline constexpr double kGravity = 9.81;  // [m/s^2], along -z of W
 
+// The same three as below without allocation after construction: for loops that call them often. Not thread-safe; keeps
+// a reference to the model, which must outlive it.
+class Dynamics {
+ public:
+  explicit Dynamics(const RobotModel& model, double gravity = kGravity);
+
+  void bias_forces(const RobotState& state, Eigen::Ref<Eigen::VectorXd> out);
+  void inverse_dynamics(const RobotState& state, const Eigen::Ref<const Eigen::VectorXd>& a,
+                        Eigen::Ref<Eigen::VectorXd> out);
+  void mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> out);
+
+  // Poses of the last call's state.
+  [[nodiscard]] const Kinematics& kinematics() const { return kinematics_; }
+
+ private:
+  // Newton-Euler without armature.
+  void newton_euler(const RobotState& state, const Eigen::Ref<const Eigen::VectorXd>& a,
+                    Eigen::Ref<Eigen::VectorXd> out);
+  void accumulate_composites();
+
+  struct Body {  // all in W
+    Eigen::Vector3d axis = Eigen::Vector3d::Zero();
+    Eigen::Vector3d w = Eigen::Vector3d::Zero(), dw = Eigen::Vector3d::Zero();  // angular velocity, acceleration
+    Eigen::Vector3d a = Eigen::Vector3d::Zero();                                // of the origin, less gravity
+    Eigen::Vector3d f = Eigen::Vector3d::Zero(), n = Eigen::Vector3d::Zero();   // on the body at its origin
+    double mass = 0.0;                                                          // of the body and all it carries
+    Eigen::Vector3d com = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // about `com`
+  };
+
+  const RobotModel* model_;
+  double gravity_;
+  Kinematics kinematics_;
+  std::vector<Body> bodies_;
+  Eigen::VectorXd zero_;
+};
+
 // Generalised forces that give zero generalised acceleration: Coriolis, centrifugal and gravity terms, (6 + dof).
 // [N] for the base's translation (W), [N m] for its rotation (B) and the joints. Armature does not enter.
 void bias_forces(const RobotModel& model, const RobotState& state, Eigen::Ref<Eigen::VectorXd> out);
 
-// Inverse dynamics: generalised forces for the acceleration `a` (same layout), bias included.
+// Inverse dynamics: generalised forces for the acceleration `a` (same layout), bias and armature included: M a + bias.
 void inverse_dynamics(const RobotModel& model, const RobotState& state, const Eigen::VectorXd& a,
                       Eigen::Ref<Eigen::VectorXd> out);
 
