@@ -101,7 +101,8 @@ struct Readings {
 
 // Sets "family.option" (families: metrics, hug, handshake, high_five, wave, bend, fly_kiss, diagnostics; options as in
 // reference/metrics.md) to a reading by its text name. Throws std::invalid_argument for an unknown option or reading
-// and lists the known ones.
+// and lists the known ones. Numbers are written as such: "metrics.ddof" takes "0" or "1", "metrics.min_frames" every
+// whole number from 1 on (reading_values then names only the default).
 void set_reading(Readings& readings, const std::string& option, const std::string& value);
 std::string reading(const Readings& readings, const std::string& option);
 std::vector<std::string> reading_names();                            // every "family.option"

@@ -1,0 +1,79 @@
+// The detectors' tracks of a human and of a robot.
+#include <fmt/format.h>
+
+#include "core/require.h"
+#include "core/skeleton.h"
+#include "metrics/detector.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+namespace {
+
+struct Follower {
+  int frame;
+  Eigen::Matrix3Xd* track;
+};
+
+Agent empty_agent(Eigen::Index frames) {
+  Agent agent;
+  for (Eigen::Matrix3Xd* track :
+       {&agent.lhand, &agent.rhand, &agent.head, &agent.root, &agent.torso, &agent.lshoulder, &agent.rshoulder})
+    track->resize(3, frames);
+  return agent;
+}
+
+// `pose(t)` and `joints(t)` are the base's pose and the joint angles at frame t.
+template <typename PoseAt, typename JointsAt>
+Agent follow(const RobotModel& robot, int frames, PoseAt pose, JointsAt joints) {
+  Agent agent = empty_agent(frames);
+  const Follower followers[] = {
+      {robot.track_frame("lhand"), &agent.lhand},         {robot.track_frame("rhand"), &agent.rhand},
+      {robot.track_frame("head"), &agent.head},           {robot.track_frame("torso"), &agent.torso},
+      {robot.track_frame("lshoulder"), &agent.lshoulder}, {robot.track_frame("rshoulder"), &agent.rshoulder}};
+  Kinematics kinematics(robot);
+  for (int t = 0; t < frames; ++t) {
+    require(joints(t).size() == robot.dof(), fmt::format("robot agent: frame {} has {} joint angles, {} has {}", t,
+                                                         joints(t).size(), robot.name, robot.dof()));
+    kinematics.update(pose(t), joints(t));
+    agent.root.col(t) = pose(t).p;
+    for (const auto& [frame, track] : followers) track->col(t) = kinematics.frame_position(frame);
+  }
+  return agent;
+}
+
+}  // namespace
+
+Agent human_agent(const PointTracks& smpl24) {
+  require(smpl24.points() == kSmplJoints,
+          fmt::format("human agent: expected {} joints, found {}", kSmplJoints, smpl24.points()));
+  Agent agent = empty_agent(smpl24.frames());
+  for (int t = 0; t < smpl24.frames(); ++t) {
+    const PointTracks::ConstFrame joints = smpl24.frame(t);
+    agent.lhand.col(t) = joints.col(kLeftHand);
+    agent.rhand.col(t) = joints.col(kRightHand);
+    agent.head.col(t) = joints.col(kHead);
+    agent.root.col(t) = joints.col(kPelvis);
+    agent.torso.col(t) = joints.col(kSpine3);
+    agent.lshoulder.col(t) = joints.col(kLeftShoulder);
+    agent.rshoulder.col(t) = joints.col(kRightShoulder);
+  }
+  return agent;
+}
+
+Agent robot_agent(const RobotModel& robot, const std::vector<RobotState>& states) {
+  return follow(
+      robot, static_cast<int>(states.size()), [&](int t) -> const Pose& { return states[t].X_WB; },
+      [&](int t) -> const Eigen::VectorXd& { return states[t].q; });
+}
+
+Agent robot_agent(const RobotModel& robot, const RobotMotion& motion) {
+  require(motion.joint_names.empty() || motion.joint_names == robot.joint_names(),
+          fmt::format("robot agent: the joints of the motion are not those of {} in its order", robot.name));
+  require(motion.q.cols() == motion.frames(),
+          fmt::format("robot agent: {} root poses, but joint angles of {} frames", motion.frames(), motion.q.cols()));
+  return follow(
+      robot, motion.frames(), [&](int t) -> const Pose& { return motion.root[t]; },
+      [&](int t) { return motion.q.col(t); });
+}
+
+}  // namespace duet
