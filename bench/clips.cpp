@@ -36,7 +36,8 @@ std::vector<ClipSource> list_sources(const Suite& suite) {
   return sources;
 }
 
-PairedMotion make_clip(const ClipSource& source, const Suite& suite, const RobotModel& robot, const PairOptions& options) {
+PairedMotion make_clip(const ClipSource& source, const Suite& suite, const RobotModel& robot,
+                       const PairOptions& options) {
   if (!source.file.empty()) return load_or_retarget(source.file, robot, options);
   SynthesisOptions synthesis;
   synthesis.seed = suite.clips.synth_seed;
@@ -62,15 +63,18 @@ MotionFile kind_of(const std::string& path) {
   if (schema.starts_with("duet.clip/")) return MotionFile::kClip;
   if (schema.starts_with("duet.paired/")) return MotionFile::kPaired;
   if (schema.starts_with("duet.recording/")) return MotionFile::kRecording;
-  throw InputError(fmt::format(
-      "{}: key 'schema': expected duet.clip/1, duet.paired/1 or duet.recording/1, found '{}'", path, schema));
+  throw InputError(fmt::format("{}: key 'schema': expected duet.clip/1, duet.paired/1 or duet.recording/1, found '{}'",
+                               path, schema));
 }
 
 PairedMotion load_or_retarget(const std::string& path, const RobotModel& robot, const PairOptions& options) {
   switch (kind_of(path)) {
-    case MotionFile::kClip: return retarget(load_clip(path), robot, options);
-    case MotionFile::kPaired: return load_paired_motion(path);
-    default: throw InputError(fmt::format("{}: expected a clip or a paired motion, found a recording", path));
+    case MotionFile::kClip:
+      return retarget(load_clip(path), robot, options);
+    case MotionFile::kPaired:
+      return load_paired_motion(path);
+    default:
+      throw InputError(fmt::format("{}: expected a clip or a paired motion, found a recording", path));
   }
 }
 

@@ -27,8 +27,8 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
 
 PairOptions pair_options(const Suite& suite);
 
-// NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not there
-// or where nothing is found.
+// NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not
+// there or where nothing is found.
 std::vector<std::string> find_motion_files(const std::vector<std::string>& paths);
 
 }  // namespace duet

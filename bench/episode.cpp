@@ -14,8 +14,8 @@ std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<Pai
       const auto add = [&](const std::string& policy, const std::string& arm) {
         for (const PairedMotion& clip : clips) {
           for (int episode = 0; episode < suite.episodes_per_clip; ++episode) {
-            const std::uint64_t seed =
-                suite.seed + stream_key({suite_id, to_string(clip.task), clip.clip_id, std::to_string(episode), "episode"});
+            const std::uint64_t seed = suite.seed + stream_key({suite_id, to_string(clip.task), clip.clip_id,
+                                                                std::to_string(episode), "episode"});
             plan.push_back({&clip, engine, controller, policy, arm, episode, seed});
           }
         }

@@ -14,12 +14,13 @@ namespace duet {
 struct EpisodeSpec {
   const PairedMotion* clip = nullptr;
   std::string engine, controller, policy;
-  std::string arm = "main";          // "null" for the control arm: policy `null`
+  std::string arm = "main";  // "null" for the control arm: policy `null`
   int episode = 0;
-  std::uint64_t seed = 0;            // of the episode, the same for every engine, controller and policy
+  std::uint64_t seed = 0;  // of the episode, the same for every engine, controller and policy
 };
 
-// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine and controller.
+// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine and
+// controller.
 std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips);
 
 // A row with everything that is known before the episode runs, its key included.

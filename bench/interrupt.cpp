@@ -26,9 +26,12 @@ void catch_interrupts() {
 
 Interrupt interrupt() {
   switch (received.load()) {
-    case SIGINT: return Interrupt::kInterrupted;
-    case SIGTERM: return Interrupt::kTerminated;
-    default: return Interrupt::kNone;
+    case SIGINT:
+      return Interrupt::kInterrupted;
+    case SIGTERM:
+      return Interrupt::kTerminated;
+    default:
+      return Interrupt::kNone;
   }
 }
 

@@ -3,7 +3,7 @@
 
 namespace duet {
 
-enum class Interrupt { kNone, kInterrupted, kTerminated };   // SIGINT (exit code 130), SIGTERM (exit code 75)
+enum class Interrupt { kNone, kInterrupted, kTerminated };  // SIGINT (exit code 130), SIGTERM (exit code 75)
 
 // From now on the two signals set the answer of interrupt() instead of ending the program.
 void catch_interrupts();

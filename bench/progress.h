@@ -1,4 +1,5 @@
-// Progress on standard error: a bar with rate and time left on a terminal, plain lines otherwise, nothing when quiet. Thread-safe.
+// Progress on standard error: a bar with rate and time left on a terminal, plain lines otherwise, nothing when quiet.
+// Thread-safe.
 #pragma once
 
 #include <chrono>

@@ -67,10 +67,14 @@ void trim(Recording& recording, int frames) {
 
 std::string describe(Outcome outcome, int tick) {
   switch (outcome) {
-    case Outcome::kFell: return fmt::format("the robot fell at {:.2f} s", tick / kControlRate);
-    case Outcome::kDiverged: return fmt::format("the engine's state diverged at {:.2f} s", tick / kControlRate);
-    case Outcome::kTimedOut: return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kControlRate);
-    default: return "";
+    case Outcome::kFell:
+      return fmt::format("the robot fell at {:.2f} s", tick / kControlRate);
+    case Outcome::kDiverged:
+      return fmt::format("the engine's state diverged at {:.2f} s", tick / kControlRate);
+    case Outcome::kTimedOut:
+      return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kControlRate);
+    default:
+      return "";
   }
 }
 
@@ -104,7 +108,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
 
   backend.reset(setup.start);
   controller.reset(setup.start);
-  policy.reset({setup.clip->task, std::string(to_string(setup.clip->task)), setup.start, &setup.reference.motion, setup.seed});
+  policy.reset(
+      {setup.clip->task, std::string(to_string(setup.clip->task)), setup.start, &setup.reference.motion, setup.seed});
   Scheduler scheduler;
   scheduler.reset({setup.start.X_WB, setup.start.q});
   History history;

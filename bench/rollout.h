@@ -1,5 +1,5 @@
-// One episode in an engine: the data-flow picture of the README as a loop. Policy at 5 Hz, scheduler and controller at 50 Hz,
-// physics at the scene's rate; everything that happens ends in a Recording.
+// One episode in an engine: the data-flow picture of the README as a loop. Policy at 5 Hz, scheduler and controller at
+// 50 Hz, physics at the scene's rate; everything that happens ends in a Recording.
 #pragma once
 
 #include <chrono>
@@ -15,28 +15,28 @@
 
 namespace duet {
 
-inline constexpr double kControlRate = 50.0;   // [Hz]
+inline constexpr double kControlRate = 50.0;  // [Hz]
 
 struct RolloutSetup {
   const PairedMotion* clip = nullptr;
-  AdaptedMotion reference;                     // the robot's side after A.4.4; frame 0 is tick 0
+  AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
   RobotState start;
   std::uint64_t seed = 0;
-  double wall_limit = 120.0;                   // [s]
-  std::function<bool()> stop_asked;            // polled once a tick; the episode then ends as kTimedOut with `interrupted`
+  double wall_limit = 120.0;         // [s]
+  std::function<bool()> stop_asked;  // polled once a tick; the episode then ends as kTimedOut with `interrupted`
 };
 
 struct Rollout {
   Recording recording;
-  std::string state_hash;                      // SHA-256 over the states at 50 Hz
+  std::string state_hash;  // SHA-256 over the states at 50 Hz
   int late_plans = 0;
-  double contact_peak = 0.0;                   // of one human contact on the robot, any physics step [N]
-  double contact_impulse = 0.0;                // of all of them [N s]
+  double contact_peak = 0.0;     // of one human contact on the robot, any physics step [N]
+  double contact_impulse = 0.0;  // of all of them [N s]
   bool interrupted = false;
 };
 
-// Runs until the reference ends, the robot falls (base below 0.45 m or tilted past acos 0.7; engines.md section 3), the state diverges
-// or the wall limit passes. Never throws for what the experiment may measure.
+// Runs until the reference ends, the robot falls (base below 0.45 m or tilted past acos 0.7; engines.md section 3), the
+// state diverges or the wall limit passes. Never throws for what the experiment may measure.
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
 
 // The partner's joints at a frame (clamped to the clip) and their velocities towards the next one.

@@ -25,10 +25,14 @@ std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(
 
 StartMode start_mode(const Suite& suite, bool walks) {
   switch (suite.start) {
-    case SuiteStart::kClip: return StartMode::kClip;
-    case SuiteStart::kApproach: return StartMode::kApproach;
-    case SuiteStart::kAct: return StartMode::kAct;
-    case SuiteStart::kAuto: break;
+    case SuiteStart::kClip:
+      return StartMode::kClip;
+    case SuiteStart::kApproach:
+      return StartMode::kApproach;
+    case SuiteStart::kAct:
+      return StartMode::kAct;
+    case SuiteStart::kAuto:
+      break;
   }
   return walks ? StartMode::kApproach : StartMode::kAct;
 }
@@ -100,9 +104,12 @@ class StopSign {
   explicit StopSign(double time_limit) : limit_(time_limit), begin_(Clock::now()) {}
   [[nodiscard]] RunEnd end() const {
     switch (interrupt()) {
-      case Interrupt::kInterrupted: return RunEnd::kInterrupted;
-      case Interrupt::kTerminated: return RunEnd::kTerminated;
-      case Interrupt::kNone: break;
+      case Interrupt::kInterrupted:
+        return RunEnd::kInterrupted;
+      case Interrupt::kTerminated:
+        return RunEnd::kTerminated;
+      case Interrupt::kNone:
+        break;
     }
     const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
     return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
@@ -149,9 +156,10 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   check_filters(options, suite);
   check_engines(suite);
   const std::string hash = suite_hash(suite);
-  const auto robot = std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
-  RunDirectory run = RunDirectory::open(
-      directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv, utc_now(), capture_environment()});
+  const auto robot =
+      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
+                                                    utc_now(), capture_environment()});
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
 
   RunSummary summary;

@@ -16,8 +16,8 @@ namespace duet {
 
 struct RunOptions {
   int threads = 1;
-  double time_limit = 0.0;                         // of the whole run [s]; 0 = none
-  std::vector<std::string> engines, controllers, policies;   // where not empty: only these
+  double time_limit = 0.0;                                  // of the whole run [s]; 0 = none
+  std::vector<std::string> engines, controllers, policies;  // where not empty: only these
   std::vector<std::string> tasks;
   std::vector<std::string> argv;
 };
@@ -26,11 +26,12 @@ enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
 
 struct RunSummary {
   int planned = 0, already_there = 0, run = 0;
-  std::map<std::string, int> outcomes;             // of those run now
+  std::map<std::string, int> outcomes;  // of those run now
   RunEnd end = RunEnd::kComplete;
 };
 
-// Throws InputError (suite, clips, run directory, a full disk), MissingError (an engine that is absent), std::invalid_argument.
+// Throws InputError (suite, clips, run directory, a full disk), MissingError (an engine that is absent),
+// std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 // One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`.

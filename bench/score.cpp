@@ -114,7 +114,8 @@ std::string score_table(const std::map<std::string, std::map<std::string, double
   text += "\n";
   const auto add_row = [&](const std::string& title, std::string_view unit, const std::string& name, bool percent) {
     text += fmt::format("{:<26} {:<8}", title, unit);
-    for (const std::string& column : columns) text += fmt::format(" {:>10}", cell(summary.at(column).at(name), percent));
+    for (const std::string& column : columns)
+      text += fmt::format(" {:>10}", cell(summary.at(column).at(name), percent));
     text += "\n";
   };
   add_row("clips", "", "clips", false);

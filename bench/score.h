@@ -17,17 +17,17 @@ namespace duet {
 
 struct ClipScore {
   std::string clip, task;
-  std::map<std::string, double> metrics;          // by catalogue name; NaN where undefined
+  std::map<std::string, double> metrics;  // by catalogue name; NaN where undefined
   std::array<ContactCounts, 3> contacts;
-  bool source_detected = false;                   // person against person, the reactor as performer
-  bool robot_detected = false;                    // version `robot`, played back
-  bool paper_detected = false;                    // version `paper`, played back
+  bool source_detected = false;  // person against person, the reactor as performer
+  bool robot_detected = false;   // version `robot`, played back
+  bool paper_detected = false;   // version `paper`, played back
 };
 
 ClipScore score_clip(const PairedMotion& motion, std::shared_ptr<const RobotModel> robot, const Readings& readings);
 
-// Per task and "all": mean of each metric over clips (contact figures from summed counts: micro average), detector rates under
-// "source_detected", "robot_detected", "paper_detected", and "clips".
+// Per task and "all": mean of each metric over clips (contact figures from summed counts: micro average), detector
+// rates under "source_detected", "robot_detected", "paper_detected", and "clips".
 std::map<std::string, std::map<std::string, double>> summarize_scores(const std::vector<ClipScore>& scores,
                                                                       const MetricReadings& readings);
 

@@ -83,7 +83,7 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
         row.success = result.success && recording.outcome == Outcome::kOk;
     }
   }
-  constexpr int kShortest = 8;   // third differences at both ends
+  constexpr int kShortest = 8;  // third differences at both ends
   if (recording.frames() < kShortest) return;
   add_finite(controller_diagnostics(recording, readings.diagnostics), row.metrics);
   const PairedMotion executed = executed_motion(rollout, setup, robot);

@@ -1,4 +1,5 @@
-// From a rollout to an episode row: verdicts of the detectors, controller diagnostics, the 18 metrics of the executed motion.
+// From a rollout to an episode row: verdicts of the detectors, controller diagnostics, the 18 metrics of the executed
+// motion.
 #pragma once
 
 #include "bench/rollout.h"
@@ -12,7 +13,8 @@ namespace duet {
 void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
                    const RobotModel& robot, EpisodeRow& row);
 
-// The executed motion in the place of the retargeted one: the 18 metrics then say what the engine and the controller cost.
+// The executed motion in the place of the retargeted one: the 18 metrics then say what the engine and the controller
+// cost.
 PairedMotion executed_motion(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot);
 
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);

@@ -56,11 +56,13 @@ std::vector<MetricColumn> metric_columns() {
 
 std::vector<std::string> notes_of(const Suite& suite) {
   return {
-      fmt::format("Suite {} {}: start `{}`, partner `{}`, physics step {:g} ms, headline detector version `{}` with `{}` thresholds.",
+      fmt::format("Suite {} {}: start `{}`, partner `{}`, physics step {:g} ms, headline detector version `{}` with "
+                  "`{}` thresholds.",
                   suite.name, suite.version, to_string(suite.start), to_string(suite.partner), 1000.0 * suite.dt,
                   to_string(suite.detector), to_string(suite.thresholds)),
       "Start `auto` means: a controller that cannot walk starts at the act position; one that walks approaches.",
-      "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the same episodes.",
+      "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
+      "same episodes.",
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",
   };
 }
@@ -91,7 +93,8 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int 
   content.columns = metric_columns();
   if (!with_clips) return content;
 
-  const auto robot = std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  const auto robot =
+      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);
   const Readings readings = readings_of(suite);
   std::vector<ClipScore> scores(clips.size());

@@ -16,8 +16,8 @@ class Progress;
 // People as in the clip, the adapted partner and the robot at the start, in mid-act and at the end.
 ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot);
 
-// Everything that the report says of runs: leaderboard, notes, retargeting figures and stories of their clips, which are made
-// again from the first run's suite (`with_clips`), on `threads` threads.
+// Everything that the report says of runs: leaderboard, notes, retargeting figures and stories of their clips, which
+// are made again from the first run's suite (`with_clips`), on `threads` threads.
 ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int threads, Progress& progress);
 
 }  // namespace duet

@@ -1,5 +1,5 @@
-// A suite: what is run, frozen and versioned. Strict YAML (docs/file-formats.md, "Suite"): an unknown key or name is refused with
-// file, line and the nearest known one. Results are comparable only within name@version.
+// A suite: what is run, frozen and versioned. Strict YAML (docs/file-formats.md, "Suite"): an unknown key or name is
+// refused with file, line and the nearest known one. Results are comparable only within name@version.
 #pragma once
 
 #include <cstdint>
@@ -15,38 +15,39 @@
 
 namespace duet {
 
-enum class SuiteStart { kAuto, kClip, kApproach, kAct };   // auto: act where the controller cannot walk, else approach
+enum class SuiteStart { kAuto, kClip, kApproach, kAct };  // auto: act where the controller cannot walk, else approach
 enum class RecordTrajectories { kNone, kFailures, kAll };
 
 struct SuiteClips {
-  int synth_per_task = 0;                    // synthesised clips of each task, or
+  int synth_per_task = 0;  // synthesised clips of each task, or
   std::uint64_t synth_seed = 42;
-  std::vector<std::string> files;            // clips or paired motions (NPZ)
+  std::vector<std::string> files;  // clips or paired motions (NPZ)
 };
 
 struct Suite {
   std::string name, version;
-  std::string file;                          // where it came from, for messages
+  std::string file;  // where it came from, for messages
   std::uint64_t seed = 10000;
   SuiteClips clips;
   std::vector<Task> tasks;
   std::vector<std::string> engines, controllers, policies;
   int episodes_per_clip = 1;
   SuiteStart start = SuiteStart::kAuto;
-  double start_radius = 1.0;                 // of `approach` [m]
+  double start_radius = 1.0;  // of `approach` [m]
   PartnerMode partner = PartnerMode::kGhost;
-  double dt = 0.002;                         // physics step [s]
+  double dt = 0.002;  // physics step [s]
   DetectorVersion detector = DetectorVersion::kRobot;
   ThresholdSet thresholds = ThresholdSet::kPaper;
-  std::string robot;                         // card; empty: the one that ships with duet
-  std::map<std::string, std::string> retarget;   // pair option -> value
-  std::map<std::string, std::string> readings;   // "family.option" -> reading
-  double wall_limit = 120.0;                 // per episode [s]
+  std::string robot;                            // card; empty: the one that ships with duet
+  std::map<std::string, std::string> retarget;  // pair option -> value
+  std::map<std::string, std::string> readings;  // "family.option" -> reading
+  double wall_limit = 120.0;                    // per episode [s]
   RecordTrajectories record = RecordTrajectories::kNone;
   bool null_arm = true;
 };
 
-using Overrides = std::vector<std::pair<std::string, std::string>>;   // dotted key -> value, as `-s clips.synth.per_task=3`
+using Overrides =
+    std::vector<std::pair<std::string, std::string>>;  // dotted key -> value, as `-s clips.synth.per_task=3`
 
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});

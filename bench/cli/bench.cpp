@@ -56,8 +56,9 @@ std::string line(const Figure& figure) {
 
 void print_confusion(const Session& session, const BenchArguments& arguments) {
   const ConfusionTable table = detector_confusion(arguments.clips, arguments.options.threads, arguments.strict);
-  std::string text = fmt::format("{} synthetic clips a task, person against person, {} thresholds; fraction accepted\n{:<16}",
-                                 table.clips, arguments.strict ? "strict" : "paper", "clips \\ detector");
+  std::string text =
+      fmt::format("{} synthetic clips a task, person against person, {} thresholds; fraction accepted\n{:<16}",
+                  table.clips, arguments.strict ? "strict" : "paper", "clips \\ detector");
   nlohmann::json json = {{"clips_per_task", table.clips}, {"rate", nlohmann::json::object()}};
   for (const std::string& task : table.tasks) text += fmt::format(" {:>10}", task);
   text += "\n";
@@ -93,13 +94,15 @@ void run_bench(const Session& session, const BenchArguments& arguments) {
 }  // namespace
 
 void add_bench(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "bench", "measure this code on this machine; `bench detectors` prints the confusion table",
+  CLI::App* command = add_command(app, session, "bench",
+                                  "measure this code on this machine; `bench detectors` prints the confusion table",
                                   "duet bench pair/paper backend --json\n  duet bench detectors --clips 200");
   auto arguments = std::make_shared<BenchArguments>();
   arguments->options.threads = default_threads();
   command->add_option("names", arguments->names, "which, by path; `duet list benchmarks` shows all (default: all)");
   command->add_option("--seconds", arguments->options.seconds, "measuring time of one figure")->capture_default_str();
-  command->add_option("-j,--threads", arguments->options.threads, "threads of the scaling figures")->capture_default_str();
+  command->add_option("-j,--threads", arguments->options.threads, "threads of the scaling figures")
+      ->capture_default_str();
   command->add_option("--clips", arguments->clips, "synthetic clips a task for `detectors`")->capture_default_str();
   command->add_flag("--strict", arguments->strict, "the strict thresholds for `detectors`");
   command->callback([&session, arguments] { run_bench(session, *arguments); });

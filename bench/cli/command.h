@@ -22,8 +22,8 @@ enum ExitCode : int {
 };
 
 struct Session {
-  bool json = false;       // machines read standard output
-  bool quiet = false;      // no progress
+  bool json = false;   // machines read standard output
+  bool quiet = false;  // no progress
   int exit_code = kExitOk;
   std::vector<std::string> argv;
 

@@ -24,13 +24,16 @@ void run_compare(const Session& session, const CompareArguments& arguments) {
 }  // namespace
 
 void add_compare(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(
-      app, session, "compare", "two runs on the same episodes: exact paired tests, intervals, the smallest difference they can see",
-      "duet compare runs/policy_a runs/policy_b");
+  CLI::App* command =
+      add_command(app, session, "compare",
+                  "two runs on the same episodes: exact paired tests, intervals, the smallest difference they can see",
+                  "duet compare runs/policy_a runs/policy_b");
   auto arguments = std::make_shared<CompareArguments>();
   command->add_option("a", arguments->a, "run directory A")->required();
   command->add_option("b", arguments->b, "run directory B")->required();
-  command->add_option("--level", arguments->options.level, "of intervals")->capture_default_str()->check(CLI::Range(0.5, 0.9999));
+  command->add_option("--level", arguments->options.level, "of intervals")
+      ->capture_default_str()
+      ->check(CLI::Range(0.5, 0.9999));
   command->add_option("--resamples", arguments->options.resamples, "of the cluster bootstrap")->capture_default_str();
   command->add_option("--seed", arguments->options.seed, "of the cluster bootstrap")->capture_default_str();
   command->callback([&session, arguments] { run_compare(session, *arguments); });

@@ -25,7 +25,8 @@ Finding robot_finding() {
   try {
     const std::string card = default_card_path();
     const RobotModel robot = load_robot(card);
-    return {"robot", true, fmt::format("{}: {} joints, {:.4f} kg, card {}", robot.name, robot.dof(), robot.total_mass(), card)};
+    return {"robot", true,
+            fmt::format("{}: {} joints, {:.4f} kg, card {}", robot.name, robot.dof(), robot.total_mass(), card)};
   } catch (const std::exception& error) {
     return {"robot", false, error.what()};
   }
@@ -36,7 +37,8 @@ std::vector<Finding> findings() {
   for (const EngineInfo& engine : engines())
     list.push_back({"engine " + engine.name, engine.available, engine.available ? engine.version : engine.reason});
   std::string kernels;
-  for (const KernelKind kernel : available_kernels()) kernels += fmt::format("{}{}", kernels.empty() ? "" : ", ", to_string(kernel));
+  for (const KernelKind kernel : available_kernels())
+    kernels += fmt::format("{}{}", kernels.empty() ? "" : ", ", to_string(kernel));
   list.push_back({"PAIR kernels", true, kernels});
   list.push_back(robot_finding());
   list.push_back({"machine", true, describe_machine()});
@@ -55,9 +57,10 @@ void run_doctor(Session& session, const std::vector<std::string>& needed) {
   print(session, text, json);
   for (const std::string& engine : needed) {
     for (const EngineInfo& info : engines()) {
-      if (info.name == engine && !info.available) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
+      if (info.name == engine && !info.available)
+        throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
     }
-    Scene scene;   // an unknown name is refused with the nearest one
+    Scene scene;  // an unknown name is refused with the nearest one
     scene.robot = std::make_shared<const RobotModel>(load_robot(default_card_path()));
     make_backend(engine, scene);
   }
@@ -66,7 +69,8 @@ void run_doctor(Session& session, const std::vector<std::string>& needed) {
 }  // namespace
 
 void add_doctor(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "doctor", "what this build and this machine can do", "duet doctor --need mujoco");
+  CLI::App* command =
+      add_command(app, session, "doctor", "what this build and this machine can do", "duet doctor --need mujoco");
   auto needed = std::make_shared<std::vector<std::string>>();
   command->add_option("--need", *needed, "engines that must be there (exit code 4 if not)")->delimiter(',');
   command->callback([&session, needed] { run_doctor(session, *needed); });

@@ -1,4 +1,5 @@
-// duet import: motion files of others -> duet's NPZ. A pair of BVH files becomes a clip, a pickled robot motion a recording.
+// duet import: motion files of others -> duet's NPZ. A pair of BVH files becomes a clip, a pickled robot motion a
+// recording.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -37,7 +38,8 @@ void import_people(const Session& session, ImportArguments arguments) {
   require(!(arguments.drop_t_pose && arguments.keep_t_pose), "--drop-t-pose and --keep-t-pose exclude each other");
   if (arguments.drop_t_pose) arguments.bvh.drop_t_pose = true;
   if (arguments.keep_t_pose) arguments.bvh.drop_t_pose = false;
-  BvhImport imported = import_bvh_pair(arguments.files[0], arguments.files[1], parse_task(arguments.task), arguments.bvh);
+  BvhImport imported =
+      import_bvh_pair(arguments.files[0], arguments.files[1], parse_task(arguments.task), arguments.bvh);
   imported.clip.reactor = arguments.reactor == "A" ? Person::kA : Person::kB;
   save_clip(imported.clip, arguments.output);
   const Phases& phases = imported.clip.phases;
@@ -52,11 +54,12 @@ void import_people(const Session& session, ImportArguments arguments) {
 }
 
 // A whole-body pickle names no joints; its columns are taken in the order of the robot card, which must fit.
-Recording play_pickle(const PickledMotion& pickled, const std::string& file, const std::shared_ptr<const RobotModel>& robot) {
+Recording play_pickle(const PickledMotion& pickled, const std::string& file,
+                      const std::shared_ptr<const RobotModel>& robot) {
   RobotMotion motion = pickled.motion;
   if (motion.q.rows() != robot->dof()) {
-    throw InputError(fmt::format("{}: expected {} joints for robot '{}', found {} (another card: --card)", file, robot->dof(),
-                                 robot->name, motion.q.rows()));
+    throw InputError(fmt::format("{}: expected {} joints for robot '{}', found {} (another card: --card)", file,
+                                 robot->dof(), robot->name, motion.q.rows()));
   }
   motion.joint_names = robot->joint_names();
   return play_back(motion, {}, Task::kHug, {0, motion.frames()}, robot);
@@ -80,19 +83,21 @@ double kinematics_error(const PickledMotion& pickled, const RobotModel& robot) {
 }
 
 void import_robot(const Session& session, const ImportArguments& arguments) {
-  const auto robot = std::make_shared<const RobotModel>(
-      load_robot(arguments.robot.empty() ? default_card_path() : arguments.robot));
+  const auto robot =
+      std::make_shared<const RobotModel>(load_robot(arguments.robot.empty() ? default_card_path() : arguments.robot));
   const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
   const Recording recording = play_pickle(pickled, arguments.files[0], robot);
   save_recording(recording, arguments.output);
   const double error = kinematics_error(pickled, *robot);
-  print(session,
-        fmt::format("{}  largest difference between its body positions and our kinematics: {:.2e} m\n{}: recording of {} frames",
-                    bulleted(pickled.verdict), error, arguments.output, recording.frames()),
-        {{"file", arguments.output},
-         {"frames", recording.frames()},
-         {"kinematics_error_m", error},
-         {"verdict", pickled.verdict}});
+  print(
+      session,
+      fmt::format(
+          "{}  largest difference between its body positions and our kinematics: {:.2e} m\n{}: recording of {} frames",
+          bulleted(pickled.verdict), error, arguments.output, recording.frames()),
+      {{"file", arguments.output},
+       {"frames", recording.frames()},
+       {"kinematics_error_m", error},
+       {"verdict", pickled.verdict}});
 }
 
 void run_import(const Session& session, const ImportArguments& arguments) {
@@ -101,7 +106,8 @@ void run_import(const Session& session, const ImportArguments& arguments) {
     require(arguments.files.size() == 1, "a robot motion (.pkl) is imported alone");
     import_robot(session, arguments);
   } else if (extension == ".bvh") {
-    require(arguments.files.size() == 2, fmt::format("expected a pair of BVH files, one a person, found {}", arguments.files.size()));
+    require(arguments.files.size() == 2,
+            fmt::format("expected a pair of BVH files, one a person, found {}", arguments.files.size()));
     import_people(session, arguments);
   } else {
     throw std::invalid_argument(fmt::format("'{}': expected a pair of .bvh files or one .pkl", arguments.files[0]));
@@ -115,16 +121,20 @@ void add_import(CLI::App& app, Session& session) {
                                   "duet import 18_01.bvh 19_01.bvh --task handshake --output handshake.npz\n"
                                   "  duet import walk_001.pkl --output walk.npz");
   auto arguments = std::make_shared<ImportArguments>();
-  command->add_option("files", arguments->files, "two BVH files, person A then B; or one pickled robot motion")->required();
+  command->add_option("files", arguments->files, "two BVH files, person A then B; or one pickled robot motion")
+      ->required();
   command->add_option("-o,--output", arguments->output, "clip or recording to write (NPZ)")->required();
   command->add_option("--task", arguments->task, "task of the clip");
   command->add_option("--robot", arguments->reactor, "who the robot replaces: A or B")->capture_default_str();
-  command->add_option("--card", arguments->robot, "robot card of a pickled motion (default: the G1 that ships with duet)");
-  command->add_option_function<double>("--units", [arguments](double v) { arguments->bvh.metres_per_unit = v; },
-                                       "metres per unit of the file (default: detected)");
+  command->add_option("--card", arguments->robot,
+                      "robot card of a pickled motion (default: the G1 that ships with duet)");
+  command->add_option_function<double>(
+      "--units", [arguments](double v) { arguments->bvh.metres_per_unit = v; },
+      "metres per unit of the file (default: detected)");
   command->add_option("--up", arguments->up, "up axis, y or z (default: detected)");
-  command->add_option_function<double>("--rate", [arguments](double v) { arguments->bvh.rate_hz = v; },
-                                       "frames per second (default: the file's frame time)");
+  command->add_option_function<double>(
+      "--rate", [arguments](double v) { arguments->bvh.rate_hz = v; },
+      "frames per second (default: the file's frame time)");
   command->add_flag("--drop-t-pose", arguments->drop_t_pose, "frame 0 is an added T pose: drop it (default: detected)");
   command->add_flag("--keep-t-pose", arguments->keep_t_pose, "keep frame 0 whatever it is");
   command->callback([&session, arguments] { run_import(session, *arguments); });

@@ -55,20 +55,23 @@ std::vector<Listed> list_metrics() {
     const char* better = metric.direction == Direction::kLower    ? "lower is better"
                          : metric.direction == Direction::kHigher ? "higher is better"
                                                                   : "no direction";
-    list.push_back({std::string(metric.name), fmt::format("{} [{}], {}; {}", metric.title, metric.unit, better, metric.source)});
+    list.push_back(
+        {std::string(metric.name), fmt::format("{} [{}], {}; {}", metric.title, metric.unit, better, metric.source)});
   }
   return list;
 }
 
 std::vector<Listed> list_readings() {
   std::vector<Listed> list;
-  for (const std::string& option : reading_names()) list.push_back({option, fmt::format("{}", fmt::join(reading_values(option), ", "))});
+  for (const std::string& option : reading_names())
+    list.push_back({option, fmt::format("{}", fmt::join(reading_values(option), ", "))});
   return list;
 }
 
 std::vector<Listed> list_pair_options() {
   std::vector<Listed> list;
-  for (const std::string& name : pair_option_names()) list.push_back({name, "default " + pair_option(PairOptions(), name)});
+  for (const std::string& name : pair_option_names())
+    list.push_back({name, "default " + pair_option(PairOptions(), name)});
   return list;
 }
 
@@ -120,7 +123,9 @@ void run_list(const Session& session, const std::string& what) {
 void add_list(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
   auto what = std::make_shared<std::string>();
-  command->add_option("what", *what, "tasks, engines, controllers, policies, metrics, readings, pair-options, robots, benchmarks")
+  command
+      ->add_option("what", *what,
+                   "tasks, engines, controllers, policies, metrics, readings, pair-options, robots, benchmarks")
       ->required();
   command->callback([&session, what] { run_list(session, *what); });
 }

@@ -36,14 +36,17 @@ int run_command(CLI::App& app, int argc, char** argv, cli::Session& session) {
 int main(int argc, char** argv) {
   duet::cli::Session session;
   session.argv.assign(argv, argv + argc);
-  CLI::App app("duet: does a humanoid's side of a two-person interaction still work when the physics engine, the controller, the\n"
-               "policy or the perception changes? Retargets two-person motion, rolls it out, scores it, ranks it.",
-               "duet");
+  CLI::App app(
+      "duet: does a humanoid's side of a two-person interaction still work when the physics engine, the controller, "
+      "the\n"
+      "policy or the perception changes? Retargets two-person motion, rolls it out, scores it, ranks it.",
+      "duet");
   app.set_version_flag("--version", duet::version_text);
   app.require_subcommand(1);
-  app.footer("`duet COMMAND --help` shows the options of a command and an example.\n"
-             "Exit codes: 0 ok, 1 a gate or check failed, 2 usage or input, 3 finished with errored episodes,\n"
-             "4 something is not there, 5 other results than before, 75 and 130 stopped and resumable.");
+  app.footer(
+      "`duet COMMAND --help` shows the options of a command and an example.\n"
+      "Exit codes: 0 ok, 1 a gate or check failed, 2 usage or input, 3 finished with errored episodes,\n"
+      "4 something is not there, 5 other results than before, 75 and 130 stopped and resumable.");
   using namespace duet::cli;
   add_doctor(app, session);
   add_list(app, session);

@@ -30,9 +30,10 @@ std::vector<Run> load_runs(const std::vector<std::string>& paths) {
     const RunInfo& first = runs.front().info;
     const RunInfo& info = runs.back().info;
     if (info.suite_hash != first.suite_hash) {
-      throw InputError(fmt::format("'{}' is a run of {} {} ({:.8}), '{}' of {} {} ({:.8}): results of different suites are not mixed",
-                                   paths.front(), first.suite, first.suite_version, first.suite_hash, path, info.suite,
-                                   info.suite_version, info.suite_hash));
+      throw InputError(fmt::format(
+          "'{}' is a run of {} {} ({:.8}), '{}' of {} {} ({:.8}): results of different suites are not mixed",
+          paths.front(), first.suite, first.suite_version, first.suite_hash, path, info.suite, info.suite_version,
+          info.suite_hash));
     }
   }
   return runs;
@@ -47,7 +48,8 @@ std::vector<EpisodeRow> all_rows(const std::vector<Run>& runs) {
 void check_formats(const std::vector<std::string>& formats) {
   static const std::vector<std::string> known = {"md", "csv", "json", "tex", "html", "sqlite"};
   for (const std::string& format : formats)
-    require(std::find(known.begin(), known.end(), format) != known.end(), unknown_name_message("format", format, known));
+    require(std::find(known.begin(), known.end(), format) != known.end(),
+            unknown_name_message("format", format, known));
 }
 
 void write_format(const std::string& format, const std::string& path, const std::vector<Run>& runs,
@@ -56,7 +58,8 @@ void write_format(const std::string& format, const std::string& path, const std:
   if (format == "csv") write_file(path, leaderboard_csv(entries));
   if (format == "json") write_file(path, leaderboard_json(entries).dump(2) + "\n");
   if (format == "tex") write_file(path, leaderboard_latex(entries));
-  if (format == "html") write_file(path, html_report(report_content(runs, !arguments.no_clips, arguments.threads, progress)));
+  if (format == "html")
+    write_file(path, html_report(report_content(runs, !arguments.no_clips, arguments.threads, progress)));
   if (format == "sqlite") write_database(all_rows(runs), path);
 }
 
@@ -68,7 +71,9 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   Progress progress(session.progress());
   nlohmann::json written = nlohmann::json::array();
   for (const std::string& format : arguments.formats) {
-    const std::string name = format == "html" ? "report.html" : format == "sqlite" ? "results.sqlite" : "leaderboard." + format;
+    const std::string name = format == "html"     ? "report.html"
+                             : format == "sqlite" ? "results.sqlite"
+                                                  : "leaderboard." + format;
     const std::string path = (folder / name).string();
     write_format(format, path, runs, entries, arguments, progress);
     written.push_back(path);
@@ -84,7 +89,8 @@ void add_report(CLI::App& app, Session& session) {
                                   "duet report runs/core --format md,csv,html --output paper");
   auto arguments = std::make_shared<ReportArguments>();
   command->add_option("runs", arguments->runs, "run directories")->required();
-  command->add_option("-f,--format", arguments->formats, "md, csv, json, tex, html, sqlite (default: md,html)")->delimiter(',');
+  command->add_option("-f,--format", arguments->formats, "md, csv, json, tex, html, sqlite (default: md,html)")
+      ->delimiter(',');
   command->add_option("-o,--output", arguments->output, "folder (default: the first run directory)");
   command->add_flag("--no-clips", arguments->no_clips, "HTML without the clips' key frames and loss curves");
   command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();

@@ -46,7 +46,8 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
     const std::string path = output_path(arguments, files[i], files.size());
     save_paired_motion(paired, path);
     const std::vector<double>& total = paired.loss.at("total");
-    lines[i] = fmt::format("{}: {} frames, objective {:.4f} -> {:.4f}\n", path, paired.frames(), total.front(), total.back());
+    lines[i] =
+        fmt::format("{}: {} frames, objective {:.4f} -> {:.4f}\n", path, paired.frames(), total.front(), total.back());
     results[i] = {{"file", path},
                   {"clip", paired.clip_id},
                   {"frames", paired.frames()},

@@ -39,10 +39,13 @@ Suite read_suite(const RunArguments& arguments) {
 
 int exit_code(const RunSummary& summary) {
   switch (summary.end) {
-    case RunEnd::kInterrupted: return kExitInterrupted;
+    case RunEnd::kInterrupted:
+      return kExitInterrupted;
     case RunEnd::kTerminated:
-    case RunEnd::kTimeLimit: return kExitResumable;
-    case RunEnd::kComplete: break;
+    case RunEnd::kTimeLimit:
+      return kExitResumable;
+    case RunEnd::kComplete:
+      break;
   }
   return summary.outcomes.contains("error") ? kExitErrors : kExitOk;
 }
@@ -51,9 +54,9 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
   std::vector<std::string> outcomes;
   for (const auto& [outcome, count] : summary.outcomes) outcomes.push_back(fmt::format("{} {}", count, outcome));
   std::string text = fmt::format("{} of {} episodes in {} ({} were there, {} run now{}{}); start: {}, partner: {}\n",
-                                 summary.already_there + summary.run, summary.planned, output, summary.already_there, summary.run,
-                                 outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "), to_string(suite.start),
-                                 to_string(suite.partner));
+                                 summary.already_there + summary.run, summary.planned, output, summary.already_there,
+                                 summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "),
+                                 to_string(suite.start), to_string(suite.partner));
   if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
   return text;
 }
@@ -62,7 +65,8 @@ void run_run(Session& session, RunArguments arguments) {
   const Suite suite = read_suite(arguments);
   if (arguments.dry_run) {
     const std::string hash = suite_hash(suite);
-    print(session, fmt::format("{}# hash: {}", resolved_yaml(suite), hash), {{"suite", resolved_yaml(suite)}, {"hash", hash}});
+    print(session, fmt::format("{}# hash: {}", resolved_yaml(suite), hash),
+          {{"suite", resolved_yaml(suite)}, {"hash", hash}});
     return;
   }
   require(!arguments.output.empty(), "--output is needed: the run directory");
@@ -86,15 +90,18 @@ void run_run(Session& session, RunArguments arguments) {
 }  // namespace
 
 void add_run(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "run", "roll a suite out in its engines, with the null arm; resumes by itself",
-                                  "duet run suites/core.yaml --output runs/core\n"
-                                  "  duet run suites/core.yaml --clips handshake_paired.npz --output runs/cmu");
+  CLI::App* command =
+      add_command(app, session, "run", "roll a suite out in its engines, with the null arm; resumes by itself",
+                  "duet run suites/core.yaml --output runs/core\n"
+                  "  duet run suites/core.yaml --clips handshake_paired.npz --output runs/cmu");
   auto arguments = std::make_shared<RunArguments>();
   arguments->options.threads = default_threads();
   RunOptions& options = arguments->options;
   command->add_option("suite", arguments->suite, "suite file (YAML)")->required();
-  command->add_option("-o,--output", arguments->output, "run directory; an unfinished run of the same suite is resumed");
-  command->add_option("--clips", arguments->clips, "clips or paired motions (NPZ, folders) in the place of the suite's");
+  command->add_option("-o,--output", arguments->output,
+                      "run directory; an unfinished run of the same suite is resumed");
+  command->add_option("--clips", arguments->clips,
+                      "clips or paired motions (NPZ, folders) in the place of the suite's");
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
   command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
   command->add_option("--partner", arguments->partner, "ghost or solid");

@@ -1,10 +1,11 @@
 // duet score: the 18 retargeting metrics and the detectors, without physics.
+#include "bench/score.h"
+
 #include <fmt/format.h>
 
 #include "bench/cli/command.h"
 #include "bench/clips.h"
 #include "bench/parallel.h"
-#include "bench/score.h"
 #include "core/require.h"
 
 namespace duet::cli {
@@ -19,7 +20,8 @@ struct ScoreArguments {
 
 std::string per_clip(const std::vector<ClipScore>& scores, const MetricReadings& readings) {
   std::string text;
-  for (const ClipScore& score : scores) text += fmt::format("{}\n{}\n", score.clip, score_table(summarize_scores({score}, readings)));
+  for (const ClipScore& score : scores)
+    text += fmt::format("{}\n{}\n", score.clip, score_table(summarize_scores({score}, readings)));
   return text;
 }
 
@@ -29,8 +31,8 @@ void run_score(const Session& session, const ScoreArguments& arguments) {
     const auto [option, value] = split_assignment(choice);
     set_reading(readings, option, value);
   }
-  const auto robot = std::make_shared<const RobotModel>(
-      load_robot(arguments.card.empty() ? default_card_path() : arguments.card));
+  const auto robot =
+      std::make_shared<const RobotModel>(load_robot(arguments.card.empty() ? default_card_path() : arguments.card));
   const std::vector<std::string> files = find_motion_files(arguments.inputs);
   std::vector<ClipScore> scores(files.size());
   Progress progress(session.progress());
@@ -41,17 +43,21 @@ void run_score(const Session& session, const ScoreArguments& arguments) {
   });
   progress.finish();
   const auto summary = summarize_scores(scores, readings.metrics);
-  print(session, (arguments.each ? per_clip(scores, readings.metrics) : "") + score_table(summary), score_json(scores, summary));
+  print(session, (arguments.each ? per_clip(scores, readings.metrics) : "") + score_table(summary),
+        score_json(scores, summary));
 }
 
 }  // namespace
 
 void add_score(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "score", "the 18 retargeting metrics and the detectors, without physics",
-                                  "duet score paired --reading metrics.large_angle=entry");
+  CLI::App* command =
+      add_command(app, session, "score", "the 18 retargeting metrics and the detectors, without physics",
+                  "duet score paired --reading metrics.large_angle=entry");
   auto arguments = std::make_shared<ScoreArguments>();
-  command->add_option("motions", arguments->inputs, "paired motions (NPZ), clips (retargeted first), or folders")->required();
-  command->add_option("--reading", arguments->readings, "family.option=reading; `duet list readings` shows all (repeatable)");
+  command->add_option("motions", arguments->inputs, "paired motions (NPZ), clips (retargeted first), or folders")
+      ->required();
+  command->add_option("--reading", arguments->readings,
+                      "family.option=reading; `duet list readings` shows all (repeatable)");
   command->add_option("--card", arguments->card, "robot card (default: the G1 that ships with duet)");
   command->add_flag("--each", arguments->each, "a table for each clip too");
   command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();

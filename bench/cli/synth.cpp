@@ -44,8 +44,11 @@ void run_synth(const Session& session, SynthArguments arguments) {
     const InteractionClip clip = synthesize(tasks[i / arguments.count], options);
     const std::string path = (std::filesystem::path(arguments.output) / (clip.id + ".npz")).string();
     save_clip(clip, path);
-    written[i] = {{"file", path},     {"task", to_string(clip.task)}, {"seconds", clip.frames() / clip.rate_hz()},
-                  {"frames", clip.frames()}, {"sha256", sha256_file(path)}};
+    written[i] = {{"file", path},
+                  {"task", to_string(clip.task)},
+                  {"seconds", clip.frames() / clip.rate_hz()},
+                  {"frames", clip.frames()},
+                  {"sha256", sha256_file(path)}};
     progress.advance();
   });
   progress.finish();
@@ -65,7 +68,8 @@ void add_synth(CLI::App& app, Session& session) {
   command->add_option("--first", arguments->options.index, "index of the first clip")->capture_default_str();
   command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
   const auto fixed = [&](const std::string& name, std::optional<double>& value, const std::string& what) {
-    command->add_option_function<double>(name, [&value](double v) { value = v; }, what + " (default: drawn)");
+    command->add_option_function<double>(
+        name, [&value](double v) { value = v; }, what + " (default: drawn)");
   };
   fixed("--height-a", arguments->options.height_a, "height of person A [m]");
   fixed("--height-b", arguments->options.height_b, "height of person B [m]");

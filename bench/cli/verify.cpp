@@ -26,22 +26,24 @@ std::vector<EpisodeRow> sample_rows(const Run& run, int count, std::uint64_t see
   std::copy_if(run.rows.begin(), run.rows.end(), std::back_inserter(rows),
                [](const EpisodeRow& row) { return !row.state_hash.empty() && row.outcome != Outcome::kTimedOut; });
   Random random(seed, stream_key({"verify"}));
-  for (size_t i = 0; i + 1 < rows.size(); ++i) std::swap(rows[i], rows[i + random.below(static_cast<int>(rows.size() - i))]);
+  for (size_t i = 0; i + 1 < rows.size(); ++i)
+    std::swap(rows[i], rows[i + random.below(static_cast<int>(rows.size() - i))]);
   rows.resize(std::min<size_t>(rows.size(), count));
   return rows;
 }
 
 struct Check {
   EpisodeRow before;
-  std::string now;   // state hash of the second run
+  std::string now;  // state hash of the second run
 };
 
 std::vector<Check> run_again(const Run& run, const VerifyArguments& arguments, Progress& progress) {
   const Suite suite = parse_suite(run.info.suite_yaml, arguments.run + "/suite.yaml");
   if (suite_hash(suite) != run.info.suite_hash)
-    throw InputError(fmt::format("'{}': the suite's clips are not what they were (hash {:.8}, was {:.8})", arguments.run,
-                                 suite_hash(suite), run.info.suite_hash));
-  const auto robot = std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+    throw InputError(fmt::format("'{}': the suite's clips are not what they were (hash {:.8}, was {:.8})",
+                                 arguments.run, suite_hash(suite), run.info.suite_hash));
+  const auto robot =
+      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, arguments.threads, progress);
   const std::vector<EpisodeSpec> plan = plan_episodes(suite, clips);
   std::vector<Check> checks;
@@ -68,9 +70,11 @@ void run_verify(Session& session, const VerifyArguments& arguments) {
   for (const Check& check : checks) {
     const bool same = check.now == check.before.state_hash;
     different += same ? 0 : 1;
-    text += fmt::format("{:<9} {} {}/{}/{} {} {:.12} {:.12}\n", same ? "same" : "DIFFERENT", check.before.clip, check.before.engine,
-                        check.before.controller, check.before.policy, check.before.arm, check.before.state_hash, check.now);
-    json.push_back({{"key", check.before.key}, {"same", same}, {"before", check.before.state_hash}, {"now", check.now}});
+    text += fmt::format("{:<9} {} {}/{}/{} {} {:.12} {:.12}\n", same ? "same" : "DIFFERENT", check.before.clip,
+                        check.before.engine, check.before.controller, check.before.policy, check.before.arm,
+                        check.before.state_hash, check.now);
+    json.push_back(
+        {{"key", check.before.key}, {"same", same}, {"before", check.before.state_hash}, {"now", check.now}});
   }
   require(!checks.empty(), fmt::format("'{}' has no episode to run again", arguments.run));
   text += fmt::format("{} of {} episodes repeat bit for bit", checks.size() - different, checks.size());
@@ -81,11 +85,14 @@ void run_verify(Session& session, const VerifyArguments& arguments) {
 }  // namespace
 
 void add_verify(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "verify", "run episodes of a run again and compare state hashes (exit code 5 where they differ)",
-                                  "duet verify runs/core --episodes 10");
+  CLI::App* command = add_command(
+      app, session, "verify", "run episodes of a run again and compare state hashes (exit code 5 where they differ)",
+      "duet verify runs/core --episodes 10");
   auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("run", arguments->run, "run directory")->required();
-  command->add_option("-k,--episodes", arguments->episodes, "how many, drawn at random")->capture_default_str()->check(CLI::Range(1, 1000000));
+  command->add_option("-k,--episodes", arguments->episodes, "how many, drawn at random")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
   command->add_option("--seed", arguments->seed, "of the draw")->capture_default_str();
   command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
   command->callback([&session, arguments] { run_verify(session, *arguments); });

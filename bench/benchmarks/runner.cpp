@@ -1,0 +1,72 @@
+#include "bench/runner.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "bench/benchmarks/parts.h"
+#include "bench/benchmarks/timer.h"
+#include "bench/suite.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kSuite = R"(
+schema: duet.suite/1
+name: bench-runner
+version: 1.0.0
+clips: {synth: {per_task: 8, seed: 42}}
+tasks: [wave, high_five]
+engines: [mujoco]
+controllers: [vmc]
+policies: [replay]
+)";
+
+// Wall time of the suite with a number of threads, in a folder that is removed again. [s]
+double run_seconds(const Suite& suite, int threads) {
+  const std::string folder =
+      (std::filesystem::temp_directory_path() / ("duet-bench-" + std::to_string(getpid()))).string();
+  RunOptions options;
+  options.threads = threads;
+  Progress quiet(Progress::Style::kQuiet);
+  const double begin = wall_seconds();
+  run_suite(suite, folder, options, quiet);
+  const double seconds = wall_seconds() - begin;
+  std::filesystem::remove_all(folder);
+  return seconds;
+}
+
+double peak_memory_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+std::vector<Figure> time_scaling(const BenchmarkOptions& options) {
+  constexpr int kRounds = 3;
+  const Suite suite = parse_suite(kSuite, "bench-runner");
+  double one = 1e9, many = 1e9;
+  for (int round = 0; round < kRounds; ++round) {
+    one = std::min(one, run_seconds(suite, 1));
+    many = std::min(many, run_seconds(suite, options.threads));
+  }
+  std::vector<Figure> figures;
+  const std::string name = "runner/scaling";
+  // The target is for two cores; with another number the figure is printed as it is.
+  figures.push_back(options.threads == 2 ? at_least(name, one / many, "1", 1.9)
+                                         : Figure{name, one / many, "1", "", true});
+  figures.push_back({name + ":threads", static_cast<double>(options.threads), "1", "", true});
+  figures.push_back({name + ":episodes_per_second", 32.0 / many, "1/s", "", true});
+  figures.push_back(at_most(name + ":peak_memory", peak_memory_mib(), "MiB", 1024.0));
+  return figures;
+}
+
+}  // namespace
+
+void add_runner_benchmarks(std::vector<Benchmark>& list) {
+  list.push_back({"runner/scaling", "a suite of 32 episodes on all threads against one", time_scaling});
+}
+
+}  // namespace duet

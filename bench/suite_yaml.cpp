@@ -1,0 +1,230 @@
+// Reads suite files: strict YAML -> Suite.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+
+#include "backends/factory.h"
+#include "bench/suite.h"
+#include "bench/suite_names.h"
+#include "controllers/controller.h"
+#include "core/file.h"
+#include "core/names.h"
+#include "core/require.h"
+#include "metrics/readings.h"
+#include "policies/policy.h"
+#include "retarget/options.h"
+#include "robots/yaml_section.h"
+
+namespace duet {
+namespace {
+
+// Runs `read` and puts file, line and key before the message of a std::invalid_argument.
+void checked(const YamlSection& section, const char* key, const std::function<void()>& read) {
+  try {
+    read();
+  } catch (const std::invalid_argument& error) {
+    section.fail(section.has(key) ? section.line(key) : section.line(), fmt::format("{}: {}", key, error.what()));
+  }
+}
+
+void get(const YamlSection& section, const char* key, std::string& out) {
+  if (section.has(key)) out = section.text(key);
+}
+
+void get(const YamlSection& section, const char* key, double& out) {
+  if (section.has(key)) out = section.number(key);
+}
+
+template <typename Integer>
+void get_integer(const YamlSection& section, const char* key, Integer lowest, Integer& out) {
+  if (!section.has(key)) return;
+  const double value = section.number(key);
+  checked(section, key, [&] {
+    require(value == std::floor(value) && value >= static_cast<double>(lowest) && value < 9.0e15,
+            fmt::format("expected a whole number, {} or more, found {}", lowest, value));
+  });
+  out = static_cast<Integer>(value);
+}
+
+template <typename E>
+void get_enum(const YamlSection& section, const char* key, const NameTable<E>& table, E& out) {
+  if (!section.has(key)) return;
+  const std::string text = section.text(key);
+  std::vector<std::string> known;
+  for (const auto& [name, value] : table) {
+    known.push_back(name);
+    if (name == text) {
+      out = value;
+      return;
+    }
+  }
+  section.fail(section.line(key), unknown_name_message(key, text, known));
+}
+
+// A section below `parent`, empty where absent.
+YamlSection below(const YamlSection& parent, const std::string& file, const char* key,
+                  std::initializer_list<const char*> known) {
+  return {file, parent.has(key) ? parent.node(key) : YAML::Load("{}"), key, known};
+}
+
+void get_names(const YamlSection& top, const char* key, const char* kind, const std::vector<std::string>& known,
+               std::vector<std::string>& out) {
+  out = top.texts(key);
+  checked(top, key, [&] {
+    require(!out.empty(), fmt::format("expected at least one {}, found none", kind));
+    for (const std::string& name : out)
+      require(std::find(known.begin(), known.end(), name) != known.end(), unknown_name_message(kind, name, known));
+  });
+}
+
+std::vector<std::string> engine_names() {
+  std::vector<std::string> names;
+  for (const EngineInfo& engine : engines()) names.push_back(engine.name);
+  return names;
+}
+
+void read_clips(const YamlSection& top, Suite& suite) {
+  const YamlSection clips = below(top, suite.file, "clips", {"synth", "files"});
+  const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed"});
+  get_integer(synth, "per_task", 1, suite.clips.synth_per_task);
+  get_integer<std::uint64_t>(synth, "seed", 0, suite.clips.synth_seed);
+  if (clips.has("files")) suite.clips.files = clips.texts("files");
+  const bool synthetic = suite.clips.synth_per_task > 0;
+  if (synthetic != suite.clips.files.empty())
+    clips.fail(clips.line(),
+               fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
+  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
+  for (std::string& file : suite.clips.files)
+    if (std::filesystem::path(file).is_relative()) file = (folder / file).lexically_normal().string();
+}
+
+void read_lists(const YamlSection& top, Suite& suite) {
+  if (top.has("tasks")) {
+    checked(top, "tasks", [&] {
+      for (const std::string& task : top.texts("tasks")) suite.tasks.push_back(parse_task(task));
+      require(!suite.tasks.empty(), "expected at least one task, found none");
+    });
+  } else {
+    suite.tasks.assign(kTasks.begin(), kTasks.end());
+  }
+  get_names(top, "engines", "engine", engine_names(), suite.engines);
+  get_names(top, "controllers", "controller", controller_names(), suite.controllers);
+  get_names(top, "policies", "policy", policy_names(), suite.policies);
+}
+
+void read_episode(const YamlSection& top, Suite& suite) {
+  get_integer(top, "episodes_per_clip", 1, suite.episodes_per_clip);
+  get_enum(top, "start", start_names(), suite.start);
+  get(top, "start_radius", suite.start_radius);
+  checked(top, "start_radius", [&] {
+    require(suite.start_radius >= 0.0 && suite.start_radius <= 5.0,
+            fmt::format("expected 0 to 5 m, found {}", suite.start_radius));
+  });
+  get_enum(top, "partner", partner_names(), suite.partner);
+  get(top, "dt", suite.dt);
+  checked(top, "dt", [&] {
+    const double steps = 0.02 / suite.dt;
+    require(suite.dt > 0.0 && std::abs(steps - std::round(steps)) < 1e-9,
+            fmt::format("expected a step [s] that divides 0.02, found {}", suite.dt));
+  });
+  get(top, "robot", suite.robot);
+  if (top.has("null_arm")) suite.null_arm = top.flag_or("null_arm", true);
+  const YamlSection detector = below(top, suite.file, "detector", {"version", "thresholds"});
+  get_enum(detector, "version", version_names(), suite.detector);
+  get_enum(detector, "thresholds", threshold_names(), suite.thresholds);
+  const YamlSection limits = below(top, suite.file, "limits", {"wall_s_per_episode"});
+  get(limits, "wall_s_per_episode", suite.wall_limit);
+  checked(limits, "wall_s_per_episode",
+          [&] { require(suite.wall_limit > 0.0, fmt::format("expected more than 0 s, found {}", suite.wall_limit)); });
+  const YamlSection record = below(top, suite.file, "record", {"trajectories"});
+  get_enum(record, "trajectories", record_names(), suite.record);
+}
+
+// A map whose keys and values another room checks.
+template <typename Set>
+void read_choices(const YamlSection& top, const char* key, const Set& set, std::map<std::string, std::string>& out) {
+  if (!top.has(key)) return;
+  const YAML::Node node = top.node(key);
+  if (!node.IsMap()) top.fail(top.line(key), fmt::format("{}: expected a mapping, found {}", key, describe(node)));
+  for (const auto& entry : node) {
+    const std::string name = entry.first.as<std::string>();
+    if (!entry.second.IsScalar())
+      top.fail(entry.first.Mark().line + 1,
+               fmt::format("{}.{}: expected one value, found {}", key, name, describe(entry.second)));
+    try {
+      set(name, entry.second.Scalar());
+    } catch (const std::invalid_argument& error) {
+      top.fail(entry.first.Mark().line + 1, fmt::format("{}: {}", key, error.what()));
+    }
+    out[name] = entry.second.Scalar();
+  }
+}
+
+Suite read_suite(const YAML::Node& document, const std::string& file) {
+  Suite suite;
+  suite.file = file;
+  const YamlSection top(file, document, "suite",
+                        {"schema",   "name",         "version",     "seed",     "clips",
+                         "tasks",    "engines",      "controllers", "policies", "episodes_per_clip",
+                         "start",    "start_radius", "partner",     "dt",       "robot",
+                         "detector", "limits",       "record",      "null_arm", "retarget",
+                         "readings"});
+  const std::string schema = top.text("schema");
+  if (schema != "duet.suite/1")
+    top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));
+  suite.name = top.text("name");
+  suite.version = top.text("version");
+  get_integer<std::uint64_t>(top, "seed", 0, suite.seed);
+  read_clips(top, suite);
+  read_lists(top, suite);
+  read_episode(top, suite);
+  PairOptions pair;
+  Readings readings;
+  read_choices(
+      top, "retarget", [&](const auto& name, const auto& value) { set_pair_option(pair, name, value); },
+      suite.retarget);
+  read_choices(
+      top, "readings", [&](const auto& name, const auto& value) { set_reading(readings, name, value); },
+      suite.readings);
+  return suite;
+}
+
+// Sets document[a][b]... = value for the key "a.b...". Names of readings have a dot of their own.
+void apply_override(const YAML::Node& document, const std::string& key, const std::string& value,
+                    const std::string& file) {
+  YAML::Node node(document);  // yaml-cpp nodes are references; reset() points one elsewhere
+  std::string rest = key;
+  for (size_t dot = rest.find('.'); dot != std::string::npos; dot = rest.find('.')) {
+    const std::string head = rest.substr(0, dot);
+    const YAML::Node child = node[head];
+    node.reset(child);
+    rest = rest.substr(dot + 1);
+    if (head == "readings") break;
+  }
+  node[rest] = parse_yaml(value, fmt::format("{} (override of '{}')", file, key));
+}
+
+}  // namespace
+
+Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides) {
+  const YAML::Node document = parse_yaml(yaml, name);
+  if (!document.IsMap())
+    throw InputError(fmt::format("{}:1: expected a suite (a mapping), found {}", name, describe(document)));
+  for (const auto& [key, value] : overrides) {
+    try {
+      apply_override(document, key, value, name);
+    } catch (const YAML::Exception& error) {
+      throw InputError(fmt::format("{}: cannot override '{}': {}", name, key, error.msg));
+    }
+  }
+  return read_suite(document, name);
+}
+
+Suite load_suite(const std::string& path, const Overrides& overrides) {
+  return parse_suite(read_file(path), path, overrides);
+}
+
+}  // namespace duet
