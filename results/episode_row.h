@@ -20,9 +20,9 @@ struct Verdict {           // of one detector
   std::string thresholds;  // "paper", "strict"
   bool success = false;
   std::map<std::string, bool> parts;
-  std::map<std::string, double> values;
-  std::map<std::string, double> margins;
-  int frames = 0;  // number of evidence frames
+  std::map<std::string, double> values;   // NaN where undefined (null in JSON, as for any other that is not finite)
+  std::map<std::string, double> margins;  // likewise
+  int frames = 0;                         // number of evidence frames
 };
 
 struct EpisodeRow {
@@ -50,8 +50,9 @@ struct EpisodeRow {
 // SHA-256 over suite hash, task, clip, policy, controller, engine, perturbation, episode.
 std::string episode_key(const EpisodeRow& row);
 
+// NaN and infinity are never written: such metrics are left out, all other such numbers become null.
 nlohmann::json to_json(const EpisodeRow& row);
-// Throws InputError naming the key and the fault; unknown keys are refused.
+// null reads as NaN. Throws InputError naming the key and the fault; unknown keys are refused.
 EpisodeRow row_from_json(const nlohmann::json& json);
 
 }  // namespace duet

@@ -28,9 +28,16 @@ struct LeaderboardEntry {
   std::map<std::string, double> other_success;  // "paper/paper", "robot/strict", ... -> rate
   long fell = 0, diverged = 0, timed_out = 0, errors = 0;
   std::map<std::string, double> metrics;  // mean over episodes that have it
+  std::string arm = "main";               // the null and the oracle arm have entries of their own
+  double level = 0.95;                    // of both intervals
+  long pairs = 0;  // episodes that the null arm has too: null_success, lift and its interval are over these
+  long unsupported = 0;
+  long unjudged = 0;  // ended well but no detector ruled on it; counted as a failure
 };
 
-// Sorted by engine, controller, policy, perturbation, task (order of kTasks, "all" last).
+// Sorted by engine, controller, policy, perturbation, task (order of kTasks, "all" last); arms of one policy in turn.
+// An episode succeeds where its headline verdict does and its outcome is ok or fell. Throws InputError: rows of two
+// suites or suite versions, an episode that is there twice.
 std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options = {});
 
 std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries);
@@ -46,10 +53,14 @@ struct Comparison {
   Interval cluster_interval;     // bootstrap over clips
   double p = 1.0, p_holm = 1.0;  // exact McNemar
   double minimum_detectable = 0.0;
+  double level = 0.95;                  // of both intervals
+  long unpaired_a = 0, unpaired_b = 0;  // episodes of the group that the other run lacks; left out
 };
 
-// Pairs rows by task, clip, episode and the group fields they share; per task and over all. Throws InputError where
-// nothing pairs (it says what differs).
+// Pairs rows of the main arm by task, clip, episode and the group fields they share; per task and over all. Where A and
+// B have one value each of engine, controller, policy or perturbation and the values differ, that is what is compared
+// ("mujoco/vmc/replay vs null hug"). Throws InputError where nothing pairs (it says what differs), for rows of two
+// suite versions and for an episode that is there twice.
 std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
                                      const LeaderboardOptions& options = {});
 std::string comparison_markdown(const std::vector<Comparison>& comparisons);

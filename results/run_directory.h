@@ -1,4 +1,5 @@
-// A run on disk, append-only and resumable: run.json, env.json, suite.yaml, episodes.jsonl; everything else is derived.
+// A run on disk, append-only and resumable: run.json, env.json, suite.yaml, episodes.jsonl and, where a run was
+// resumed, resumed.jsonl (when, command line and environment of each resumption); everything else is derived.
 // ARCHITECTURE decision 9.
 #pragma once
 
@@ -30,12 +31,12 @@ class RunDirectory {
   [[nodiscard]] bool has(const std::string& key) const { return keys_.contains(key); }
   [[nodiscard]] std::size_t size() const { return keys_.size(); }
   // On disk when it returns. Throws InputError (a full disk); the file then ends with the last whole row.
-  // std::invalid_argument for a key that is already there. Not thread-safe.
+  // std::invalid_argument for a key that is empty or already there and for a row of another suite. Not thread-safe.
   void append(const EpisodeRow& row);
 
  private:
   RunDirectory() = default;
-  std::string path_;
+  std::string path_, suite_hash_;
   std::unordered_set<std::string> keys_;
   std::unique_ptr<LineAppender> lines_;
 };

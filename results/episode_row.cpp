@@ -1,0 +1,188 @@
+#include "results/episode_row.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/digest.h"
+#include "core/names.h"
+#include "core/require.h"
+#include "results/json_fields.h"
+
+namespace duet {
+namespace {
+
+nlohmann::json finite_or_null(const std::map<std::string, double>& values) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [name, value] : values) json[name] = number_or_null(value);
+  return json;
+}
+
+nlohmann::json finite_only(const std::map<std::string, double>& values) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [name, value] : values) {
+    if (std::isfinite(value)) json[name] = value;
+  }
+  return json;
+}
+
+nlohmann::json to_json(const Verdict& verdict) {
+  return {{"version", verdict.version},
+          {"thresholds", verdict.thresholds},
+          {"success", verdict.success},
+          {"parts", verdict.parts},
+          {"values", finite_or_null(verdict.values)},
+          {"margins", finite_or_null(verdict.margins)},
+          {"frames", verdict.frames}};
+}
+
+int small_integer(JsonFields& fields, const std::string& key, const std::string& what) {
+  const std::int64_t value = fields.integer(key);
+  if (value < 0 || value > std::numeric_limits<int>::max()) {
+    throw InputError(fmt::format("{}: key '{}': expected a whole number of at least 0, found {}", what, key, value));
+  }
+  return static_cast<int>(value);
+}
+
+Verdict verdict_from_json(const nlohmann::json& json, const std::string& what) {
+  JsonFields fields(json, what);
+  Verdict verdict;
+  verdict.version = fields.text("version");
+  verdict.thresholds = fields.text("thresholds");
+  verdict.success = fields.boolean("success");
+  verdict.parts = fields.booleans("parts");
+  verdict.values = fields.numbers("values", true);
+  verdict.margins = fields.numbers("margins", true);
+  verdict.frames = small_integer(fields, "frames", what);
+  fields.refuse_unknown();
+  return verdict;
+}
+
+std::vector<Verdict> verdicts_from_json(const nlohmann::json& json) {
+  if (!json.is_array()) {
+    throw InputError(fmt::format("episode row: key 'verdicts': expected a list, found {}", json.type_name()));
+  }
+  std::vector<Verdict> verdicts;
+  for (const nlohmann::json& entry : json) {
+    verdicts.push_back(verdict_from_json(entry, fmt::format("episode row: verdict {}", verdicts.size())));
+  }
+  return verdicts;
+}
+
+Outcome outcome_from(const std::string& name) {
+  try {
+    return parse_outcome(name);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(fmt::format("episode row: key 'outcome': {}", error.what()));
+  }
+}
+
+std::string arm_from(const std::string& name) {
+  static constexpr std::array<std::string_view, 3> kArms = {"main", "null", "oracle"};
+  for (const std::string_view arm : kArms) {
+    if (name == arm) return name;
+  }
+  const std::array<std::string, 3> known = {"main", "null", "oracle"};
+  throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", name, known)));
+}
+
+void read_identity(JsonFields& fields, EpisodeRow& row) {
+  if (const std::int64_t schema = fields.integer("schema"); schema != kRowSchema) {
+    throw InputError(fmt::format("episode row: expected schema {}, found {}", kRowSchema, schema));
+  }
+  row.key = fields.text("key");
+  if (row.key.empty()) throw InputError("episode row: key 'key': expected a digest, found \"\"");
+  row.suite = fields.text("suite");
+  row.suite_version = fields.text("suite_version");
+  row.suite_hash = fields.text("suite_hash");
+  row.task = fields.text("task");
+  row.clip = fields.text("clip");
+  row.episode = small_integer(fields, "episode", "episode row");
+  row.seed = fields.unsigned_integer("seed");
+  row.engine = fields.text("engine");
+  row.engine_version = fields.text("engine_version");
+  row.controller = fields.text("controller");
+  row.policy = fields.text("policy");
+  row.perturbation = fields.text("perturbation");
+  row.robot_digest = fields.text("robot_digest");
+  row.arm = arm_from(fields.text("arm"));
+}
+
+void read_result(JsonFields& fields, EpisodeRow& row) {
+  row.outcome = outcome_from(fields.text("outcome"));
+  row.message = fields.text("message");
+  if (!fields.at("success").is_null()) row.success = fields.boolean("success");
+  row.verdicts = verdicts_from_json(fields.at("verdicts"));
+  row.metrics = fields.numbers("metrics", false);
+  row.fell = fields.boolean("fell");
+  row.frames = small_integer(fields, "frames", "episode row");
+  row.sim_s = fields.number_or_nan("sim_s");
+  row.wall_s = fields.number_or_nan("wall_s");
+  row.contact_peak_n = fields.number_or_nan("contact_peak_n");
+  row.contact_impulse_ns = fields.number_or_nan("contact_impulse_ns");
+  row.late_plans = small_integer(fields, "late_plans", "episode row");
+  row.state_hash = fields.text("state_hash");
+  row.started_at = fields.text("started_at");
+}
+
+}  // namespace
+
+std::string episode_key(const EpisodeRow& row) {
+  Sha256 hash;
+  const std::string episode = fmt::format("{}", row.episode);
+  for (const std::string* part : {&row.suite_hash, &row.task, &row.clip, &row.policy, &row.controller, &row.engine,
+                                  &row.perturbation, &episode}) {
+    // The length first, so that no two different lists of parts read the same.
+    hash.update(fmt::format("{}:", part->size()));
+    hash.update(std::string_view(*part));
+  }
+  return hash.hex();
+}
+
+nlohmann::json to_json(const EpisodeRow& row) {
+  nlohmann::json verdicts = nlohmann::json::array();
+  for (const Verdict& verdict : row.verdicts) verdicts.push_back(to_json(verdict));
+  return {{"schema", kRowSchema},
+          {"key", row.key},
+          {"suite", row.suite},
+          {"suite_version", row.suite_version},
+          {"suite_hash", row.suite_hash},
+          {"task", row.task},
+          {"clip", row.clip},
+          {"episode", row.episode},
+          {"seed", row.seed},
+          {"engine", row.engine},
+          {"engine_version", row.engine_version},
+          {"controller", row.controller},
+          {"policy", row.policy},
+          {"perturbation", row.perturbation},
+          {"robot_digest", row.robot_digest},
+          {"arm", row.arm},
+          {"outcome", std::string(to_string(row.outcome))},
+          {"message", row.message},
+          {"success", row.success.has_value() ? nlohmann::json(*row.success) : nlohmann::json(nullptr)},
+          {"verdicts", std::move(verdicts)},
+          {"metrics", finite_only(row.metrics)},
+          {"fell", row.fell},
+          {"frames", row.frames},
+          {"sim_s", number_or_null(row.sim_s)},
+          {"wall_s", number_or_null(row.wall_s)},
+          {"contact_peak_n", number_or_null(row.contact_peak_n)},
+          {"contact_impulse_ns", number_or_null(row.contact_impulse_ns)},
+          {"late_plans", row.late_plans},
+          {"state_hash", row.state_hash},
+          {"started_at", row.started_at}};
+}
+
+EpisodeRow row_from_json(const nlohmann::json& json) {
+  JsonFields fields(json, "episode row");
+  EpisodeRow row;
+  read_identity(fields, row);
+  read_result(fields, row);
+  fields.refuse_unknown();
+  return row;
+}
+
+}  // namespace duet

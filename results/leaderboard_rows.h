@@ -1,0 +1,50 @@
+// How leaderboard entries are laid out in tables: one row per (engine, controller, perturbation, policy), tasks as
+// columns. Shared by the Markdown, LaTeX and HTML writers.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "results/leaderboard.h"
+
+namespace duet {
+
+struct LeaderboardRow {
+  std::string engine, controller, policy, perturbation, arm;
+  std::map<std::string, const LeaderboardEntry*> by_task;  // "all" included
+
+  [[nodiscard]] const LeaderboardEntry* find(const std::string& task) const;
+};
+
+// By engine, controller, perturbation; then the main arm by policy, the oracle, and the null arm last.
+std::vector<LeaderboardRow> leaderboard_rows(const std::vector<LeaderboardEntry>& entries);
+
+// Tasks that occur, in the order of kTasks, others after them by name; without "all".
+std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& entries);
+// The place of a task in that order.
+int task_rank(std::string_view task);
+
+// Names of other verdicts, or of metrics, that occur in any entry.
+std::vector<std::string> other_verdicts(const std::vector<LeaderboardEntry>& entries);
+std::vector<std::string> metric_names(const std::vector<LeaderboardEntry>& entries);
+
+// Columns that tell rows apart; those with one value throughout go into the caption.
+struct RowLabels {
+  std::vector<std::string> columns;             // "Engine", ..., always with "Policy"
+  std::vector<std::vector<std::string>> cells;  // per row
+  std::string caption;                          // "Engine mujoco, controller vmc." or ""
+};
+RowLabels row_labels(const std::vector<LeaderboardRow>& rows);
+
+// Sentences that belong under a leaderboard: what the figures are, small samples, episodes without a null pair.
+std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& entries);
+
+std::string task_title(const std::string& task);                  // "high_five" -> "High-five", "all" -> "Overall"
+std::string percent(double fraction);                             // "84.9", "-" for NaN
+std::string percent(double fraction, const Interval& interval);   // "84.9 [77.6, 90.1]"
+std::string points(double difference, const Interval& interval);  // "+12.3 [4.5, 20.1]"
+std::string significant(double value);                            // four significant digits, "-" for NaN
+
+}  // namespace duet

@@ -1,0 +1,22 @@
+// A table of strings as aligned Markdown, as CSV (RFC 4180) or as the rows of a LaTeX tabular.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+struct TextTable {
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;  // each as long as the header
+  std::size_t label_columns = 1;               // these are set left, the others right
+};
+
+std::string markdown_table(const TextTable& table);
+std::string csv_table(const TextTable& table);    // lines end with CR LF
+std::string latex_table(const TextTable& table);  // tabular with booktabs rules; cells are escaped
+
+std::string escape_latex(std::string_view text);
+
+}  // namespace duet
