@@ -36,14 +36,17 @@ class Backend {
   [[nodiscard]] virtual std::string version() const = 0;    // the engine's own
   [[nodiscard]] const Scene& scene() const { return scene_; }
 
-  // Puts the robot into `state`, clears contacts and warm starts: the same state gives bitwise the same continuation.
+  // Puts the robot into `state`; clears contacts, warm starts and pushes, and takes the partner away until the next
+  // set_partner(): the same state gives bitwise the same continuation. Throws std::invalid_argument for wrong sizes,
+  // values that are not finite and a quaternion that is not unit.
   void reset(const RobotState& state);
   // Partner joints now; each following step moves them on at `velocities` until the next call.
   void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
   // The reference being tracked. Engines ignore it; playback moves the robot there.
   void follow(const Reference& reference);
   // One physics step of scene().dt with the torque law of JointCommand evaluated inside it. kDiverged is final until
-  // reset.
+  // reset: state() then stays at the last finite one. Throws std::invalid_argument for wrong sizes, values that are not
+  // finite and negative gains.
   Outcome step(const JointCommand& command);
 
   [[nodiscard]] const RobotState& state() const { return state_; }
@@ -54,9 +57,12 @@ class Backend {
   [[nodiscard]] double time() const { return static_cast<double>(steps_) * scene_.dt; }  // since reset [s]
 
   [[nodiscard]] Snapshot snapshot() const;
-  void restore(const Snapshot& snapshot);  // throws std::invalid_argument for another scene's size
+  // Continues as bitwise the same run; contacts() is empty until the next step. Throws std::invalid_argument for another
+  // scene's size.
+  void restore(const Snapshot& snapshot);
 
-  // Adds a force on a link at a point for the following steps until called again with zero. [N], frame W.
+  // Adds a force on a link for the following steps until called again for that link (with zero: no force). The force
+  // keeps its direction in W and acts at the point of the link that is at p_W now. [N], frame W.
   void push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W);
 
  protected:
@@ -74,6 +80,7 @@ class Backend {
   virtual void do_restore(std::span<const double> values) = 0;
 
   Scene scene_;
+  RobotState last_finite_;
   long steps_ = 0;
   bool diverged_ = false;
 };

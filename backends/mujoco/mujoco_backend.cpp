@@ -1,0 +1,237 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <tuple>
+
+#include "backends/mujoco/mjcf.h"
+#include "backends/mujoco/mujoco.h"
+#include "backends/mujoco/mujoco_model.h"
+#include "backends/partner.h"
+
+namespace duet {
+namespace {
+
+struct Push {
+  Eigen::Vector3d f_W = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_L = Eigen::Vector3d::Zero();
+};
+constexpr int kPushValues = 6;
+
+class MujocoBackend final : public Backend {
+ public:
+  explicit MujocoBackend(const Scene& scene)
+      : Backend(scene),
+        compiled_(compile_mujoco(scene)),
+        m_(*compiled_.model),
+        d_(*compiled_.data),
+        applied_(Eigen::VectorXd::Zero(scene.robot->dof())),
+        pushes_(scene.robot->links.size()) {
+    contacts_.reserve(mujoco_sizes(scene).contacts);
+    order_.reserve(mujoco_sizes(scene).contacts);
+  }
+
+  [[nodiscard]] std::string_view name() const override { return "mujoco"; }
+  [[nodiscard]] std::string version() const override { return mj_versionString(); }
+
+ private:
+  void do_reset() override {
+    mj_resetData(&m_, &d_);
+    write_state(state_, compiled_, d_);
+    partner_ = {};
+    std::fill(pushes_.begin(), pushes_.end(), Push{});
+    pushed_ = false;
+  }
+
+  void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) override {
+    partner_.set(joints, velocities);
+  }
+
+  Outcome do_step(const JointCommand& command) override {
+    place_partner();
+    apply_torques(command);
+    mj_step1(&m_, &d_);
+    if (pushed_) apply_pushes();
+    move_partner_contacts();
+    mj_step2(&m_, &d_);
+    partner_.advance(scene().dt);
+    if (diverged()) return Outcome::kDiverged;
+    check_buffers();
+    read_state(compiled_, state_);
+    read_torques();
+    read_contacts();
+    return Outcome::kOk;
+  }
+
+  // The gain on velocity is MuJoCo's joint damping, which its Euler integrator takes at the end of the step: stable
+  // where an explicit one is not. It cannot be limited there, so a joint whose whole torque is at the limit gets the
+  // limit itself and no damping.
+  void apply_torques(const JointCommand& command) {
+    const std::vector<RobotJoint>& joints = scene().robot->joints;
+    for (int i = 0; i < applied_.size(); ++i) {
+      const int v = compiled_.v_address[i];
+      const double spring = command.kp[i] * (command.q_target[i] - state_.q[i]) + command.tau_ff[i];
+      const double torque = spring - command.kd[i] * state_.v[i];
+      const bool saturated = std::abs(torque) >= joints[i].effort;
+      m_.dof_damping[v] = saturated ? 0.0 : command.kd[i];
+      applied_[i] = saturated ? std::copysign(joints[i].effort, torque) : spring;
+      d_.qfrc_applied[v] = applied_[i];
+    }
+  }
+
+  void read_torques() {
+    for (int i = 0; i < applied_.size(); ++i)
+      torques_[i] = applied_[i] - m_.dof_damping[compiled_.v_address[i]] * state_.v[i];
+  }
+
+  void place_partner() {
+    if (!partner_.present) return;
+    for (size_t i = 0; i < compiled_.human_geom.size(); ++i) {
+      const CapsulePose pose = capsule_pose(scene().human.capsules[i], partner_.joints);
+      const int mocap = compiled_.human_mocap[i], geom = compiled_.human_geom[i];
+      Eigen::Map<Eigen::Vector3d>(d_.mocap_pos + 3 * mocap) = pose.X_WC.p;
+      const Eigen::Quaterniond& R = pose.X_WC.R;
+      Eigen::Map<Eigen::Vector4d>(d_.mocap_quat + 4 * mocap) << R.w(), R.x(), R.y(), R.z();
+      m_.geom_size[3 * geom + 1] = pose.half_length;
+      m_.geom_rbound[geom] = pose.half_length + m_.geom_size[3 * geom];
+    }
+  }
+
+  // MuJoCo takes mocap bodies as resting. What their velocity changes is the reference acceleration of the rows of the
+  // contacts with them: -b times the relative velocity.
+  void move_partner_contacts() {
+    if (!partner_.present || compiled_.human_geom.empty()) return;
+    for (int i = 0; i < d_.ncon; ++i) {
+      const mjContact& contact = d_.contact[i];
+      const bool first_is_human = compiled_.geoms[contact.geom1].side == ContactSide::kHuman;
+      const MujocoGeom& human = compiled_.geoms[first_is_human ? contact.geom1 : contact.geom2];
+      if (human.side != ContactSide::kHuman || contact.efc_address < 0) continue;
+      const Eigen::Vector3d v_W =
+          capsule_velocity(scene().human.capsules[human.index], partner_, Eigen::Vector3d(contact.pos));
+      for (int k = 0; k < contact.dim; ++k) {
+        const int row = contact.efc_address + k;
+        const double along = Eigen::Map<const Eigen::Vector3d>(contact.frame + 3 * k).dot(v_W);
+        d_.efc_aref[row] -= d_.efc_KBIP[4 * row + 1] * (first_is_human ? -along : along);
+      }
+    }
+  }
+
+  void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) override {
+    mj_kinematics(&m_, &d_);
+    const int body = compiled_.link_body[link];
+    pushes_[link] = {f_W, rotation(body).transpose() * (p_W - position(body))};
+    pushed_ = true;
+  }
+
+  void apply_pushes() {
+    for (size_t link = 0; link < pushes_.size(); ++link) {
+      const int body = compiled_.link_body[link];
+      const Push& push = pushes_[link];
+      const Eigen::Vector3d p_W = position(body) + rotation(body) * push.p_L;
+      const Eigen::Vector3d arm = p_W - Eigen::Map<const Eigen::Vector3d>(d_.xipos + 3 * body);
+      Eigen::Map<Eigen::Vector3d>(d_.xfrc_applied + 6 * body) = push.f_W;
+      Eigen::Map<Eigen::Vector3d>(d_.xfrc_applied + 6 * body + 3) = arm.cross(push.f_W);
+    }
+  }
+
+  [[nodiscard]] Eigen::Matrix3d rotation(int body) const {
+    return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d_.xmat + 9 * body);
+  }
+  [[nodiscard]] Eigen::Vector3d position(int body) const { return Eigen::Vector3d(d_.xpos + 3 * body); }
+
+  // On a bad number MuJoCo silently starts again from its own initial state; its counters tell.
+  [[nodiscard]] bool diverged() const {
+    return d_.warning[mjWARN_BADQPOS].number + d_.warning[mjWARN_BADQVEL].number + d_.warning[mjWARN_BADQACC].number >
+           0;
+  }
+
+  void check_buffers() const {
+    if (d_.warning[mjWARN_CONTACTFULL].number + d_.warning[mjWARN_CNSTRFULL].number == 0) return;
+    throw std::runtime_error(fmt::format("mujoco: more than {} contacts or {} constraint rows in one step",
+                                         m_.nconmax, m_.njmax));
+  }
+
+  void read_contacts() {
+    order_.clear();
+    for (int i = 0; i < d_.ncon; ++i)
+      if (d_.contact[i].efc_address >= 0) order_.push_back(i);
+    std::sort(order_.begin(), order_.end(), [this](int a, int b) {
+      const mjContact &x = d_.contact[a], &y = d_.contact[b];
+      return std::tie(x.geom1, x.geom2, a) < std::tie(y.geom1, y.geom2, b);
+    });
+    contacts_.clear();
+    for (const int i : order_) contacts_.push_back(contact_of(i));
+  }
+
+  // MuJoCo's force acts on the second geom's body, in a frame whose rows are the normal and two tangents.
+  [[nodiscard]] Contact contact_of(int index) const {
+    const mjContact& contact = d_.contact[index];
+    const bool second_is_robot = compiled_.geoms[contact.geom2].side == ContactSide::kRobot;
+    const MujocoGeom& robot = compiled_.geoms[second_is_robot ? contact.geom2 : contact.geom1];
+    const MujocoGeom& other = compiled_.geoms[second_is_robot ? contact.geom1 : contact.geom2];
+    std::array<mjtNum, 6> wrench{};
+    mj_contactForce(&m_, &d_, index, wrench.data());
+    const Eigen::Vector3d f_W =
+        Eigen::Map<const Eigen::Matrix3d>(contact.frame) * Eigen::Map<const Eigen::Vector3d>(wrench.data());
+    return {.link = robot.index,
+            .side = other.side,
+            .other = other.index,
+            .p_WC = Eigen::Vector3d(contact.pos),
+            .f_W = second_is_robot ? f_W : Eigen::Vector3d(-f_W),
+            .depth = std::max(0.0, -contact.dist)};
+  }
+
+  void do_snapshot(Snapshot& snapshot) const override {
+    std::vector<double>& values = snapshot.values;
+    values.insert(values.end(), d_.qpos, d_.qpos + m_.nq);
+    values.insert(values.end(), d_.qvel, d_.qvel + m_.nv);
+    values.insert(values.end(), d_.qacc_warmstart, d_.qacc_warmstart + m_.nv);
+    values.push_back(d_.time);
+    values.push_back(pushed_ ? 1.0 : 0.0);
+    for (const Push& push : pushes_) {
+      values.insert(values.end(), push.f_W.data(), push.f_W.data() + 3);
+      values.insert(values.end(), push.p_L.data(), push.p_L.data() + 3);
+    }
+    partner_.append_to(values);
+  }
+
+  void do_restore(std::span<const double> values) override {
+    mj_resetData(&m_, &d_);
+    const double* from = values.data();
+    const auto take = [&from](int count, mjtNum* to) {
+      std::copy_n(from, count, to);
+      from += count;
+    };
+    take(m_.nq, d_.qpos);
+    take(m_.nv, d_.qvel);
+    take(m_.nv, d_.qacc_warmstart);
+    take(1, &d_.time);
+    pushed_ = *from++ != 0.0;
+    for (Push& push : pushes_) {
+      push = {Eigen::Vector3d(from), Eigen::Vector3d(from + 3)};
+      from += kPushValues;
+    }
+    partner_.read_from({from, MovingPartner::kValues});
+  }
+
+  MujocoModel compiled_;
+  mjModel& m_;
+  mjData& d_;
+  MovingPartner partner_;
+  Eigen::VectorXd applied_;  // torques without the damping that the integrator adds
+  std::vector<Push> pushes_;
+  bool pushed_ = false;
+  std::vector<int> order_;
+};
+
+}  // namespace
+
+EngineInfo mujoco_info() {
+  return {.name = "mujoco", .available = true, .version = mj_versionString(), .reason = ""};
+}
+
+std::unique_ptr<Backend> make_mujoco_backend(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
+
+}  // namespace duet

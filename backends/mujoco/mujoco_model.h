@@ -1,0 +1,45 @@
+// A scene compiled by MuJoCo, and where the robot's joints and shapes are in its arrays. Includes the vendor's header:
+// only for the files of this folder that are built with MuJoCo.
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+#include <vector>
+
+#include "backends/scene.h"
+#include "core/contact.h"
+#include "core/robot_state.h"
+
+namespace duet {
+
+// What a geom of the compiled model is: a shape on a link, a capsule of the human or the ground.
+struct MujocoGeom {
+  ContactSide side = ContactSide::kGround;
+  int index = -1;  // link of the robot or capsule of the human; -1 for the ground
+};
+
+struct MujocoDelete {
+  void operator()(mjModel* model) const { mj_deleteModel(model); }
+  void operator()(mjData* data) const { mj_deleteData(data); }
+};
+
+// One compiled copy per backend: gains and capsule lengths are written into it. Not shared between threads.
+struct MujocoModel {
+  std::unique_ptr<mjModel, MujocoDelete> model;
+  std::unique_ptr<mjData, MujocoDelete> data;
+  std::vector<int> q_address;     // of joint i in qpos
+  std::vector<int> v_address;     // of joint i in qvel
+  std::vector<int> link_body;     // body of link i
+  std::vector<MujocoGeom> geoms;  // by MuJoCo's geom id
+  std::vector<int> human_geom;    // geom of capsule i; empty unless the partner is solid
+  std::vector<int> human_mocap;   // mocap index of capsule i
+};
+
+// Throws std::runtime_error with MuJoCo's message where it refuses the document. Thread-safe (compiling is serialised).
+MujocoModel compile_mujoco(const Scene& scene);
+
+void write_state(const RobotState& state, const MujocoModel& from, mjData& to);
+void read_state(const MujocoModel& from, RobotState& state);
+
+}  // namespace duet

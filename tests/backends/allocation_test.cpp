@@ -1,0 +1,43 @@
+#include "backends/factory.h"
+#include "tests/backends/allocation_count.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/backends/small_robots.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+TEST(Allocation, IsCounted) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: malloc belongs to the sanitizer";
+  const long before = test::allocation_count();
+  const auto value = std::make_unique<std::vector<double>>(10);
+  EXPECT_GE(test::allocation_count(), before + 2);
+}
+
+TEST(Allocation, StepMakesNoneInAnyEngine) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: malloc belongs to the sanitizer";
+  std::array<double, 24> bones{};
+  bones.fill(0.2);
+  for (const EngineInfo& info : engines()) {
+    if (!info.available) continue;
+    Scene scene = test::g1_scene(PartnerMode::kSolid);
+    scene.human = make_human_body(bones);
+    const auto backend = make_backend(info.name, scene);
+    const RobotState state = scene.robot->standing_state();
+    backend->reset(state);
+    const JointCommand command = scene.robot->default_command(scene.robot->neutral);
+    const Reference reference{state.X_WB, state.q};
+    const HumanJoints joints = HumanJoints::Constant(0.3), velocities = HumanJoints::Constant(0.01);
+    const long before = test::allocation_count();
+    for (int i = 0; i < 500; ++i) {  // through the fall: contacts of every kind
+      backend->follow(reference);
+      backend->set_partner(joints, velocities);
+      backend->push(0, {1.0, 0.0, 0.0}, state.X_WB.p);
+      backend->step(command);
+    }
+    EXPECT_EQ(test::allocation_count(), before) << info.name;
+  }
+}
+
+}  // namespace
+}  // namespace duet

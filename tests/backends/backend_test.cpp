@@ -1,0 +1,126 @@
+// What Backend itself promises for every engine: arguments are checked once, with messages that name the joint.
+#include "backends/backend.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <limits>
+
+#include "backends/factory.h"
+#include "tests/backends/small_robots.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+using test::thrown_message;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+Scene wheel_scene() {
+  Scene scene;
+  scene.robot = test::wheel();
+  return scene;
+}
+
+std::string refused_scene(const std::function<void(Scene&)>& change) {
+  Scene scene = wheel_scene();
+  change(scene);
+  return thrown_message<std::invalid_argument>([&] { make_backend("playback", scene); });
+}
+
+struct BackendChecks : ::testing::Test {
+  std::unique_ptr<Backend> backend = make_backend("playback", wheel_scene());
+  RobotState state = test::state_of(*backend->scene().robot, Eigen::Vector3d::Zero());
+  JointCommand command = test::no_torque(*backend->scene().robot);
+};
+
+TEST(Backend, RefusesASceneWithoutRobot) {
+  EXPECT_THAT(refused_scene([](Scene& s) { s.robot = nullptr; }), HasSubstr("no robot"));
+}
+
+TEST(Backend, RefusesAStepOutsideItsRange) {
+  for (const double dt : {0.0, -0.001, 0.0201, kNan})
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.dt = dt; }), HasSubstr("expected in (0, 0.02]")) << dt;
+}
+
+TEST(Backend, RefusesNegativeFrictionAndSkinByName) {
+  for (const double bad : {-0.1, kNan, kInfinity}) {
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_ground = bad; }), HasSubstr("friction robot_ground"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_human = bad; }), HasSubstr("friction robot_human"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_robot = bad; }), HasSubstr("friction robot_robot"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.human_stiffness = bad; }), HasSubstr("human_stiffness"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.human_damping = bad; }), HasSubstr("human_damping"));
+  }
+}
+
+TEST_F(BackendChecks, ResetRefusesBadStates) {
+  const auto message = [&](const std::function<void(RobotState&)>& change) {
+    RobotState bad = state;
+    change(bad);
+    return thrown_message<std::invalid_argument>([&] { backend->reset(bad); });
+  };
+  EXPECT_THAT(message([](RobotState& s) { s.q = Eigen::VectorXd::Zero(2); }), HasSubstr("q has 2 entries, expected 1"));
+  EXPECT_THAT(message([](RobotState& s) { s.v[0] = kInfinity; }), HasSubstr("v of joint 'axle' is inf"));
+  EXPECT_THAT(message([](RobotState& s) { s.X_WB.p.x() = kNan; }), HasSubstr("pose of the base is not finite"));
+  EXPECT_THAT(message([](RobotState& s) { s.X_WB.R.coeffs() *= 1.001; }), HasSubstr("norm"));
+  EXPECT_THAT(message([](RobotState& s) { s.w_WB_B.z() = kNan; }), HasSubstr("velocity of the base is not finite"));
+}
+
+TEST_F(BackendChecks, StepRefusesBadCommandsByJoint) {
+  backend->reset(state);
+  const auto message = [&](const std::function<void(JointCommand&)>& change) {
+    JointCommand bad = command;
+    change(bad);
+    return thrown_message<std::invalid_argument>([&] { backend->step(bad); });
+  };
+  EXPECT_THAT(message([](JointCommand& c) { c.q_target.resize(0); }), HasSubstr("q_target has 0 entries, expected 1"));
+  EXPECT_THAT(message([](JointCommand& c) { c.q_target[0] = kNan; }), HasSubstr("q_target of joint 'axle' is nan"));
+  EXPECT_THAT(message([](JointCommand& c) { c.kp[0] = -1.0; }), HasSubstr("kp of joint 'axle' is -1, expected finite"));
+  EXPECT_THAT(message([](JointCommand& c) { c.kd[0] = -1.0; }), HasSubstr("kd of joint 'axle' is -1, expected finite"));
+  EXPECT_THAT(message([](JointCommand& c) { c.tau_ff[0] = kInfinity; }), HasSubstr("tau_ff of joint 'axle' is inf"));
+  EXPECT_EQ(backend->time(), 0.0);
+}
+
+TEST_F(BackendChecks, FollowPartnerAndPushRefuseBadValues) {
+  Reference reference{{}, Eigen::VectorXd::Zero(3)};
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->follow(reference); }),
+              HasSubstr("q has 3 entries, expected 1"));
+  reference.q = Eigen::VectorXd::Zero(1);
+  reference.X_WB.R.coeffs().setZero();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->follow(reference); }), HasSubstr("norm 0"));
+  HumanJoints joints = HumanJoints::Zero();
+  joints(1, 5) = kNan;
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->set_partner(joints, HumanJoints::Zero()); }),
+              HasSubstr("not finite"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->set_partner(HumanJoints::Zero(), joints); }),
+              HasSubstr("not finite"));
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(2, zero, zero); }),
+              HasSubstr("link 2 of wheel, expected 0 to 1"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(-1, zero, zero); }), HasSubstr("link -1"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(0, {kNan, 0, 0}, zero); }),
+              HasSubstr("not finite"));
+}
+
+TEST_F(BackendChecks, TimeCountsStepsExactly) {
+  backend->reset(state);
+  for (int i = 0; i < 1000; ++i) EXPECT_EQ(backend->step(command), Outcome::kOk);
+  EXPECT_EQ(backend->time(), 1000 * backend->scene().dt);
+  backend->reset(state);
+  EXPECT_EQ(backend->time(), 0.0);
+}
+
+TEST_F(BackendChecks, RestoreRefusesAnotherScenesSnapshot) {
+  backend->reset(state);
+  Snapshot snapshot = backend->snapshot();
+  snapshot.values.push_back(0.0);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->restore(snapshot); }),
+              HasSubstr(fmt::format("has {} values, expected {}", snapshot.values.size(), snapshot.values.size() - 1)));
+}
+
+}  // namespace
+}  // namespace duet

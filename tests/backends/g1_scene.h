@@ -1,0 +1,22 @@
+// The G1 on the ground, for the tests of what no small robot shows.
+#pragma once
+
+#include <array>
+
+#include "backends/scene.h"
+#include "robots/robot_model.h"
+
+namespace duet::test {
+
+inline std::shared_ptr<const RobotModel> g1() {
+  return std::make_shared<const RobotModel>(load_robot(default_card_path()));
+}
+
+inline Scene g1_scene(PartnerMode partner = PartnerMode::kNone) {
+  Scene scene;
+  scene.robot = g1();
+  scene.partner = partner;
+  return scene;
+}
+
+}  // namespace duet::test

@@ -1,0 +1,257 @@
+// MuJoCo against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "backends/factory.h"
+#include "core/random.h"
+#include "robots/dynamics.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/backends/small_robots.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+struct Mujoco : ::testing::Test {
+  void SetUp() override {
+    if (!engines()[1].available) GTEST_SKIP() << "not run: " << engines()[1].reason;
+  }
+  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
+    Scene scene;
+    scene.robot = std::move(robot);
+    scene.partner = PartnerMode::kNone;
+    scene.dt = dt;
+    return make_backend("mujoco", scene);
+  }
+};
+
+constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
+
+TEST_F(Mujoco, FallsAsSemiImplicitEulerDoes) {
+  const auto backend = make(test::sledge());
+  RobotState state = test::state_of(*backend->scene().robot, {0.3, -0.2, 50.0});
+  state.v_WB = {1.0, 2.0, 3.0};
+  backend->reset(state);
+  const int steps = 250;
+  for (int i = 0; i < steps; ++i) ASSERT_EQ(backend->step(test::no_torque(*backend->scene().robot)), Outcome::kOk);
+  const double t = backend->time(), dt = backend->scene().dt;
+  EXPECT_NEAR(backend->state().X_WB.p.x(), 0.3 + t, kAlgebra);
+  EXPECT_NEAR(backend->state().X_WB.p.y(), -0.2 + 2.0 * t, kAlgebra);
+  EXPECT_NEAR(backend->state().X_WB.p.z(), 50.0 + 3.0 * t - 0.5 * kGravity * t * (t + dt), kAlgebra);
+  EXPECT_NEAR(backend->state().v_WB.z(), 3.0 - kGravity * t, kAlgebra);
+}
+
+TEST_F(Mujoco, ReportsVelocitiesInOurFrames) {
+  const auto backend = make(test::sledge());
+  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 50.0});
+  state.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -1.0).normalized());
+  state.w_WB_B = {0.0, 0.0, 2.0};  // about a principal axis: constant in B
+  backend->reset(state);
+  for (int i = 0; i < 100; ++i) backend->step(test::no_torque(*backend->scene().robot));
+  const Eigen::Quaterniond turned = state.X_WB.R * yaw_rotation(2.0 * backend->time());
+  EXPECT_NEAR(backend->state().X_WB.R.angularDistance(turned), 0.0, 1e-7);
+  EXPECT_NEAR((backend->state().w_WB_B - state.w_WB_B).norm(), 0.0, kAlgebra);
+}
+
+struct Wheel : Mujoco {
+  void SetUp() override {
+    Mujoco::SetUp();
+    if (IsSkipped()) return;
+    backend = make(test::wheel());
+    backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
+    command = test::no_torque(*backend->scene().robot);
+  }
+  static constexpr double kInertia = test::kWheelInertia + test::kWheelArmature;
+  std::unique_ptr<Backend> backend;
+  JointCommand command;
+};
+
+TEST_F(Wheel, TurnsWithItsArmature) {
+  command.tau_ff[0] = 0.5;
+  for (int i = 0; i < 100; ++i) backend->step(command);
+  EXPECT_NEAR(backend->state().v[0], 0.5 / kInertia * backend->time(), 1e-6);  // the base gives way by 1e-6
+  EXPECT_EQ(backend->torques()[0], 0.5);
+}
+
+TEST_F(Wheel, FollowsTheTorqueLawWithDampingAtTheEndOfTheStep) {
+  command.q_target[0] = 0.2;
+  command.kp[0] = 8.0;
+  command.kd[0] = 0.9;
+  command.tau_ff[0] = 0.3;
+  double q = 0.0, v = 0.0;
+  const double dt = backend->scene().dt;
+  for (int i = 0; i < 200; ++i) {
+    backend->step(command);
+    v = (v + dt / kInertia * (8.0 * (0.2 - q) + 0.3)) / (1.0 + dt / kInertia * 0.9);
+    q += dt * v;
+    ASSERT_NEAR(backend->state().q[0], q, 1e-6);
+    ASSERT_NEAR(backend->state().v[0], v, 1e-6);
+    ASSERT_NEAR(backend->torques()[0], 8.0 * (0.2 - (q - dt * v)) + 0.3 - 0.9 * v, 1e-4);
+  }
+}
+
+TEST_F(Wheel, ClampsTheWholeLawNotItsSpring) {
+  command.tau_ff[0] = 100.0;  // effort is 10
+  backend->step(command);
+  EXPECT_EQ(backend->torques()[0], 10.0);
+  EXPECT_NEAR(backend->state().v[0], 10.0 / kInertia * backend->scene().dt, 1e-6);
+  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0});
+  state.v[0] = 20.0;
+  backend->reset(state);
+  command.tau_ff[0] = 0.0;
+  command.kd[0] = 5.0;  // asks for -100
+  backend->step(command);
+  EXPECT_EQ(backend->torques()[0], -10.0);
+  EXPECT_NEAR(backend->state().v[0], 20.0 - 10.0 / kInertia * backend->scene().dt, 1e-5);
+}
+
+TEST_F(Wheel, StopsAtItsLimit) {
+  command.tau_ff[0] = 10.0;
+  double highest = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    backend->step(command);
+    highest = std::max(highest, backend->state().q[0]);
+  }
+  EXPECT_LT(highest, 1.0 + 0.1);  // arrives at 16 rad/s
+  EXPECT_NEAR(backend->state().q[0], 1.0, 0.005);
+  EXPECT_NEAR(backend->state().v[0], 0.0, 1e-3);
+}
+
+TEST_F(Mujoco, DivergenceIsAValueAndFinalUntilReset) {
+  auto robot = test::wheel();
+  robot->joints[0].effort = 1e300;
+  const auto backend = make(robot);
+  const RobotState state = test::state_of(*robot, {0.0, 0.0, 1000.0});
+  backend->reset(state);
+  JointCommand command = test::no_torque(*robot);
+  command.q_target[0] = 0.5;
+  command.kp[0] = 1e9;  // an explicit spring far beyond what the step bears
+  Outcome outcome = Outcome::kOk;
+  for (int i = 0; i < 2000 && outcome == Outcome::kOk; ++i) outcome = backend->step(command);
+  EXPECT_EQ(outcome, Outcome::kDiverged);
+  EXPECT_TRUE(backend->state().q.allFinite());
+  command = test::no_torque(*robot);
+  EXPECT_EQ(backend->step(command), Outcome::kDiverged);
+  backend->reset(state);
+  EXPECT_EQ(backend->step(command), Outcome::kOk);
+  EXPECT_FALSE(std::filesystem::exists("MUJOCO_LOG.TXT"));
+}
+
+TEST_F(Mujoco, RefusesAModelThatItCannotCompileWithItsMessage) {
+  auto robot = test::wheel();
+  robot->links[1].inertia = -Eigen::Matrix3d::Identity();
+  EXPECT_NE(test::thrown_message<std::runtime_error>([&] { make(robot); }).find("MuJoCo refuses the scene"),
+            std::string::npos);
+}
+
+TEST_F(Mujoco, BranchedTreesKeepTheCardsJointOrder) {
+  // A second wheel on the base listed between a wheel and its child: breadth-first, unlike MuJoCo's order.
+  auto robot = test::wheel();
+  RobotLink second = robot->links[1], child = robot->links[1];
+  second.name = "second";
+  child.name = "child";
+  child.parent = 1;
+  robot->links.insert(robot->links.end(), {second, child});
+  robot->joints.resize(3, robot->joints[0]);
+  robot->neutral = Eigen::VectorXd::Zero(3);
+  const auto backend = make(robot);
+  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
+  JointCommand command = test::no_torque(*robot);
+  command.tau_ff[1] = 0.5;
+  for (int i = 0; i < 10; ++i) backend->step(command);
+  EXPECT_GT(backend->state().q[1], 1e-4);
+  EXPECT_NEAR(backend->state().q[0], 0.0, 1e-9);
+  EXPECT_NEAR(backend->state().q[2], 0.0, 1e-9);
+}
+
+TEST_F(Mujoco, AccelerationsAgreeWithOurDynamics) {
+  const auto backend = make(test::g1(), 1e-6);
+  const RobotModel& robot = *backend->scene().robot;
+  Random random(1, 2);
+  for (int trial = 0; trial < 3; ++trial) {
+    RobotState state = test::state_of(robot, {0.0, 0.0, 50.0});
+    state.X_WB.R = Eigen::AngleAxisd(1.0, Eigen::Vector3d(0.1, 0.7, -0.3).normalized());
+    state.w_WB_B = {random.normal(), random.normal(), random.normal()};
+    state.v_WB = {random.normal(), random.normal(), random.normal()};
+    for (int i = 0; i < robot.dof(); ++i) {
+      state.q[i] = std::clamp(0.3 * random.normal(), robot.joints[i].lower + 0.05, robot.joints[i].upper - 0.05);
+      state.v[i] = random.normal();
+    }
+    JointCommand command = test::no_torque(robot);
+    for (int i = 0; i < robot.dof(); ++i) command.tau_ff[i] = random.normal();
+    const int n = 6 + robot.dof();
+    Eigen::VectorXd bias(n), force = Eigen::VectorXd::Zero(n);
+    Eigen::MatrixXd mass(n, n);
+    bias_forces(robot, state, bias);
+    mass_matrix(robot, state, mass);
+    force.tail(robot.dof()) = command.tau_ff;
+    const Eigen::VectorXd expected = mass.llt().solve(force - bias);
+    backend->reset(state);
+    backend->step(command);
+    Eigen::VectorXd found(n);
+    found << backend->state().v_WB - state.v_WB, backend->state().w_WB_B - state.w_WB_B, backend->state().v - state.v;
+    found /= backend->scene().dt;
+    EXPECT_LT((found - expected).norm() / expected.norm(), 1e-6);
+  }
+}
+
+// A run that falls over: contacts come and go, everything is excited.
+struct Trace {
+  std::vector<RobotState> states;
+  std::vector<size_t> contacts;
+};
+
+Trace fall(Backend& backend, int begin, int end) {
+  const RobotModel& robot = *backend.scene().robot;
+  Trace run;
+  JointCommand command = robot.default_command(robot.neutral);
+  for (int i = begin; i < end; ++i) {
+    command.q_target[3] = robot.neutral[3] + 0.3 * std::sin(0.02 * i);
+    EXPECT_EQ(backend.step(command), Outcome::kOk);
+    run.states.push_back(backend.state());
+    run.contacts.push_back(backend.contacts().size());
+  }
+  return run;
+}
+
+bool same(const Trace& a, const Trace& b) {
+  return a.contacts == b.contacts && std::ranges::equal(a.states, b.states, test::same);
+}
+
+TEST_F(Mujoco, RunsAgainBitwiseAfterResetInAFreshWorldAndInAnotherThread) {
+  const Scene scene = test::g1_scene();
+  const auto backend = make_backend("mujoco", scene);
+  backend->reset(scene.robot->standing_state());
+  const Trace first = fall(*backend, 0, 1000);
+  backend->reset(scene.robot->standing_state());
+  EXPECT_TRUE(same(fall(*backend, 0, 1000), first));
+  Trace other;
+  std::thread thread([&] {
+    const auto fresh = make_backend("mujoco", scene);
+    fresh->reset(scene.robot->standing_state());
+    other = fall(*fresh, 0, 1000);
+  });
+  thread.join();
+  EXPECT_TRUE(same(other, first));
+}
+
+TEST_F(Mujoco, ContinuesBitwiseFromASnapshotInTheMiddleOfAFall) {
+  const Scene scene = test::g1_scene();
+  const auto backend = make_backend("mujoco", scene);
+  backend->reset(scene.robot->standing_state());
+  backend->push(9, {3.0, 1.0, 0.0}, scene.robot->standing_state().X_WB.p);
+  fall(*backend, 0, 300);
+  ASSERT_FALSE(backend->contacts().empty());
+  const Snapshot snapshot = backend->snapshot();
+  const Trace first = fall(*backend, 300, 900);
+  backend->restore(snapshot);
+  EXPECT_TRUE(same(fall(*backend, 300, 900), first));
+  const auto fresh = make_backend("mujoco", scene);
+  fresh->restore(snapshot);
+  EXPECT_TRUE(same(fall(*fresh, 300, 900), first));
+  EXPECT_EQ(fresh->time(), 900 * scene.dt);
+}
+
+}  // namespace
+}  // namespace duet
