@@ -98,7 +98,7 @@ void read_clips(const YamlSection& top, Suite& suite) {
                fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
   const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
   for (std::string& file : suite.clips.files)
-    if (std::filesystem::path(file).is_relative()) file = (folder / file).lexically_normal().string();
+    file = std::filesystem::absolute(folder / file).lexically_normal().string();
 }
 
 void read_lists(const YamlSection& top, Suite& suite) {

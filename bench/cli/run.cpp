@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <filesystem>
+
 #include "bench/cli/command.h"
 #include "bench/clips.h"
 #include "bench/interrupt.h"
@@ -24,7 +26,8 @@ struct RunArguments {
 void use_clips(const std::vector<std::string>& paths, Suite& suite) {
   if (paths.empty()) return;
   suite.clips = {};
-  suite.clips.files = find_motion_files(paths);
+  for (const std::string& file : find_motion_files(paths))
+    suite.clips.files.push_back(std::filesystem::absolute(file).string());
 }
 
 Suite read_suite(const RunArguments& arguments) {

@@ -1,0 +1,29 @@
+// Clips and suites that the bench tests share.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "bench/suite.h"
+#include "motion/paired_motion.h"
+#include "motion/synthesis.h"
+#include "retarget/pair.h"
+#include "robots/robot_model.h"
+
+namespace duet::test {
+
+inline std::shared_ptr<const RobotModel> g1() {
+  return std::make_shared<const RobotModel>(load_robot(default_card_path()));
+}
+
+inline PairedMotion paired(Task task, const RobotModel& robot) { return retarget(synthesize(task, {}), robot); }
+
+// One engine without physics, one clip of two tasks: quick and exact.
+inline Suite playback_suite() {
+  return parse_suite(
+      "schema: duet.suite/1\nname: test\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave, handshake]\n"
+      "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\n",
+      "test.yaml");
+}
+
+}  // namespace duet::test

@@ -1,0 +1,116 @@
+#include "bench/rollout.h"
+
+#include <gtest/gtest.h>
+
+#include "backends/factory.h"
+#include "bench/runner.h"
+#include "tests/bench/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+struct Parts {
+  std::shared_ptr<const RobotModel> robot = test::g1();
+  PairedMotion clip = test::paired(Task::kWave, *robot);
+  Suite suite = test::playback_suite();
+  EpisodeSpec spec{&clip, "playback", "pd", "replay", "main", 0, 1};
+};
+
+Rollout roll(const Parts& parts, RolloutSetup setup, const std::string& policy = "replay") {
+  Scene scene;
+  scene.robot = parts.robot;
+  scene.human = make_human_body(bone_lengths(parts.clip.partner));
+  const auto backend = make_backend("playback", scene);
+  const auto controller = make_controller("pd", parts.robot);
+  const auto maker = make_policy(policy, parts.robot);
+  return roll_out(setup, *backend, *controller, *maker);
+}
+
+TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
+  const Parts parts;
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  const Rollout rollout = roll(parts, setup);
+  ASSERT_EQ(rollout.recording.frames(), parts.clip.frames());
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
+  // Anchors 0.5 s apart are densified linearly: within the second difference of the motion over half an anchor's
+  // spacing.
+  double worst = 0.0;
+  for (int t = 50; t < rollout.recording.frames(); ++t)
+    worst = std::max(worst, (rollout.recording.reference[t].X_WB.p - parts.clip.robot.root[t].p).norm());
+  EXPECT_LT(worst, 0.12);
+  // Playback is one tick behind the reference it follows, exactly.
+  for (int t = 1; t < rollout.recording.frames(); t += 17)
+    EXPECT_EQ(rollout.recording.robot[t].q, rollout.recording.reference[t - 1].q) << t;
+}
+
+TEST(Rollout, SameEpisodeGivesTheSameHash) {
+  const Parts parts;
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  EXPECT_EQ(roll(parts, setup).state_hash, roll(parts, setup).state_hash);
+  EXPECT_NE(roll(parts, setup).state_hash, roll(parts, setup, "null").state_hash);
+}
+
+TEST(Rollout, PartnerIsTheClipsOwnAtEveryTick) {
+  const Parts parts;
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  const Rollout rollout = roll(parts, setup);
+  for (int t = 0; t < rollout.recording.frames(); t += 31)
+    EXPECT_EQ(rollout.recording.partner.at(t, kHead), parts.clip.partner.joints.at(t, kHead)) << t;
+}
+
+TEST(Rollout, PartnerVelocityLeadsToTheNextFrame) {
+  const Parts parts;
+  const PointTracks& joints = parts.clip.partner.joints;
+  const HumanJoints next = partner_joints(joints, 10) + partner_velocities(joints, 10, 50.0) / 50.0;
+  EXPECT_LT((next - partner_joints(joints, 11)).norm(), 1e-12);
+  EXPECT_EQ(partner_velocities(joints, joints.frames() - 1, 50.0).norm(), 0.0);
+  EXPECT_EQ(partner_joints(joints, joints.frames() + 5), partner_joints(joints, joints.frames() - 1));
+}
+
+TEST(Rollout, WallLimitEndsAsTimedOut) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  setup.wall_limit = 1e-9;
+  const Rollout rollout = roll(parts, setup);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kTimedOut);
+  EXPECT_EQ(rollout.recording.frames(), 1);
+  EXPECT_NE(rollout.recording.message.find("wall-clock limit"), std::string::npos);
+  EXPECT_FALSE(rollout.interrupted);
+}
+
+TEST(Rollout, StopRequestMarksTheEpisodeInterrupted) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  setup.stop_asked = [] { return true; };
+  EXPECT_TRUE(roll(parts, setup).interrupted);
+}
+
+TEST(Rollout, FallIsLowOrTilted) {
+  RobotState state;
+  state.X_WB.p.z() = 0.75;
+  EXPECT_FALSE(has_fallen(state));
+  state.X_WB.p.z() = 0.44;
+  EXPECT_TRUE(has_fallen(state));
+  state.X_WB.p.z() = 0.75;
+  state.X_WB.R = Eigen::AngleAxisd(std::acos(0.7) + 1e-6, Eigen::Vector3d::UnitX());
+  EXPECT_TRUE(has_fallen(state));
+}
+
+TEST(Playback, RecordsTheMotionAsItIs) {
+  const Parts parts;
+  const Recording recording =
+      play_back(parts.clip.robot, parts.clip.partner.joints, Task::kWave, parts.clip.phases, parts.robot);
+  ASSERT_EQ(recording.frames(), parts.clip.frames());
+  for (int t = 0; t < recording.frames(); t += 13) {
+    EXPECT_EQ(recording.robot[t].q, parts.clip.robot.q.col(t)) << t;
+    EXPECT_EQ(recording.robot[t].X_WB.p, parts.clip.robot.root[t].p) << t;
+  }
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([&] {
+              play_back(parts.clip.robot, parts.clip.partner.joints.slice(0, 5), Task::kWave, {}, parts.robot);
+            }).find("5 of the partner"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace duet

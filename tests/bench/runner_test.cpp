@@ -1,0 +1,148 @@
+#include "bench/runner.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "backends/factory.h"
+#include "bench/parallel.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "tests/bench/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+RunSummary run(const Suite& suite, const std::string& folder, const RunOptions& options = {}) {
+  Progress quiet(Progress::Style::kQuiet);
+  return run_suite(suite, folder, options, quiet);
+}
+
+TEST(Runner, RunsTheNullArmBesideEveryPolicy) {
+  const test::ScratchFolder folder;
+  const RunSummary summary = run(test::playback_suite(), folder / "run");
+  EXPECT_EQ(summary.planned, 4);
+  EXPECT_EQ(summary.run, 4);
+  const Run loaded = load_run(folder / "run");
+  int null_rows = 0;
+  for (const EpisodeRow& row : loaded.rows) null_rows += row.arm == "null" ? 1 : 0;
+  EXPECT_EQ(null_rows, 2);
+}
+
+TEST(Runner, SecondCallRunsNothing) {
+  const test::ScratchFolder folder;
+  run(test::playback_suite(), folder / "run");
+  const std::string before = read_file(folder / "run/episodes.jsonl");
+  const RunSummary summary = run(test::playback_suite(), folder / "run");
+  EXPECT_EQ(summary.already_there, 4);
+  EXPECT_EQ(summary.run, 0);
+  EXPECT_EQ(read_file(folder / "run/episodes.jsonl"), before);
+}
+
+TEST(Runner, KilledRunResumesFromItsLastWholeRow) {
+  const test::ScratchFolder folder;
+  run(test::playback_suite(), folder / "run");
+  const std::string path = folder / "run/episodes.jsonl";
+  const std::string whole = read_file(path);
+  std::ofstream(path, std::ios::trunc) << whole.substr(0, whole.find('\n') + 40);  // one row and a torn one
+  const RunSummary summary = run(test::playback_suite(), folder / "run");
+  EXPECT_EQ(summary.already_there, 1);
+  EXPECT_EQ(summary.run, 3);
+  EXPECT_EQ(load_run(folder / "run").rows.size(), 4u);
+}
+
+TEST(Runner, ThreadsDoNotChangeResults) {
+  const test::ScratchFolder folder;
+  RunOptions two;
+  two.threads = 2;
+  run(test::playback_suite(), folder / "one");
+  run(test::playback_suite(), folder / "two", two);
+  std::map<std::string, std::string> hashes;
+  for (const EpisodeRow& row : load_run(folder / "one").rows) hashes[row.key] = row.state_hash;
+  for (const EpisodeRow& row : load_run(folder / "two").rows) EXPECT_EQ(hashes.at(row.key), row.state_hash) << row.clip;
+}
+
+TEST(Runner, DirectoryOfAnotherSuiteIsRefused) {
+  const test::ScratchFolder folder;
+  run(test::playback_suite(), folder / "run");
+  Suite other = test::playback_suite();
+  other.name = "other";
+  const std::string message = test::thrown_message<InputError>([&] { run(other, folder / "run"); });
+  EXPECT_THAT(message, HasSubstr("other"));
+  EXPECT_THAT(message, HasSubstr("test"));
+}
+
+TEST(Runner, TimeLimitLeavesAResumableRun) {
+  const test::ScratchFolder folder;
+  RunOptions options;
+  options.time_limit = 1e-9;
+  const RunSummary summary = run(test::playback_suite(), folder / "run", options);
+  EXPECT_EQ(summary.end, RunEnd::kTimeLimit);
+  EXPECT_LT(summary.run, summary.planned);
+  EXPECT_EQ(run(test::playback_suite(), folder / "run").end, RunEnd::kComplete);
+  EXPECT_EQ(load_run(folder / "run").rows.size(), 4u);
+}
+
+TEST(Runner, FiltersThatTheSuiteDoesNotHaveAreRefused) {
+  const test::ScratchFolder folder;
+  RunOptions options;
+  options.tasks = {"hug"};
+  EXPECT_THAT(
+      test::thrown_message<std::invalid_argument>([&] { run(test::playback_suite(), folder / "run", options); }),
+      HasSubstr("the suite has no task 'hug'"));
+  options.tasks = {"wave"};
+  EXPECT_EQ(run(test::playback_suite(), folder / "run", options).planned, 2);
+}
+
+TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
+  const auto robot = test::g1();
+  PairedMotion clip = test::paired(Task::kWave, *robot);
+  clip.phases = {0, clip.frames() + 10};  // the adaptation refuses it
+  const EpisodeRow row =
+      run_episode({&clip, "playback", "pd", "replay", "main", 0, 1}, test::playback_suite(), "hash", robot);
+  EXPECT_EQ(row.outcome, Outcome::kError);
+  EXPECT_EQ(row.success, false);
+  EXPECT_FALSE(row.message.empty());
+}
+
+TEST(Runner, PairedClipsOfTheSameIdAreRefused) {
+  const test::ScratchFolder folder;
+  const auto robot = test::g1();
+  const PairedMotion clip = test::paired(Task::kWave, *robot);
+  save_paired_motion(clip, folder / "a.npz");
+  save_paired_motion(clip, folder / "b.npz");
+  Suite suite = test::playback_suite();
+  suite.clips = {0, 0, {folder / "a.npz", folder / "b.npz"}};
+  EXPECT_THAT(test::thrown_message<InputError>([&] { run(suite, folder / "run"); }), HasSubstr("ids name episodes"));
+}
+
+TEST(Runner, MujocoEpisodesRepeatBitForBit) {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco" && !engine.available) GTEST_SKIP() << "not run: MuJoCo absent";
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  suite.controllers = {"vmc"};
+  suite.start = SuiteStart::kAct;
+  const auto robot = test::g1();
+  const PairedMotion clip = test::paired(Task::kWave, *robot);
+  const EpisodeSpec spec{&clip, "mujoco", "vmc", "replay", "main", 0, 7};
+  const EpisodeRow first = run_episode(spec, suite, "hash", robot);
+  const EpisodeRow second = run_episode(spec, suite, "hash", robot);
+  EXPECT_EQ(first.outcome, Outcome::kOk) << first.message;
+  EXPECT_EQ(first.state_hash, second.state_hash);
+  EXPECT_EQ(first.metrics, second.metrics);
+}
+
+TEST(Parallel, EveryIndexOnceAndTheFirstExceptionComesBack) {
+  std::vector<std::atomic<int>> hits(100);
+  parallel_for_each(100, 2, [&](int i) { ++hits[i]; });
+  for (const auto& hit : hits) EXPECT_EQ(hit, 1);
+  EXPECT_THROW(parallel_for_each(100, 2, [](int i) { require(i != 50, "fifty"); }), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace duet

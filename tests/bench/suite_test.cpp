@@ -1,0 +1,131 @@
+#include "bench/suite.h"
+
+#include <gmock/gmock.h>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* kMinimal = R"(schema: duet.suite/1
+name: small
+version: 1.0.0
+clips: {synth: {per_task: 2}}
+engines: [playback]
+controllers: [pd]
+policies: [replay]
+)";
+
+std::string refusal(const std::string& extra, const std::string& base = kMinimal) {
+  return test::thrown_message<InputError>([&] { parse_suite(base + extra, "s.yaml"); });
+}
+
+TEST(Suite, DefaultsAreTheDocumentedOnes) {
+  const Suite suite = parse_suite(kMinimal, "s.yaml");
+  EXPECT_EQ(suite.tasks.size(), kTasks.size());
+  EXPECT_EQ(suite.partner, PartnerMode::kGhost);
+  EXPECT_EQ(suite.detector, DetectorVersion::kRobot);
+  EXPECT_EQ(suite.start, SuiteStart::kAuto);
+  EXPECT_TRUE(suite.null_arm);
+  EXPECT_EQ(suite.dt, 0.002);
+}
+
+TEST(Suite, ResolvedTextReadsBackToTheSameHash) {
+  const Suite suite =
+      parse_suite(std::string(kMinimal) +
+                      "tasks: [hug, high-five]\nstart: act\npartner: solid\ndt: 0.001\nnull_arm: false\n"
+                      "readings: {metrics.large_angle: entry}\nretarget: {kernel: scalar}\n"
+                      "detector: {version: paper, thresholds: strict}\nrecord: {trajectories: all}\n",
+                  "s.yaml");
+  const Suite again = parse_suite(resolved_yaml(suite), "again.yaml");
+  EXPECT_EQ(resolved_yaml(again), resolved_yaml(suite));
+  EXPECT_EQ(suite_hash(again), suite_hash(suite));
+  EXPECT_EQ(again.thresholds, ThresholdSet::kStrict);
+  EXPECT_EQ(again.readings.at("metrics.large_angle"), "entry");
+}
+
+TEST(Suite, HashFollowsWhatIsRun) {
+  const Suite suite = parse_suite(kMinimal, "s.yaml");
+  EXPECT_NE(suite_hash(suite), suite_hash(parse_suite(kMinimal, "s.yaml", {{"clips.synth.seed", "7"}})));
+  EXPECT_EQ(suite_hash(suite), suite_hash(parse_suite(kMinimal, "other.yaml")));
+}
+
+TEST(Suite, HashFollowsTheContentOfClipsAndNotTheirPlace) {
+  const test::ScratchFolder folder;
+  write_file(folder / "one.npz", "content");
+  write_file(folder / "two.npz", "content");
+  write_file(folder / "three.npz", "other");
+  const auto hash = [&](const std::string& name) {
+    std::string yaml = kMinimal;
+    yaml.replace(yaml.find("{synth: {per_task: 2}}"), 22, "{files: [" + (folder / name) + "]}");
+    return suite_hash(parse_suite(yaml, "s.yaml"));
+  };
+  EXPECT_EQ(hash("one.npz"), hash("two.npz"));
+  EXPECT_NE(hash("one.npz"), hash("three.npz"));
+}
+
+TEST(Suite, OverridesReachNestedKeysAndReadings) {
+  const Suite suite =
+      parse_suite(kMinimal, "s.yaml",
+                  {{"clips.synth.per_task", "3"}, {"tasks", "[wave]"}, {"readings.metrics.jpe_frame", "pelvis"}});
+  EXPECT_EQ(suite.clips.synth_per_task, 3);
+  EXPECT_EQ(suite.tasks, std::vector<Task>{Task::kWave});
+  EXPECT_EQ(suite.readings.at("metrics.jpe_frame"), "pelvis");
+}
+
+TEST(Suite, UnknownKeysAndNamesAreRefusedWithTheNearest) {
+  EXPECT_THAT(refusal("tassks: [hug]\n"), AllOf(HasSubstr("s.yaml:8"), HasSubstr("tassks"), HasSubstr("tasks")));
+  EXPECT_THAT(refusal("tasks: [hugg]\n"), AllOf(HasSubstr("s.yaml:8"), HasSubstr("did you mean 'hug'")));
+  EXPECT_THAT(refusal("partner: ghots\n"), HasSubstr("did you mean 'ghost'"));
+  EXPECT_THAT(refusal("readings: {metrics.larg_angle: entry}\n"), HasSubstr("large_angle"));
+  EXPECT_THAT(refusal("retarget: {kernell: v3}\n"), HasSubstr("kernel"));
+  EXPECT_THAT(refusal("limits: {wall: 3}\n"), HasSubstr("wall_s_per_episode"));
+}
+
+TEST(Suite, UnknownEngineControllerAndPolicyAreRefused) {
+  std::string yaml = kMinimal;
+  yaml.replace(yaml.find("playback"), 8, "mujocco");
+  EXPECT_THAT(refusal("", yaml), HasSubstr("engine 'mujocco'"));
+  yaml = kMinimal;
+  yaml.replace(yaml.find("[pd]"), 4, "[vcm]");
+  EXPECT_THAT(refusal("", yaml), AllOf(HasSubstr("controller 'vcm'"), HasSubstr("vmc")));
+  yaml = kMinimal;
+  yaml.replace(yaml.find("[replay]"), 8, "[]");
+  EXPECT_THAT(refusal("", yaml), HasSubstr("at least one policy"));
+}
+
+TEST(Suite, ValuesOutOfRangeAreRefused) {
+  EXPECT_THAT(refusal("dt: 0.003\n"), HasSubstr("divides 0.02"));
+  EXPECT_THAT(refusal("dt: -1\n"), HasSubstr("divides 0.02"));
+  EXPECT_THAT(refusal("episodes_per_clip: 0\n"), HasSubstr("1 or more"));
+  EXPECT_THAT(refusal("episodes_per_clip: 1.5\n"), HasSubstr("whole number"));
+  EXPECT_THAT(refusal("start_radius: 9\n"), HasSubstr("0 to 5 m"));
+  EXPECT_THAT(refusal("limits: {wall_s_per_episode: 0}\n"), HasSubstr("more than 0 s"));
+  EXPECT_THAT(refusal("seed: -4\n"), HasSubstr("0 or more"));
+}
+
+TEST(Suite, BrokenDocumentsAreRefused) {
+  EXPECT_THAT(refusal("", "[1, 2"), HasSubstr("s.yaml:"));
+  EXPECT_THAT(refusal("", ""), HasSubstr("expected a suite"));
+  EXPECT_THAT(refusal("", "name: x\n"), HasSubstr("schema"));
+  EXPECT_THAT(refusal("", "schema: duet.suite/9\nname: x\nversion: 1\n"), HasSubstr("duet.suite/9"));
+  std::string both = kMinimal;
+  both.replace(both.find("{synth: {per_task: 2}}"), 22, "{synth: {per_task: 2}, files: [a.npz]}");
+  EXPECT_THAT(refusal("", both), HasSubstr("found both"));
+  EXPECT_THAT(test::thrown_message<InputError>([] { load_suite("nowhere.yaml"); }), HasSubstr("nowhere.yaml"));
+}
+
+TEST(Suite, ShippedSuitesLoad) {
+  for (const char* name : {"demo", "core"}) {
+    const Suite suite = load_suite(std::string(DUET_SOURCE_DIR) + "/suites/" + name + ".yaml");
+    EXPECT_EQ(suite.tasks.size(), kTasks.size()) << name;
+  }
+}
+
+}  // namespace
+}  // namespace duet
