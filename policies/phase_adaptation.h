@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string_view>
 
 #include "core/robot_motion.h"
 #include "core/task.h"
@@ -28,9 +29,26 @@ struct AdaptationOptions {
   double lead = 1.0;          // of neutral-to-act ramp kept before the act with kAct [s]
   double return_time = 1.0;   // over which the upper body goes back to neutral after the act [s]
   bool hold_stance = true;    // kAct: legs stay in the standing pose, the pelvis keeps its act position on the ground
+  bool keep_torso = true;  // kAct with hold_stance: the waist takes over, inside its limits, what the pelvis loses of
+                           // its turn and tilt, so that the torso is oriented as in the clip; false: waist as in the
+                           // clip
 };
 
-// Throws std::invalid_argument where the phases do not fit the motion or options are out of range.
+// "hip", "knee" or "ankle" in the joint's name; every other joint is upper body.
+bool is_leg_joint(std::string_view name);
+
+// kClip: the motion to the bit.
+// kApproach: act to the bit. Before it the root goes from a start drawn uniformly from the disc around the clip's start
+//   (height and orientation as there) straight to the first act frame, the upper body from neutral; legs as in the
+//   clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral.
+// kAct: the clip from `lead` before the act on (all of it, where the preparation is shorter). With hold_stance the root
+//   stands upright at x, y and yaw of the first act frame at the robot's standing height, legs standing; the upper body
+//   goes from neutral to the first act frame, through the act and back. Without hold_stance root and legs wait in the
+//   first act frame, go through the act to the bit and stay in its last frame.
+// A follow-up shorter than `return_time` ends on the way to neutral: no frame is added, the partner has none for it.
+// The seed matters to kApproach only: the same seed gives the same bits.
+// Throws std::invalid_argument where the motion is not valid, not at 50 Hz or not of this robot's joints in its order,
+// where the phases do not fit it (0 <= act_begin < act_end <= frames) or options are out of range.
 AdaptedMotion adapt_by_phase(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options, std::uint64_t seed);
 

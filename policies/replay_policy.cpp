@@ -1,0 +1,45 @@
+#include "policies/replay_policy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr double kRateHz = 50.0;
+constexpr int kTicksPerAnchor = static_cast<int>(kAnchorSpacing * kRateHz);
+
+}  // namespace
+
+ReplayPolicy::ReplayPolicy(std::shared_ptr<const RobotModel> robot) : robot_(std::move(robot)) {
+  require(robot_ != nullptr, "policy 'replay' needs a robot");
+}
+
+void ReplayPolicy::reset(const EpisodeContext& context) {
+  require(context.hindsight != nullptr, "policy 'replay' needs the episode's motion (EpisodeContext::hindsight)");
+  const RobotMotion& motion = *context.hindsight;
+  validate(motion, "policy 'replay'");
+  require(motion.frames() > 0, "policy 'replay': expected a motion with frames, found none");
+  require(motion.rate_hz == kRateHz,
+          fmt::format("policy 'replay': expected a motion at {} Hz, found {} Hz", kRateHz, motion.rate_hz));
+  require(motion.joint_names == robot_->joint_names(),
+          fmt::format("policy 'replay': expected the {} joints of robot '{}' in its order, found {} others",
+                      robot_->dof(), robot_->name, motion.joint_names.size()));
+  motion_ = motion;
+}
+
+Anchors ReplayPolicy::act(const Observation& observation) {
+  require(motion_.frames() > 0, "policy 'replay': reset comes first");
+  Anchors anchors;
+  for (int i = 0; i < kAnchors; ++i)
+    anchors[static_cast<std::size_t>(i)] =
+        motion_.reference(std::clamp(observation.tick + i * kTicksPerAnchor, 0, motion_.frames() - 1));
+  return anchors;
+}
+
+}  // namespace duet
