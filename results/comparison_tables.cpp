@@ -1,0 +1,97 @@
+// A comparison of two runs as Markdown and JSON.
+#include <fmt/format.h>
+
+#include "results/json_fields.h"
+#include "results/leaderboard.h"
+#include "results/leaderboard_rows.h"
+#include "results/text_table.h"
+
+namespace duet {
+namespace {
+
+std::string p_value(double p) { return p < 0.001 ? "<0.001" : fmt::format("{:.3f}", p); }
+
+std::string interval_text(const Interval& interval) {
+  return fmt::format("[{:.1f}, {:.1f}]", 100.0 * interval.low, 100.0 * interval.high);
+}
+
+std::vector<std::string> cells_of(const Comparison& comparison) {
+  const double pairs = static_cast<double>(comparison.pairs);
+  return {comparison.group,
+          fmt::format("{}", comparison.pairs),
+          percent(static_cast<double>(comparison.both + comparison.only_a) / pairs),
+          percent(static_cast<double>(comparison.both + comparison.only_b) / pairs),
+          points(comparison.difference, comparison.interval),
+          interval_text(comparison.cluster_interval),
+          fmt::format("{}", comparison.only_a),
+          fmt::format("{}", comparison.only_b),
+          p_value(comparison.p),
+          p_value(comparison.p_holm),
+          fmt::format("{:.1f}", 100.0 * comparison.minimum_detectable)};
+}
+
+long largest(const std::vector<Comparison>& comparisons, long Comparison::*field) {
+  long value = 0;
+  for (const Comparison& comparison : comparisons) value = std::max(value, comparison.*field);
+  return value;
+}
+
+std::string notes(const std::vector<Comparison>& comparisons) {
+  const double level = 100.0 * comparisons.front().level;
+  std::string text = fmt::format(
+      "Same episodes in both runs. A, B: success in %. A - B: points with Newcombe's paired {:g} % interval; by clip: "
+      "bootstrap over clips. p: exact McNemar, p (Holm): corrected for the {} comparisons here. MDE: the smallest "
+      "difference, in points, that so many pairs with so much disagreement show in 80 % of runs.\n",
+      level, comparisons.size());
+  std::string small;
+  for (const Comparison& comparison : comparisons) {
+    if (comparison.pairs < 30) small.append(small.empty() ? "" : "; ").append(comparison.group);
+  }
+  if (!small.empty()) {
+    text += fmt::format("Warning: fewer than 30 pairs in {}. A difference there is no finding by itself.\n", small);
+  }
+  const long only_a = largest(comparisons, &Comparison::unpaired_a);
+  const long only_b = largest(comparisons, &Comparison::unpaired_b);
+  if (only_a > 0 || only_b > 0) {
+    text += fmt::format("Warning: episodes without a partner are left out (in one group up to {} of A and {} of B).\n",
+                        only_a, only_b);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string comparison_markdown(const std::vector<Comparison>& comparisons) {
+  if (comparisons.empty()) return "Nothing to compare.\n";
+  TextTable table;
+  table.header = {"Comparison", "Pairs", "A", "B", "A - B", "by clip", "only A", "only B", "p", "p (Holm)", "MDE"};
+  for (const Comparison& comparison : comparisons) table.rows.push_back(cells_of(comparison));
+  return markdown_table(table) + "\n" + notes(comparisons);
+}
+
+nlohmann::json comparison_json(const std::vector<Comparison>& comparisons) {
+  nlohmann::json list = nlohmann::json::array();
+  const auto interval = [](const Interval& limits) {
+    return nlohmann::json::array({number_or_null(limits.low), number_or_null(limits.high)});
+  };
+  for (const Comparison& comparison : comparisons) {
+    list.push_back({{"group", comparison.group},
+                    {"pairs", comparison.pairs},
+                    {"both", comparison.both},
+                    {"only_a", comparison.only_a},
+                    {"only_b", comparison.only_b},
+                    {"neither", comparison.neither},
+                    {"difference", number_or_null(comparison.difference)},
+                    {"interval", interval(comparison.interval)},
+                    {"cluster_interval", interval(comparison.cluster_interval)},
+                    {"level", comparison.level},
+                    {"p", number_or_null(comparison.p)},
+                    {"p_holm", number_or_null(comparison.p_holm)},
+                    {"minimum_detectable", number_or_null(comparison.minimum_detectable)},
+                    {"unpaired_a", comparison.unpaired_a},
+                    {"unpaired_b", comparison.unpaired_b}});
+  }
+  return {{"schema", "duet.comparison/1"}, {"comparisons", std::move(list)}};
+}
+
+}  // namespace duet

@@ -1,0 +1,146 @@
+#include "results/html_report.h"
+
+#include <fmt/format.h>
+
+#include <set>
+
+#include "results/leaderboard_rows.h"
+#include "results/report_parts.h"
+
+namespace duet {
+namespace {
+
+struct Section {
+  std::string id, title, body;
+};
+
+std::string text_at(const nlohmann::json& json, std::initializer_list<const char*> keys) {
+  const nlohmann::json* at = &json;
+  for (const char* key : keys) {
+    if (!at->is_object() || !at->contains(key)) return "";
+    at = &at->at(key);
+  }
+  return at->is_string() ? at->get<std::string>() : "";
+}
+
+std::string header_html(const ReportContent& content) {
+  std::string html = fmt::format("<header><h1>{}</h1>", escape_html(content.title));
+  std::string machine = text_at(content.environment, {"machine"});
+  if (const std::string version = text_at(content.environment, {"build", "version"}); !version.empty()) {
+    const std::string commit = text_at(content.environment, {"build", "commit"});
+    machine += fmt::format("{}duet {}{}", machine.empty() ? "" : " · ", version,
+                           commit.empty() ? "" : fmt::format(" ({})", commit.substr(0, 10)));
+  }
+  if (!machine.empty()) html += fmt::format(R"(<p class="machine">{}</p>)", escape_html(machine));
+  if (!content.notes.empty()) {
+    html += R"(<ul class="notes">)";
+    for (const std::string& note : content.notes) html += fmt::format("<li>{}</li>", escape_html(note));
+    html += "</ul>";
+  }
+  return html + "</header>\n";
+}
+
+std::string leaderboard_section(const ReportContent& content) {
+  if (content.entries.empty()) return "";
+  std::string html = leaderboard_html(content.entries);
+  if (const std::string table = detector_table_html(content.entries); !table.empty()) {
+    html += "<h3>Every detector</h3>" + table;
+  }
+  if (const std::string table = episode_metrics_html(content); !table.empty()) {
+    html += "<h3>Episode metrics</h3>" + table;
+  }
+  return html;
+}
+
+// Buttons that show one task; hidden until the script that serves them runs.
+std::string filter_html(const std::vector<ClipStory>& stories) {
+  std::set<std::pair<int, std::string>> tasks;
+  for (const ClipStory& story : stories) tasks.emplace(task_rank(story.task), story.task);
+  if (tasks.size() < 2) return "";
+  std::string html =
+      R"(<div class="filter" role="group" aria-label="Show clips of" hidden><button type="button" data-task="" aria-pressed="true">All</button>)";
+  for (const auto& [rank, task] : tasks) {
+    html += fmt::format(R"(<button type="button" data-task="{}" aria-pressed="false">{}</button>)", escape_html(task),
+                        escape_html(task_title(task)));
+  }
+  return html + "</div>";
+}
+
+std::string stories_section(const ReportContent& content) {
+  if (content.stories.empty()) return "";
+  std::string html = filter_html(content.stories);
+  html +=
+      "<p>Seen at right angles to the line between the two agents; limbs on the far side are paler. Ground ticks are "
+      "0.5 m apart.</p>";
+  for (const ClipStory& story : content.stories) html += story_html(story, content.columns);
+  return html;
+}
+
+std::string environment_section(const ReportContent& content) {
+  if (content.environment.is_null() || content.environment.empty()) return "";
+  const std::string text = content.environment.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  return fmt::format("<details><summary>What these results depend on</summary><pre>{}</pre></details>",
+                     escape_html(text));
+}
+
+std::string navigation(const std::vector<Section>& sections) {
+  std::string html = R"(<nav aria-label="Sections"><ul>)";
+  for (const Section& section : sections) {
+    html += fmt::format(R"(<li><a href="#{}">{}</a></li>)", section.id, section.title);
+  }
+  return html + "</ul></nav>\n";
+}
+
+}  // namespace
+
+std::string escape_html(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string html_report(const ReportContent& content) {
+  std::vector<Section> sections;
+  const auto add = [&](const char* id, const char* title, std::string body) {
+    if (!body.empty()) sections.push_back({id, title, std::move(body)});
+  };
+  add("leaderboard", "Leaderboard", leaderboard_section(content));
+  add("retargeting", "Retargeting", retargeting_html(content));
+  add("clips", "Clips", stories_section(content));
+  add("environment", "Environment", environment_section(content));
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
+      "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<meta name=\"color-scheme\" content=\"light dark\"><title>{}</title>\n<style>{}</style></head>\n<body>",
+      escape_html(content.title), report_style());
+  html += header_html(content) + navigation(sections) + "<main>\n";
+  for (const Section& section : sections) {
+    html +=
+        fmt::format("<section id=\"{0}\" aria-labelledby=\"{0}-title\"><h2 id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
+                    section.id, section.title, section.body);
+  }
+  return html + fmt::format("</main>\n<script>{}</script>\n</body></html>\n", report_script());
+}
+
+}  // namespace duet

@@ -1,0 +1,34 @@
+// The pieces of the HTML report, each a fragment of HTML or SVG: internal to html_report.cpp and its tests.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "results/html_report.h"
+
+namespace duet {
+
+std::string escape_html(std::string_view text);  // also for attribute values in double quotes
+
+// Style sheet and script of the report.
+std::string_view report_style();
+std::string_view report_script();
+
+// A table cell's drawing: the interval as a bar on [0, 1], the rate as a dot, the null arm (NaN: none) as a tick.
+std::string interval_bar_svg(double rate, const Interval& interval, double null_rate, int width_px);
+
+// The key frames of a clip side by side, seen at right angles to the line between the two agents; "" where there are
+// no points. Points that are not finite are left out, with their bones.
+std::string key_frames_svg(const std::vector<KeyFrame>& frames);
+
+// Loss terms over iterations, on a logarithmic axis where the positive values span more than a factor 20; "" where
+// there are none.
+std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss);
+
+std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
+std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts
+std::string episode_metrics_html(const ReportContent& content);                 // "" without metrics
+std::string retargeting_html(const ReportContent& content);                     // "" without metrics
+std::string story_html(const ClipStory& story, const std::vector<MetricColumn>& columns);
+
+}  // namespace duet

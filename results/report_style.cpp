@@ -1,0 +1,129 @@
+// Style sheet of the HTML report: light and dark by the reader's scheme, printable, no fonts or files from elsewhere.
+#include "results/report_parts.h"
+
+namespace duet {
+
+std::string_view report_style() {
+  return R"css(
+:root{--bg:#fcfcfa;--panel:#fff;--ink:#1b1e22;--soft:#59616b;--line:#dfe2e6;--faint:#f1f3f5;--robot:#1f5fa8;
+--human:#b9501a;--source:#8b9199;--other:#5b7d33;--bar:#1f5fa8;--null:#b9501a;
+--t0:#1b1e22;--t1:#0072b2;--t2:#d55e00;--t3:#009e73;--t4:#cc79a7;--t5:#8a6d00;--t6:#56a0d9;--t7:#7a4fa3;--t8:#777d84}
+@media(prefers-color-scheme:dark){:root{--bg:#131519;--panel:#1a1d22;--ink:#e8e9eb;--soft:#a5adb7;--line:#333941;
+--faint:#20242a;--robot:#74aef0;--human:#f29a62;--source:#7f8791;--other:#a5cc74;--bar:#74aef0;--null:#f29a62;
+--t0:#e8e9eb;--t1:#5db2e6;--t2:#ff9248;--t3:#3fcfa4;--t4:#e6a3c6;--t5:#e0c04a;--t6:#9ccbf0;--t7:#b997e0;--t8:#a0a6ad}}
+*{box-sizing:border-box}
+html{scroll-behavior:smooth}
+body{margin:0;background:var(--bg);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",
+"Noto Sans","Liberation Sans",Arial,sans-serif}
+main,header,nav ul{max-width:1240px;margin:0 auto;padding:0 28px}
+header{padding-top:36px;padding-bottom:18px}
+h1{font-size:30px;line-height:1.2;margin:0 0 6px;letter-spacing:-.01em}
+h2{font-size:21px;margin:44px 0 8px;padding-top:8px}
+h3{font-size:16px;margin:26px 0 6px}
+p{margin:6px 0;max-width:86ch}
+.machine{color:var(--soft);font-size:14px}
+.notes{margin:14px 0 0;padding:10px 16px 10px 34px;background:var(--faint);border-left:3px solid var(--line);max-width:100ch;
+font-size:14px}
+nav{position:sticky;top:0;z-index:2;background:var(--bg);border-bottom:1px solid var(--line)}
+nav ul{display:flex;gap:22px;list-style:none;padding-top:8px;padding-bottom:8px;font-size:14px;flex-wrap:wrap}
+a{color:var(--robot)}
+nav a{text-decoration:none}
+nav a:hover,nav a:focus{text-decoration:underline}
+.scroll{overflow-x:auto;margin:10px 0;border:1px solid var(--line);border-radius:6px;background:var(--panel)}
+table{border-collapse:collapse;width:100%;font-size:14px;font-variant-numeric:tabular-nums}
+caption{text-align:left;padding:10px 14px 4px;color:var(--soft);font-size:14px}
+th,td{padding:7px 12px;text-align:right;vertical-align:middle;border-top:1px solid var(--line);white-space:nowrap}
+thead th{border-top:0;border-bottom:1px solid var(--ink);font-weight:600;vertical-align:bottom}
+th.l,td.l,tbody th{text-align:left}
+tbody th{font-weight:600}
+tbody tr:hover{background:var(--faint)}
+tr.control{color:var(--soft)}
+tr.control th{font-weight:400;font-style:italic}
+td.zero{color:var(--source)}
+.ci{color:var(--soft);font-size:12px;display:block}
+.rate{font-weight:600}
+.unit{color:var(--soft);font-weight:400}
+.gain{color:var(--robot)}
+th button{all:unset;cursor:pointer}
+th button:focus-visible{outline:2px solid var(--robot);outline-offset:2px}
+th button::after{content:"";display:inline-block;width:.9em;color:var(--soft)}
+th[aria-sort=ascending] button::after{content:" \25B4"}
+th[aria-sort=descending] button::after{content:" \25BE"}
+.bar{display:block;margin:2px 0 0 auto}
+.bar .track{stroke:var(--line);stroke-width:2}
+.bar .range{stroke:var(--bar);stroke-width:7;stroke-linecap:round;opacity:.35}
+.bar .dot{fill:var(--bar)}
+.bar .null{stroke:var(--null);stroke-width:2.4}
+.control .bar .range{stroke:var(--source)}
+.control .bar .dot{fill:var(--source)}
+.legend{color:var(--soft);font-size:13px;display:flex;gap:18px;flex-wrap:wrap;align-items:center;margin:4px 0 0}
+.legend svg{vertical-align:-3px;display:inline-block;margin:0 5px 0 0}
+.filter{display:flex;gap:8px;flex-wrap:wrap;margin:12px 0}
+.filter button{font:inherit;font-size:14px;padding:4px 12px;border:1px solid var(--line);border-radius:99px;
+background:var(--panel);color:var(--ink);cursor:pointer}
+.filter button[aria-pressed=true]{background:var(--ink);color:var(--bg);border-color:var(--ink)}
+.filter button:focus-visible,summary:focus-visible{outline:2px solid var(--robot);outline-offset:2px}
+article.clip{border:1px solid var(--line);border-radius:6px;background:var(--panel);padding:14px 18px 16px;margin:14px 0;
+break-inside:avoid}
+article.clip h3{margin:0 0 4px;display:flex;gap:12px;align-items:baseline;flex-wrap:wrap}
+.tag{font-size:12px;font-weight:400;color:var(--soft);border:1px solid var(--line);border-radius:99px;padding:0 9px}
+.stage{display:block;width:100%;max-height:330px;margin:4px auto 8px}
+.stage text{fill:var(--soft)}
+.stage .frame-label{fill:var(--ink)}
+.stage .ground{stroke:var(--soft);fill:none}
+.stage .tick{stroke:var(--line);fill:none}
+.stage g path{fill:none;stroke-linecap:round;stroke-linejoin:round}
+.stage .human{stroke:var(--human)}.stage .robot{stroke:var(--robot)}.stage .source{stroke:var(--source);opacity:.5}
+.stage .other{stroke:var(--other)}
+.stage circle.human,.stage circle.robot,.stage circle.source,.stage circle.other{fill:var(--panel)}
+.stage .far{opacity:.45}
+.details{display:grid;grid-template-columns:minmax(320px,1.4fr) minmax(240px,1fr);gap:10px 26px;align-items:start}
+@media(max-width:820px){.details{grid-template-columns:1fr}}
+.plot{width:100%;height:auto;display:block}
+.plot text{fill:var(--soft);font-size:12px}
+.plot .grid{stroke:var(--line)}
+.plot .axis{stroke:var(--soft)}
+.plot polyline,.plot path{fill:none;stroke-width:1.8;stroke-linejoin:round}
+.plot .key{fill:var(--ink)}
+.compact{font-size:13px}
+.compact th,.compact td{padding:3px 8px}
+.compact tbody th{font-weight:400}
+details{margin:10px 0;border:1px solid var(--line);border-radius:6px;background:var(--panel);padding:8px 14px}
+summary{cursor:pointer;font-weight:600}
+pre{overflow:auto;font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace;margin:8px 0;white-space:pre-wrap;
+overflow-wrap:anywhere}
+footer{max-width:1240px;margin:40px auto 30px;padding:0 28px;color:var(--soft);font-size:13px}
+[hidden]{display:none!important}
+@media print{nav,.filter{display:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
+main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}
+)css";
+}
+
+// Sorting of tables, the filter of clips, open details on paper. Without a script everything is shown.
+std::string_view report_script() {
+  return R"js(
+document.querySelectorAll('table.sortable th button').forEach(function(button){
+  button.addEventListener('click',function(){
+    var th=button.closest('th'),row=th.parentNode,body=th.closest('table').tBodies[0];
+    var column=Array.prototype.indexOf.call(row.children,th),down=th.getAttribute('aria-sort')!=='descending';
+    row.querySelectorAll('th').forEach(function(other){other.removeAttribute('aria-sort')});
+    th.setAttribute('aria-sort',down?'descending':'ascending');
+    var value=function(tr){var cell=tr.children[column],v=cell.dataset.v;return v===undefined?cell.textContent:v===''?-Infinity:+v};
+    Array.from(body.rows).sort(function(a,b){var x=value(a),y=value(b);return (x<y?-1:x>y?1:0)*(down?-1:1)})
+      .forEach(function(tr){body.appendChild(tr)});
+  });
+});
+document.querySelectorAll('.filter').forEach(function(bar){
+  bar.hidden=false;
+  bar.addEventListener('click',function(event){
+    var chosen=event.target.closest('button');if(!chosen)return;
+    bar.querySelectorAll('button').forEach(function(b){b.setAttribute('aria-pressed',b===chosen)});
+    document.querySelectorAll('article.clip').forEach(function(clip){
+      clip.hidden=chosen.dataset.task!==''&&clip.dataset.task!==chosen.dataset.task});
+  });
+});
+addEventListener('beforeprint',function(){document.querySelectorAll('details').forEach(function(d){d.open=true})});
+)js";
+}
+
+}  // namespace duet
