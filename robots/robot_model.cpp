@@ -90,8 +90,13 @@ std::string default_card_path() {
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
   if (!program.empty())
     places.push_back((program.parent_path() / ".." / "share" / "duet" / card).lexically_normal().string());
+  return first_card(places);
+}
+
+std::string first_card(const std::vector<std::string>& places) {
+  std::error_code ignored;
   for (const std::string& place : places)
-    if (fs::exists(place, ignored)) return place;
+    if (std::filesystem::exists(place, ignored)) return place;
   throw MissingError(fmt::format("no robot card: looked at {}", fmt::join(places, ", ")));
 }
 

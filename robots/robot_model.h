@@ -108,4 +108,7 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
 // program. Throws MissingError naming the places looked at.
 std::string default_card_path();
 
+// The first of `places` that exists; throws MissingError naming them all where none does.
+std::string first_card(const std::vector<std::string>& places);
+
 }  // namespace duet
