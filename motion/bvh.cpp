@@ -191,12 +191,12 @@ void read_frame(Words& words, std::size_t channels, Bvh& bvh, int frame) {
 void read_motion(Words& words, Bvh& bvh) {
   words.expect("MOTION", "after the hierarchy");
   words.expect("Frames:", "MOTION");
-  const double frames = words.number(words.next(), "Frames:");
+  const double frames = words.number(words.next(), "Frames");
   if (!(frames >= 1.0 && frames <= 1e8 && frames == std::floor(frames)))
     words.fail(fmt::format("Frames: expected a whole number of at least 1, found {}", frames));
   words.expect("Frame", "after Frames");
   words.expect("Time:", "after Frames");
-  bvh.frame_time = words.number(words.next(), "Frame Time:");
+  bvh.frame_time = words.number(words.next(), "Frame Time");
   if (!(bvh.frame_time > 0.0)) words.fail(fmt::format("Frame Time: expected above 0 s, found {}", bvh.frame_time));
   if (const std::string_view word = words.next_on_line(); !word.empty())
     words.fail("after Frame Time: expected a new line, found " + Words::found(word));

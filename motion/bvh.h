@@ -33,10 +33,10 @@ Bvh read_bvh(const std::string& path);
 enum class UpAxis { kY, kZ };
 
 struct BvhOptions {  // empty = detected; the verdict says what was found and from what
-  std::optional<double> metres_per_unit;
-  std::optional<UpAxis> up;
-  std::optional<double> rate_hz;    // overrides the frame time
-  std::optional<bool> drop_t_pose;  // an added T pose in frame 0
+  std::optional<double> metres_per_unit = {};
+  std::optional<UpAxis> up = {};
+  std::optional<double> rate_hz = {};    // overrides the frame time
+  std::optional<bool> drop_t_pose = {};  // an added T pose in frame 0
   double output_rate_hz = 50.0;
 };
 

@@ -1,0 +1,239 @@
+#include "motion/interaction_clip.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "tests/motion/npz_edit.h"
+#include "tests/motion/people.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::edited;
+using test::thrown_message;
+using test::two_people;
+using test::with_number;
+using test::without_key;
+using ::testing::HasSubstr;
+
+void expect_same(const HumanMotion& a, const HumanMotion& b) {
+  EXPECT_EQ(a.rate_hz, b.rate_hz);
+  EXPECT_EQ(a.joints, b.joints);
+  ASSERT_EQ(a.rotations.size(), b.rotations.size());
+  for (std::size_t i = 0; i < a.rotations.size(); ++i) EXPECT_EQ(a.rotations[i].coeffs(), b.rotations[i].coeffs());
+}
+
+void expect_same(const InteractionClip& a, const InteractionClip& b) {
+  EXPECT_EQ(a.id, b.id);
+  EXPECT_EQ(a.task, b.task);
+  expect_same(a.a, b.a);
+  expect_same(a.b, b.b);
+  EXPECT_EQ(a.phases, b.phases);
+  EXPECT_EQ(a.reactor, b.reactor);
+  EXPECT_EQ(a.contacts, b.contacts);
+  EXPECT_EQ(a.source, b.source);
+}
+
+TEST(InteractionClip, FileGivesBackEveryBit) {
+  const test::ScratchFolder folder;
+  const InteractionClip clip = two_people();
+  save_clip(clip, folder / "clip.npz");
+  expect_same(load_clip(folder / "clip.npz"), clip);
+  EXPECT_EQ(clip_bytes(load_clip(folder / "clip.npz")), read_file(folder / "clip.npz"));
+}
+
+TEST(InteractionClip, RotationsContactsAndSourceMayBeAbsent) {
+  InteractionClip clip = two_people();
+  clip.a.rotations.clear();
+  clip.contacts.clear();
+  clip.source.clear();
+  expect_same(parse_clip(clip_bytes(clip), "x"), clip);
+}
+
+TEST(InteractionClip, RolesFollowTheReactor) {
+  InteractionClip clip = two_people();
+  EXPECT_EQ(&clip.reactor_motion(), &clip.a);
+  EXPECT_EQ(&clip.actor_motion(), &clip.b);
+  clip.reactor = Person::kB;
+  EXPECT_EQ(&clip.reactor_motion(), &clip.b);
+  EXPECT_EQ(&clip.actor_motion(), &clip.a);
+}
+
+// A file whose columns come in another order: the names decide, for positions, rotations and contacts.
+TEST(InteractionClip, JointsAreBoundByName) {
+  const InteractionClip clip = two_people();
+  const std::string bytes = edited(clip_bytes(clip), [&](Npz& npz) {
+    std::vector<int> reversed;
+    for (int j = kSmplJoints - 1; j >= 0; --j) reversed.push_back(j);
+    std::vector<std::string> names;
+    for (const int j : reversed) names.emplace_back(kSmplNames[j]);
+    npz.set("human_joint_names", names);
+    for (const std::string who : {"a", "b"}) {
+      npz.set(who + "_joints", npz.tracks(who + "_joints", kSmplJoints).select(reversed));
+      const std::vector<double> stored = npz.numbers(who + "_rotations_wxyz", {-1, kSmplJoints, 4});
+      std::vector<double> turned;
+      for (std::size_t t = 0; t < 20; ++t)
+        for (const int j : reversed)
+          turned.insert(turned.end(), &stored[4 * (kSmplJoints * t + j)], &stored[4 * (kSmplJoints * t + j)] + 4);
+      npz.set(who + "_rotations_wxyz", turned, {20, kSmplJoints, 4});
+    }
+    const std::int64_t last = kSmplJoints - 1;
+    npz.set("contacts", std::vector<std::int64_t>{6, 8, last - kRightHand, last - kLeftHand}, {1, 4});
+  });
+  expect_same(parse_clip(bytes, "reversed"), clip);
+}
+
+TEST(InteractionClip, MirroringTwiceIsTheClip) {
+  const InteractionClip clip = two_people();
+  expect_same(mirrored(mirrored(clip)), clip);
+}
+
+TEST(InteractionClip, MirroringReflectsTheWorldAndExchangesSides) {
+  const InteractionClip clip = two_people();
+  const InteractionClip image = mirrored(clip);
+  EXPECT_NO_THROW(validate(image));
+  const Eigen::Vector3d left = clip.a.joints.at(3, kLeftHand);
+  EXPECT_EQ(image.a.joints.at(3, kRightHand), Eigen::Vector3d(left.x(), -left.y(), left.z()));
+  EXPECT_EQ(image.contacts[0].joint_a, kLeftHand);
+  EXPECT_EQ(image.contacts[0].joint_b, kRightHand);
+  EXPECT_NEAR(heading(image.a.joints, 4), -heading(clip.a.joints, 4), 1e-14);
+}
+
+// The person of the tests is rigid: every bone is its rotation times the bone of the reference posture, and the
+// reference posture is its own mirror image.
+TEST(InteractionClip, MirroredRotationsTurnMirroredBones) {
+  InteractionClip clip = two_people();
+  const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.7, Eigen::Vector3d(0.3, 0.5, -0.8).normalized()));
+  for (int t = 0; t < clip.frames(); ++t)
+    for (int j = 0; j < kSmplJoints; ++j) {
+      clip.a.joints.at(t, j) = tilt * Eigen::Vector3d(clip.a.joints.at(t, j));
+      clip.a.rotations[t * kSmplJoints + j] = tilt * clip.a.rotations[t * kSmplJoints + j];
+    }
+  const InteractionClip image = mirrored(clip);
+  for (int t = 0; t < image.frames(); ++t)
+    for (int j = 1; j < kSmplJoints; ++j) {
+      const int parent = kSmplParents[j];
+      const Eigen::Vector3d bone = test::reference_posture().col(j) - test::reference_posture().col(parent);
+      EXPECT_LT(
+          (image.a.joints.at(t, j) - image.a.joints.at(t, parent) - image.a.rotations[t * kSmplJoints + parent] * bone)
+              .norm(),
+          1e-14);
+    }
+}
+
+struct BadClip {
+  std::string expected;
+  std::function<void(InteractionClip&)> spoil;
+};
+
+TEST(InteractionClip, ValidationNamesClipAndFault) {
+  const std::vector<BadClip> cases = {
+      {"clip 'pair_7', person B: expected at least 2 frames, found 1",
+       [](InteractionClip& c) { c.b = slice(c.b, 0, 1); }},
+      {"expected two people of the same length, found 20 and 19 frames",
+       [](InteractionClip& c) { c.b = slice(c.b, 0, 19); }},
+      {"expected two people at the same rate, found 50 and 60 Hz", [](InteractionClip& c) { c.b.rate_hz = 60.0; }},
+      {"expected phases with 0 <= act_begin <= act_end <= 20 frames, found [5, 21)",
+       [](InteractionClip& c) { c.phases.act_end = 21; }},
+      {"found [13, 12)", [](InteractionClip& c) { c.phases.act_begin = 13; }},
+      {"found [-1, 12)", [](InteractionClip& c) { c.phases.act_begin = -1; }},
+      {"contact window 0: expected 0 <= begin < end <= 20 frames, found [8, 8)",
+       [](InteractionClip& c) { c.contacts[0].begin = 8; }},
+      {"contact window 0: expected 0 <= begin < end <= 20 frames, found [6, 21)",
+       [](InteractionClip& c) { c.contacts[0].end = 21; }},
+      {"contact window 0: expected joints 0..23, found 24", [](InteractionClip& c) { c.contacts[0].joint_b = 24; }},
+  };
+  for (const BadClip& bad : cases) {
+    InteractionClip clip = two_people();
+    bad.spoil(clip);
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { validate(clip); }), HasSubstr(bad.expected));
+    const test::ScratchFolder folder;
+    EXPECT_THROW(save_clip(clip, folder / "clip.npz"), std::invalid_argument);
+  }
+}
+
+struct BadFile {
+  std::string expected;
+  std::string bytes;
+};
+
+TEST(InteractionClip, ReadingNamesFileKeyAndFault) {
+  const std::string good = clip_bytes(two_people());
+  const auto with_text = [&](const std::string& key, const std::string& value) {
+    return edited(good, [&](Npz& npz) { npz.set_text(key, value); });
+  };
+  const auto with_integers = [&](const std::string& key, std::vector<std::int64_t> values,
+                                 std::vector<std::size_t> shape) {
+    return edited(good, [&](Npz& npz) { npz.set(key, std::move(values), std::move(shape)); });
+  };
+  const auto with_joint = [&](int joint, const std::string& name) {
+    return edited(good, [&](Npz& npz) {
+      std::vector<std::string> names(kSmplNames.begin(), kSmplNames.end());
+      names[joint] = name;
+      npz.set("human_joint_names", names);
+    });
+  };
+  const auto with_frames = [&](int begin, int end) {
+    return edited(good, [&](Npz& npz) { npz.set("b_joints", npz.tracks("b_joints", 24).slice(begin, end)); });
+  };
+  const std::vector<BadFile> cases = {
+      {"key 'schema': expected 'duet.interaction_clip', found 'other'", with_text("schema", "other")},
+      {"key 'schema_version': expected 1, found 2", with_integers("schema_version", {2}, {})},
+      {"unknown key 'fase'", with_text("fase", "x")},
+      {"did you mean 'phases'?", with_text("phase", "x")},
+      {"key 'task': unknown task 'hugg'", with_text("task", "hugg")},
+      {"key 'reactor': expected 'A' or 'B', found 'C'", with_text("reactor", "C")},
+      {"key 'rate_hz': expected a positive rate, found 0", with_number(good, "rate_hz", 0, 0.0)},
+      {"key 'phases': expected a frame number, found -3", with_integers("phases", {-3, 4}, {2})},
+      {"expected phases with 0 <= act_begin <= act_end <= 20 frames", with_integers("phases", {3, 40}, {2})},
+      {"key 'contacts': row 0, column 3: 24 is out of range", with_integers("contacts", {1, 2, 3, 24}, {1, 4})},
+      {"contact window 0: expected 0 <= begin < end", with_integers("contacts", {4, 2, 3, 3}, {1, 4})},
+      {"did you mean 'left_knee'?", with_joint(kLeftKnee, "left_kne")},
+      {"joint 'head' is there twice", with_joint(kLeftKnee, "head")},
+      {"key 'a_joints': frame 0, joint 'left_hip': the bone to 'pelvis' is 0 m long",
+       edited(good,
+              [&](Npz& npz) {
+                PointTracks joints = npz.tracks("a_joints", 24);
+                joints.at(0, kLeftHip) = joints.at(0, kPelvis);
+                npz.set("a_joints", joints);
+              })},
+      {"expected a unit quaternion", with_number(good, "a_rotations_wxyz", 1, 0.9)},
+      {"key 'b_joints': expected at least 2 frames, found 1",
+       edited(without_key(good, "b_rotations_wxyz"),
+              [&](Npz& npz) { npz.set("b_joints", npz.tracks("b_joints", 24).slice(0, 1)); })},
+      {"found 20 and 19 frames", without_key(with_frames(0, 19), "b_rotations_wxyz")},
+      {"b_rotations_wxyz", with_frames(0, 19)},
+      {"a_joints", with_number(good, "a_joints", 4, std::nan(""))},
+      {"source_values", without_key(good, "source_values")},
+  };
+  for (const BadFile& bad : cases) {
+    const std::string message = thrown_message<InputError>([&] { (void)parse_clip(bad.bytes, "bad.npz"); });
+    EXPECT_THAT(message, HasSubstr("bad.npz"));
+    EXPECT_THAT(message, HasSubstr(bad.expected));
+  }
+}
+
+TEST(InteractionClip, EveryMissingKeyIsNamed) {
+  const std::string good = clip_bytes(two_people());
+  for (const std::string key : {"schema", "schema_version", "id", "task", "reactor", "phases", "rate_hz",
+                                "human_joint_names", "a_joints", "b_joints"})
+    EXPECT_THAT(thrown_message<InputError>([&] { (void)parse_clip(without_key(good, key), "part.npz"); }),
+                HasSubstr("'" + key + "'"));
+}
+
+TEST(InteractionClip, EmptyAndTruncatedFilesAreRefused) {
+  const std::string good = clip_bytes(two_people());
+  EXPECT_THAT(thrown_message<InputError>([&] { (void)parse_clip("", "empty.npz"); }), HasSubstr("empty.npz"));
+  for (std::size_t size = 0; size < good.size(); size += 1 + size / 8)
+    EXPECT_THROW((void)parse_clip(good.substr(0, size), "cut.npz"), InputError) << size;
+  const test::ScratchFolder folder;
+  EXPECT_THAT(thrown_message<InputError>([&] { (void)load_clip(folder / "absent.npz"); }), HasSubstr("absent.npz"));
+}
+
+}  // namespace
+}  // namespace duet
