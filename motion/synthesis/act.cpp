@@ -1,0 +1,58 @@
+#include "motion/synthesis/act.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/require.h"
+
+namespace duet::synthesis {
+namespace {
+
+constexpr std::array<Act, 6> kActs = {{
+    {Task::kHug, 25.9, 4.5, 13.0, 1.6, 1.05, 1.25, 0.25, true, hug_layout, perform_hug},
+    {Task::kHandshake, 22.9, 3.5, 10.0, 1.1, 0.85, 1.2, 0.05, false, handshake_layout, perform_handshake},
+    {Task::kHighFive, 16.1, 2.4, 6.5, 1.1, 1.4, 1.65, 0.05, false, high_five_layout, perform_high_five},
+    {Task::kWave, 18.6, 4.5, 9.0, 1.0, 1.45, 1.7, 0.0, false, wave_layout, perform_wave},
+    {Task::kBend, 17.6, 4.5, 9.5, 0.6, 0.0, 0.0, 0.0, false, bend_layout, perform_bend},
+    {Task::kFlyKiss, 17.9, 5.5, 10.0, 1.1, 1.1, 1.5, 0.0, false, fly_kiss_layout, perform_fly_kiss},
+}};
+
+// How far in front of the root a hand at height z is when it uses `share` of the arm.
+double reach_ahead(const Body& body, int side, double z, double share, const Lean& lean) {
+  const Eigen::Vector3d shoulder = shoulder_at(body, side, lean);
+  const double length = share * body.arm();
+  const double square = length * length - std::pow(z - shoulder.z(), 2) - std::pow(shoulder.y(), 2);
+  return shoulder.x() + std::sqrt(std::max(square, 0.0));
+}
+
+}  // namespace
+
+const Act& act_of(Task task) {
+  const auto* found = std::find_if(kActs.begin(), kActs.end(), [task](const Act& act) { return act.task == task; });
+  require(found != kActs.end(), "synthesize: unknown task");
+  return *found;
+}
+
+Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d origin(placement.position.x(), placement.position.y(), 0.0);
+  return origin + rot_z(placement.yaw) * point;
+}
+
+Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a) {
+  if (person == 0) return point_of_a;
+  return {layout.distance - point_of_a.x(), layout.lateral - point_of_a.y(), point_of_a.z()};
+}
+
+Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean) {
+  std::array<double, 2> ahead;
+  for (const int k : {0, 1})
+    ahead[k] = std::clamp(reach_ahead(cast.body[k], cast.side, z, share, lean), nearest, farthest);
+  Layout layout;
+  layout.distance = ahead[0] + ahead[1];
+  layout.meet = {ahead[0], 0.0, z};
+  for (const int k : {0, 1})
+    layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.93);
+  return layout;
+}
+
+}  // namespace duet::synthesis

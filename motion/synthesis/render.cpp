@@ -1,0 +1,144 @@
+#include "motion/synthesis/render.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace duet::synthesis {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kStanceSway = 0.006;   // of the pelvis [m]
+constexpr double kTrunkSway = 0.008;    // [rad]
+constexpr double kWeightShift = 0.022;  // of the pelvis over the standing foot [m]
+constexpr double kPelvisDrop = 0.035;   // on the side of the swinging leg [rad]
+constexpr double kPelvisTurn = 0.16;    // per metre between the feet [rad/m]
+constexpr double kCounterTurn = 1.7;    // of the spine, per turn of the pelvis
+constexpr double kHeightWindow = 0.14;  // half width of the smoothing of the pelvis' height [s]
+constexpr double kFarthestLook = 1.0;   // [rad]
+
+// How far the left foot is ahead of the right one, in the direction the person faces. [m]
+double left_ahead(const Performer& person, double t, double yaw) {
+  const Vector3d apart = person.gait.foot(0, t).toe - person.gait.foot(1, t).toe;
+  return apart.x() * std::cos(yaw) + apart.y() * std::sin(yaw);
+}
+
+void turn_head(const Performer& person, const Performer& partner, double t, TorsoPose& torso) {
+  const Placement there = partner.gait.root(t);
+  const Eigen::Vector2d away = there.position - torso.pelvis.head<2>();
+  const double chest_yaw = torso.yaw + torso.pelvis_yaw + torso.twist;
+  const double aside = turn_between(chest_yaw, std::atan2(away.y(), away.x()));
+  const double down = std::atan2(0.9 * (person.body.height - partner.body.height), std::max(away.norm(), 0.3));
+  const double weight = person.look.at(t);
+  // Nobody looks back over the shoulder at someone straight behind: the turn fades out towards the back.
+  const double turned = kFarthestLook * std::tanh(aside / kFarthestLook) * std::pow(std::cos(0.5 * aside), 2);
+  torso.look_yaw = weight * turned + 0.05 * person.sway[5].at(t);
+  torso.look_pitch = weight * 0.6 * std::clamp(down, -0.5, 0.5) + person.nod.at(t) + 0.03 * person.sway[6].at(t) -
+                     0.5 * weight * (torso.pelvis_pitch + torso.spine_bend);
+}
+
+TorsoPose torso_at(const Performer& person, const Performer& partner, double t, double height) {
+  const Placement root = person.gait.root(t);
+  const double walking = 0.02 * std::pow(person.gait.weight(t), 2);
+  const Lean lean = {person.forward.at(t) + walking + kTrunkSway * person.sway[2].at(t),
+                     person.side.at(t) + kTrunkSway * person.sway[3].at(t), person.twist.at(t), person.crouch.at(t),
+                     person.shift.at(t) + kStanceSway * person.sway[0].at(t)};
+  TorsoPose torso = standing_torso(person.body, root, lean, height);
+  const double weight = person.gait.weight(t);
+  const double aside = kWeightShift * weight + 1.5 * kStanceSway * person.sway[1].at(t);
+  torso.pelvis.head<2>() += aside * Eigen::Vector2d(-std::sin(root.yaw), std::cos(root.yaw));
+  torso.pelvis_roll = kPelvisDrop * weight;
+  torso.pelvis_yaw = -kPelvisTurn * left_ahead(person, t, root.yaw) + 0.01 * person.sway[4].at(t);
+  torso.twist -= kCounterTurn * torso.pelvis_yaw;
+  turn_head(person, partner, t, torso);
+  return torso;
+}
+
+// Highest pelvis that both legs allow.
+double highest_pelvis(const Performer& person, const Performer& partner, double t) {
+  Figure figure;
+  pose_torso(person.body, torso_at(person, partner, t, 0.0), figure);
+  const double reach = kLegReach * person.body.leg();
+  double highest = person.body.stand_height - person.crouch.at(t);
+  for (const int side : {0, 1}) {
+    const Vector3d hip = figure.p.col(sided(kLeftHip, side));
+    const Vector3d ankle = ankle_of(person.body, person.gait.foot(side, t), side);
+    const double across = (hip - ankle).head<2>().norm();
+    const double up = std::sqrt(std::max(reach * reach - across * across, 0.0));
+    // The figure was posed with the pelvis at minus the crouch.
+    highest = std::min(highest, ankle.z() + up - (hip.z() + person.crouch.at(t)));
+  }
+  return highest;
+}
+
+// Nowhere above `limit`, and smooth: least value in a window, then a weighted mean over the same window.
+std::vector<double> smooth_below(const std::vector<double>& limit, int half) {
+  const int n = static_cast<int>(limit.size());
+  std::vector<double> least(n), smooth(n, 0.0), weights;
+  double sum = 0.0;
+  for (int k = -half; k <= half; ++k) {
+    const double x = static_cast<double>(k) / (half + 1);
+    weights.push_back(std::pow(1.0 - x * x, 3));
+    sum += weights.back();
+  }
+  for (int t = 0; t < n; ++t)
+    least[t] = *std::min_element(limit.begin() + std::max(t - half, 0), limit.begin() + std::min(t + half, n - 1) + 1);
+  for (int t = 0; t < n; ++t)
+    for (int k = -half; k <= half; ++k) smooth[t] += weights[k + half] / sum * least[std::clamp(t + k, 0, n - 1)];
+  return smooth;
+}
+
+std::vector<double> pelvis_heights(const Performer& person, const Performer& partner, int frames, double rate_hz) {
+  std::vector<double> limit(frames);
+  for (int i = 0; i < frames; ++i) limit[i] = highest_pelvis(person, partner, i / rate_hz);
+  return smooth_below(limit, std::max(1, static_cast<int>(std::lround(kHeightWindow * rate_hz))));
+}
+
+ArmPose arm_at(const Performer& person, const Figure& own, const Figure& partner, int side, double t) {
+  // Arms swing against the legs: the left one goes forward with the right foot.
+  const double ahead = left_ahead(person, t, own.yaw);
+  const double swing = -side_sign(side) * person.arm_swing * std::atan(ahead / (2.0 * person.body.leg()));
+  const int first = side == 0 ? 6 : 9;
+  const Vector3d sway(person.sway[first].at(t), person.sway[first + 1].at(t), person.sway[first + 2].at(t));
+  return person.arms[side].at({t, side, person.body, own, partner, swing, sway});
+}
+
+void store(const Figure& figure, int frame, HumanMotion& motion) {
+  motion.joints.frame(frame) = figure.p;
+  for (const Eigen::Matrix3d& rotation : figure.R)
+    motion.rotations.push_back(Eigen::Quaterniond(rotation).normalized());
+}
+
+}  // namespace
+
+std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz) {
+  std::array<HumanMotion, 2> motions;
+  std::array<std::vector<double>, 2> heights;
+  for (int k : {0, 1}) {
+    motions[k].rate_hz = rate_hz;
+    motions[k].joints = PointTracks(frames, kSmplJoints);
+    motions[k].rotations.reserve(static_cast<size_t>(frames) * kSmplJoints);
+    heights[k] = pelvis_heights(people[k], people[1 - k], frames, rate_hz);
+  }
+  for (int i = 0; i < frames; ++i) {
+    const double t = i / rate_hz;
+    std::array<Figure, 2> figures;
+    for (int k : {0, 1}) {
+      const double height = heights[k][i] + people[k].crouch.at(t);
+      pose_torso(people[k].body, torso_at(people[k], people[1 - k], t, height), figures[k]);
+    }
+    const std::array<Figure, 2> torsos = figures;
+    for (int k : {0, 1}) {
+      for (const int side : {0, 1}) {
+        pose_leg(people[k].body, people[k].gait.foot(side, t), side, figures[k]);
+        pose_arm(people[k].body, arm_at(people[k], figures[k], torsos[1 - k], side, t), side, figures[k]);
+      }
+      store(figures[k], i, motions[k]);
+    }
+  }
+  return motions;
+}
+
+}  // namespace duet::synthesis

@@ -1,0 +1,14 @@
+// From two performers to joints: pelvis heights that keep both legs within reach, then trunk, legs and arms frame by
+// frame.
+#pragma once
+
+#include <array>
+
+#include "motion/human_motion.h"
+#include "motion/synthesis/performer.h"
+
+namespace duet::synthesis {
+
+std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz);
+
+}  // namespace duet::synthesis
