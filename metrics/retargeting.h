@@ -39,7 +39,8 @@ Classification classification(const ContactCounts& counts, ZeroDivision zero_div
 
 // Magnitudes (J, T) [rad].
 Eigen::MatrixXd hinge_magnitudes(const Eigen::MatrixXd& q);  // |q|
-// Each group of hinges (q row, axis in the preceding link's frame, in order) as one rotation.
+// Each group of hinges (q row, axis, in order) as one rotation: the product of the hinges' rotations. Axes are in the
+// frame before the group's first hinge, at q = 0; they need not be unit.
 struct HingeGroup {
   std::vector<int> rows;
   std::vector<Eigen::Vector3d> axes;
@@ -67,6 +68,12 @@ std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, co
 // The contact counts behind them per threshold, to be added over clips (micro average).
 std::array<ContactCounts, 3> retargeting_contact_counts(const PairedMotion& motion, const RobotModel& robot,
                                                         const MetricReadings& readings = {});
+// The same figures under every reading, the other options as given: "jpe.pelvis", "awd.cross", "awd.with_hands.full"
+// (nine keypoints of A.1.1 instead of the seven of C.2.1), "contact_f1_0.35.source_frame", "large_angle_ratio.entry",
+// "large_angle_ratio.grouped.entry", "angle_std.pooled", "jerk_mean.central", "jerk_mean.links.diff" (all links instead
+// of the 16 pair points), ...
+std::map<std::string, double> retargeting_metrics_all_readings(const PairedMotion& motion, const RobotModel& robot,
+                                                               const MetricReadings& readings = {});
 inline constexpr std::array<double, 3> kContactThresholds = {0.2, 0.35, 0.5};
 
 }  // namespace duet

@@ -1,0 +1,79 @@
+#include "metrics/catalogue.h"
+
+#include <array>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "core/names.h"
+
+namespace duet {
+namespace {
+
+constexpr auto kDown = Direction::kLower;
+constexpr auto kUp = Direction::kHigher;
+constexpr auto kPlain = Direction::kNone;
+constexpr auto kRetarget = MetricGroup::kRetargeting;
+constexpr auto kControl = MetricGroup::kController;
+constexpr auto kEpisode = MetricGroup::kEpisode;
+constexpr std::string_view kC21 = "supplement C.2.1";
+constexpr std::string_view kS4 = "supplement A.4.6, Table S4";
+constexpr std::string_view kDetectors = "supplement C.3.1, Algorithms 1-6";
+
+constexpr auto kCatalogue = std::to_array<MetricInfo>({
+    {"jpe", "m", kDown, kRetarget, "Joint position error", kC21},
+    {"awd", "m", kDown, kRetarget, "Average workspace distance", kC21},
+    {"contact_precision_0.2", "1", kUp, kRetarget, "Contact precision at 0.2 m", kC21},
+    {"contact_recall_0.2", "1", kUp, kRetarget, "Contact recall at 0.2 m", kC21},
+    {"contact_f1_0.2", "1", kUp, kRetarget, "Contact F1 at 0.2 m", kC21},
+    {"contact_accuracy_0.2", "1", kUp, kRetarget, "Contact accuracy at 0.2 m", kC21},
+    {"contact_precision_0.35", "1", kUp, kRetarget, "Contact precision at 0.35 m", kC21},
+    {"contact_recall_0.35", "1", kUp, kRetarget, "Contact recall at 0.35 m", kC21},
+    {"contact_f1_0.35", "1", kUp, kRetarget, "Contact F1 at 0.35 m", kC21},
+    {"contact_accuracy_0.35", "1", kUp, kRetarget, "Contact accuracy at 0.35 m", kC21},
+    {"contact_precision_0.5", "1", kUp, kRetarget, "Contact precision at 0.5 m", kC21},
+    {"contact_recall_0.5", "1", kUp, kRetarget, "Contact recall at 0.5 m", kC21},
+    {"contact_f1_0.5", "1", kUp, kRetarget, "Contact F1 at 0.5 m", kC21},
+    {"contact_accuracy_0.5", "1", kUp, kRetarget, "Contact accuracy at 0.5 m", kC21},
+    {"large_angle_ratio", "1", kDown, kRetarget, "Large-angle ratio", kC21},
+    {"angle_std", "rad", kDown, kRetarget, "Angle standard deviation", kC21},
+    {"jerk_mean", "m/s^3", kDown, kRetarget, "Jerk, mean", kC21},
+    {"jerk_std", "m/s^3", kDown, kRetarget, "Jerk, standard deviation", kC21},
+
+    {"hf_ratio", "1", kDown, kControl, "Joint-velocity energy above 5 Hz", kS4},
+    {"dof_jerk", "rad/s^3", kDown, kControl, "Joint jerk", kS4},
+    {"root_jerk", "m/s^3", kDown, kControl, "Root jerk", kS4},
+    {"root_error", "m", kDown, kControl, "Root position error", kS4},
+    {"root_angle_error", "deg", kDown, kControl, "Root orientation error", kS4},
+    {"dof_error", "rad", kDown, kControl, "Joint position tracking error", kS4},
+    {"dof_velocity_error", "rad/s", kDown, kControl, "Joint velocity tracking error", kS4},
+    {"hf_ratio_reference", "1", kDown, kControl, "Joint-velocity energy above 5 Hz, before the controller", kS4},
+    {"dof_jerk_reference", "rad/s^3", kDown, kControl, "Joint jerk before the controller", kS4},
+    {"root_jerk_reference", "m/s^3", kDown, kControl, "Root jerk before the controller", kS4},
+
+    {"success", "1", kUp, kEpisode, "Success", kDetectors},
+    {"success_lift", "1", kUp, kEpisode, "Success over the null arm", "duet: control arms"},
+    {"fell", "1", kDown, kEpisode, "Falls", "duet: outcomes"},
+    {"time_to_fall", "s", kUp, kEpisode, "Time to fall", "duet: outcomes"},
+    {"evidence_frames", "1", kPlain, kEpisode, "Frames of evidence", kDetectors},
+    {"contact_peak", "N", kDown, kEpisode, "Peak contact force with the partner", "duet: partner safety"},
+    {"contact_impulse", "N s", kPlain, kEpisode, "Contact impulse with the partner", "duet: partner safety"},
+    {"late_plans", "1", kDown, kEpisode, "Ticks without a plan in time", "supplement F"},
+    {"frames", "1", kPlain, kEpisode, "Frames", "duet: episode"},
+    {"sim_s", "s", kPlain, kEpisode, "Simulated time", "duet: episode"},
+    {"wall_s", "s", kPlain, kEpisode, "Wall time", "duet: episode"},
+});
+
+}  // namespace
+
+std::span<const MetricInfo> metric_catalogue() { return kCatalogue; }
+
+const MetricInfo& metric_info(std::string_view name) {
+  for (const MetricInfo& info : kCatalogue)
+    if (info.name == name) return info;
+  std::vector<std::string> names;
+  for (const MetricInfo& info : kCatalogue) names.emplace_back(info.name);
+  throw std::invalid_argument(unknown_name_message("metric", name, names));
+}
+
+}  // namespace duet

@@ -1,0 +1,176 @@
+#include "metrics/retargeting.h"
+
+#include <fmt/format.h>
+
+#include "core/require.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+namespace {
+
+// Everything that the metrics look at, from one pass of forward kinematics. The initiator is H_p: in the source as in
+// the clip, afterwards as adapted. The responder is H_s in the source and the robot afterwards.
+struct ScoredTracks {
+  PointTracks robot_pairs;                                           // (T, 16, 3)
+  PointTracks source_initiator, source_responder, initiator, robot;  // (T, K, 3) keypoints, hands included
+  std::vector<int> awd_points;                                       // keypoints of AWD: without hands
+  std::vector<int> hands;                                            // left, right
+};
+
+void check_frames(const PairedMotion& motion, const RobotModel& robot) {
+  const auto check = [&](int frames, const char* name) {
+    require(frames == motion.frames(),
+            fmt::format("retargeting metrics: {} has {} frames, but robot has {}", name, frames, motion.frames()));
+  };
+  require(motion.frames() > 0, "retargeting metrics: the paired motion is empty");
+  check(static_cast<int>(motion.robot.q.cols()), "robot.q");
+  check(motion.partner.frames(), "partner");
+  check(motion.source_partner.frames(), "source_partner");
+  check(motion.source_reactor.frames(), "source_reactor");
+  check(motion.reshaped.frames(), "reshaped");
+  require(motion.robot.joint_names.empty() || motion.robot.joint_names == robot.joint_names(),
+          fmt::format("retargeting metrics: the joints of the motion are not those of {} in its order", robot.name));
+}
+
+ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) {
+  check_frames(motion, robot);
+  const int pairs = static_cast<int>(robot.pairs.size());
+  std::vector<int> frames, pair_points, robot_points, human_points;
+  ScoredTracks tracks;
+  for (const RetargetPair& pair : robot.pairs) {
+    pair_points.push_back(static_cast<int>(frames.size()));
+    frames.push_back(pair.frame);
+  }
+  for (size_t k = 0; k < robot.keypoints.size(); ++k) {
+    robot_points.push_back(pairs + static_cast<int>(k));
+    frames.push_back(robot.keypoints[k].frame);
+    human_points.push_back(robot.keypoints[k].smpl);
+    if (robot.keypoints[k].name.find("hand") == std::string::npos) tracks.awd_points.push_back(static_cast<int>(k));
+  }
+  tracks.hands = {robot.keypoint_index("left_hand"), robot.keypoint_index("right_hand")};
+  const PointTracks points = frame_tracks(robot, motion.robot, frames);
+  tracks.robot_pairs = points.select(pair_points);
+  tracks.robot = points.select(robot_points);
+  tracks.source_initiator = motion.source_partner.joints.select(human_points);
+  tracks.source_responder = motion.source_reactor.joints.select(human_points);
+  tracks.initiator = motion.partner.joints.select(human_points);
+  return tracks;
+}
+
+double awd_of(const ScoredTracks& tracks, const std::vector<int>& points, AwdEntries entries) {
+  return awd(tracks.source_initiator.select(points), tracks.source_responder.select(points),
+             tracks.initiator.select(points), tracks.robot.select(points), entries);
+}
+
+std::array<ContactCounts, 3> contact_counts_of(const ScoredTracks& tracks, const MetricReadings& readings) {
+  const PointTracks hands[] = {tracks.source_initiator.select(tracks.hands),
+                               tracks.source_responder.select(tracks.hands), tracks.initiator.select(tracks.hands),
+                               tracks.robot.select(tracks.hands)};
+  std::array<ContactCounts, 3> counts;
+  for (size_t i = 0; i < counts.size(); ++i)
+    counts[i] = contact_counts(hands[0], hands[1], hands[2], hands[3], kContactThresholds[i], readings);
+  return counts;
+}
+
+void add_contacts(const ScoredTracks& tracks, const MetricReadings& readings, const std::string& suffix,
+                  std::map<std::string, double>& out) {
+  const std::array<ContactCounts, 3> counts = contact_counts_of(tracks, readings);
+  for (size_t i = 0; i < counts.size(); ++i) {
+    const Classification c = classification(counts[i], readings.zero_division);
+    const std::string ending = fmt::format("_{}{}", kContactThresholds[i], suffix);
+    out["contact_precision" + ending] = c.precision;
+    out["contact_recall" + ending] = c.recall;
+    out["contact_f1" + ending] = c.f1;
+    out["contact_accuracy" + ending] = c.accuracy;
+  }
+}
+
+// Every link's origin: the other plausible choice of "3D joint positions" for jerk.
+PointTracks link_tracks(const RobotModel& robot, const RobotMotion& motion) {
+  PointTracks tracks(motion.frames(), static_cast<int>(robot.links.size()));
+  Kinematics kinematics(robot);
+  for (int t = 0; t < motion.frames(); ++t) {
+    kinematics.update(motion.root[t], motion.q.col(t));
+    for (size_t i = 0; i < robot.links.size(); ++i)
+      tracks.at(t, static_cast<int>(i)) = kinematics.p_WL(static_cast<int>(i));
+  }
+  return tracks;
+}
+
+// The text names of a reading option with the readings set to each in turn.
+template <typename Action>
+void for_each_reading(const MetricReadings& given, const std::string& option, Action action) {
+  for (const std::string& value : reading_values(option)) {
+    Readings readings;
+    readings.metrics = given;
+    set_reading(readings, option, value);
+    action(value, readings.metrics);
+  }
+}
+
+void add_angle_readings(const Eigen::MatrixXd& magnitudes, const std::string& kind, const MetricReadings& given,
+                        std::map<std::string, double>& out) {
+  for_each_reading(given, "metrics.large_angle", [&](const std::string& name, const MetricReadings& r) {
+    out["large_angle_ratio." + kind + name] = large_angle_ratio(magnitudes, r.large_angle);
+  });
+  for_each_reading(given, "metrics.angle_std", [&](const std::string& name, const MetricReadings& r) {
+    out["angle_std." + kind + name] = angle_std(magnitudes, r.angle_std, r.ddof);
+  });
+}
+
+void add_jerk(const PointTracks& points, double rate_hz, const std::string& suffix, const MetricReadings& readings,
+              std::map<std::string, double>& out) {
+  const Jerk j = jerk(points, rate_hz, readings.jerk_scheme, readings.ddof);
+  out["jerk_mean" + suffix] = j.mean;
+  out["jerk_std" + suffix] = j.std;
+}
+
+}  // namespace
+
+std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
+                                                  const MetricReadings& readings) {
+  const ScoredTracks tracks = scored_tracks(motion, robot);
+  const Eigen::MatrixXd magnitudes = hinge_magnitudes(motion.robot.q);
+  std::map<std::string, double> out;
+  out["jpe"] = jpe(tracks.robot_pairs, motion.reshaped, readings.jpe_frame);
+  out["awd"] = awd_of(tracks, tracks.awd_points, readings.awd_entries);
+  add_contacts(tracks, readings, "", out);
+  out["large_angle_ratio"] = large_angle_ratio(magnitudes, readings.large_angle);
+  out["angle_std"] = angle_std(magnitudes, readings.angle_std, readings.ddof);
+  add_jerk(tracks.robot_pairs, motion.robot.rate_hz, "", readings, out);
+  return out;
+}
+
+std::array<ContactCounts, 3> retargeting_contact_counts(const PairedMotion& motion, const RobotModel& robot,
+                                                        const MetricReadings& readings) {
+  return contact_counts_of(scored_tracks(motion, robot), readings);
+}
+
+std::map<std::string, double> retargeting_metrics_all_readings(const PairedMotion& motion, const RobotModel& robot,
+                                                               const MetricReadings& readings) {
+  const ScoredTracks tracks = scored_tracks(motion, robot);
+  const double rate_hz = motion.robot.rate_hz;
+  std::vector<int> all_keypoints(robot.keypoints.size());
+  for (size_t k = 0; k < all_keypoints.size(); ++k) all_keypoints[k] = static_cast<int>(k);
+
+  std::map<std::string, double> out;
+  for_each_reading(readings, "metrics.jpe_frame", [&](const std::string& name, const MetricReadings& r) {
+    out["jpe." + name] = jpe(tracks.robot_pairs, motion.reshaped, r.jpe_frame);
+  });
+  for_each_reading(readings, "metrics.awd_entries", [&](const std::string& name, const MetricReadings& r) {
+    out["awd." + name] = awd_of(tracks, tracks.awd_points, r.awd_entries);
+    out["awd.with_hands." + name] = awd_of(tracks, all_keypoints, r.awd_entries);
+  });
+  for_each_reading(readings, "metrics.matching",
+                   [&](const std::string& name, const MetricReadings& r) { add_contacts(tracks, r, "." + name, out); });
+  add_angle_readings(hinge_magnitudes(motion.robot.q), "", readings, out);
+  add_angle_readings(grouped_magnitudes(motion.robot.q, hinge_groups(robot)), "grouped.", readings, out);
+  const PointTracks links = link_tracks(robot, motion.robot);
+  for_each_reading(readings, "metrics.jerk_scheme", [&](const std::string& name, const MetricReadings& r) {
+    add_jerk(tracks.robot_pairs, rate_hz, "." + name, r, out);
+    add_jerk(links, rate_hz, ".links." + name, r, out);
+  });
+  return out;
+}
+
+}  // namespace duet
