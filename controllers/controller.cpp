@@ -8,12 +8,16 @@
 namespace duet {
 namespace {
 
+std::unique_ptr<Controller> make_default_vmc(std::shared_ptr<const RobotModel> robot) {
+  return make_vmc_controller(std::move(robot));
+}
+
 struct Entry {
   const char* name;
   std::unique_ptr<Controller> (*make)(std::shared_ptr<const RobotModel>);
 };
 
-constexpr Entry kControllers[] = {{"pd", make_pd_controller}, {"vmc", make_vmc_controller}};
+constexpr Entry kControllers[] = {{"pd", make_pd_controller}, {"vmc", make_default_vmc}};
 
 }  // namespace
 
