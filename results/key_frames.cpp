@@ -212,7 +212,7 @@ std::string legend_svg(const std::vector<KeyFrame>& frames, double height_mm, do
                        1.4 * font);
     x += 1.9 * font;
     svg += fmt::format(R"(<text x="{:.0f}" y="{:.0f}">{}</text>)", x, height_mm - 0.05 * font, escape_html(label));
-    x += (0.6 * static_cast<double>(label.size()) + 1.2) * font;
+    x += (0.62 * static_cast<double>(label.size()) + 1.5) * font;
   }
   return svg;
 }

@@ -20,8 +20,7 @@ auto place(const LeaderboardRow& row) {
 
 std::string policy_label(const LeaderboardRow& row) {
   if (row.arm == "main") return row.policy;
-  return row.policy == row.arm ? fmt::format("{} (control arm)", row.arm)
-                               : fmt::format("{} ({} arm)", row.policy, row.arm);
+  return row.policy == row.arm ? fmt::format("{} (control)", row.arm) : fmt::format("{} ({} arm)", row.policy, row.arm);
 }
 
 bool is_constant(const std::vector<LeaderboardRow>& rows, std::string LeaderboardRow::*field) {

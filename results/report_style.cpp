@@ -15,11 +15,12 @@ std::string_view report_style() {
 html{scroll-behavior:smooth}
 body{margin:0;background:var(--bg);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",
 "Noto Sans","Liberation Sans",Arial,sans-serif}
-main,header,nav ul{max-width:1240px;margin:0 auto;padding:0 28px}
+main,header,nav ul{max-width:1360px;margin:0 auto;padding:0 28px}
 header{padding-top:36px;padding-bottom:18px}
 h1{font-size:30px;line-height:1.2;margin:0 0 6px;letter-spacing:-.01em}
 h2{font-size:21px;margin:44px 0 8px;padding-top:8px}
 h3{font-size:16px;margin:26px 0 6px}
+section>p{font-size:14px;color:var(--soft)}
 p{margin:6px 0;max-width:86ch}
 .machine{color:var(--soft);font-size:14px}
 .notes{margin:14px 0 0;padding:10px 16px 10px 34px;background:var(--faint);border-left:3px solid var(--line);max-width:100ch;
@@ -46,9 +47,10 @@ td.zero{color:var(--source)}
 .gain{color:var(--robot)}
 th button{all:unset;cursor:pointer}
 th button:focus-visible{outline:2px solid var(--robot);outline-offset:2px}
-th button::after{content:"";display:inline-block;width:.9em;color:var(--soft)}
-th[aria-sort=ascending] button::after{content:" \25B4"}
-th[aria-sort=descending] button::after{content:" \25BE"}
+th button{position:relative}
+th button::after{content:"";position:absolute;left:100%;color:var(--soft);font-size:10px}
+th[aria-sort=ascending] button::after{content:"\25B4"}
+th[aria-sort=descending] button::after{content:"\25BE"}
 .bar{display:block;margin:2px 0 0 auto}
 .bar .track{stroke:var(--line);stroke-width:2}
 .bar .range{stroke:var(--bar);stroke-width:7;stroke-linecap:round;opacity:.35}
@@ -85,6 +87,9 @@ article.clip h3{margin:0 0 4px;display:flex;gap:12px;align-items:baseline;flex-w
 .plot .axis{stroke:var(--soft)}
 .plot polyline,.plot path{fill:none;stroke-width:1.8;stroke-linejoin:round}
 .plot .key{fill:var(--ink)}
+table.board{font-size:13.5px}
+.board th,.board td{padding:7px 8px}
+.board .ci{font-size:11.5px}
 .compact{font-size:13px}
 .compact th,.compact td{padding:3px 8px}
 .compact tbody th{font-weight:400}
@@ -92,7 +97,7 @@ details{margin:10px 0;border:1px solid var(--line);border-radius:6px;background:
 summary{cursor:pointer;font-weight:600}
 pre{overflow:auto;font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas,monospace;margin:8px 0;white-space:pre-wrap;
 overflow-wrap:anywhere}
-footer{max-width:1240px;margin:40px auto 30px;padding:0 28px;color:var(--soft);font-size:13px}
+footer{max-width:1360px;margin:40px auto 30px;padding:0 28px;color:var(--soft);font-size:13px}
 [hidden]{display:none!important}
 @media print{nav,.filter{display:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
 main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}

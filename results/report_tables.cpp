@@ -100,8 +100,8 @@ std::string metric_table(const std::string& caption, const std::vector<std::stri
   }
   if (names.empty()) return "";
   std::string html = fmt::format(
-      R"(<div class="scroll" tabindex="0"><table class="compact"><caption>{}</caption><thead><tr><th scope="col" class="l">Metric</th>)",
-      escape_html(caption));
+      R"(<div class="scroll" tabindex="0"><table class="compact">{}<thead><tr><th scope="col" class="l">Metric</th>)",
+      caption.empty() ? "" : fmt::format("<caption>{}</caption>", escape_html(caption)));
   for (const std::string& head : heads) html += fmt::format(R"(<th scope="col">{}</th>)", escape_html(head));
   html += "</tr></thead><tbody>";
   for (const std::string& name : ordered(names, columns)) {
@@ -120,7 +120,7 @@ std::string joined(const std::vector<std::string>& cells) {
 
 std::string bar_legend(double level) {
   return fmt::format(
-      R"(<p class="legend"><span><svg class="bar" width="56" height="16" aria-hidden="true"><line class="range" x1="10" x2="46" y1="8" y2="8"/><circle class="dot" cx="30" cy="8" r="4"/></svg>success with its {:g} % interval on 0 to 100 %</span><span><svg class="bar" width="10" height="16" aria-hidden="true"><line class="null" x1="5" x2="5" y1="1" y2="15"/></svg>the same episodes under the null arm</span></p>)",
+      R"(<p class="legend"><span><svg class="bar" width="56" height="16" aria-hidden="true"><line class="range" x1="10" x2="46" y1="8" y2="8"/><circle class="dot" cx="30" cy="8" r="4"/></svg>success with its {:g} % interval on 0 to 100 %</span><span><svg class="bar" width="10" height="16" aria-hidden="true"><line class="null" x1="5" x2="5" y1="1" y2="15"/></svg>the same episodes under the null arm</span><span>Fell, diverged, timed out, ended in an error: episodes</span></p>)",
       100.0 * level);
 }
 
@@ -146,18 +146,18 @@ std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries) {
   const RowLabels labels = row_labels(rows);
   const std::vector<std::string> tasks = leaderboard_tasks(entries);
   std::string html =
-      fmt::format(R"(<div class="scroll" tabindex="0"><table class="sortable"><caption>{}</caption><thead><tr>)",
+      fmt::format(R"(<div class="scroll" tabindex="0"><table class="sortable board"><caption>{}</caption><thead><tr>)",
                   escape_html(labels.caption));
   for (const std::string& title : labels.columns) html += sortable_heading(title, true);
   for (const char* title : {"n", "Overall", "Lift"}) html += sortable_heading(title, false);
   for (const std::string& task : tasks) html += sortable_heading(task_title(task), false);
-  for (const char* title : {"Fell", "Diverged", "Timeout", "Errors"}) html += sortable_heading(title, false);
+  for (const char* title : {"Fell", "Div.", "Time", "Err."}) html += sortable_heading(title, false);
   html += "</tr></thead><tbody>\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const LeaderboardEntry* overall = rows[i].find("all");
     html += fmt::format("<tr{}>", rows[i].arm == "main" ? "" : R"( class="control")") + label_cells(labels.cells[i]);
-    html += count_cell(overall, &LeaderboardEntry::n) + success_cell(overall, 150) + lift_cell(overall);
-    for (const std::string& task : tasks) html += success_cell(rows[i].find(task), 78);
+    html += count_cell(overall, &LeaderboardEntry::n) + success_cell(overall, 116) + lift_cell(overall);
+    for (const std::string& task : tasks) html += success_cell(rows[i].find(task), 72);
     for (const auto field : {&LeaderboardEntry::fell, &LeaderboardEntry::diverged, &LeaderboardEntry::timed_out,
                              &LeaderboardEntry::errors}) {
       html += count_cell(overall, field);
