@@ -2,6 +2,7 @@
 // an option leaves all others as they were. What was drawn or given is recorded as text for the clip's `source`.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -13,14 +14,17 @@
 
 namespace duet::synthesis {
 
+// Names of one person's quantities begin with this.
+inline constexpr std::array<std::string_view, 2> kWho = {"a.", "b."};
+
 class Draws {
  public:
   Draws(std::uint64_t seed, Task task, int index);
 
   // Uniform in [low, high), or `given` where it is set.
   double uniform(const std::string& quantity, double low, double high, std::optional<double> given = {});
-  // low + (high - low) * style where `given` is empty would be no draw at all: this is one, spread 0.2 of the range
-  // about that point and kept inside it. For quantities that follow the style.
+  // A quantity that follows the style (0 ... 1): low + (high - low) * style, give or take a fifth of the range, kept
+  // inside it.
   double styled(const std::string& quantity, double style, double low, double high);
   bool chance(const std::string& quantity, double probability, std::optional<bool> given = {});
   [[nodiscard]] Random stream(std::string_view quantity) const;

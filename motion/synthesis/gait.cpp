@@ -12,6 +12,8 @@ namespace duet::synthesis {
 namespace {
 
 constexpr double kSwingShare = 0.86;  // of the step time a foot is in the air
+constexpr double kHasty = 0.46;       // least time of a step [s]
+constexpr double kLongestStep = 0.7;  // in lengths of the leg
 constexpr double kRollShare = 0.22;   // of the step time the heel rises before the toe leaves
 
 Eigen::Vector2d rotated(double yaw, const Eigen::Vector2d& v) { return Eigen::Rotation2Dd(yaw) * v; }
@@ -42,6 +44,13 @@ Placement Walk::at(double t) const {
   here.position = from.position + s * (to.position - from.position) + 4.0 * s * (1.0 - s) * bulge;
   here.yaw = from.yaw + (to.yaw - from.yaw) * (turned_by < 1.0 ? ramp(u / turned_by) : s);
   return here;
+}
+
+Placement Walk::footfall(int i) const {
+  if (i >= steps - 2) return to;
+  // From landing until this foot's next swing; the root passes over the foot in the middle.
+  const double step = step_time();
+  return at(begin + (i + 0.5 * (1.0 + kSwingShare) + 0.5 * (2.0 - kSwingShare)) * step);
 }
 
 Gait::Gait(const Body& body, const Placement& start)
@@ -75,11 +84,8 @@ void Gait::walk(const Walk& walk) {
     swing.lift = walk.begin + i * step + 0.5 * (1.0 - kSwingShare) * step;
     swing.land = swing.lift + kSwingShare * step;
     swing.roll_time = kRollShare * step;
-    const bool last = i >= walk.steps - 2;
-    // The stance lasts until this foot's next swing; the root passes over it in the middle.
-    const double mid_stance = swing.land + 0.5 * (2.0 - kSwingShare) * step;
     swing.from = standing_[swing.foot];
-    swing.to = planted(last ? walk.to : walk.at(mid_stance), swing.foot);
+    swing.to = planted(walk.footfall(i), swing.foot);
     const Eigen::Vector3d travel = swing.to.toe - swing.from.toe;
     const double forward = travel.head<2>().dot(rotated(swing.from.yaw, {1.0, 0.0}));
     swing.roll = 0.12 + 0.75 * std::clamp(forward / (2.0 * leg_), 0.0, 0.8);
@@ -122,6 +128,24 @@ double step_length(const Body& body, double speed) {
   return std::sqrt(60.0 * kWalkRatio * speed) * body.leg() / kMeanLeg;
 }
 
+void choose_steps(const Body& body, double speed, Walk& walk) {
+  constexpr double kMostTurn = 0.3 * std::numbers::pi;
+  const double usual = step_length(body, speed);
+  const double longest = std::min(usual, kLongestStep * body.leg());
+  const auto comfortable = [&] {
+    Placement last = walk.from;
+    for (int i = 0; i < walk.steps - 1; ++i) {
+      const Placement next = walk.footfall(i);
+      if ((next.position - last.position).norm() > longest || std::abs(next.yaw - last.yaw) > kMostTurn) return false;
+      last = next;
+    }
+    return true;
+  };
+  walk.steps = std::max(2, static_cast<int>(std::lround((walk.end - walk.begin) * speed / usual)));
+  while (!comfortable()) ++walk.steps;
+  walk.end = std::max(walk.end, walk.begin + walk.steps * kHasty);
+}
+
 Walk plan_walk(const Body& body, const Placement& from, const Placement& to, double speed, double begin) {
   Walk walk;
   walk.begin = begin;
@@ -132,11 +156,8 @@ Walk plan_walk(const Body& body, const Placement& from, const Placement& to, dou
   const Eigen::Vector2d chord = to.position - from.position;
   const double length = chord.norm();
   walk.bulge = -0.5 * std::tan(0.25 * turn) * Eigen::Vector2d(-chord.y(), chord.x());
-  const double shortest = 2.0 * 0.45;  // two steps take at least this long [s]
-  const double duration = std::max(kGlidePeak * length / speed, shortest);
-  const double usual_step = step_length(body, speed) / speed;
-  walk.steps = std::max(2, static_cast<int>(std::lround(duration / usual_step)));
-  walk.end = begin + duration;
+  walk.end = begin + std::max(kGlidePeak * length / speed, 2.0 * kHasty);
+  choose_steps(body, speed, walk);
   walk.first_foot = turn > 0.0 ? 1 : 0;
   return walk;
 }

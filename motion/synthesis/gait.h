@@ -28,6 +28,8 @@ struct Walk {
 
   [[nodiscard]] Placement at(double t) const;
   [[nodiscard]] double step_time() const { return (end - begin) / steps; }
+  // Where the root is when step `i` carries the weight, that is what its foot is planted for.
+  [[nodiscard]] Placement footfall(int i) const;
 };
 
 // One foot in the air. During [lift, land] its toe moves; its heel rises `roll_time` before that.
@@ -70,7 +72,12 @@ class Gait {
 // (Sekiya and Nagasaki 1998), scaled with leg length. [m]
 double step_length(const Body& body, double speed);
 
-// A walk along an arc whose highest speed is `speed`; begins with the foot on the outer side.
+// Takes as many steps as the walk needs: the walker's cadence at `speed`, no step longer than a comfortable one, no
+// step turning by more than a quarter; makes the walk longer where its steps would be hasty.
+void choose_steps(const Body& body, double speed, Walk& walk);
+
+// A walk along an arc whose highest speed is `speed`, unless it is so short that this would take hasty steps; begins
+// with the foot on the outer side.
 Walk plan_walk(const Body& body, const Placement& from, const Placement& to, double speed, double begin);
 
 // Smallest signed difference to - from. [rad]

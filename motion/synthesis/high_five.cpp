@@ -36,7 +36,7 @@ std::vector<Clap> plan_claps(const Scene& scene, Draws& draws) {
 }
 
 // The palm faces the partner: forearm upright, hand bent back.
-const Eigen::Vector3d kPole(-0.15, 0.75, -1.0);
+const Eigen::Vector3d kPole(-0.15, 0.5, -1.0);
 constexpr double kWrist = -0.35;
 
 Hold ready_near(const Eigen::Vector3d& point) {

@@ -1,5 +1,7 @@
 // Hug: arms open on the last steps, one over and one under the partner's arms (the taller one's over where statures
 // differ much), hands on the back, perhaps a pat, then apart.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -38,7 +40,7 @@ Spot spot_for(const Cast& cast, const Layout& layout, int person, int arm, Draws
   const Figure own = embracing(cast, layout, person), partner = embracing(cast, layout, 1 - person);
   Spot spot;
   spot.over = goes_over(cast, person, arm);
-  const std::string name = std::string(person == 0 ? "a." : "b.") + (arm == 0 ? "left" : "right") + ".spot";
+  const std::string name = fmt::format("{}{}.spot", kWho[person], arm == 0 ? "left" : "right");
   const double below = draws.uniform(name + ".below", spot.over ? 0.10 : 0.12, spot.over ? 0.16 : 0.2);
   const double wanted = cast.target_height ? *cast.target_height + (spot.over ? 0.03 : -0.03)
                                            : own.p(2, sided(kLeftShoulder, arm)) - below;
@@ -100,7 +102,7 @@ void perform_hug(Scene& scene, Draws& draws) {
   const double free = scene.act_end + 0.55;
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
-    const std::string who = k == 0 ? "a." : "b.";
+    const std::string who(kWho[k]);
     const double wrap = scene.act_begin + person.reaction;
     person.lean_to(wrap, wrap + kWrap, scene.layout.lean[k]);
     person.lean_to(scene.act_end + 0.2, scene.release_end - 0.1, {});

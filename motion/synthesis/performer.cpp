@@ -5,7 +5,7 @@
 namespace duet::synthesis {
 namespace {
 
-constexpr double kPelvisShare = 0.5;     // of the trunk's inclination that comes from the hips, the rest from the spine
+constexpr double kPelvisShare = 0.62;    // of the trunk's inclination that comes from the hips, the rest from the spine
 constexpr double kCounterweight = 0.07;  // backward shift of the pelvis at a right angle, in statures
 
 double missing(const Body& body, int side, const Eigen::Vector3d& target, const Lean& lean, double share) {

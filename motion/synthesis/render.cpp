@@ -39,14 +39,15 @@ void turn_head(const Performer& person, const Performer& partner, double t, Tors
                      0.5 * weight * (torso.pelvis_pitch + torso.spine_bend);
 }
 
-TorsoPose torso_at(const Performer& person, const Performer& partner, double t, double height) {
+// The trunk with the pelvis at height 0.
+TorsoPose torso_at(const Performer& person, const Performer& partner, double t) {
   const Placement root = person.gait.root(t);
-  const double walking = 0.02 * std::pow(person.gait.weight(t), 2);
-  const Lean lean = {person.forward.at(t) + walking + kTrunkSway * person.sway[2].at(t),
-                     person.side.at(t) + kTrunkSway * person.sway[3].at(t), person.twist.at(t), person.crouch.at(t),
-                     person.shift.at(t) + kStanceSway * person.sway[0].at(t)};
-  TorsoPose torso = standing_torso(person.body, root, lean, height);
   const double weight = person.gait.weight(t);
+  const double walking = 0.02 * weight * weight;
+  const Lean lean = {person.forward.at(t) + walking + kTrunkSway * person.sway[2].at(t),
+                     person.side.at(t) + kTrunkSway * person.sway[3].at(t), person.twist.at(t), 0.0,
+                     person.shift.at(t) + kStanceSway * person.sway[0].at(t)};
+  TorsoPose torso = standing_torso(person.body, root, lean, 0.0);
   const double aside = kWeightShift * weight + 1.5 * kStanceSway * person.sway[1].at(t);
   torso.pelvis.head<2>() += aside * Eigen::Vector2d(-std::sin(root.yaw), std::cos(root.yaw));
   torso.pelvis_roll = kPelvisDrop * weight;
@@ -56,19 +57,17 @@ TorsoPose torso_at(const Performer& person, const Performer& partner, double t, 
   return torso;
 }
 
-// Highest pelvis that both legs allow.
-double highest_pelvis(const Performer& person, const Performer& partner, double t) {
+// Highest pelvis that both legs and the crouch allow.
+double highest_pelvis(const Performer& person, const TorsoPose& torso_at_zero, double t) {
   Figure figure;
-  pose_torso(person.body, torso_at(person, partner, t, 0.0), figure);
+  pose_torso(person.body, torso_at_zero, figure);
   const double reach = kLegReach * person.body.leg();
   double highest = person.body.stand_height - person.crouch.at(t);
   for (const int side : {0, 1}) {
     const Vector3d hip = figure.p.col(sided(kLeftHip, side));
     const Vector3d ankle = ankle_of(person.body, person.gait.foot(side, t), side);
     const double across = (hip - ankle).head<2>().norm();
-    const double up = std::sqrt(std::max(reach * reach - across * across, 0.0));
-    // The figure was posed with the pelvis at minus the crouch.
-    highest = std::min(highest, ankle.z() + up - (hip.z() + person.crouch.at(t)));
+    highest = std::min(highest, ankle.z() + std::sqrt(std::max(reach * reach - across * across, 0.0)) - hip.z());
   }
   return highest;
 }
@@ -90,19 +89,32 @@ std::vector<double> smooth_below(const std::vector<double>& limit, int half) {
   return smooth;
 }
 
-std::vector<double> pelvis_heights(const Performer& person, const Performer& partner, int frames, double rate_hz) {
+std::vector<TorsoPose> pose_torsos(const Performer& person, const Performer& partner, int frames, double rate_hz) {
+  std::vector<TorsoPose> torsos(frames);
   std::vector<double> limit(frames);
-  for (int i = 0; i < frames; ++i) limit[i] = highest_pelvis(person, partner, i / rate_hz);
-  return smooth_below(limit, std::max(1, static_cast<int>(std::lround(kHeightWindow * rate_hz))));
+  for (int i = 0; i < frames; ++i) {
+    torsos[i] = torso_at(person, partner, i / rate_hz);
+    limit[i] = highest_pelvis(person, torsos[i], i / rate_hz);
+  }
+  const int half = std::max(1, static_cast<int>(std::lround(kHeightWindow * rate_hz)));
+  const std::vector<double> heights = smooth_below(limit, half);
+  for (int i = 0; i < frames; ++i) torsos[i].pelvis.z() = heights[i];
+  return torsos;
 }
 
-ArmPose arm_at(const Performer& person, const Figure& own, const Figure& partner, int side, double t) {
+// Reads no more of the partner than the torso.
+void pose_limbs(const Performer& person, const Figure& partner, double t, Figure& own) {
   // Arms swing against the legs: the left one goes forward with the right foot.
   const double ahead = left_ahead(person, t, own.yaw);
-  const double swing = -side_sign(side) * person.arm_swing * std::atan(ahead / (2.0 * person.body.leg()));
-  const int first = side == 0 ? 6 : 9;
-  const Vector3d sway(person.sway[first].at(t), person.sway[first + 1].at(t), person.sway[first + 2].at(t));
-  return person.arms[side].at({t, side, person.body, own, partner, swing, sway});
+  const double stride = person.arm_swing * std::atan(ahead / (2.0 * person.body.leg()));
+  for (const int side : {0, 1}) {
+    const int first = side == 0 ? 6 : 9;
+    const Vector3d sway(person.sway[first].at(t), person.sway[first + 1].at(t), person.sway[first + 2].at(t));
+    const Moment moment{t, side, person.body, own, partner, -side_sign(side) * stride, sway};
+    const ArmPose arm = person.arms[side].at(moment);
+    pose_leg(person.body, person.gait.foot(side, t), side, own);
+    pose_arm(person.body, arm, side, own);
+  }
 }
 
 void store(const Figure& figure, int frame, HumanMotion& motion) {
@@ -115,26 +127,18 @@ void store(const Figure& figure, int frame, HumanMotion& motion) {
 
 std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz) {
   std::array<HumanMotion, 2> motions;
-  std::array<std::vector<double>, 2> heights;
-  for (int k : {0, 1}) {
+  std::array<std::vector<TorsoPose>, 2> torsos;
+  for (const int k : {0, 1}) {
     motions[k].rate_hz = rate_hz;
     motions[k].joints = PointTracks(frames, kSmplJoints);
     motions[k].rotations.reserve(static_cast<size_t>(frames) * kSmplJoints);
-    heights[k] = pelvis_heights(people[k], people[1 - k], frames, rate_hz);
+    torsos[k] = pose_torsos(people[k], people[1 - k], frames, rate_hz);
   }
   for (int i = 0; i < frames; ++i) {
-    const double t = i / rate_hz;
     std::array<Figure, 2> figures;
-    for (int k : {0, 1}) {
-      const double height = heights[k][i] + people[k].crouch.at(t);
-      pose_torso(people[k].body, torso_at(people[k], people[1 - k], t, height), figures[k]);
-    }
-    const std::array<Figure, 2> torsos = figures;
-    for (int k : {0, 1}) {
-      for (const int side : {0, 1}) {
-        pose_leg(people[k].body, people[k].gait.foot(side, t), side, figures[k]);
-        pose_arm(people[k].body, arm_at(people[k], figures[k], torsos[1 - k], side, t), side, figures[k]);
-      }
+    for (const int k : {0, 1}) pose_torso(people[k].body, torsos[k][i], figures[k]);
+    for (const int k : {0, 1}) {
+      pose_limbs(people[k], figures[1 - k], i / rate_hz, figures[k]);
       store(figures[k], i, motions[k]);
     }
   }

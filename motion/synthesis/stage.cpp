@@ -16,7 +16,6 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kLead = 0.4, kSettle = 0.3,
                  kTail = 0.4;         // least time standing: before, before the act, at the end [s]
 constexpr double kShortestWay = 0.6;  // both ways together [m]
-const std::array<std::string, 2> kWho = {"a.", "b."};
 
 Body draw_body(const std::string& who, std::optional<double> height, Draws& draws) {
   Random stature = draws.stream(who + "height");
@@ -82,9 +81,8 @@ Walk turn_away(const Body& body, const Placement& from, double speed, const std:
   walk.to.yaw = to.yaw;  // plan_walk turns the short way round, which is the same
   walk.turned_by = 0.55;
   walk.moves_from = 0.3;
-  const double step = walk.step_time();
   walk.end = std::max(walk.end / (1.0 - walk.moves_from), 3.0);
-  walk.steps = std::max(5, static_cast<int>(std::lround(walk.end / step)));
+  choose_steps(body, 0.85 * speed, walk);
   walk.first_foot = sign > 0.0 ? 0 : 1;
   return walk;
 }
@@ -127,7 +125,7 @@ Timing plan_timing(const Act& act, const Scene& scene, const Ways& ways, std::ar
   for (const int k : {0, 1}) {
     const Body& body = scene.cast.body[k];
     timing.approach[k] = plan_walk(body, ways.start[k], ways.act[k], speed[k], k * later_start);
-    timing.leave[k] = plan_leave(body, ways.act[k], speed[k], kWho[k], act.close, brief, draws);
+    timing.leave[k] = plan_leave(body, ways.act[k], speed[k], std::string(kWho[k]), act.close, brief, draws);
     for (Walk& walk : timing.leave[k]) walk = later(walk, timing.reaction[k]);
     timing.arrive = std::max(timing.arrive, timing.approach[k].end);
     timing.leaving = std::max(timing.leaving, timing.leave[k].back().end);
@@ -159,7 +157,7 @@ double draw_seconds(const Act& act, const SynthesisOptions& options, Draws& draw
 }
 
 Performer make_performer(const Body& body, const Ways& ways, int k, double style, Draws& draws) {
-  const std::string& who = kWho[k];
+  const std::string who(kWho[k]);
   const double outward = draws.uniform(who + "arms.outward", 0.10, 0.17);
   const double upright = draws.uniform(who + "arms.plumb", 0.3, 1.0);
   Performer person(body, ways.start[k], hanging(outward, upright));

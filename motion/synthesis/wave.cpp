@@ -26,7 +26,7 @@ Hold waving_hand(const Waving& waving) {
     ArmPose arm;
     arm.hand = shoulder + chest_vector(m, offset) + 0.006 * m.sway;
     arm.hand.z() = waving.height + 0.006 * m.sway.z() - 1.6 * stroke * stroke;
-    arm.pole = chest_vector(m, {-0.2, 0.7, -1.0});
+    arm.pole = chest_vector(m, {-0.2, 0.5, -1.0});
     arm.wrist = -0.1;
     return arm;
   };
@@ -49,7 +49,7 @@ void perform_wave(Scene& scene, Draws& draws) {
   const std::array<double, 2> end = {scene.act_begin + stop * length, scene.act_end};
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
-    const std::string who = k == 0 ? "a." : "b.";
+    const std::string who(kWho[k]);
     const double rate = draws.uniform(who + "wave.rate_hz", 1.7, 2.4);
     const double usual = draws.styled(who + "wave.amplitude", scene.cast.style, 0.12, 0.20);
     const double high = draws.styled(who + "wave.share", scene.cast.style, 0.87, 1.02);
