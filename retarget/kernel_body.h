@@ -107,7 +107,7 @@ inline void turn_root(const Place& at, Work& k) {
   const int dof = at.setup.dof;
   for (int r = 0; r < 3; ++r) {
     k.w[r] = at.variable(dof + r);
-    V p = at.constant(kRoot + r) + at.step.offset[r];
+    V p = V{} + at.step.offset[r];
     if (at.setup.per_frame_translation) p += at.variable(at.setup.rows - 3 + r);
     k.p[0][r] = p;
   }

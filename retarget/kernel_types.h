@@ -65,7 +65,8 @@ struct Step {
   float offset[3];
 };
 
-// Rows of a block's constants; then the targets (48), the partner's keypoints (3 K), the original distances.
+// Rows of a block's constants; then the targets (48), the partner's keypoints (3 K), the original distances. Positions
+// are relative to the frame's root before optimisation: small numbers, wherever the two stand in the world.
 enum Constant {
   kWeight,  // 1 for a frame of the sequence, 0 for padding
   kEdgeBefore,
@@ -75,8 +76,7 @@ enum Constant {
   kBendAfter,  // 1 where the second difference centred on t - 1, t, t + 1 exists
   kCosYaw,
   kSinYaw,
-  kRoot,
-  kTarget = kRoot + 3,
+  kTarget,
   kHuman = kTarget + 3 * kPairs
 };
 

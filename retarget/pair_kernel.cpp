@@ -128,10 +128,9 @@ void LaneSolver::pack_frame(const PairProblem& problem, int block, int lane) {
   set(pair_kernel::kBendAfter, bend(t + 1));
   set(pair_kernel::kCosYaw, std::cos(problem.yaw[source]));
   set(pair_kernel::kSinYaw, std::sin(problem.yaw[source]));
-  for (int r = 0; r < 3; ++r) set(pair_kernel::kRoot + r, problem.root(r, source));
-  const auto targets = problem.targets.frame(source);
+  const Eigen::Matrix3Xd targets = problem.targets.frame(source).colwise() - problem.root.col(source);
   for (int i = 0; i < 3 * kRetargetPairs; ++i) set(pair_kernel::kTarget + i, targets.data()[i]);
-  const auto human = problem.human.frame(source);
+  const Eigen::Matrix3Xd human = problem.human.frame(source).colwise() - problem.root.col(source);
   for (int i = 0; i < 3 * setup_.keys; ++i) set(pair_kernel::kHuman + i, human.data()[i]);
   const int first = pair_kernel::kHuman + 3 * setup_.keys;
   for (int i = 0; i < problem.distances.rows(); ++i) set(first + i, problem.distances(i, source));

@@ -1,0 +1,99 @@
+#include "retarget/options.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+TEST(PairOptions, DefaultsArePrintedValues) {
+  const PairOptions options;
+  EXPECT_EQ(pair_option(options, "w-kin"), "1");
+  EXPECT_EQ(pair_option(options, "w-con"), "0.25");
+  EXPECT_EQ(pair_option(options, "w-hum"), "0.25");
+  EXPECT_EQ(pair_option(options, "w-temp"), "5");
+  EXPECT_EQ(pair_option(options, "w-pose"), "0.02");
+  EXPECT_EQ(pair_option(options, "stage1-iterations"), "150");
+  EXPECT_EQ(pair_option(options, "stage1-rate"), "0.02");
+  EXPECT_EQ(pair_option(options, "stage2-iterations"), "50");
+  EXPECT_EQ(pair_option(options, "stage2-rate"), "0.005");
+  EXPECT_EQ(pair_option(options, "stage2-contact-scale"), "10");
+  EXPECT_EQ(pair_option(options, "keypoints"), "nine");
+  EXPECT_EQ(pair_option(options, "root"), "constant-offset");
+}
+
+TEST(PairOptions, TextFormsRoundTrip) {
+  const std::vector<std::pair<std::string, std::string>> values = {{"w-kin", "0.3"},
+                                                                   {"w-con", "1e-05"},
+                                                                   {"w-hum", "2"},
+                                                                   {"w-temp", "0"},
+                                                                   {"w-acceleration", "10"},
+                                                                   {"w-pose", "0.5"},
+                                                                   {"stage1-iterations", "7"},
+                                                                   {"stage1-rate", "0.125"},
+                                                                   {"stage2-iterations", "0"},
+                                                                   {"stage2-rate", "0.25"},
+                                                                   {"stage2-contact-scale", "3"},
+                                                                   {"keep-moments", "off"},
+                                                                   {"kin-loss", "mean-norm"},
+                                                                   {"contact-reduction", "mean"},
+                                                                   {"contact-blocks", "cross-and-human"},
+                                                                   {"root", "per-frame"},
+                                                                   {"keypoints", "eleven"},
+                                                                   {"filter", "off"},
+                                                                   {"adapt-human", "off"},
+                                                                   {"kernel", "scalar"},
+                                                                   {"smpl", "a path.npz"}};
+  PairOptions options;
+  ASSERT_EQ(values.size(), pair_option_names().size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto& [name, value] = values[i];
+    EXPECT_EQ(pair_option_names()[i], name);
+    EXPECT_NE(pair_option(options, name), value) << name;
+    set_pair_option(options, name, value);
+    EXPECT_EQ(pair_option(options, name), value) << name;
+  }
+  EXPECT_EQ(options.contact_blocks, ContactBlocks::kCrossAndHuman);
+  EXPECT_EQ(options.keypoints, ContactKeypoints::kEleven);
+  EXPECT_EQ(options.kernel, KernelKind::kScalar);
+  EXPECT_DOUBLE_EQ(options.weights.kin, 0.3);
+}
+
+TEST(PairOptions, UnknownNameOrValueListsTheKnownOnes) {
+  PairOptions options;
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "root", "free"); }),
+            "pair option 'root' has no value 'free': constant-offset, per-frame, fixed");
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "w-kim", "1"); }),
+              HasSubstr("'w-kim'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { static_cast<void>(pair_option(options, "rot")); }),
+              HasSubstr("keypoints"));
+  for (const char* bad : {"", "nan", "inf", "-1", "1x", " 1"}) {
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "w-kin", bad); }),
+                HasSubstr("a finite number"))
+        << bad;
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "stage1-iterations", bad); }),
+                HasSubstr("a whole number"))
+        << bad;
+  }
+  EXPECT_EQ(pair_option(options, "w-kin"), "1");
+}
+
+TEST(PairOptions, ValidateRefusesBadNumbersAndNoIterations) {
+  PairOptions options;
+  EXPECT_NO_THROW(validate(options));
+  options.weights.temp = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { validate(options); }), HasSubstr("'w-temp'"));
+  options = {};
+  options.schedule.stage1_iterations = 0;
+  options.schedule.stage2_iterations = 0;
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { validate(options); }), HasSubstr("at least one iteration"));
+}
+
+}  // namespace
+}  // namespace duet
