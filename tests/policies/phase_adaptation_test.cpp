@@ -1,0 +1,189 @@
+#include "policies/phase_adaptation.h"
+
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <limits>
+
+#include "tests/policies/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::g1;
+using test::kAlgebra;
+using test::swinging_motion;
+
+constexpr int kFrames = 300;
+constexpr Phases kPhases{120, 200};
+
+AdaptedMotion adapted(const RobotMotion& motion, const AdaptationOptions& options, std::uint64_t seed = 1,
+                      const Phases& phases = kPhases) {
+  return adapt_by_phase(motion, phases, *g1(), options, seed);
+}
+
+void expect_same_frame(const RobotMotion& a, int frame_a, const RobotMotion& b, int frame_b) {
+  const Reference x = a.reference(frame_a), y = b.reference(frame_b);
+  EXPECT_EQ(x.q, y.q) << frame_a;
+  EXPECT_EQ(x.X_WB.p, y.X_WB.p) << frame_a;
+  EXPECT_EQ(x.X_WB.R.coeffs(), y.X_WB.R.coeffs()) << frame_a;
+}
+
+// Largest change of a joint from one frame to the next.
+double largest_step(const RobotMotion& motion, int begin, int end) {
+  double largest = 0.0;
+  for (int t = begin + 1; t < end; ++t)
+    largest = std::max(largest, (motion.q.col(t) - motion.q.col(t - 1)).cwiseAbs().maxCoeff());
+  return largest;
+}
+
+TEST(IsLegJoint, FindsTheLegsOfTheG1) {
+  int legs = 0;
+  for (const RobotJoint& joint : g1()->joints) legs += is_leg_joint(joint.name) ? 1 : 0;
+  EXPECT_EQ(legs, 12);
+  EXPECT_FALSE(is_leg_joint("waist_pitch_joint"));
+  EXPECT_FALSE(is_leg_joint("left_shoulder_roll_joint"));
+  EXPECT_TRUE(is_leg_joint("left_hip_yaw_joint"));
+}
+
+TEST(ClipAdaptation, IsTheClip) {
+  const RobotMotion motion = swinging_motion(kFrames, 1);
+  const AdaptedMotion result = adapted(motion, {.start = StartMode::kClip});
+  EXPECT_EQ(result.phases, kPhases);
+  EXPECT_EQ(result.clip_frame, 0);
+  ASSERT_EQ(result.motion.frames(), kFrames);
+  for (int t = 0; t < kFrames; ++t) expect_same_frame(result.motion, t, motion, t);
+}
+
+TEST(ApproachAdaptation, KeepsTheActToTheBit) {
+  const RobotMotion motion = swinging_motion(kFrames, 1);
+  const AdaptedMotion result = adapted(motion, {});
+  EXPECT_EQ(result.phases, kPhases);
+  EXPECT_EQ(result.clip_frame, 0);
+  ASSERT_EQ(result.motion.frames(), kFrames);
+  for (int t = kPhases.act_begin; t < kPhases.act_end; ++t) expect_same_frame(result.motion, t, motion, t);
+}
+
+TEST(ApproachAdaptation, StartsInTheDiscAsTheClipIsTurned) {
+  const RobotMotion motion = swinging_motion(kFrames, 1);
+  const Pose& original = motion.root.front();
+  double inside_half_radius = 0.0;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  constexpr int kSeeds = 400;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Pose start = adapted(motion, {.start_radius = 0.8}, static_cast<std::uint64_t>(seed)).motion.root.front();
+    const Eigen::Vector3d offset = start.p - original.p;
+    EXPECT_LE(offset.norm(), 0.8);
+    EXPECT_EQ(offset.z(), 0.0);
+    EXPECT_NEAR(start.R.angularDistance(original.R), 0.0, 1e-7);
+    inside_half_radius += offset.norm() < 0.4 ? 1.0 / kSeeds : 0.0;
+    mean += offset / kSeeds;
+  }
+  // Uniform over the area: a quarter lies inside half the radius, the mean at the centre. Four standard errors.
+  EXPECT_NEAR(inside_half_radius, 0.25, 4.0 * std::sqrt(0.25 * 0.75 / kSeeds));
+  EXPECT_LT(mean.norm(), 4.0 * 0.8 / std::sqrt(2.0 * kSeeds));
+}
+
+TEST(ApproachAdaptation, GoesStraightFromNeutralToTheAct) {
+  const RobotMotion motion = swinging_motion(kFrames, 2);
+  const RobotMotion result = adapted(motion, {}).motion;
+  const Pose start = result.root.front(), goal = motion.root[kPhases.act_begin];
+  for (int t = 0; t < kPhases.act_begin; ++t) {
+    const double s = static_cast<double>(t) / kPhases.act_begin;
+    const Pose expected = interpolate(start, goal, s);
+    EXPECT_NEAR((result.root[static_cast<std::size_t>(t)].p - expected.p).norm(), 0.0, kAlgebra);
+    EXPECT_NEAR(result.root[static_cast<std::size_t>(t)].R.angularDistance(expected.R), 0.0, 1e-7);
+    for (int j = 0; j < g1()->dof(); ++j) {
+      const bool leg = is_leg_joint(g1()->joints[static_cast<std::size_t>(j)].name);
+      const double angle = leg ? motion.q(j, t) : (1.0 - s) * g1()->neutral[j] + s * motion.q(j, kPhases.act_begin);
+      EXPECT_NEAR(result.q(j, t), angle, kAlgebra);
+    }
+  }
+}
+
+TEST(ApproachAdaptation, StandsStillAfterTheActAndReturnsToNeutral) {
+  const RobotMotion motion = swinging_motion(kFrames, 3);
+  const RobotMotion result = adapted(motion, {.return_time = 1.2}).motion;
+  const int last = kPhases.act_end - 1;
+  for (int t = kPhases.act_end; t < kFrames; ++t) {
+    EXPECT_EQ(result.root[static_cast<std::size_t>(t)].p, motion.root[static_cast<std::size_t>(last)].p);
+    const double s = std::min(1.0, (t - last) / 60.0);
+    for (int j = 0; j < g1()->dof(); ++j) {
+      const bool leg = is_leg_joint(g1()->joints[static_cast<std::size_t>(j)].name);
+      EXPECT_NEAR(result.q(j, t), motion.q(j, last) + (leg ? 0.0 : s * (g1()->neutral[j] - motion.q(j, last))),
+                  kAlgebra);
+    }
+  }
+}
+
+TEST(ApproachAdaptation, SameSeedGivesTheSameBits) {
+  const RobotMotion motion = swinging_motion(kFrames, 4);
+  const RobotMotion a = adapted(motion, {}, 7).motion, b = adapted(motion, {}, 7).motion,
+                    c = adapted(motion, {}, 8).motion;
+  for (int t = 0; t < kFrames; ++t) expect_same_frame(a, t, b, t);
+  EXPECT_NE(a.root.front().p, c.root.front().p);
+}
+
+TEST(ApproachAdaptation, WorksWithoutPreparationOrFollowUp) {
+  const RobotMotion motion = swinging_motion(50, 5);
+  const AdaptedMotion result = adapted(motion, {}, 1, {0, 50});
+  for (int t = 0; t < 50; ++t) expect_same_frame(result.motion, t, motion, t);
+}
+
+TEST(PhaseAdaptation, KeepsJointLimitsAndNeverJumps) {
+  for (const StartMode start : {StartMode::kApproach, StartMode::kAct})
+    for (const bool hold_stance : {false, true})
+      for (std::uint64_t seed = 0; seed < 5; ++seed) {
+        const RobotMotion motion = swinging_motion(kFrames, seed);
+        const AdaptedMotion result = adapted(motion, {.start = start, .hold_stance = hold_stance}, seed);
+        EXPECT_NO_THROW(validate(result.motion, "adapted"));
+        const Eigen::VectorXd lower = g1()->lower().array() - kAlgebra, upper = g1()->upper().array() + kAlgebra;
+        for (int t = 0; t < result.motion.frames(); ++t) {
+          EXPECT_TRUE((result.motion.q.col(t).array() >= lower.array()).all()) << t;
+          EXPECT_TRUE((result.motion.q.col(t).array() <= upper.array()).all()) << t;
+        }
+        // A ramp of 1 s over the widest range of a joint, or the clip's own steps (the waist's change with the root's).
+        const double ramp = (g1()->upper() - g1()->lower()).maxCoeff() / 50.0;
+        EXPECT_LE(largest_step(result.motion, 0, result.motion.frames()),
+                  std::max(ramp, 2.0 * largest_step(motion, 0, kFrames)));
+      }
+}
+
+std::string refusal(const std::function<void(RobotMotion&, Phases&, AdaptationOptions&)>& change) {
+  RobotMotion motion = swinging_motion(50, 1);
+  Phases phases{10, 30};
+  AdaptationOptions options;
+  change(motion, phases, options);
+  return test::thrown_message<std::invalid_argument>([&] { adapt_by_phase(motion, phases, *g1(), options, 1); });
+}
+
+TEST(PhaseAdaptation, RefusesPhasesThatDoNotFit) {
+  using M = RobotMotion;
+  using O = AdaptationOptions;
+  const std::string expected = "phase adaptation: expected an act inside [0, 50), found ";
+  EXPECT_EQ(refusal([](M&, Phases& p, O&) { p = {-1, 10}; }), expected + "[-1, 10)");
+  EXPECT_EQ(refusal([](M&, Phases& p, O&) { p = {10, 10}; }), expected + "[10, 10)");
+  EXPECT_EQ(refusal([](M&, Phases& p, O&) { p = {10, 51}; }), expected + "[10, 51)");
+}
+
+TEST(PhaseAdaptation, RefusesOptionsAndMotionsThatDoNotFit) {
+  using M = RobotMotion;
+  using O = AdaptationOptions;
+  EXPECT_EQ(refusal([](M&, Phases&, O& o) { o.start_radius = -0.1; }),
+            "phase adaptation: expected start_radius >= 0, found -0.1");
+  EXPECT_EQ(refusal([](M&, Phases&, O& o) { o.lead = std::nan(""); }),
+            "phase adaptation: expected lead >= 0, found nan");
+  EXPECT_EQ(refusal([](M&, Phases&, O& o) { o.return_time = std::numeric_limits<double>::infinity(); }),
+            "phase adaptation: expected return_time >= 0, found inf");
+  EXPECT_EQ(refusal([](M& m, Phases&, O&) { m.rate_hz = 30; }),
+            "phase adaptation: expected a motion at 50 Hz, found 30 Hz");
+  EXPECT_EQ(refusal([](M& m, Phases&, O&) { std::swap(m.joint_names[0], m.joint_names[1]); }),
+            "phase adaptation: expected joint 0 to be 'left_hip_pitch_joint', found 'left_hip_roll_joint'");
+  EXPECT_EQ(refusal([](M& m, Phases&, O&) { m.joint_names.pop_back(), m.q = m.q.topRows(28).eval(); }),
+            "phase adaptation: expected the 29 joints of robot '" + g1()->name + "', found 28");
+  EXPECT_THAT(refusal([](M& m, Phases&, O&) { m.q(0, 3) = std::nan(""); }), testing::HasSubstr("is not finite"));
+}
+
+}  // namespace
+}  // namespace duet
