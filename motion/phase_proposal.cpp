@@ -16,10 +16,15 @@ namespace {
 using Signal = std::vector<double>;
 
 constexpr double kReach = 0.20;          // hands this much farther apart than at their nearest are still in the act [m]
-constexpr double kGestureShare = 0.35;   // of the way from rest to peak
+constexpr double kRaisedShare = 0.35;    // of the way from rest to peak: the hand is on its way up
+constexpr double kLoweredShare = 0.75;   // ... and on its way down again
+constexpr double kCoveredShare = 0.50;   // of the gap between the people that reaching hands cover at most
+constexpr double kLeanShare = 0.15;      // of the deepest bow
 constexpr double kLeastHandRise = 0.10;  // a smaller rise of the hands is no gesture [m]
 constexpr double kLeastLean = 0.10;      // a smaller bow is no gesture [rad]
-constexpr double kGap = 0.40;            // shorter interruptions belong to the act [s]
+constexpr double kClaspGap = 1.5;        // shorter interruptions of a contact belong to the act (a second clap) [s]
+constexpr double kGestureGap = 5.0;      // ... of a gesture (the other's reply) [s]
+constexpr double kOnsetGap = 0.1;        // ... of the reach for a contact [s]
 constexpr double kRestQuantile = 0.10;
 
 Eigen::Vector3d chest(const HumanMotion& motion, int t) {
@@ -39,6 +44,11 @@ double hand_distance(const HumanMotion& a, const HumanMotion& b, int t) {
 double hand_to_chest(const HumanMotion& who, const HumanMotion& other, int t) {
   const Eigen::Vector3d target = chest(other, t);
   return std::min((who.joints.at(t, kLeftHand) - target).norm(), (who.joints.at(t, kRightHand) - target).norm());
+}
+
+// How much of the way between the two pelvises the nearest hands cover. [m]
+double covered_gap(const HumanMotion& a, const HumanMotion& b, int t) {
+  return (a.joints.at(t, kPelvis) - b.joints.at(t, kPelvis)).norm() - hand_distance(a, b, t);
 }
 
 // Height of the higher hand above the pelvis. [m]
@@ -65,68 +75,101 @@ double rest_level(Signal signal) {
   return *rest;
 }
 
+// The act is where `signal` is above the thresholds around its peak; it begins earlier where `onset` says so.
 struct Activity {
   Signal signal;
-  double threshold = 0.0;
+  double begin_threshold = 0.0;
+  double end_threshold = 0.0;
+  double gap = 0.0;  // [s]
+  Signal onset;
+  double onset_threshold = 0.0;
   bool found = false;  // the signal moves enough to call its peak an act
 };
 
-Activity near_contact(Signal distance) {
-  for (double& value : distance) value = -value;
-  const double peak = *std::max_element(distance.begin(), distance.end());
-  return {.signal = std::move(distance), .threshold = peak - kReach, .found = true};
+// From 0 at rest to 1 at the peak; all 0 where the range is smaller than `least`.
+Signal share(const Signal& signal, double least) {
+  const double rest = rest_level(signal);
+  const double range = *std::max_element(signal.begin(), signal.end()) - rest;
+  Signal result(signal.size(), 0.0);
+  if (range >= least)
+    std::transform(signal.begin(), signal.end(), result.begin(), [&](double x) { return (x - rest) / range; });
+  return result;
 }
 
-// A gesture of either person: the one who moves more, and both where both do it.
-Activity gesture(const Signal& a, const Signal& b, double least) {
-  const auto share = [&](const Signal& signal) {
-    const double rest = rest_level(signal);
-    const double range = *std::max_element(signal.begin(), signal.end()) - rest;
-    Signal result(signal.size(), 0.0);
-    if (range >= least)
-      std::transform(signal.begin(), signal.end(), result.begin(), [&](double x) { return (x - rest) / range; });
-    return result;
-  };
-  const Signal of_a = share(a);
-  const Signal of_b = share(b);
-  Activity activity{.signal = Signal(a.size()), .threshold = kGestureShare, .found = false};
-  for (std::size_t t = 0; t < a.size(); ++t) activity.signal[t] = std::max(of_a[t], of_b[t]);
-  activity.found = *std::max_element(activity.signal.begin(), activity.signal.end()) >= 1.0;
-  return activity;
+// What either person does, each measured by the own peak.
+Signal either(const Signal& a, const Signal& b, double least) {
+  Signal result = share(a, least);
+  const Signal other = share(b, least);
+  std::transform(result.begin(), result.end(), other.begin(), result.begin(),
+                 [](double x, double y) { return std::max(x, y); });
+  return result;
+}
+
+Activity contact(Signal distance, Signal onset, double onset_threshold) {
+  for (double& value : distance) value = -value;
+  const double edge = *std::max_element(distance.begin(), distance.end()) - kReach;
+  return {.signal = std::move(distance),
+          .begin_threshold = edge,
+          .end_threshold = edge,
+          .gap = kClaspGap,
+          .onset = std::move(onset),
+          .onset_threshold = onset_threshold,
+          .found = true};
+}
+
+Activity gesture(Signal signal, double begin_share, double end_share) {
+  const bool found = *std::max_element(signal.begin(), signal.end()) > 0.0;
+  return {.signal = std::move(signal),
+          .begin_threshold = begin_share,
+          .end_threshold = end_share,
+          .gap = kGestureGap,
+          .onset = {},
+          .onset_threshold = 0.0,
+          .found = found};
 }
 
 Activity activity_of(const HumanMotion& a, const HumanMotion& b, Task task) {
-  const int frames = a.frames();
+  const auto over = [&](auto&& value) { return over_time(a.frames(), value); };
+  const auto hands_apart = [&] { return over([&](int t) { return hand_distance(a, b, t); }); };
+  const auto hands_up = [&] {
+    return either(over([&](int t) { return hand_rise(a, t); }), over([&](int t) { return hand_rise(b, t); }),
+                  kLeastHandRise);
+  };
   switch (task) {
     case Task::kHandshake:
+      return contact(hands_apart(), share(over([&](int t) { return covered_gap(a, b, t); }), kReach), kCoveredShare);
     case Task::kHighFive:
-      return near_contact(over_time(frames, [&](int t) { return hand_distance(a, b, t); }));
+      return contact(hands_apart(), hands_up(), kRaisedShare);
     case Task::kHug:
-      return near_contact(
-          over_time(frames, [&](int t) { return std::min(hand_to_chest(a, b, t), hand_to_chest(b, a, t)); }));
+      return contact(over([&](int t) { return std::min(hand_to_chest(a, b, t), hand_to_chest(b, a, t)); }), {}, 0.0);
     case Task::kWave:
     case Task::kFlyKiss:
-      return gesture(over_time(frames, [&](int t) { return hand_rise(a, t); }),
-                     over_time(frames, [&](int t) { return hand_rise(b, t); }), kLeastHandRise);
+      return gesture(hands_up(), kRaisedShare, kLoweredShare);
     case Task::kBend:
-      return gesture(over_time(frames, [&](int t) { return lean(a, t); }),
-                     over_time(frames, [&](int t) { return lean(b, t); }), kLeastLean);
+      return gesture(
+          either(over([&](int t) { return lean(a, t); }), over([&](int t) { return lean(b, t); }), kLeastLean),
+          kLeanShare, kLeanShare);
   }
   return {};
 }
 
-// The stretch above the threshold around the peak, interruptions up to `gap` frames included.
-Phases stretch(const Activity& activity, int gap) {
-  const int frames = static_cast<int>(activity.signal.size());
-  const auto grow = [&](int from, int step) {
-    int edge = from;
-    for (int t = from; t >= 0 && t < frames && std::abs(t - edge) <= gap + 1; t += step)
-      if (activity.signal[t] >= activity.threshold) edge = t;
-    return edge;
-  };
-  const int peak =
-      static_cast<int>(std::max_element(activity.signal.begin(), activity.signal.end()) - activity.signal.begin());
-  return {.act_begin = grow(peak, -1), .act_end = grow(peak, 1) + 1};
+// The last frame from `from` in direction `step` (-1 or 1) at or above the threshold, without a gap of more than `gap`
+// frames.
+int reach(const Signal& signal, int from, int step, double threshold, int gap) {
+  int edge = from;
+  for (int t = from; t >= 0 && t < static_cast<int>(signal.size()) && std::abs(t - edge) <= gap + 1; t += step)
+    if (signal[t] >= threshold) edge = t;
+  return edge;
+}
+
+Phases stretch(const Activity& activity, double rate_hz) {
+  const auto frames = [&](double seconds) { return static_cast<int>(seconds * rate_hz); };
+  const Signal& signal = activity.signal;
+  const int peak = static_cast<int>(std::max_element(signal.begin(), signal.end()) - signal.begin());
+  const int begin = reach(signal, peak, -1, activity.begin_threshold, frames(activity.gap));
+  const int end = reach(signal, peak, 1, activity.end_threshold, frames(activity.gap));
+  return {.act_begin = reach(activity.onset, begin, -1, activity.onset_threshold, frames(kOnsetGap)),
+          .act_end = end + 1};
 }
 
 }  // namespace
@@ -140,7 +183,7 @@ Phases propose_phases(const HumanMotion& a, const HumanMotion& b, Task task) {
                       b.frames()));
   const Activity activity = activity_of(a, b, task);
   if (!activity.found) return {.act_begin = a.frames() / 3, .act_end = std::max(a.frames() - a.frames() / 3, 1)};
-  return stretch(activity, static_cast<int>(kGap * a.rate_hz));
+  return stretch(activity, a.rate_hz);
 }
 
 }  // namespace duet
