@@ -89,7 +89,9 @@ CardShape read_shape(const std::string& file, const YAML::Node& node) {
   const bool sphere = shape.kind == ShapeKind::kSphere;
   for (const char* key : {"center", "from", "to"})
     if (section.has(key) != (sphere == (std::string_view(key) == "center")))
-      section.fail(shape.line, fmt::format("expected '{}' for a {}", sphere ? "center" : "from' and 'to", kind));
+      section.fail(shape.line, fmt::format("expected {} for a {}, found {} '{}'",
+                                           sphere ? "'center' alone" : "'from' and 'to' alone", kind,
+                                           section.has(key) ? "also" : "no", key));
   shape.from = section.vector3(sphere ? "center" : "from");
   shape.to = section.vector3(sphere ? "center" : "to");
   if (!sphere && (shape.to - shape.from).norm() < 1e-6)
@@ -141,6 +143,7 @@ RobotCard parse_card(const std::string& text, const std::string& file) {
   card.name = root.text("name");
   card.urdf = root.text("urdf");
   card.base = root.text("base");
+  card.base_line = root.line("base");
   for (const YAML::Node& node : root.items("joints")) card.joints.push_back(read_joint(file, node));
   for (const YAML::Node& node : root.items("locked")) card.locked.push_back(read_lock(file, node));
   for (const YAML::Node& node : root.items("frames")) card.frames.push_back(read_frame(file, node));

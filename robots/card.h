@@ -54,6 +54,7 @@ struct CardPoint {
 
 struct RobotCard {
   std::string name, urdf, base;
+  int base_line = 0;
   std::vector<CardJoint> joints;
   std::vector<CardLock> locked;
   std::vector<CardFrame> frames;

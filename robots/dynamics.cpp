@@ -116,7 +116,8 @@ void Dynamics::mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> 
   out.block<3, 3>(0, 0) = all.mass * Eigen::Matrix3d::Identity();
   for (int k = 0; k < 3; ++k) out.block<3, 1>(0, 3 + k) = R * (all.mass * Eigen::Vector3d::Unit(k).cross(c_B));
   out.block<3, 3>(3, 0) = out.block<3, 3>(0, 3).transpose();
-  out.block<3, 3>(3, 3) = R.transpose() * all.inertia * R + shifted_inertia(all.mass, c_B);
+  const Eigen::Matrix3d I_B = R.transpose() * all.inertia * R + shifted_inertia(all.mass, c_B);
+  out.block<3, 3>(3, 3) = 0.5 * (I_B + I_B.transpose());
 }
 
 void bias_forces(const RobotModel& model, const RobotState& state, Eigen::Ref<Eigen::VectorXd> out) {

@@ -80,15 +80,15 @@ class Loader {
   void find_base() {
     base_ = urdf_link(card_.base);
     if (base_ < 0)
-      fail_card(1, fmt::format("'base' with {}: {}", urdf_file_,
-                               unknown_name_message("link", card_.base, urdf_link_names())));
+      fail_card(card_.base_line, fmt::format("'base' with {}: {}", urdf_file_,
+                                             unknown_name_message("link", card_.base, urdf_link_names())));
     if (base_ == 0) return;
     const bool floats = base_ == 1 && urdf_.joints[0].type == UrdfJointType::kFloating && urdf_.links[0].mass == 0.0 &&
                         std::count_if(urdf_.joints.begin(), urdf_.joints.end(),
                                       [](const UrdfJoint& joint) { return joint.parent == 0; }) == 1;
     if (!floats)
-      fail_card(1, fmt::format("'base': expected the root link of {}, '{}', found '{}'", urdf_file_,
-                               urdf_.links[0].name, card_.base));
+      fail_card(card_.base_line, fmt::format("'base': expected the root link of {}, '{}', found '{}'", urdf_file_,
+                                             urdf_.links[0].name, card_.base));
   }
 
   const CardJoint* card_joint(const std::string& name) const {

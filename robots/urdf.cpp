@@ -6,6 +6,7 @@
 #include <urdf_parser/urdf_parser.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <mutex>
@@ -32,31 +33,50 @@ std::mutex& console_bridge_mutex() {
   return mutex;
 }
 
-void check_xml(const std::string& text, const std::string& file) {
+void remove_children(TiXmlElement& element, const char* name) {
+  while (TiXmlElement* child = element.FirstChildElement(name)) element.RemoveChild(child);
+}
+
+// The text without what duet does not look at: a shape or material that urdfdom does not know is then no error.
+std::string without_geometry(const std::string& text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
   TiXmlDocument document;
   document.Parse(text.c_str());
   if (document.Error())
-    throw InputError(
-        fmt::format("{}:{}: expected well-formed XML, found: {}", file, document.ErrorRow(), document.ErrorDesc()));
-  if (document.FirstChildElement("robot") == nullptr)
-    throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+    throw InputError(fmt::format("{}:{}: expected well-formed XML, found: {}", file, std::max(document.ErrorRow(), 1),
+                                 document.ErrorDesc()));
+  TiXmlElement* const robot = document.FirstChildElement("robot");
+  if (robot == nullptr) throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+  for (const char* name : {"material", "transmission", "gazebo", "mujoco", "sensor"}) remove_children(*robot, name);
+  for (TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link"))
+    for (const char* name : {"visual", "collision"}) remove_children(*link, name);
+  TiXmlPrinter printer;
+  document.Accept(&printer);
+  return printer.Str();
 }
 
-[[noreturn]] void refuse(const std::string& file, std::vector<std::string> errors) {
-  for (std::string& error : errors) {
-    while (!error.empty() && (error.back() == '.' || std::isspace(static_cast<unsigned char>(error.back()))))
-      error.pop_back();
-    if (error.find("No root link found") != std::string::npos)
-      error = "expected one link that is no joint's child (the root), found none: the joints form a cycle";
-    if (error.find("Two root links found") != std::string::npos) error = "expected one root link. " + error;
+// urdfdom's sentences in the house's form where they do not say what was expected.
+std::string reworded(std::string error) {
+  while (!error.empty() && (error.back() == '.' || std::isspace(static_cast<unsigned char>(error.back()))))
+    error.pop_back();
+  constexpr std::string_view kTwo = "Two root links found: ";
+  if (const size_t at = error.find(kTwo); at != std::string::npos)
+    return "expected one root (a link that is no joint's child), found two: " + error.substr(at + kTwo.size());
+  if (error.find("No root link found") != std::string::npos)
+    return "expected one root (a link that is no joint's child), found none: the joints form a cycle";
+  return error;
+}
+
+[[noreturn]] void refuse(const std::string& file, const std::vector<std::string>& errors) {
+  // Parsers report from the inside out, may say the same twice, and end with a sentence that names nothing.
+  std::vector<std::string> sentences;
+  for (const std::string& error : errors) {
+    const std::string sentence = reworded(error);
+    if (sentence.find("xml is not initialized correctly") != std::string::npos && !sentences.empty()) continue;
+    if (std::find(sentences.begin(), sentences.end(), sentence) == sentences.end()) sentences.push_back(sentence);
   }
-  // Parsers report from the inside out and may say the same twice.
-  std::vector<std::string> unique;
-  for (const std::string& error : errors)
-    if (std::find(unique.begin(), unique.end(), error) == unique.end()) unique.push_back(error);
-  throw InputError(fmt::format("{}: not a valid URDF: {}", file, fmt::join(unique, "; ")));
+  throw InputError(fmt::format("{}: not a valid URDF: {}", file, fmt::join(sentences, "; ")));
 }
 
 urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& file) {
@@ -74,7 +94,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& 
   }
   console_bridge::useOutputHandler(previous);
   console_bridge::setLogLevel(level);
-  if (!model || !model->getRoot()) refuse(file, collector.errors);
+  // urdfdom goes on after some errors, for instance without an inertia that it could not read.
+  if (!model || !model->getRoot() || !collector.errors.empty()) refuse(file, collector.errors);
   return model;
 }
 
@@ -192,8 +213,7 @@ const char* to_string(UrdfJointType type) {
 }
 
 UrdfModel parse_urdf(const std::string& text, const std::string& file) {
-  check_xml(text, file);
-  const urdf::ModelInterfaceSharedPtr source = parse(text, file);
+  const urdf::ModelInterfaceSharedPtr source = parse(without_geometry(text, file), file);
   UrdfModel model;
   std::set<std::string> visited;
   const std::function<void(const urdf::Link&)> visit = [&](const urdf::Link& link) {

@@ -29,16 +29,19 @@ YamlSection::YamlSection(std::string file, YAML::Node node, std::string where, s
     : file_(std::move(file)), node_(std::move(node)), where_(std::move(where)) {
   if (!node_.IsMap()) fail(line(), fmt::format("expected a mapping, found {}", describe(node_)));
   const std::vector<std::string> names(known.begin(), known.end());
-  std::vector<std::string> seen;
   for (const auto& entry : node_) {
     if (!entry.first.IsScalar()) fail(line_of(entry.first), "expected a plain key, found " + describe(entry.first));
     const std::string& key = entry.first.Scalar();
     if (std::find(names.begin(), names.end(), key) == names.end())
       fail(line_of(entry.first), unknown_name_message("key", key, names));
-    if (std::find(seen.begin(), seen.end(), key) != seen.end())
+    if (!lines_.emplace(key, line_of(entry.first)).second)
       fail(line_of(entry.first), fmt::format("expected each key once, found '{}' again", key));
-    seen.push_back(key);
   }
+}
+
+int YamlSection::line(const char* key) const {
+  const auto it = lines_.find(key);
+  return it == lines_.end() ? line() : it->second;
 }
 
 void YamlSection::fail(int line, const std::string& message) const {
@@ -54,14 +57,14 @@ YAML::Node YamlSection::node(const char* key) const {
 std::string YamlSection::text(const char* key) const {
   const YAML::Node value = node(key);
   if (!value.IsScalar() || value.Scalar().empty())
-    fail(line_of(value), fmt::format("'{}': expected a text, found {}", key, describe(value)));
+    fail(line(key), fmt::format("'{}': expected a text, found {}", key, describe(value)));
   return value.Scalar();
 }
 
-double YamlSection::finite(const YAML::Node& node, std::string_view what) const {
+double YamlSection::finite(const YAML::Node& node, const char* key) const {
   double value = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value))
-    fail(line_of(node), fmt::format("'{}': expected a finite number, found {}", what, describe(node)));
+    fail(line(key), fmt::format("'{}': expected a finite number, found {}", key, describe(node)));
   return value;
 }
 
@@ -77,31 +80,22 @@ bool YamlSection::flag_or(const char* key, bool fallback) const {
   const YAML::Node value = node(key);
   bool flag = false;
   if (!value.IsScalar() || !YAML::convert<bool>::decode(value, flag))
-    fail(line_of(value), fmt::format("'{}': expected true or false, found {}", key, describe(value)));
+    fail(line(key), fmt::format("'{}': expected true or false, found {}", key, describe(value)));
   return flag;
 }
 
 Eigen::Vector3d YamlSection::vector3(const char* key) const {
   const YAML::Node value = node(key);
   if (!value.IsSequence() || value.size() != 3)
-    fail(line_of(value), fmt::format("'{}': expected three numbers, found {}", key, describe(value)));
+    fail(line(key), fmt::format("'{}': expected three numbers, found {}", key, describe(value)));
   return {finite(value[0], key), finite(value[1], key), finite(value[2], key)};
 }
 
 std::vector<YAML::Node> YamlSection::items(const char* key) const {
   if (!has(key)) return {};
   const YAML::Node value = node(key);
-  if (!value.IsSequence()) fail(line_of(value), fmt::format("'{}': expected a list, found {}", key, describe(value)));
+  if (!value.IsSequence()) fail(line(key), fmt::format("'{}': expected a list, found {}", key, describe(value)));
   return {value.begin(), value.end()};
-}
-
-std::vector<std::string> YamlSection::texts(const char* key) const {
-  std::vector<std::string> result;
-  for (const YAML::Node& item : items(key)) {
-    if (!item.IsScalar()) fail(line_of(item), fmt::format("'{}': expected a text, found {}", key, describe(item)));
-    result.push_back(item.Scalar());
-  }
-  return result;
 }
 
 }  // namespace duet

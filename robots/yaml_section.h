@@ -5,7 +5,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,7 +23,7 @@ class YamlSection {
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   [[nodiscard]] int line() const { return line_of(node_); }
-  [[nodiscard]] int line(const char* key) const { return line_of(node_[key]); }
+  [[nodiscard]] int line(const char* key) const;  // of the key itself; of the mapping where the key is absent
 
   // A missing key throws, naming it.
   [[nodiscard]] std::string text(const char* key) const;
@@ -29,7 +31,6 @@ class YamlSection {
   [[nodiscard]] std::optional<double> optional_number(const char* key) const;
   [[nodiscard]] bool flag_or(const char* key, bool fallback) const;
   [[nodiscard]] Eigen::Vector3d vector3(const char* key) const;
-  [[nodiscard]] std::vector<std::string> texts(const char* key) const;
   // Elements of a list; none where the key is absent.
   [[nodiscard]] std::vector<YAML::Node> items(const char* key) const;
   // The node itself; throws where it is absent.
@@ -39,12 +40,14 @@ class YamlSection {
   [[noreturn]] void fail(int line, const std::string& message) const;
 
  private:
-  [[nodiscard]] static int line_of(const YAML::Node& node) { return node.Mark().line + 1; }
-  [[nodiscard]] double finite(const YAML::Node& node, std::string_view what) const;
+  // Counted from 1; an empty document has no mark.
+  [[nodiscard]] static int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
+  [[nodiscard]] double finite(const YAML::Node& node, const char* key) const;
 
   std::string file_;
   YAML::Node node_;
   std::string where_;
+  std::map<std::string, int> lines_;  // of the keys
 };
 
 // The document of `text`; throws InputError with file and line for text that is not YAML.

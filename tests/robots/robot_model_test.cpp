@@ -1,0 +1,111 @@
+#include "robots/robot_model.h"
+
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "tests/robots/fixtures.h"
+
+namespace duet {
+namespace {
+
+using test::g1;
+using test::thrown_message;
+
+TEST(RobotModel, FindsNamesAndRefusesOthers) {
+  EXPECT_EQ(g1().joint_index("left_knee_joint"), 3);
+  EXPECT_EQ(g1().frames[g1().frame_index("pelvis")].link, 0);
+  EXPECT_EQ(g1().keypoints[g1().keypoint_index("right_hand")].name, "right_hand");
+  EXPECT_EQ(g1().track_frame("head"), g1().frame_index("head_link"));
+  EXPECT_THAT(
+      thrown_message<std::invalid_argument>([] { static_cast<void>(g1().joint_index("left_kne_joint")); }),
+      testing::StartsWith("unknown joint 'left_kne_joint': did you mean 'left_knee_joint'? Known: left_hip_pi"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().frame_index("pelvi")); }),
+              testing::StartsWith("unknown frame 'pelvi': did you mean 'pelvis'? Known: "));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().keypoint_index("left_wris")); }),
+              testing::StartsWith("unknown keypoint 'left_wris': did you mean 'left_wrist'?"));
+  EXPECT_EQ(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().track_frame("trso")); }),
+            "unknown track 'trso': did you mean 'torso'? Known: head, lhand, lshoulder, rhand, rshoulder, torso");
+}
+
+TEST(RobotModel, VectorsFollowTheJoints) {
+  const RobotModel model = test::load_small();
+  EXPECT_EQ(model.joint_names(), (std::vector<std::string>{"shoulder", "elbow"}));
+  EXPECT_EQ(model.lower()[0], -1.0);
+  EXPECT_EQ(model.upper()[0], 2.0);
+  EXPECT_EQ(model.neutral, Eigen::Vector2d(0.5, 0.0));
+}
+
+TEST(RobotModel, StandsAtAPlaceWithItsHeading) {
+  const Pose X{yaw_rotation(0.8) * Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX())), {1, 2, 9}};
+  const RobotState state = g1().standing_state(X);
+  EXPECT_NEAR(yaw_of(state.X_WB.R), 0.8, 1e-15);
+  EXPECT_LT((state.X_WB.R * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 1e-15);
+  EXPECT_EQ(state.X_WB.p, Eigen::Vector3d(1, 2, g1().standing_height));
+  EXPECT_EQ(state.q, g1().neutral);
+  EXPECT_EQ(state.v, Eigen::VectorXd::Zero(29));
+  EXPECT_EQ(state.v_WB.norm() + state.w_WB_B.norm(), 0.0);
+}
+
+TEST(RobotModel, DefaultCommandCarriesTheCardsGains) {
+  const JointCommand command = g1().default_command(g1().neutral);
+  EXPECT_EQ(command.q_target, g1().neutral);
+  for (int j = 0; j < 29; ++j) {
+    EXPECT_EQ(command.kp[j], g1().joints[j].kp);
+    EXPECT_EQ(command.kd[j], g1().joints[j].kd);
+  }
+  EXPECT_EQ(command.tau_ff, Eigen::VectorXd::Zero(29));
+  EXPECT_EQ(
+      thrown_message<std::invalid_argument>([] { static_cast<void>(g1().default_command(Eigen::VectorXd::Zero(12))); }),
+      "default command of 'g1': expected 29 joint targets, found 12");
+}
+
+TEST(RobotModel, DigestTellsCardsAndUrdfsApart) {
+  const std::string digest = test::load_small().digest;
+  EXPECT_EQ(digest.size(), 64u);
+  EXPECT_EQ(test::load_small().digest, digest);
+  EXPECT_NE(test::load_small(test::kSmallCard + "# a comment\n").digest, digest);
+  EXPECT_NE(test::load_small(test::kSmallCard, test::kSmallUrdf + "\n").digest, digest);
+}
+
+TEST(LoadRobot, UrdfByPathReplacesTheCards) {
+  const test::ScratchFolder folder;
+  write_file(folder / "card.yaml", test::replaced(test::kSmallCard, "small.urdf", "absent.urdf"));
+  write_file(folder / "other.urdf", test::kSmallUrdf);
+  EXPECT_EQ(load_robot(folder / "card.yaml", folder / "other.urdf").dof(), 2);
+  EXPECT_EQ(thrown_message<InputError>([&] { load_robot(folder / "card.yaml"); }),
+            "cannot read '" + folder / "absent.urdf" + "': No such file or directory");
+  EXPECT_EQ(thrown_message<InputError>([&] { load_robot(folder / "no.yaml"); }),
+            "cannot read '" + folder / "no.yaml" + "': No such file or directory");
+}
+
+// urdfdom's message handler is one per process; loading must not race on it.
+TEST(LoadRobot, IsThreadSafe) {
+  std::vector<std::string> digests(4);
+  std::vector<std::thread> threads;
+  for (std::string& digest : digests) threads.emplace_back([&digest] { digest = load_robot(test::g1_card()).digest; });
+  for (std::thread& thread : threads) thread.join();
+  for (const std::string& digest : digests) EXPECT_EQ(digest, g1().digest);
+}
+
+TEST(DefaultCard, IsTheSourceTreesUnlessDuetShareHasOne) {
+  unsetenv("DUET_SHARE");
+  EXPECT_EQ(default_card_path(), test::g1_card());
+  const test::ScratchFolder folder;
+  setenv("DUET_SHARE", (folder / "share").c_str(), 1);
+  EXPECT_EQ(default_card_path(), test::g1_card());  // nothing there: the next place
+  write_file(folder / "share/robots/g1/g1.yaml", test::kSmallCard);
+  EXPECT_EQ(default_card_path(), folder / "share/robots/g1/g1.yaml");
+  unsetenv("DUET_SHARE");
+}
+
+TEST(DefaultCard, NamesThePlacesLookedAt) {
+  const test::ScratchFolder folder;
+  EXPECT_EQ(thrown_message<MissingError>([&] {
+              first_card({folder / "a", folder / "b"});
+            }),
+            "no robot card: looked at " + folder / "a" + ", " + folder / "b");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,223 @@
+#include "robots/urdf.h"
+
+#include <Eigen/Geometry>
+#include <numbers>
+
+#include "robots/kinematics.h"
+#include "tests/robots/fixtures.h"
+
+namespace duet {
+namespace {
+
+using test::kSmallCard;
+using test::kSmallUrdf;
+using test::replaced;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string urdf_error(const std::string& urdf) {
+  return test::thrown_message<InputError>([&] { parse_urdf(urdf, "x.urdf"); });
+}
+
+TEST(Urdf, ReadsLinksAndJointsParentsFirst) {
+  const UrdfModel model = parse_urdf(kSmallUrdf, "x.urdf");
+  ASSERT_EQ(model.links.size(), 4u);
+  EXPECT_EQ(model.links[0].name, "base");
+  for (size_t i = 0; i < model.joints.size(); ++i) {
+    EXPECT_EQ(model.joints[i].child, static_cast<int>(i) + 1);
+    EXPECT_LT(model.joints[i].parent, model.joints[i].child);
+  }
+  const UrdfJoint& elbow = model.joints[2];
+  EXPECT_EQ(elbow.name, "elbow");
+  EXPECT_EQ(elbow.type, UrdfJointType::kContinuous);
+  EXPECT_EQ(elbow.lower, -2.0 * std::numbers::pi);
+  EXPECT_EQ(elbow.upper, 2.0 * std::numbers::pi);
+  EXPECT_LT((elbow.axis - Eigen::Vector3d(1, 1, 0).normalized()).norm(), 1e-15);
+}
+
+TEST(Urdf, RollPitchYawTurnAboutFixedAxes) {
+  const UrdfJoint joint = parse_urdf(kSmallUrdf, "x.urdf").joints[0];
+  const Eigen::Matrix3d expected =
+      (Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
+       Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
+  EXPECT_LT((joint.X_PC.R.toRotationMatrix() - expected).norm(), 1e-15);
+}
+
+TEST(Urdf, InertiaIsTurnedIntoTheLinksAxes) {
+  const std::string turned =
+      replaced(kSmallUrdf, "<origin xyz=\"0 0 0.1\"/>", "<origin xyz=\"0 0 0.1\" rpy=\"0 0 1.5707963267948966\"/>");
+  const UrdfModel model = parse_urdf(turned, "x.urdf");
+  EXPECT_LT((model.links[0].inertia.diagonal() - Eigen::Vector3d(0.03, 0.02, 0.025)).norm(), 1e-15);
+}
+
+// Merging: mass, first moment and inertia about a common point of the merged link are the sums of its parts'.
+TEST(Urdf, MergedPartsKeepMassMomentAndInertia) {
+  const RobotModel model = test::load_small();
+  ASSERT_EQ(model.links.size(), 3u);
+  const RobotLink& merged = model.links[1];
+  EXPECT_NEAR(merged.mass, 4.0, 1e-15);
+  // The brick is turned by 90 degrees about z: its x axis is the link's y axis.
+  const Eigen::Vector3d brick_com = Eigen::Vector3d(0.05, 0, -0.2) + Eigen::Vector3d(0, 0.02, 0);
+  EXPECT_LT((merged.com - (1.0 * Eigen::Vector3d(0, 0, -0.1) + 3.0 * brick_com) / 4.0).norm(), 1e-15);
+  const auto about_origin = [](double m, const Eigen::Vector3d& c, const Eigen::Matrix3d& I) -> Eigen::Matrix3d {
+    return I + m * (c.squaredNorm() * Eigen::Matrix3d::Identity() - c * c.transpose());
+  };
+  Eigen::Matrix3d upper = Eigen::Vector3d(0.01, 0.01, 0.002).asDiagonal();
+  Eigen::Matrix3d brick;
+  brick << 0.004, -0.0001, 0, -0.0001, 0.003, 0, 0, 0, 0.005;
+  const Eigen::Matrix3d sum = about_origin(1.0, {0, 0, -0.1}, upper) + about_origin(3.0, brick_com, brick);
+  EXPECT_LT((about_origin(merged.mass, merged.com, merged.inertia) - sum).norm(), 1e-15);
+  EXPECT_EQ(model.frames[model.frame_index("brick")].link, 1);
+  EXPECT_LT((model.frames[model.frame_index("brick")].X_LF.p - Eigen::Vector3d(0.05, 0, -0.2)).norm(), 1e-15);
+}
+
+TEST(Urdf, LockedJointIsMergedAtItsAngle) {
+  const std::string card = replaced(kSmallCard, "  - {name: elbow, armature: 0.02, kp: 10, kd: 0.5}\n",
+                                    "locked:\n  - {name: elbow, position: 0.6}\n");
+  const RobotModel locked = test::load_small(card), free = test::load_small();
+  ASSERT_EQ(locked.dof(), 1);
+  EXPECT_NEAR(locked.total_mass(), free.total_mass(), 1e-15);
+  Kinematics a(locked), b(free);
+  a.update({}, Eigen::VectorXd::Constant(1, 0.3));
+  b.update({}, Eigen::Vector2d(0.3, 0.6));
+  EXPECT_LT((a.center_of_mass() - b.center_of_mass()).norm(), 1e-15);
+  EXPECT_LT((a.frame_position(locked.frame_index("tip")) - b.frame_position(free.frame_index("tip"))).norm(), 1e-15);
+}
+
+TEST(Urdf, MasslessRootWithAFloatingJointIsTheWorld) {
+  const std::string world =
+      replaced(kSmallUrdf, "<link name=\"base\">",
+               "<link name=\"world\"/><joint name=\"float\" type=\"floating\"><parent link=\"world\"/><child "
+               "link=\"base\"/></joint><link name=\"base\">");
+  const RobotModel model = test::load_small(kSmallCard, world);
+  EXPECT_EQ(model.links[0].name, "base");
+  EXPECT_EQ(model.dof(), 2);
+}
+
+TEST(Urdf, LoadsTheMakersFilesWithCardsOfTheirOwn) {
+  for (const char* name : {"g1_12dof", "g1_29dof_rev_1_0", "g1_29dof_with_hand_rev_1_0"}) {
+    const std::string path = test::shared_file(fmt::format("g1/{}.urdf", name));
+    if (path.empty()) GTEST_SKIP() << "not run: g1 absent";
+    const UrdfModel urdf = parse_urdf(read_file(path), path);
+    std::string card = "name: other\nurdf: none.urdf\nbase: pelvis\njoints:\n", locked = "locked:\n";
+    int movable = 0, fingers = 0;
+    for (const UrdfJoint& joint : urdf.joints) {
+      if (joint.type == UrdfJointType::kFixed) continue;
+      if (joint.name.find("_hand_") != std::string::npos) {
+        locked += fmt::format("  - {{name: {}, position: 0}}\n", joint.name);
+        ++fingers;
+        continue;
+      }
+      card += fmt::format("  - {{name: {}, armature: 0.01, kp: 100, kd: 2}}\n", joint.name);
+      ++movable;
+    }
+    if (fingers > 0) card += locked;
+    const test::ScratchFolder folder;
+    write_file(folder / "card.yaml", card);
+    const RobotModel model = load_robot(folder / "card.yaml", path);
+    EXPECT_EQ(model.dof(), movable);
+    EXPECT_EQ(movable, std::string(name) == "g1_12dof" ? 12 : 29);
+    double mass = 0.0;
+    for (const UrdfLink& link : urdf.links) mass += link.mass;
+    EXPECT_NEAR(model.total_mass(), mass, 1e-12);
+    EXPECT_EQ(model.standing_height, 0.0);
+  }
+}
+
+// Shapes, materials and transmissions are not looked at, so neither are their faults.
+TEST(Urdf, GeometryMayBeAnything) {
+  const std::string odd =
+      replaced(kSmallUrdf, "<visual><geometry><mesh filename=\"package://nowhere/upper.STL\"/></geometry></visual>",
+               "<visual><geometry><torus radius=\"x\"/></geometry><material name=\"unheard of\"/></visual>"
+               "<collision><geometry><capsule radius=\"0.1\" length=\"nan\"/></geometry></collision><collision/>");
+  EXPECT_EQ(parse_urdf(odd, "x.urdf").links.size(), 4u);
+  EXPECT_EQ(parse_urdf(replaced(kSmallUrdf, "</robot>", "<material/><transmission/></robot>"), "x.urdf").links.size(),
+            4u);
+}
+
+TEST(UrdfErrors, NotXml) {
+  EXPECT_EQ(urdf_error(""), "x.urdf: expected a URDF, found an empty file");
+  EXPECT_EQ(urdf_error(" \n "), "x.urdf: expected a URDF, found an empty file");
+  EXPECT_EQ(urdf_error("joints: 3"), "x.urdf:1: expected well-formed XML, found: Error document empty.");
+  EXPECT_EQ(urdf_error("<sdf/>"), "x.urdf: expected the element <robot>, found none");
+  EXPECT_EQ(urdf_error(kSmallUrdf.substr(0, kSmallUrdf.size() / 2)),
+            "x.urdf:13: expected well-formed XML, found: Error parsing Element.");
+}
+
+TEST(UrdfErrors, Tree) {
+  EXPECT_EQ(
+      urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"loose\"/></robot>")),
+      "x.urdf: not a valid URDF: expected one root (a link that is no joint's child), found two: [base] and [loose]");
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "</robot>", "<link name=\"brick\"/></robot>")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("brick")));
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "name=\"elbow\"", "name=\"weld\"")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("weld")));
+  const std::string back =
+      "<joint name=\"back\" type=\"fixed\"><parent link=\"lower\"/><child link=\"base\"/></joint></robot>";
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", back)),
+            "x.urdf: not a valid URDF: expected one root (a link that is no joint's child), found none: the joints "
+            "form a cycle");
+  const std::string island =
+      "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child "
+      "link=\"b\"/></joint><joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", island)),
+            "x.urdf: link 'a': expected a path to the root 'base', found a cycle of joints");
+  const std::string second =
+      "<joint name=\"second\" type=\"fixed\"><parent link=\"base\"/><child link=\"lower\"/></joint></robot>";
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", second)),
+            "x.urdf: link 'lower': expected one parent, found two");
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<child link=\"lower\"/>", "<child link=\"lowr\"/>")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[lowr]"), HasSubstr("[elbow]")));
+  EXPECT_THAT(urdf_error("<robot name=\"empty\"/>"),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("No link")));
+}
+
+TEST(UrdfErrors, Joints) {
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<limit lower=\"-1\" upper=\"2\" effort=\"10\" velocity=\"5\"/>", "")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[shoulder]"), HasSubstr("limits")));
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, " effort=\"10\"", "")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("effort"), HasSubstr("[shoulder]")));
+  EXPECT_THAT(
+      urdf_error(replaced(kSmallUrdf, "lower=\"-1\"", "lower=\"nan\"")),
+      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("lower"), HasSubstr("nan"), HasSubstr("[shoulder]")));
+  EXPECT_THAT(
+      urdf_error(replaced(kSmallUrdf, "upper=\"2\"", "upper=\"1e999\"")),
+      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("upper"), HasSubstr("1e999"), HasSubstr("[shoulder]")));
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "type=\"continuous\"", "type=\"hinge\"")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[elbow]"), HasSubstr("[hinge]")));
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 0 0\"/>")),
+            "x.urdf: joint 'shoulder': expected an axis with a direction, found (0, 0, 0)");
+  EXPECT_THAT(
+      urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 zero\"/>")),
+      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("axis"), HasSubstr("[shoulder]"), HasSubstr("zero")));
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><mimic joint=\"elbow\"/>")),
+            "x.urdf: joint 'shoulder': expected an independent joint, found one that mimics 'elbow'");
+}
+
+TEST(UrdfErrors, Inertia) {
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"-2\"/>")),
+            "x.urdf: link 'base': expected a mass >= 0, found -2");
+  EXPECT_THAT(
+      urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"nan\"/>")),
+      AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("mass"), HasSubstr("nan"), HasSubstr("[base]")));
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass/>")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("mass"), HasSubstr("[base]")));
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "ixx=\"-0.02\"")),
+            "x.urdf: link 'base': expected an inertia with principal moments >= 0, found -0.02");
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "ixx=\"0.02\"", "")),
+              AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("ixx"), HasSubstr("[base]")));
+}
+
+TEST(UrdfErrors, PrintNothingToTheConsole) {
+  testing::internal::CaptureStderr();
+  testing::internal::CaptureStdout();
+  urdf_error("<robot name=\"empty\"/>");
+  urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass/>"));
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_EQ(testing::internal::GetCapturedStdout(), "");
+}
+
+}  // namespace
+}  // namespace duet
