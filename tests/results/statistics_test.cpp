@@ -197,7 +197,7 @@ TEST(ClusterBootstrap, MatchesTheExactResamplingDistribution) {
 
 // Values that agree within a cluster: clustered intervals keep their level, those that ignore it do not.
 TEST(ClusterBootstrap, CoversWhereValuesWithinAClusterAgree) {
-  constexpr int kTrials = 300;
+  constexpr int kTrials = 200;
   Random random(11, stream_key({"bootstrap coverage"}));
   int clustered = 0;
   int naive = 0;
@@ -218,7 +218,7 @@ TEST(ClusterBootstrap, CoversWhereValuesWithinAClusterAgree) {
     clustered += by_cluster.low <= 0.0 && 0.0 <= by_cluster.high ? 1 : 0;
     naive += by_value.low <= 0.0 && 0.0 <= by_value.high ? 1 : 0;
   }
-  // Binomial spread of 300 trials at 0.95 is 0.0126; a percentile interval over 40 clusters loses one or two points.
+  // Binomial spread of 200 trials at 0.95 is 0.015; a percentile interval over 40 clusters loses one or two points.
   EXPECT_NEAR(static_cast<double>(clustered) / kTrials, 0.94, 0.05);
   EXPECT_LT(static_cast<double>(naive) / kTrials, 0.75);
 }

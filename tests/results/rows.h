@@ -1,0 +1,70 @@
+// Rows for the tests of this room.
+#pragma once
+
+#include <string>
+
+#include "results/episode_row.h"
+
+namespace duet::test {
+
+// A row with every field set, none to its default.
+inline EpisodeRow full_row() {
+  EpisodeRow row;
+  row.suite = "hhoi-core";
+  row.suite_version = "1.0.0";
+  row.suite_hash = std::string(64, 'a');
+  row.task = "hug";
+  row.clip = "hug-003";
+  row.episode = 7;
+  row.seed = 0xfedcba9876543210ULL;
+  row.engine = "mujoco";
+  row.engine_version = "2.2.2";
+  row.controller = "wbc-sim";
+  row.policy = "replay";
+  row.perturbation = "jitter_0.05";
+  row.robot_digest = std::string(64, 'b');
+  row.arm = "oracle";
+  row.outcome = Outcome::kFell;
+  row.message = "pelvis below 0.3 m at 2.1 s, \"sideways\"\nμ = 0.8";
+  row.success = true;
+  row.verdicts = {{.version = "paper",
+                   .thresholds = "strict",
+                   .success = true,
+                   .parts = {{"contact", true}, {"duration", false}},
+                   .values = {{"distance", 0.1}},
+                   .margins = {{"overall", -0.25}},
+                   .frames = 31}};
+  row.metrics = {{"jpe", 0.1 + 0.2}, {"hf_ratio", 1e-300}};
+  row.fell = true;
+  row.frames = 250;
+  row.sim_s = 5.0;
+  row.wall_s = 0.75;
+  row.contact_peak_n = 81.5;
+  row.contact_impulse_ns = 3.25;
+  row.late_plans = 2;
+  row.state_hash = std::string(64, 'c');
+  row.started_at = "2026-01-02T03:04:05Z";
+  row.key = episode_key(row);
+  return row;
+}
+
+// One episode of a small benchmark; its key follows from its identity.
+inline EpisodeRow episode(const std::string& policy, const std::string& task, int number, bool success,
+                          const std::string& arm = "main") {
+  EpisodeRow row;
+  row.suite = "tiny";
+  row.suite_version = "1.0.0";
+  row.suite_hash = "0123456789abcdef";
+  row.task = task;
+  row.clip = task + "-" + std::to_string(number / 3);
+  row.episode = number;
+  row.engine = "mujoco";
+  row.controller = "vmc";
+  row.policy = policy;
+  row.arm = arm;
+  row.success = success;
+  row.key = episode_key(row);
+  return row;
+}
+
+}  // namespace duet::test

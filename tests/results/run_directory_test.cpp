@@ -1,0 +1,258 @@
+#include "results/run_directory.h"
+
+#include <gmock/gmock.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include "core/require.h"
+#include "results/environment.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::episode;
+using test::ScratchFolder;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+
+RunInfo tiny_run() {
+  RunInfo info;
+  info.suite = "tiny";
+  info.suite_version = "1.0.0";
+  info.suite_hash = "0123456789abcdef";
+  info.suite_yaml = "name: tiny\nversion: 1.0.0\n";
+  info.argv = {"duet", "run", "tiny.yaml"};
+  info.created_at = "2026-01-02T03:04:05Z";
+  info.environment = {{"machine", "a machine"}};
+  return info;
+}
+
+void append_text(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary | std::ios::app) << text;
+}
+
+TEST(RunDirectory, KeepsWhatWasAppended) {
+  const ScratchFolder scratch;
+  const std::string path = scratch / "runs/first";
+  RunDirectory run = RunDirectory::open(path, tiny_run());
+  run.append(episode("replay", "hug", 0, true));
+  run.append(episode("replay", "hug", 1, false));
+  EXPECT_EQ(run.size(), 2U);
+  EXPECT_TRUE(run.has(episode("replay", "hug", 1, false).key));
+  EXPECT_FALSE(run.has(episode("replay", "hug", 2, false).key));
+  // On disk while the run goes on.
+  const duet::Run loaded = load_run(path);
+  ASSERT_EQ(loaded.rows.size(), 2U);
+  EXPECT_EQ(to_json(loaded.rows[1]), to_json(episode("replay", "hug", 1, false)));
+  EXPECT_EQ(loaded.info.suite, "tiny");
+  EXPECT_EQ(loaded.info.suite_yaml, tiny_run().suite_yaml);
+  EXPECT_EQ(loaded.info.argv, tiny_run().argv);
+  EXPECT_EQ(loaded.info.environment, tiny_run().environment);
+  EXPECT_EQ(loaded.dropped_lines, 0);
+}
+
+TEST(RunDirectory, ResumesWithoutForgettingOrRewriting) {
+  const ScratchFolder scratch;
+  RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
+  RunInfo later = tiny_run();
+  later.created_at = "2026-01-03T00:00:00Z";
+  later.environment = {{"machine", "another machine"}};
+  RunDirectory resumed = RunDirectory::open(scratch / "run", later);
+  EXPECT_TRUE(resumed.has(episode("replay", "hug", 0, true).key));
+  resumed.append(episode("replay", "hug", 1, true));
+  const duet::Run run = load_run(scratch / "run");
+  EXPECT_EQ(run.rows.size(), 2U);
+  EXPECT_EQ(run.info.created_at, tiny_run().created_at);
+  EXPECT_EQ(run.info.environment, tiny_run().environment);
+  const nlohmann::json resumption = nlohmann::json::parse(read_file(scratch / "run/resumed.jsonl"));
+  EXPECT_EQ(resumption.at("at"), later.created_at);
+  EXPECT_EQ(resumption.at("environment"), later.environment);
+}
+
+TEST(RunDirectory, AKilledRunLosesOnlyTheLineItWasWriting) {
+  const ScratchFolder scratch;
+  RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
+  const std::string rows = scratch / "run/episodes.jsonl";
+  append_text(rows, to_json(episode("replay", "hug", 1, true)).dump().substr(0, 100));
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 1U);
+  EXPECT_EQ(load_run(scratch / "run").dropped_lines, 1);
+  RunDirectory resumed = RunDirectory::open(scratch / "run", tiny_run());
+  EXPECT_EQ(resumed.size(), 1U);
+  resumed.append(episode("replay", "hug", 1, true));
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 2U);
+  EXPECT_EQ(load_run(scratch / "run").dropped_lines, 0);
+}
+
+TEST(RunDirectory, ARunKilledWhileItWasCreatedCanStartAgain) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directories(scratch / "run");
+  append_text(scratch / "run/run.json.part-1-0", "{");
+  EXPECT_EQ(RunDirectory::open(scratch / "run", tiny_run()).size(), 0U);
+  std::filesystem::remove(scratch / "run/env.json");
+  std::filesystem::remove(scratch / "run/suite.yaml");
+  RunDirectory::open(scratch / "run", tiny_run());
+  EXPECT_EQ(load_run(scratch / "run").info.suite_yaml, tiny_run().suite_yaml);
+}
+
+TEST(RunDirectory, RefusesAnotherSuiteAndNamesBoth) {
+  const ScratchFolder scratch;
+  RunDirectory::open(scratch / "run", tiny_run());
+  RunInfo other = tiny_run();
+  other.suite = "large";
+  other.suite_version = "2.0.0";
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "run", other); }),
+              AllOf(HasSubstr("tiny@1.0.0 (0123456789ab)"), HasSubstr("large@2.0.0 (0123456789ab)")));
+  RunInfo edited = tiny_run();
+  edited.suite_hash = "fedcba9876543210";
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "run", edited); }),
+              AllOf(HasSubstr("(0123456789ab)"), HasSubstr("(fedcba987654)")));
+}
+
+TEST(RunDirectory, RefusesAFolderOfSomethingElse) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directories(scratch / "photos");
+  append_text(scratch / "photos/a.jpg", "x");
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "photos", tiny_run()); }),
+              HasSubstr("is not empty and holds no run"));
+  EXPECT_FALSE(std::filesystem::exists(scratch / "photos/run.json"));
+  append_text(scratch / "file", "x");
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "file", tiny_run()); }), HasSubstr("file"));
+}
+
+TEST(RunDirectory, RefusesTheSameEpisodeTwiceAndRowsOfAnotherSuite) {
+  const ScratchFolder scratch;
+  RunDirectory run = RunDirectory::open(scratch / "run", tiny_run());
+  run.append(episode("replay", "hug", 0, true));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(episode("replay", "hug", 0, false)); }),
+              HasSubstr("is already in"));
+  EpisodeRow foreign = episode("replay", "hug", 1, true);
+  foreign.suite_hash = "another";
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(foreign); }), HasSubstr("suite hash another"));
+  EpisodeRow nameless = episode("replay", "hug", 1, true);
+  nameless.key = "";
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(nameless); }), HasSubstr("without a key"));
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 1U);
+}
+
+// As a full disk does, a limit on the size of files lets a part of a line through.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST(RunDirectory, AFullDiskLeavesWholeRowsAndTheEpisodeCanBeAppendedLater) {
+  const ScratchFolder scratch;
+  RunDirectory run = RunDirectory::open(scratch / "run", tiny_run());
+  run.append(episode("replay", "hug", 0, true));
+  const EpisodeRow late = episode("replay", "hug", 1, true);
+  {
+    const FileSizeLimit limit(std::filesystem::file_size(scratch / "run/episodes.jsonl") + 100);
+    EXPECT_THAT(thrown_message<InputError>([&] { run.append(late); }), HasSubstr("episodes.jsonl"));
+  }
+  EXPECT_FALSE(run.has(late.key));
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 1U);
+  EXPECT_EQ(load_run(scratch / "run").dropped_lines, 0);
+  run.append(late);
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 2U);
+}
+
+TEST(RunDirectory, TextThatIsNoUtf8DoesNotLoseTheEpisode) {
+  const ScratchFolder scratch;
+  RunDirectory run = RunDirectory::open(scratch / "run", tiny_run());
+  EpisodeRow row = episode("replay", "hug", 0, false);
+  row.message = "engine said \xff\xfe";
+  run.append(row);
+  EXPECT_THAT(load_run(scratch / "run").rows.at(0).message, HasSubstr("engine said"));
+}
+
+TEST(LoadRun, NamesFileAndLineOfABrokenRow) {
+  const ScratchFolder scratch;
+  RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
+  const std::string rows = scratch / "run/episodes.jsonl";
+  const std::string whole = read_file(rows);
+  const auto with_line = [&](const std::string& line) {
+    std::ofstream(rows, std::ios::binary | std::ios::trunc) << whole << line << "\n";
+    const std::string message = thrown_message<InputError>([&] { load_run(scratch / "run"); });
+    // Resuming must not paper over it either.
+    EXPECT_EQ(thrown_message<InputError>([&] { RunDirectory::open(scratch / "run", tiny_run()); }), message);
+    return message;
+  };
+  EXPECT_THAT(with_line("{\"schema\": 1,"), AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("not valid JSON")));
+  EXPECT_THAT(with_line(""), HasSubstr("episodes.jsonl:2: "));
+  nlohmann::json json = to_json(episode("replay", "hug", 1, true));
+  json["extra"] = 1;
+  EXPECT_THAT(with_line(json.dump()), AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("unknown key 'extra'")));
+  EXPECT_THAT(with_line(to_json(episode("replay", "hug", 0, true)).dump()),
+              AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("is already in line 1")));
+  EpisodeRow foreign = episode("replay", "hug", 1, true);
+  foreign.suite = "large";
+  foreign.suite_hash = "fedcba9876543210";
+  EXPECT_THAT(with_line(to_json(foreign).dump()),
+              AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("large@1.0.0"), HasSubstr("tiny@1.0.0")));
+}
+
+TEST(LoadRun, RefusesWhatIsNoRun) {
+  const ScratchFolder scratch;
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "nowhere"); }), HasSubstr("is not a run directory"));
+  RunDirectory::open(scratch / "run", tiny_run());
+  append_text(scratch / "run/run.json", "}");
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "run"); }), HasSubstr("run.json: not valid JSON"));
+  std::ofstream(scratch / "run/run.json", std::ios::trunc) << R"({"schema": "duet.run/9"})";
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "run"); }),
+              HasSubstr("expected schema duet.run/1, found duet.run/9"));
+}
+
+TEST(Environment, HasWhatResultsDependOnAndNamesNobody) {
+  setenv("DUET_TEST_FOLDER", "/home/somebody/data", 1);
+  const char* before = std::getenv("HOME");
+  const std::string home = before != nullptr ? before : "";
+  setenv("HOME", "/home/somebody", 1);
+  const nlohmann::json environment = capture_environment();
+  setenv("HOME", home.c_str(), 1);
+  unsetenv("DUET_TEST_FOLDER");
+  for (const char* key : {"machine", "build", "processor", "load_average", "memory", "kernel", "locale",
+                          "floating_point", "libraries", "random_numbers", "variables"}) {
+    EXPECT_TRUE(environment.contains(key)) << key;
+  }
+  EXPECT_GE(environment.at("processor").at("usable_cores").get<int>(), 1);
+  EXPECT_GT(environment.at("memory").at("total_bytes").get<std::uint64_t>(), 1U << 20);
+  EXPECT_THAT(environment.at("build").at("compiler").get<std::string>(), HasSubstr(" "));
+  EXPECT_THAT(environment.at("build").at("flags").get<std::string>(), HasSubstr("-ffp-contract=off"));
+  EXPECT_EQ(environment.at("variables").at("DUET_TEST_FOLDER"), "~/data");
+  char host[256] = {};
+  ASSERT_EQ(gethostname(host, sizeof host - 1), 0);
+  if (std::string(host).size() > 3) {
+    EXPECT_EQ(environment.dump().find(host), std::string::npos);
+  }
+  EXPECT_EQ(environment.dump().find("somebody"), std::string::npos);
+}
+
+TEST(Environment, DescribesTheMachineInOneLine) {
+  const std::string line = describe_machine();
+  EXPECT_THAT(line, AllOf(HasSubstr(" core"), HasSubstr(", ")));
+  EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace duet
