@@ -7,6 +7,7 @@
 #include "core/require.h"
 #include "policies/null_policy.h"
 #include "policies/replay_policy.h"
+#include "policies/scheduler.h"
 
 namespace duet {
 namespace {
@@ -23,7 +24,8 @@ struct PolicyEntry {
   std::unique_ptr<Policy> (*make)(Robot robot);
 };
 
-constexpr std::array<PolicyEntry, 2> kPolicies = {{{"replay", make<ReplayPolicy>}, {"null", make<NullPolicy>}}};
+constexpr std::array<PolicyEntry, 3> kPolicies = {
+    {{"replay", make<ReplayPolicy>}, {"replay_dense", make<DenseReplayPolicy>}, {"null", make<NullPolicy>}}};
 
 }  // namespace
 
@@ -38,6 +40,8 @@ Eigen::VectorXd to_vector(const ObservationFrame& frame, const Eigen::Vector3d& 
       R_BW * -Eigen::Vector3d::UnitZ(), robot.q, robot.v, robot.X_WB.p - start_position, sign * wxyz;
   return vector;
 }
+
+std::vector<Reference> Policy::plan(const Observation& observation) { return densify(act(observation)); }
 
 std::vector<std::string> policy_names() {
   std::vector<std::string> names;

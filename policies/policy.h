@@ -58,9 +58,14 @@ class Policy {
   virtual void reset(const EpisodeContext& context) = 0;
   // Anchors at observation.tick / 50 + {0, ..., 2} s.
   virtual Anchors act(const Observation& observation) = 0;
+  // What the scheduler gets: references at observation.tick + {0, 1, ...} ticks. Algorithm 8 on act(), unless a policy
+  // knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 % of one
+  // of 1 Hz (docs/deviations.md).
+  virtual std::vector<Reference> plan(const Observation& observation);
 };
 
-// "replay" (the retargeted motion with hindsight), "null" (holds the neutral pose where it stands).
+// "replay" (the retargeted motion with hindsight, as anchors), "replay_dense" (the same at 50 Hz past the anchors: the
+// upper bound of controller and engine), "null" (holds the neutral pose where it stands).
 // Throws std::invalid_argument for an unknown name (with the nearest and all known).
 std::vector<std::string> policy_names();
 std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot);

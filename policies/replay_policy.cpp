@@ -33,13 +33,23 @@ void ReplayPolicy::reset(const EpisodeContext& context) {
   motion_ = motion;
 }
 
-Anchors ReplayPolicy::act(const Observation& observation) {
+Reference ReplayPolicy::at(int tick) const {
   require(motion_.frames() > 0, "policy 'replay': reset comes first");
+  return motion_.reference(std::clamp(tick, 0, motion_.frames() - 1));
+}
+
+Anchors ReplayPolicy::act(const Observation& observation) {
   Anchors anchors;
-  for (int i = 0; i < kAnchors; ++i)
-    anchors[static_cast<std::size_t>(i)] =
-        motion_.reference(std::clamp(observation.tick + i * kTicksPerAnchor, 0, motion_.frames() - 1));
+  for (int i = 0; i < kAnchors; ++i) anchors[static_cast<std::size_t>(i)] = at(observation.tick + i * kTicksPerAnchor);
   return anchors;
+}
+
+std::vector<Reference> DenseReplayPolicy::plan(const Observation& observation) {
+  constexpr int kTicks = (kAnchors - 1) * kTicksPerAnchor;  // as densify
+  std::vector<Reference> plan;
+  plan.reserve(kTicks);
+  for (int i = 0; i < kTicks; ++i) plan.push_back(at(observation.tick + i));
+  return plan;
 }
 
 }  // namespace duet

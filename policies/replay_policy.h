@@ -7,7 +7,7 @@
 
 namespace duet {
 
-class ReplayPolicy final : public Policy {
+class ReplayPolicy : public Policy {
  public:
   // Throws std::invalid_argument without a robot.
   explicit ReplayPolicy(std::shared_ptr<const RobotModel> robot);
@@ -18,9 +18,21 @@ class ReplayPolicy final : public Policy {
   // The last frame stands for everything after it.
   Anchors act(const Observation& observation) override;
 
+ protected:
+  // The motion at `tick`. Throws std::invalid_argument before reset.
+  [[nodiscard]] Reference at(int tick) const;
+
  private:
   std::shared_ptr<const RobotModel> robot_;  // shared with the backend and the controller of the same episode
   RobotMotion motion_;
+};
+
+// The same motion at 50 Hz, without the loss of the anchors.
+class DenseReplayPolicy final : public ReplayPolicy {
+ public:
+  using ReplayPolicy::ReplayPolicy;
+  [[nodiscard]] std::string_view name() const override { return "replay_dense"; }
+  std::vector<Reference> plan(const Observation& observation) override;
 };
 
 }  // namespace duet

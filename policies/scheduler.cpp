@@ -23,6 +23,15 @@ const Reference& entry(const std::vector<Reference>& plan, int start, int tick) 
   return plan[static_cast<std::size_t>(std::clamp(tick - start, 0, static_cast<int>(plan.size()) - 1))];
 }
 
+// Messages are made only on failure: a plan has a hundred references.
+void check(const Reference& reference, const char* what) {
+  const bool finite = reference.X_WB.p.allFinite() && reference.X_WB.R.coeffs().allFinite() && reference.q.allFinite();
+  if (!finite) throw std::invalid_argument(fmt::format("scheduler: {} holds a number that is not finite", what));
+  const double norm = reference.X_WB.R.norm();
+  if (std::abs(norm - 1.0) > kUnitTolerance)
+    throw std::invalid_argument(fmt::format("scheduler: {}: expected a quaternion of norm 1, found {}", what, norm));
+}
+
 }  // namespace
 
 Scheduler::Scheduler(const SchedulerOptions& options) : options_(options) {
@@ -51,13 +60,13 @@ void Scheduler::reset(const Reference& start) {
 }
 
 void Scheduler::push(const Anchors& anchors, int tick) {
-  require(started_, "scheduler: reset comes before the first plan");
-  for (int i = 0; i < kAnchors; ++i) {
-    const Reference& anchor = anchors[static_cast<std::size_t>(i)];
-    check(anchor, "anchor");
-    require(anchor.q.size() == last_.q.size(),
-            fmt::format("scheduler: expected {} joints in anchor {}, found {}", last_.q.size(), i, anchor.q.size()));
-  }
+  for (const Reference& anchor : anchors) check_plan(anchor);
+  push(densify(anchors), tick);
+}
+
+void Scheduler::push(std::vector<Reference> plan, int tick) {
+  require(!plan.empty(), "scheduler: expected a plan with references, found none");
+  for (const Reference& reference : plan) check_plan(reference);
   require(plan_.empty() || tick > plan_start_,
           fmt::format("scheduler: expected a plan made after tick {}, found {}", plan_start_, tick));
   require(!asked_ || tick <= tick_ + 1,
@@ -67,14 +76,12 @@ void Scheduler::push(const Anchors& anchors, int tick) {
   if (plan_.empty() || late_) {
     before.push_back(last_);  // what is held fades into the new plan
   } else {
-    const int end = plan_start_ + static_cast<int>(plan_.size());
-    for (int t = next; t < std::min(end, next + options_.fuse_ticks); ++t) fuse(t, before.emplace_back());
-    if (before.empty()) before.push_back(last_);
+    for (int t = next; t < next + options_.fuse_ticks; ++t) fuse(t, before.emplace_back());
   }
   tightened_ = late_;
   old_plan_ = std::move(before);
   old_start_ = takeover_ = next;
-  plan_ = densify(anchors);
+  plan_ = std::move(plan);
   plan_start_ = tick;
 }
 
@@ -96,12 +103,12 @@ const Reference& Scheduler::at(int tick) {
   return last_;
 }
 
-void Scheduler::check(const Reference& reference, const char* what) const {
-  const bool finite = reference.X_WB.p.allFinite() && reference.X_WB.R.coeffs().allFinite() && reference.q.allFinite();
-  require(finite, fmt::format("scheduler: {} holds a number that is not finite", what));
-  const double norm = reference.X_WB.R.norm();
-  require(std::abs(norm - 1.0) <= kUnitTolerance,
-          fmt::format("scheduler: {}: expected a quaternion of norm 1, found {}", what, norm));
+void Scheduler::check_plan(const Reference& reference) const {
+  require(started_, "scheduler: reset comes before the first plan");
+  check(reference, "plan");
+  if (reference.q.size() != last_.q.size())
+    throw std::invalid_argument(
+        fmt::format("scheduler: plan: expected {} joints, found {}", last_.q.size(), reference.q.size()));
 }
 
 // Of the new plan, in [0, 1].

@@ -37,6 +37,8 @@ class Scheduler {
   // refused by reset or with another number of joints, for a tick that is not after the previous plan's or is after the
   // next one to be asked for.
   void push(const Anchors& anchors, int tick);
+  // A plan of one reference per tick (Policy::plan); what follows its last one is that one. Refused too: no reference.
+  void push(std::vector<Reference> plan, int tick);
   // The fused reference at `tick`; ticks come in order, each once (std::invalid_argument otherwise). With no plan for
   // this tick (late): holds the last one and tightens the root bounds. The reference stays valid until the next call.
   const Reference& at(int tick);
@@ -44,7 +46,7 @@ class Scheduler {
   [[nodiscard]] int late_ticks() const { return late_ticks_; }
 
  private:
-  void check(const Reference& reference, const char* what) const;
+  void check_plan(const Reference& reference) const;
   [[nodiscard]] double weight(int tick) const;
   void fuse(int tick, Reference& reference) const;
   void bound_root(const Pose& target, Pose& emitted) const;

@@ -17,8 +17,9 @@ class TorsoOrientation {
   // Orientation of the link above the last waist joint in the base frame, R_BT.
   [[nodiscard]] Eigen::Quaterniond at(const Eigen::VectorXd& q) const;
   // Sets the waist joints of `q`, inside their limits, to bring at(q) as near to R_BT as they can (smallest angle);
-  // starts from those in `q` and is made for goals within a right angle of at(q): from further away the limits may stop
-  // it at a worse answer. A continuous function of both as long as there is one best answer.
+  // starts from those in `q` and is made for goals within a right angle of at(q): from further away, or where the way
+  // there leads through a limit of the yaw, it may end at a worse answer. A continuous function of both as long as
+  // there is one best answer.
   void solve(const Eigen::Quaterniond& R_BT, Eigen::VectorXd& q) const;
 
  private:

@@ -56,10 +56,10 @@ TEST(ToVector, IsTheSameForBothSignsOfAQuaternion) {
 }
 
 TEST(MakePolicy, KnowsItsNamesAndRefusesOthers) {
-  EXPECT_EQ(policy_names(), (std::vector<std::string>{"replay", "null"}));
+  EXPECT_EQ(policy_names(), (std::vector<std::string>{"replay", "replay_dense", "null"}));
   for (const std::string& name : policy_names()) EXPECT_EQ(make_policy(name, g1())->name(), name);
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("nul", g1()); }),
-            "unknown policy 'nul': did you mean 'null'? Known: replay, null");
+            "unknown policy 'nul': did you mean 'null'? Known: replay, replay_dense, null");
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("null", nullptr); }), "policy 'null' needs a robot");
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("replay", nullptr); }),
             "policy 'replay' needs a robot");
@@ -139,6 +139,40 @@ TEST(ReplayThroughTheScheduler, KeepsALinearMotion) {
     EXPECT_NEAR(yaw_of(reference.X_WB.R), 0.2 * tick / 50.0, kAlgebra);
   }
   EXPECT_EQ(scheduler.late_ticks(), 0);
+}
+
+// Amplitude that is left of a swing of joint 0 at `rate_hz` after policy and scheduler.
+double swing_left(const std::string& name, double rate_hz) {
+  constexpr int kTicks = 1000;
+  RobotMotion motion{50.0, g1()->joint_names(), std::vector<Pose>(kTicks), Eigen::MatrixXd::Zero(29, kTicks)};
+  const auto angle = [rate_hz](int t) { return 2.0 * std::numbers::pi * rate_hz * t / 50.0; };
+  for (int t = 0; t < kTicks; ++t) motion.q(0, t) = std::sin(angle(t));
+  const auto policy = make_policy(name, g1());
+  EpisodeContext context;
+  context.hindsight = &motion;
+  policy->reset(context);
+  Scheduler scheduler;
+  scheduler.reset(motion.reference(0));
+  double sine = 0.0, cosine = 0.0;
+  for (int tick = 0; tick < 900; ++tick) {
+    if (tick % kTicksPerPlan == 0) scheduler.push(policy->plan({.history = {}, .tick = tick}), tick);
+    const double value = scheduler.at(tick).q[0];
+    if (tick < 100) continue;  // 800 ticks: whole periods of the rates asked for
+    sine += value * std::sin(angle(tick)) / 400.0;
+    cosine += value * std::cos(angle(tick)) / 400.0;
+  }
+  return std::hypot(sine, cosine);
+}
+
+// The price of five anchors half a second apart, as docs/deviations.md states it.
+TEST(ReplayThroughTheScheduler, LosesTheSwingsThatAnchorsCannotHold) {
+  EXPECT_NEAR(swing_left("replay", 0.25), 0.94, 0.01);
+  EXPECT_NEAR(swing_left("replay", 0.5), 0.75, 0.01);
+  EXPECT_NEAR(swing_left("replay", 1.0), 0.23, 0.01);
+}
+
+TEST(DenseReplay, LosesNothing) {
+  for (const double rate_hz : {0.5, 1.0, 3.0}) EXPECT_NEAR(swing_left("replay_dense", rate_hz), 1.0, kAlgebra);
 }
 
 }  // namespace

@@ -264,7 +264,14 @@ TEST(Scheduler, RefusesMisuse) {
   EXPECT_EQ(message([&](Scheduler& s) { s.reset(at_rest(2)), s.at(5), s.push(plan, 7); }),
             "scheduler: expected a plan made at tick 6 or before, found 7");
   EXPECT_EQ(message([&](Scheduler& s) { s.reset(at_rest(3)), s.push(plan, 0); }),
-            "scheduler: expected 3 joints in anchor 0, found 2");
+            "scheduler: plan: expected 3 joints, found 2");
+}
+
+TEST(Scheduler, RefusesAPlanWithoutReferences) {
+  Scheduler scheduler;
+  scheduler.reset(at_rest(2));
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { scheduler.push(std::vector<Reference>{}, 0); }),
+            "scheduler: expected a plan with references, found none");
 }
 
 TEST(Scheduler, RefusesReferencesThatAreNotFiniteOrNotUnit) {
@@ -273,11 +280,11 @@ TEST(Scheduler, RefusesReferencesThatAreNotFiniteOrNotUnit) {
   Anchors anchors = constant_plan(0, 0, 0);
   anchors[3].q[1] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { scheduler.push(anchors, 0); }),
-            "scheduler: anchor holds a number that is not finite");
+            "scheduler: plan holds a number that is not finite");
   anchors = constant_plan(0, 0, 0);
   anchors[4].X_WB.R.coeffs() *= 2.0;
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { scheduler.push(anchors, 0); }),
-            "scheduler: anchor: expected a quaternion of norm 1, found 2");
+            "scheduler: plan: expected a quaternion of norm 1, found 2");
   Reference start = at_rest(2);
   start.X_WB.p.x() = std::numeric_limits<double>::infinity();
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { scheduler.reset(start); }),
