@@ -192,6 +192,7 @@ Comparison evaluate(const std::string& name, const Gathered& gathered, const Lea
 
 void correct_for_family(std::vector<Comparison>& comparisons) {
   std::vector<double> p_values;
+  p_values.reserve(comparisons.size());
   for (const Comparison& comparison : comparisons) p_values.push_back(comparison.p);
   const std::vector<double> adjusted = holm(p_values);
   for (std::size_t i = 0; i < comparisons.size(); ++i) comparisons[i].p_holm = adjusted[i];

@@ -101,7 +101,7 @@ void record_resumption(const std::string& folder, const RunInfo& info) {
 }
 
 EpisodeRow parse_row(std::string_view line, const std::string& where, const RunInfo& info) {
-  const EpisodeRow row = [&] {
+  EpisodeRow row = [&] {
     try {
       return row_from_json(parse_json(line, "episode row"));
     } catch (const InputError& error) {

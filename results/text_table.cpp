@@ -11,22 +11,25 @@ std::size_t width(std::string_view text) {
       std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
+// A '<' opens a tag only before these; "<0.001" stays readable as text.
+bool opens_tag(std::string_view rest) {
+  if (rest.size() < 2) return false;
+  const char next = rest[1];
+  return (next >= 'a' && next <= 'z') || (next >= 'A' && next <= 'Z') || next == '/' || next == '!' || next == '?';
+}
+
 std::string escape_markdown(std::string_view text) {
   std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '|':
-        escaped += "\\|";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '\n':
-      case '\r':
-        escaped += ' ';
-        break;
-      default:
-        escaped += c;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (c == '|') {
+      escaped += "\\|";
+    } else if (c == '\n' || c == '\r') {
+      escaped += ' ';
+    } else if (c == '<' && opens_tag(text.substr(i))) {
+      escaped += "&lt;";
+    } else {
+      escaped += c;
     }
   }
   return escaped;

@@ -1,0 +1,99 @@
+#include "results/database.h"
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include "core/require.h"
+#include "results/leaderboard.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::episode;
+using test::full_row;
+using test::ScratchFolder;
+using test::thrown_message;
+using testing::HasSubstr;
+
+// The rows that a query gives, cells joined by '|', NULL as "NULL".
+std::vector<std::string> query(const std::string& path, const char* sql) {
+  sqlite3* opened = nullptr;
+  EXPECT_EQ(sqlite3_open_v2(path.c_str(), &opened, SQLITE_OPEN_READONLY, nullptr), SQLITE_OK);
+  const std::unique_ptr<sqlite3, decltype(&sqlite3_close)> database(opened, &sqlite3_close);
+  std::vector<std::string> lines;
+  const auto collect = [](void* out, int count, char** cells, char**) {
+    std::string line;
+    for (int i = 0; i < count; ++i) line.append(i == 0 ? "" : "|").append(cells[i] != nullptr ? cells[i] : "NULL");
+    static_cast<std::vector<std::string>*>(out)->push_back(line);
+    return 0;
+  };
+  EXPECT_EQ(sqlite3_exec(database.get(), sql, collect, &lines, nullptr), SQLITE_OK) << sqlite3_errmsg(database.get());
+  return lines;
+}
+
+TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
+  const ScratchFolder scratch;
+  EpisodeRow row = full_row();
+  row.metrics["awd"] = std::numeric_limits<double>::quiet_NaN();
+  row.contact_peak_n = std::numeric_limits<double>::infinity();
+  const std::string path = scratch / "deep/results.sqlite";
+  write_database({row, episode("replay", "hug", 1, false)}, path);
+  EXPECT_THAT(query(path,
+                    "SELECT task, clip, episode, seed, outcome, success, headline, fell, contact_peak_n, message "
+                    "FROM episodes WHERE suite = 'hhoi-core'"),
+              testing::ElementsAre("hug|hug-003|7|18364758544493064720|fell|1|1|1|NULL|" + row.message));
+  EXPECT_THAT(query(path, "SELECT name FROM metrics ORDER BY name"), testing::ElementsAre("hf_ratio", "jpe"));
+  EXPECT_THAT(query(path, "SELECT value = 0.1 + 0.2 FROM metrics WHERE name = 'jpe'"), testing::ElementsAre("1"));
+  EXPECT_THAT(query(path, "SELECT version, thresholds, success, frames FROM verdicts"),
+              testing::ElementsAre("paper|strict|1|31"));
+  EXPECT_THAT(
+      query(path, "SELECT kind, name, value FROM verdict_values ORDER BY kind, name"),
+      testing::ElementsAre("margin|overall|-0.25", "part|contact|1.0", "part|duration|0.0", "value|distance|0.1"));
+}
+
+TEST(Database, ViewAgreesWithTheLeaderboard) {
+  const ScratchFolder scratch;
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 12; ++i) rows.push_back(episode("replay", "hug", i, i < 7));
+  rows[0].outcome = Outcome::kDiverged;
+  rows[1].success.reset();
+  rows[2].outcome = Outcome::kFell;
+  const LeaderboardEntry entry = leaderboard(rows).front();
+  write_database(rows, scratch / "r.sqlite");
+  EXPECT_THAT(query(scratch / "r.sqlite", "SELECT n, k, fell, diverged FROM leaderboard"),
+              testing::ElementsAre(std::to_string(entry.n) + "|" + std::to_string(entry.k) + "|1|1"));
+  EXPECT_EQ(entry.k, 5);
+}
+
+TEST(Database, ReplacesTheFileAndLeavesNothingElse) {
+  const ScratchFolder scratch;
+  const std::string path = scratch / "r.sqlite";
+  write_database({episode("replay", "hug", 0, true)}, path);
+  write_database({episode("replay", "hug", 1, true), episode("replay", "hug", 2, true)}, path);
+  EXPECT_THAT(query(path, "SELECT COUNT(*) FROM episodes"), testing::ElementsAre("2"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch / ""), std::filesystem::directory_iterator()), 1);
+}
+
+TEST(Database, AFaultKeepsTheOldFile) {
+  const ScratchFolder scratch;
+  const std::string path = scratch / "r.sqlite";
+  write_database({episode("replay", "hug", 0, true)}, path);
+  const EpisodeRow twice = episode("replay", "hug", 1, true);
+  EXPECT_THAT(thrown_message<InputError>([&] {
+                write_database({twice, twice}, path);
+              }),
+              testing::AllOf(HasSubstr("cannot write '" + path + "'"), HasSubstr("episodes.key")));
+  EXPECT_THAT(query(path, "SELECT episode FROM episodes"), testing::ElementsAre("0"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(scratch / ""), std::filesystem::directory_iterator()), 1);
+  EXPECT_THAT(thrown_message<InputError>([] { write_database({}, "/proc/nowhere/r.sqlite"); }),
+              HasSubstr("cannot write '/proc/nowhere/r.sqlite'"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,181 @@
+#include "results/html_report.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <regex>
+
+#include "results/report_parts.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::episode;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+// A person of a few bones who stands at (x, y).
+StickFigure person(const std::string& label, double x, double y) {
+  StickFigure figure{.label = label, .points = {}, .bones = {{0, 1}, {1, 2}, {0, 3}, {0, 4}, {1, 5}, {1, 6}}};
+  figure.points = {{x, y, 0.9},       {x, y, 1.4},       {x, y, 1.6},      {x, y - 0.1, 0.0},
+                   {x, y + 0.1, 0.0}, {x, y - 0.3, 1.1}, {x, y + 0.3, 1.1}};
+  return figure;
+}
+
+std::vector<KeyFrame> meeting() {
+  return {{"start 0.00 s", {person("source", 1.6, 0.0), person("human", 0.0, 0.0), person("robot", 1.5, 0.0)}},
+          {"act 1.00 s", {person("source", 1.1, 0.0), person("human", 0.5, 0.0), person("robot", 1.0, 0.0)}}};
+}
+
+ReportContent content() {
+  ReportContent content;
+  content.title = "Tiny <run> & \"more\"";
+  content.environment = {{"machine", "A processor, 2 cores"},
+                         {"build", {{"version", "0.1.0"}, {"commit", "abcdef0123456789"}}}};
+  content.notes = {"<script>alert('x')</script>"};
+  content.entries = leaderboard({episode("replay", "hug", 0, true), episode("null", "hug", 0, false, "null")});
+  content.columns = {{"jpe", "Joint position error", "m", "lower"}, {"contact_f1", "Contact F1", "1", "higher"}};
+  content.retargeting = {{"all", {{"jpe", 0.0625}}}, {"hug", {{"jpe", 0.125}, {"contact_f1", 0.5}, {"unlisted", 7.0}}}};
+  content.stories = {{"clip <1>", "hug", meeting(), {{"total", {10.0, 1.0, 0.1}}}, {{"jpe", 0.03}}},
+                     {"clip 2", "wave", {}, {}, {}}};
+  return content;
+}
+
+// Every tag that opens is closed, in order: enough of a parser for what this report is made of.
+std::string unbalanced_tag(const std::string& html) {
+  static const std::regex tag(R"(<(/?)([a-zA-Z0-9]+)[^>]*?(/?)>)");
+  std::vector<std::string> open;
+  std::string text = html.substr(html.find("<html"));
+  text.erase(text.find("<style>"), text.find("</style>") - text.find("<style>"));
+  text.erase(text.find("<script>"), text.find("</script>") - text.find("<script>"));
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), tag); it != std::sregex_iterator(); ++it) {
+    const std::string name = (*it)[2];
+    if (name == "meta" || (*it)[3] == "/" || name == "style" || name == "script") continue;
+    if ((*it)[1] != "/") {
+      open.push_back(name);
+    } else if (open.empty() || open.back() != name) {
+      return name;
+    } else {
+      open.pop_back();
+    }
+  }
+  return open.empty() ? "" : open.back();
+}
+
+TEST(HtmlReport, IsOneFileThatNeedsNoNetwork) {
+  const std::string html = html_report(content());
+  EXPECT_THAT(html, testing::StartsWith("<!DOCTYPE html>"));
+  EXPECT_EQ(unbalanced_tag(html), "");
+  for (const char* outside : {"http:", "https:", "src=", "@import", "url(", "<link"})
+    EXPECT_THAT(html, Not(HasSubstr(outside)));
+  EXPECT_THAT(html, AllOf(HasSubstr("prefers-color-scheme:dark"), HasSubstr("@media print"), HasSubstr("lang=\"en\"")));
+}
+
+TEST(HtmlReport, EscapesEveryText) {
+  ReportContent hostile = content();
+  const std::string evil = "\"><script>x</script>&'";
+  hostile.entries[0].policy = hostile.entries[0].engine = evil;
+  hostile.columns[0].title = hostile.columns[0].unit = evil;
+  hostile.retargeting[evil] = {{evil, 1.0}};
+  hostile.stories[0].title = hostile.stories[0].task = evil;
+  hostile.stories[0].frames[0].label = hostile.stories[0].frames[0].figures[0].label = evil;
+  hostile.stories[0].loss[evil] = {1.0};
+  hostile.stories[0].metrics[evil] = 1.0;
+  hostile.environment[evil] = evil;
+  const std::string html = html_report(hostile);
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("<script>x")), Not(HasSubstr("<script>alert")),
+                          HasSubstr("Tiny &lt;run&gt; &amp; &quot;more&quot;")));
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_EQ(escape_html("<a b=\"c\">&'"), "&lt;a b=&quot;c&quot;&gt;&amp;&#39;");
+}
+
+TEST(HtmlReport, ShowsMachineNotesTablesAndClips) {
+  const std::string html = html_report(content());
+  for (const char* piece : {"A processor, 2 cores · duet 0.1.0 (abcdef0123)", "id=\"leaderboard\"",
+                            "id=\"retargeting\"", "id=\"clips\"", "<details><summary>", "Joint position error",
+                            "0.0625", "unlisted", "start 0.00 s", "data-task=\"wave\"", "null (control)"}) {
+    EXPECT_THAT(html, HasSubstr(piece));
+  }
+}
+
+TEST(HtmlReport, EmptyContentHasNoEmptySections) {
+  const std::string html = html_report({});
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(html, Not(HasSubstr("<section")));
+}
+
+TEST(HtmlReport, NeverPrintsNan) {
+  ReportContent broken = content();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  broken.stories[0].frames[0].figures[1].points[2].x() = nan;
+  broken.stories[0].loss["bad"] = {nan, std::numeric_limits<double>::infinity()};
+  broken.stories[0].loss["holes"] = {1.0, nan, 0.5};
+  broken.retargeting["hug"]["jpe"] = nan;
+  broken.stories[0].metrics["jpe"] = nan;
+  const std::string html = html_report(broken);
+  EXPECT_FALSE(std::regex_search(html.substr(html.find("<body>")), std::regex(R"([^a-z](nan|inf)[^a-z])")));
+}
+
+TEST(KeyFrames, AreSeenAcrossTheLineBetweenTheAgents) {
+  // Wherever the two stand, the drawing is that of two people 1.5 m apart along the paper.
+  const std::string along_x = key_frames_svg(meeting());
+  std::vector<KeyFrame> turned = meeting();
+  for (KeyFrame& frame : turned) {
+    for (StickFigure& figure : frame.figures) {
+      for (Eigen::Vector3d& p : figure.points) p = {4.0 - p.y(), -7.0 + p.x(), p.z()};
+    }
+  }
+  const auto without_ticks = [](const std::string& svg) {
+    return std::regex_replace(svg, std::regex(R"(<path class="ground" stroke-width="8"[^>]*>)"), "");
+  };
+  EXPECT_EQ(without_ticks(key_frames_svg(turned)), without_ticks(along_x));
+  EXPECT_THAT(along_x, AllOf(HasSubstr("class=\"human\""), HasSubstr("class=\"robot\""), HasSubstr("class=\"source\""),
+                             HasSubstr("far"), HasSubstr("<circle class=\"human\"")));
+}
+
+TEST(KeyFrames, CoordinatesAreWholeMillimetres) {
+  EXPECT_FALSE(std::regex_search(key_frames_svg(meeting()), std::regex(R"([ML][0-9]*\.[0-9])")));
+}
+
+TEST(KeyFrames, OddInputIsDrawnAsFarAsItGoes) {
+  EXPECT_EQ(key_frames_svg({}), "");
+  EXPECT_EQ(key_frames_svg({{"empty", {}}}), "");
+  // One agent only, agents in one place, bones to points that are not there.
+  EXPECT_NE(key_frames_svg({{"alone", {person("human", 0, 0)}}}), "");
+  EXPECT_NE(key_frames_svg({{"same", {person("human", 0, 0), person("robot", 0, 0)}}}), "");
+  StickFigure loose = person("other", 0, 0);
+  loose.bones = {{0, 99}, {-1, 0}, {0, 1}};
+  EXPECT_THAT(key_frames_svg({{"loose", {loose}}}), HasSubstr("class=\"other"));
+}
+
+TEST(LossPlot, ChoosesItsAxis) {
+  EXPECT_THAT(loss_plot_svg({{"total", {100.0, 1.0, 0.5}}}), HasSubstr("(logarithmic)"));
+  EXPECT_THAT(loss_plot_svg({{"total", {3.0, 2.0, 1.0}}}), Not(HasSubstr("(logarithmic)")));
+  EXPECT_THAT(loss_plot_svg({{"total", {-3.0, 200.0}}}), Not(HasSubstr("(logarithmic)")));
+  EXPECT_THAT(loss_plot_svg({{"total", {0.0, 0.0}}}), HasSubstr("0"));
+  EXPECT_EQ(loss_plot_svg({}), "");
+  EXPECT_EQ(loss_plot_svg({{"total", {}}}), "");
+}
+
+TEST(LossPlot, LongCurvesStaySmallAndKeepTheirEnds) {
+  std::vector<double> values(100000);
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 1.0 + static_cast<double>(values.size() - i);
+  const std::string svg = loss_plot_svg({{"total", values}});
+  EXPECT_LT(svg.size(), 6000U);
+  EXPECT_THAT(svg, HasSubstr("M52.0 "));
+  EXPECT_THAT(svg, HasSubstr("L420.0 "));
+}
+
+TEST(IntervalBar, SpansTheUnitInterval) {
+  const std::string bar =
+      interval_bar_svg(0.5, {.low = 0.0, .high = 1.0}, std::numeric_limits<double>::quiet_NaN(), 110);
+  EXPECT_THAT(bar, AllOf(HasSubstr("x1=\"5.0\" x2=\"105.0\""), HasSubstr("cx=\"55.0\""), Not(HasSubstr("null"))));
+  EXPECT_THAT(interval_bar_svg(0.5, {.low = 0.4, .high = 0.6}, 0.25, 110), HasSubstr("class=\"null\" x1=\"30.0\""));
+}
+
+}  // namespace
+}  // namespace duet

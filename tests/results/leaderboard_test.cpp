@@ -1,0 +1,239 @@
+#include "results/leaderboard.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/require.h"
+#include "results/interval_plot.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::episode;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+LeaderboardEntry entry_of(const std::vector<LeaderboardEntry>& entries, const std::string& policy,
+                          const std::string& task) {
+  const auto found = std::find_if(entries.begin(), entries.end(), [&](const LeaderboardEntry& entry) {
+    return entry.policy == policy && entry.task == task;
+  });
+  if (found == entries.end()) throw std::runtime_error("no entry " + policy + " " + task);
+  return *found;
+}
+
+// 20 hugs and 10 waves of "replay" and of the null arm. Hug: 16 and 2 succeed, waves: 9 and 5.
+std::vector<EpisodeRow> small_benchmark() {
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 20; ++i) {
+    rows.push_back(episode("replay", "hug", i, i < 16));
+    rows.push_back(episode("null", "hug", i, i < 2, "null"));
+  }
+  for (int i = 0; i < 10; ++i) {
+    rows.push_back(episode("replay", "wave", i, i < 9));
+    rows.push_back(episode("null", "wave", i, i >= 5, "null"));
+  }
+  return rows;
+}
+
+std::size_t columns(const std::string& line) {
+  return static_cast<std::size_t>(std::count(line.begin(), line.end(), '|'));
+}
+
+TEST(Leaderboard, CountsAndIntervalsPerTaskAndOverAll) {
+  const std::vector<LeaderboardEntry> entries = leaderboard(small_benchmark());
+  ASSERT_EQ(entries.size(), 6U);
+  const LeaderboardEntry hug = entry_of(entries, "replay", "hug");
+  EXPECT_EQ(hug.n, 20);
+  EXPECT_EQ(hug.k, 16);
+  EXPECT_DOUBLE_EQ(hug.success, 0.8);
+  EXPECT_EQ(hug.interval.low, wilson(16, 20).low);
+  EXPECT_EQ(hug.interval.high, wilson(16, 20).high);
+  const LeaderboardEntry all = entry_of(entries, "replay", "all");
+  EXPECT_EQ(all.n, 30);
+  EXPECT_DOUBLE_EQ(all.success, 25.0 / 30.0);  // micro average: each episode counts the same
+}
+
+TEST(Leaderboard, LiftIsPairedWithTheNullArm) {
+  const std::vector<LeaderboardEntry> entries = leaderboard(small_benchmark());
+  const LeaderboardEntry wave = entry_of(entries, "replay", "wave");
+  EXPECT_EQ(wave.pairs, 10);
+  EXPECT_DOUBLE_EQ(wave.null_success, 0.5);
+  EXPECT_DOUBLE_EQ(wave.lift, 0.4);
+  // Waves 5 to 8 succeed in both arms, 0 to 4 with the policy only, 9 with the null arm only.
+  const Interval expected = newcombe_paired(4, 5, 1, 0);
+  EXPECT_EQ(wave.lift_interval.low, expected.low);
+  EXPECT_EQ(wave.lift_interval.high, expected.high);
+  const LeaderboardEntry null_wave = entry_of(entries, "null", "wave");
+  EXPECT_EQ(null_wave.arm, "null");
+  EXPECT_TRUE(std::isnan(null_wave.lift));
+}
+
+TEST(Leaderboard, LiftCoversOnlyEpisodesThatTheNullArmHas) {
+  std::vector<EpisodeRow> rows = small_benchmark();
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.arm == "null" && row.task == "hug" && row.episode >= 4; });
+  const LeaderboardEntry hug = entry_of(leaderboard(rows), "replay", "hug");
+  EXPECT_EQ(hug.n, 20);
+  EXPECT_EQ(hug.pairs, 4);
+  EXPECT_DOUBLE_EQ(hug.null_success, 0.5);
+  EXPECT_DOUBLE_EQ(hug.lift, 0.5);
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.arm == "null"; });
+  const std::vector<LeaderboardEntry> alone = leaderboard(rows);
+  EXPECT_TRUE(std::isnan(entry_of(alone, "replay", "hug").lift));
+  EXPECT_THAT(leaderboard_markdown(alone), HasSubstr("The null arm was not run"));
+}
+
+TEST(Leaderboard, ANullArmUnderAnotherConditionDoesNotPair) {
+  for (std::string EpisodeRow::*field : {&EpisodeRow::engine, &EpisodeRow::controller, &EpisodeRow::perturbation}) {
+    std::vector<EpisodeRow> rows = {episode("replay", "hug", 0, true), episode("null", "hug", 0, false, "null")};
+    rows[1].*field = "other";
+    EXPECT_EQ(entry_of(leaderboard(rows), "replay", "hug").pairs, 0);
+  }
+}
+
+TEST(Leaderboard, WhatDidNotEndWellFailsAndIsShown) {
+  std::vector<EpisodeRow> rows;
+  for (const Outcome outcome :
+       {Outcome::kOk, Outcome::kFell, Outcome::kDiverged, Outcome::kTimedOut, Outcome::kError, Outcome::kUnsupported}) {
+    rows.push_back(episode("replay", "hug", static_cast<int>(rows.size()), true));
+    rows.back().outcome = outcome;
+    rows.back().verdicts = {Verdict{"robot", "strict", true, {}, {}, {}, 0}};
+  }
+  rows.push_back(episode("replay", "hug", 6, true));
+  rows.back().success.reset();
+  const LeaderboardEntry entry = entry_of(leaderboard(rows), "replay", "hug");
+  EXPECT_EQ(entry.n, 7);
+  EXPECT_EQ(entry.k, 2);  // ok, and fell after it had succeeded
+  EXPECT_EQ(entry.fell, 1);
+  EXPECT_EQ(entry.diverged, 1);
+  EXPECT_EQ(entry.timed_out, 1);
+  EXPECT_EQ(entry.errors, 1);
+  EXPECT_EQ(entry.unsupported, 1);
+  EXPECT_EQ(entry.unjudged, 1);
+  EXPECT_DOUBLE_EQ(entry.other_success.at("robot/strict"), 2.0 / 7.0);
+  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)),
+              AllOf(HasSubstr("1 episodes were not supported"), HasSubstr("1 episodes have no headline verdict")));
+}
+
+TEST(Leaderboard, MetricsAreMeansOverEpisodesThatHaveThem) {
+  std::vector<EpisodeRow> rows = {episode("replay", "hug", 0, true), episode("replay", "hug", 1, true),
+                                  episode("replay", "wave", 2, true)};
+  rows[0].metrics = {{"jpe", 1.0}, {"lar", 5.0}};
+  rows[1].metrics = {{"jpe", 2.0}};
+  rows[2].metrics = {{"jpe", 6.0}};
+  const std::vector<LeaderboardEntry> entries = leaderboard(rows);
+  EXPECT_DOUBLE_EQ(entry_of(entries, "replay", "hug").metrics.at("jpe"), 1.5);
+  EXPECT_DOUBLE_EQ(entry_of(entries, "replay", "hug").metrics.at("lar"), 5.0);
+  EXPECT_DOUBLE_EQ(entry_of(entries, "replay", "all").metrics.at("jpe"), 3.0);
+}
+
+TEST(Leaderboard, DoesNotDependOnTheOrderOfRows) {
+  std::vector<EpisodeRow> rows = small_benchmark();
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i].metrics = {{"jpe", 0.1 * static_cast<double>(i) + 1e-9}};
+  const nlohmann::json forward = leaderboard_json(leaderboard(rows));
+  std::reverse(rows.begin(), rows.end());
+  EXPECT_EQ(leaderboard_json(leaderboard(rows)), forward);
+}
+
+TEST(Leaderboard, IsSortedWithTasksInTheirOrder) {
+  std::vector<EpisodeRow> rows;
+  for (const char* engine : {"ode", "mujoco"}) {
+    for (const char* task : {"fly_kiss", "bend", "juggle", "hug", "high_five"}) {
+      rows.push_back(episode("replay", task, 0, true));
+      rows.back().engine = engine;
+    }
+  }
+  std::vector<std::string> order;
+  for (const LeaderboardEntry& entry : leaderboard(rows)) order.push_back(entry.engine + " " + entry.task);
+  EXPECT_THAT(order, testing::ElementsAre("mujoco hug", "mujoco high_five", "mujoco bend", "mujoco fly_kiss",
+                                          "mujoco juggle", "mujoco all", "ode hug", "ode high_five", "ode bend",
+                                          "ode fly_kiss", "ode juggle", "ode all"));
+}
+
+TEST(Leaderboard, RefusesMixedSuitesAndEpisodesThatAreThereTwice) {
+  std::vector<EpisodeRow> rows = {episode("replay", "hug", 0, true), episode("replay", "hug", 1, true)};
+  rows[1].suite_version = "2.0.0";
+  EXPECT_THAT(thrown_message<InputError>([&] { leaderboard(rows); }),
+              AllOf(HasSubstr("tiny@1.0.0"), HasSubstr("tiny@2.0.0")));
+  rows[1] = rows[0];
+  EXPECT_THAT(thrown_message<InputError>([&] { leaderboard(rows); }),
+              HasSubstr("the episode hug hug-0 0 of mujoco/vmc/replay clean (main arm) is there twice"));
+}
+
+TEST(LeaderboardMarkdown, AlignsAndPrintsTheNullArmAsARow) {
+  const std::string text = leaderboard_markdown(leaderboard(small_benchmark()));
+  EXPECT_THAT(text, HasSubstr("Engine mujoco, controller vmc, perturbation clean."));
+  EXPECT_THAT(text, HasSubstr("Hug (20)"));
+  EXPECT_THAT(text, HasSubstr("| replay         |  30 | 83.3 [66.4, 92.7] |"));
+  EXPECT_THAT(text, HasSubstr("| null (control) |  30 |"));
+  EXPECT_THAT(text, HasSubstr("Fewer than 30 episodes: Hug, Wave."));
+  std::size_t width = 0;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("|")) continue;
+    if (width == 0) width = line.size();
+    EXPECT_EQ(line.size(), width) << line;
+    EXPECT_EQ(columns(line), 11U);
+  }
+}
+
+TEST(LeaderboardMarkdown, EscapesNames) {
+  std::vector<EpisodeRow> rows = {episode("a|b\n<c> <5", "hug", 0, true)};
+  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("a\\|b &lt;c> <5"));
+  EXPECT_EQ(leaderboard_markdown({}), "No episodes.\n");
+}
+
+TEST(LeaderboardMarkdown, NullArmComesAfterThePoliciesOfItsEngine) {
+  std::vector<EpisodeRow> rows = {episode("zeta", "hug", 0, true), episode("null", "hug", 0, true, "null"),
+                                  episode("clip", "hug", 0, true, "oracle"), episode("alpha", "hug", 0, true)};
+  const std::string text = leaderboard_markdown(leaderboard(rows));
+  EXPECT_LT(text.find("| alpha"), text.find("| zeta"));
+  EXPECT_LT(text.find("| zeta"), text.find("| clip (oracle arm)"));
+  EXPECT_LT(text.find("| clip (oracle arm)"), text.find("| null (control)"));
+}
+
+TEST(LeaderboardCsv, FollowsRfc4180) {
+  std::vector<EpisodeRow> rows = {episode("say \"hi\", twice", "hug", 0, true)};
+  rows[0].metrics = {{"jpe", 0.1}};
+  const std::string text = leaderboard_csv(leaderboard(rows));
+  EXPECT_THAT(text, testing::StartsWith("engine,controller,policy,perturbation,arm,task,n,k,success,"));
+  EXPECT_THAT(text, HasSubstr("mujoco,vmc,\"say \"\"hi\"\", twice\",clean,main,hug,1,1,1,"));
+  EXPECT_THAT(text, HasSubstr(",metric:jpe\r\n"));
+  EXPECT_THAT(text, testing::EndsWith(",0.1\r\n"));
+  EXPECT_THAT(text, Not(HasSubstr("nan")));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 3);
+}
+
+TEST(LeaderboardLatex, IsABooktabsTabularWithEscapedNames) {
+  const std::string text = leaderboard_latex(leaderboard({episode("d_star 100% & co", "high_five", 0, true)}));
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("\\begin{tabular}{lrrrrrrrr}"), HasSubstr("\\toprule"), HasSubstr("\\midrule"),
+                    HasSubstr("d\\_star 100\\% \\& co & 1 & 100.0 [20.7, 100.0] & -"), HasSubstr("\\bottomrule")));
+}
+
+TEST(LeaderboardJson, HasNullWhereThereIsNoNullArm) {
+  const nlohmann::json json = leaderboard_json(leaderboard({episode("replay", "hug", 0, true)}));
+  const nlohmann::json& entry = json.at("entries").at(0);
+  EXPECT_TRUE(entry.at("null_success").is_null());
+  EXPECT_TRUE(entry.at("lift_interval").at(0).is_null());
+  EXPECT_EQ(entry.at("k"), 1);
+  EXPECT_THAT(json.dump(), Not(HasSubstr("nan")));
+}
+
+TEST(IntervalPlot, StandsAloneAndEscapes) {
+  const std::string svg =
+      interval_plot_svg(leaderboard({episode("a<b", "hug", 0, true), episode("c", "hug", 0, true)}));
+  EXPECT_THAT(svg,
+              AllOf(testing::StartsWith("<svg xmlns="), HasSubstr("a&lt;b"), HasSubstr("prefers-color-scheme:dark"),
+                    HasSubstr("100.0 [20.7, 100.0]"), Not(HasSubstr("nan"))));
+  EXPECT_THAT(interval_plot_svg({}), testing::EndsWith("</svg>\n"));
+}
+
+}  // namespace
+}  // namespace duet
