@@ -31,6 +31,7 @@ std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
           {"stage2-rate", &o.schedule.stage2_rate},
           {"stage2-contact-scale", &o.schedule.stage2_contact_scale},
           {"keep-moments", &o.schedule.keep_moments},
+          {"adam-epsilon", &o.schedule.epsilon},
           {"kin-loss", &o.kin_loss},
           {"contact-reduction", &o.contact_reduction},
           {"contact-blocks", &o.contact_blocks},

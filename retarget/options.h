@@ -23,6 +23,7 @@ struct PairSchedule {
   double stage2_rate = 0.005;
   double stage2_contact_scale = 10.0;
   bool keep_moments = true;  // Adam's moments across the stages
+  double epsilon = 1e-8;     // Adam's, not given in the text: the common default
 };
 
 enum class KinLoss { kSquared, kMeanNorm };                  // sum of squares over pairs, 1/T | PHC's mean norm

@@ -152,7 +152,7 @@ pair_kernel::Step LaneSolver::make_step(const PairIteration& iteration) const {
   step.acceleration = static_cast<float>(2.0 * w.temp * w.acceleration * frames / (frames - 2.0));
   step.rate = static_cast<float>(iteration.rate / (1.0 - std::pow(0.9, iteration.adam_step)));
   step.square = static_cast<float>(1.0 / std::sqrt(1.0 - std::pow(0.999, iteration.adam_step)));
-  step.epsilon = static_cast<float>(1e-8 * frames);
+  step.epsilon = static_cast<float>(iteration.epsilon * frames);
   for (int r = 0; r < 3; ++r) step.offset[r] = static_cast<float>(offset_[r]);
   return step;
 }
@@ -203,7 +203,7 @@ void LaneSolver::move_offset(const PairIteration& iteration, const Eigen::Vector
   offset_square_ = 0.999 * offset_square_ + 0.001 * gradient.array().square();
   const double k = iteration.adam_step;
   const Eigen::Array3d root = (offset_square_ / (1.0 - std::pow(0.999, k))).sqrt();
-  offset_ -= iteration.rate / (1.0 - std::pow(0.9, k)) * offset_mean_ / (root + 1e-8);
+  offset_ -= iteration.rate / (1.0 - std::pow(0.9, k)) * offset_mean_ / (root + iteration.epsilon);
 }
 
 // Block b < 0 or b >= blocks holds the neighbours in time of the first and last blocks: the same rows of another

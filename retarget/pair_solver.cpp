@@ -43,7 +43,7 @@ class ReferenceSolver {
     square = 0.999 * square + 0.001 * g.square();
     const double rate = iteration.rate / (1.0 - std::pow(0.9, iteration.adam_step));
     const double bias = 1.0 / std::sqrt(1.0 - std::pow(0.999, iteration.adam_step));
-    x -= rate * mean / (bias * square.sqrt() + 1e-8);
+    x -= rate * mean / (bias * square.sqrt() + iteration.epsilon);
   }
 
   const PairProblem& problem_;
@@ -73,6 +73,7 @@ PairIteration pair_iteration(const PairOptions& options, int iteration) {
   out.weights = options.weights;
   if (second) out.weights.con *= schedule.stage2_contact_scale;
   out.rate = second ? schedule.stage2_rate : schedule.stage1_rate;
+  out.epsilon = schedule.epsilon;
   out.adam_step = iteration + 1 - (restarted ? schedule.stage1_iterations : 0);
   out.reset = restarted && iteration == schedule.stage1_iterations;
   return out;

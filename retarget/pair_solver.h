@@ -30,6 +30,7 @@ KernelKind choose_kernel(const PairProblem& problem, const PairOptions& options)
 struct PairIteration {
   PairWeights weights;
   double rate = 0.0;
+  double epsilon = 1e-8;
   int adam_step = 1;   // 1 after the moments are (re)set
   bool reset = false;  // Adam's moments start from zero
 };

@@ -41,6 +41,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"stage2-rate", "0.25"},
                                                                    {"stage2-contact-scale", "3"},
                                                                    {"keep-moments", "off"},
+                                                                   {"adam-epsilon", "0.001"},
                                                                    {"kin-loss", "mean-norm"},
                                                                    {"contact-reduction", "mean"},
                                                                    {"contact-blocks", "cross-and-human"},

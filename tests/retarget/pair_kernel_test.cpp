@@ -1,8 +1,14 @@
-// The SIMD kernels against the double reference. Measured on these clips: objective within 2e-5, keypoints within 3 mm.
+// The SIMD kernels against the double reference.
+//
+// With Adam's usual epsilon the first steps are +-rate times the sign of the gradient, so that rounding is amplified:
+// moving the data of the double reference by 1e-7 m changes its own result by 1e-6 to 3e-4 of the objective. Agreement
+// of the gradients is therefore tested with a large epsilon, where the descent is smooth, to rounding; that of the
+// paper's schedule to what its own sensitivity allows.
 #include "retarget/pair_kernel.h"
 
 #include <gmock/gmock.h>
 
+#include <map>
 #include <thread>
 
 #include "core/require.h"
@@ -51,56 +57,72 @@ double largest_shift(const PairProblem& problem, const PairVariables& a, const P
   return shift;
 }
 
-void expect_agreement(const PairProblem& problem, const PairOptions& options, const std::string& what) {
+double relative_difference(double a, double b) { return std::abs(a - b) / std::abs(b); }
+
+// Smooth descent: every option's gradient, to rounding. Floats carry 6e-8; 60 steps accumulate some tens of it, and
+// w_temp's second differences lose two digits.
+void expect_same_descent(const PairProblem& problem, PairOptions options, const std::string& what) {
+  options.schedule.stage1_iterations = 40;
+  options.schedule.stage1_rate = 0.05;
+  options.schedule.stage2_iterations = 20;
+  options.schedule.stage2_rate = 0.02;
+  options.schedule.epsilon = 5.0 / problem.frames();  // gradients are of the order of 1 / T
   const PairSolution reference = solve(problem, options, KernelKind::kScalar);
-  const double expected = final_objective(problem, options, reference);
+  EXPECT_LT(reference.total[39], 0.98 * reference.total[0]) << what << ": the descent is too short to tell anything";
   for (const KernelKind kernel : lane_kernels()) {
     const PairSolution lanes = solve(problem, options, kernel);
     const std::string name = what + ", kernel " + std::string(to_string(kernel));
     EXPECT_EQ(lanes.kernel, kernel);
-    EXPECT_NEAR(final_objective(problem, options, lanes), expected, 1e-4 * expected) << name;
-    EXPECT_LT(largest_shift(problem, lanes.x, reference.x), 5e-3) << name;
-    ASSERT_EQ(lanes.total.size(), reference.total.size());
-    for (std::size_t i = 0; i < lanes.total.size(); i += 7) {
-      EXPECT_NEAR(lanes.total[i], reference.total[i], 1e-4 * reference.total[i]) << name << ", iteration " << i;
+    EXPECT_LT(largest_shift(problem, lanes.x, reference.x), 2e-5) << name;
+    ASSERT_EQ(lanes.terms.size(), reference.terms.size());
+    for (std::size_t i = 0; i < lanes.terms.size(); ++i) {
+      const PairTerms& a = lanes.terms[i];
+      const PairTerms& b = reference.terms[i];
+      const double scale = reference.total[i];
+      EXPECT_NEAR(lanes.total[i], scale, 5e-6 * scale) << name << ", iteration " << i;
+      EXPECT_NEAR(a.kin, b.kin, 1e-5 * b.kin) << name;
+      EXPECT_NEAR(a.con, b.con, 1e-5 * b.con) << name;
+      EXPECT_NEAR(a.hum, b.hum, 1e-4 * b.hum + 1e-9) << name;
+      EXPECT_NEAR(a.temp, b.temp, 1e-4 * b.temp + 1e-9) << name;
+      EXPECT_NEAR(a.pose, b.pose, 1e-4 * b.pose + 1e-9) << name;
     }
   }
 }
 
-TEST(PairKernel, FirstGradientStepAgreesToRounding) {
-  for (const RobotModel& robot : {test::g1(), test::slanted_robot()}) {
-    PairOptions options;
-    options.schedule = {.stage1_iterations = 3, .stage2_iterations = 2};
-    const PairProblem problem = make_pair_problem(test::random_clip(37, 1), robot, options);
-    const PairSolution reference = solve(problem, options, KernelKind::kScalar);
-    for (const KernelKind kernel : lane_kernels()) {
-      const PairSolution lanes = solve(problem, options, kernel);
-      for (int i = 0; i < 5; ++i) {
-        const PairTerms& a = lanes.terms[i];
-        const PairTerms& b = reference.terms[i];
-        // Sums of some thousand squares of floats: 1e-6 relative; the terms start from zero at the first iteration.
-        EXPECT_NEAR(a.kin, b.kin, 3e-6 * b.kin);
-        EXPECT_NEAR(a.con, b.con, 3e-6 * b.con);
-        EXPECT_NEAR(a.hum, b.hum, 1e-4 * b.hum + 1e-12);
-        EXPECT_NEAR(a.temp, b.temp, 1e-4 * b.temp + 1e-9);
-        EXPECT_NEAR(a.pose, b.pose, 1e-4 * b.pose + 1e-12);
+TEST(PairKernel, SmoothDescentIsTheReferencesForAnyLength) {
+  for (const int frames : {5, 6, 15, 16, 17, 31, 32, 33, 37, 250, 1007}) {
+    const PairOptions options;
+    expect_same_descent(make_pair_problem(test::random_clip(frames, frames), test::g1(), options), options,
+                        "frames " + std::to_string(frames));
+  }
+}
+
+TEST(PairKernel, SmoothDescentOnSlantedAxesFarFromTheOrigin) {
+  InteractionClip clip = test::random_clip(37, 3);
+  for (HumanMotion* person : {&clip.a, &clip.b}) {
+    for (int t = 0; t < 37; ++t) person->joints.frame(t).colwise() += Eigen::Vector3d(300.0, -200.0, 0.0);
+  }
+  const PairOptions options;
+  expect_same_descent(make_pair_problem(clip, test::slanted_robot(), options), options, "slanted");
+}
+
+// Means over seeds: a single sequence may lie on the edge of a sign.
+TEST(PairKernel, PapersScheduleEndsWhereTheReferenceDoes) {
+  const PairOptions options;
+  for (const auto& [frames, seeds] : {std::pair{5, 30}, {37, 12}, {1007, 2}}) {
+    std::map<KernelKind, double> difference;
+    for (int seed = 1; seed <= seeds; ++seed) {
+      const PairProblem problem = make_pair_problem(test::random_clip(frames, seed), test::g1(), options);
+      const PairSolution reference = solve(problem, options, KernelKind::kScalar);
+      const double expected = final_objective(problem, options, reference);
+      for (const KernelKind kernel : lane_kernels()) {
+        const PairSolution lanes = solve(problem, options, kernel);
+        difference[kernel] += relative_difference(final_objective(problem, options, lanes), expected) / seeds;
+        EXPECT_LT(largest_shift(problem, lanes.x, reference.x), 5e-3) << frames << " frames, seed " << seed;
       }
     }
+    for (const auto& [kernel, mean] : difference) EXPECT_LT(mean, 1e-4) << frames << " frames, " << to_string(kernel);
   }
-}
-
-TEST(PairKernel, PaperModeAgreesWithTheReferenceForAnyLength) {
-  for (const auto& [frames, seed] : {std::pair{5, 1U}, {6, 2U}, {16, 3U}, {17, 4U}, {37, 5U}, {37, 6U}, {250, 7U}}) {
-    const PairOptions options;
-    const PairProblem problem = make_pair_problem(test::random_clip(frames, seed), test::g1(), options);
-    expect_agreement(problem, options, "frames " + std::to_string(frames));
-  }
-}
-
-TEST(PairKernel, PaperModeAgreesWithTheReferenceAtThePapersLength) {
-  const PairOptions options;
-  const PairProblem problem = make_pair_problem(test::random_clip(1007, 8), test::g1(), options);
-  expect_agreement(problem, options, "frames 1007");
 }
 
 TEST(PairKernel, EveryOptionAgreesWithTheReference) {
@@ -113,12 +135,12 @@ TEST(PairKernel, EveryOptionAgreesWithTheReference) {
   for (const auto& [name, value] : changes) {
     PairOptions options;
     set_pair_option(options, name, value);
-    expect_agreement(make_pair_problem(clip, test::g1(), options), options, name + "=" + value);
+    expect_same_descent(make_pair_problem(clip, test::g1(), options), options, name + "=" + value);
   }
   PairOptions options;
   options.adapt_human = false;
   options.root_translation = RootTranslation::kPerFrame;
-  expect_agreement(make_pair_problem(clip, test::g1(), options), options, "no human, root per frame");
+  expect_same_descent(make_pair_problem(clip, test::g1(), options), options, "no human, root per frame");
 }
 
 TEST(PairKernel, Avx2AndAvx512GiveTheSameBits) {
@@ -179,7 +201,9 @@ TEST(PairKernel, UnavailableKernelIsRefusedByName) {
   const PairProblem problem = make_pair_problem(test::random_clip(5, 14), test::g1(), options);
   for (const KernelKind kernel : {KernelKind::kV3, KernelKind::kV4}) {
     if (kernel_runs_here(kernel)) {
-      EXPECT_EQ(choose_kernel(problem, {.kernel = kernel}), kernel);
+      PairOptions named;
+      named.kernel = kernel;
+      EXPECT_EQ(choose_kernel(problem, named), kernel);
       continue;
     }
     EXPECT_THAT(test::thrown_message<MissingError>([&] { solve(problem, options, kernel); }),

@@ -56,7 +56,7 @@ TEST(PairTree, ParentIsTheNearestPairedAncestor) {
   EXPECT_EQ(tree.parent, expected);
   std::array<bool, kRetargetPairs> seen{};
   for (const int i : tree.order) {
-    if (tree.parent[i] >= 0) EXPECT_TRUE(seen[tree.parent[i]]) << i;
+    EXPECT_TRUE(tree.parent[i] < 0 || seen[tree.parent[i]]) << i;
     seen[i] = true;
   }
 }
