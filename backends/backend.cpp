@@ -83,8 +83,7 @@ Backend::Backend(Scene scene) : scene_(checked(std::move(scene))) {
 
 void Backend::reset(const RobotState& state) {
   check_pose(state.X_WB, "Backend::reset");
-  require(state.v_WB.allFinite() && state.w_WB_B.allFinite(),
-          "Backend::reset: the velocity of the base is not finite");
+  require(state.v_WB.allFinite() && state.w_WB_B.allFinite(), "Backend::reset: the velocity of the base is not finite");
   check_vector(state.q, *scene_.robot, "Backend::reset: q", true);
   check_vector(state.v, *scene_.robot, "Backend::reset: v", true);
   state_ = state;
@@ -159,8 +158,9 @@ void Backend::restore(const Snapshot& snapshot) {
 
 void Backend::push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) {
   const int links = static_cast<int>(scene_.robot->links.size());
-  require(link >= 0 && link < links,
-          fmt::format("Backend::push: link {} of {}, expected 0 to {}", link, scene_.robot->name, links - 1));
+  if (link < 0 || link >= links)
+    throw std::invalid_argument(
+        fmt::format("Backend::push: link {} of {}, expected 0 to {}", link, scene_.robot->name, links - 1));
   require(f_W.allFinite() && p_W.allFinite(), "Backend::push: force or point is not finite");
   do_push(link, f_W, p_W);
 }

@@ -57,8 +57,8 @@ class Backend {
   [[nodiscard]] double time() const { return static_cast<double>(steps_) * scene_.dt; }  // since reset [s]
 
   [[nodiscard]] Snapshot snapshot() const;
-  // Continues as bitwise the same run; contacts() is empty until the next step. Throws std::invalid_argument for another
-  // scene's size.
+  // Continues as bitwise the same run; contacts() is empty until the next step. Throws std::invalid_argument for
+  // another scene's size.
   void restore(const Snapshot& snapshot);
 
   // Adds a force on a link for the following steps until called again for that link (with zero: no force). The force

@@ -41,8 +41,7 @@ const Eigen::VectorXd& ContactForces::solve(const Matrix6Xd& G, const Vector6d& 
     const Vector6d residual = A_ * y_ - target;
     f_.noalias() = y_ - step * regularisation_ * (y_ - f_rest);
     f_.noalias() -= step * (A_.transpose() * residual);
-    for (Eigen::Index i = 0; i < f_.size(); i += 3)
-      f_.segment<3>(i) = project_on_pyramid(f_.segment<3>(i), friction_);
+    for (Eigen::Index i = 0; i < f_.size(); i += 3) f_.segment<3>(i) = project_on_pyramid(f_.segment<3>(i), friction_);
     const double next = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * momentum * momentum));
     y_ = f_ + (momentum - 1.0) / next * (f_ - previous_);
     momentum = next;

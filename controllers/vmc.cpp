@@ -19,15 +19,15 @@
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;              // [s], 50 Hz
-constexpr int kIterations = 120;            // of the contact forces
-constexpr double kRegularisation = 1e-6;    // of contact forces: of two that do the same, the even one
-constexpr double kSoleDamping = 10.0;       // of a sole that moves although it should not [1/s]
-constexpr double kSingular = 1e-4;          // damping of a straight leg's Jacobian
-constexpr double kStopMargin = 0.02;        // of the upper body's targets to their stops [rad]
-constexpr double kYawRange = 0.3;           // of the pelvis against the feet [rad]
-constexpr double kTiltRange = 0.3;          // largest error that is acted on [rad]
-constexpr double kLeanRange = 0.05;         // of the centre of mass against a steady push [m]
+constexpr double kTick = 0.02;                  // [s], 50 Hz
+constexpr int kIterations = 120;                // of the contact forces
+constexpr double kRegularisation = 1e-6;        // of contact forces: of two that do the same, the even one
+constexpr double kSoleDamping = 10.0;           // of a sole that moves although it should not [1/s]
+constexpr double kSingular = 1e-4;              // damping of a straight leg's Jacobian
+constexpr double kStopMargin = 0.02;            // of the upper body's targets to their stops [rad]
+constexpr double kYawRange = 0.3;               // of the pelvis against the feet [rad]
+constexpr double kTiltRange = 0.3;              // largest error that is acted on [rad]
+constexpr double kLeanRange = 0.05;             // of the centre of mass against a steady push [m]
 const Eigen::Vector2d kShiftRange(0.02, 0.03);  // along x and y of the stance: what of the root's place is followed [m]
 
 using Matrix6 = Matrix6d;
@@ -38,6 +38,7 @@ class Vmc final : public Controller {
       : robot_(std::move(robot)),
         options_(options),
         kinematics_(*robot_),
+        dynamics_(*robot_),
         stance_(*robot_),
         card_(robot_->default_command(robot_->neutral)),
         lower_(robot_->lower()),
@@ -72,13 +73,17 @@ class Vmc final : public Controller {
     stance_yaw_ = yaw_of(state.X_WB.R);
     root_rest_ = state.X_WB.p.head<2>() - kinematics_.center_of_mass().head<2>() + center_.head<2>();
     lean_.setZero();
+    push_.setZero();
+    first_tick_ = true;
     forces_.restart(f_rest_);
   }
 
   void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
     observe(state);
+    feel_push();
     move_upper(state, reference);
     keep_soles();
+    shift_ = shift(reference);
     const Vector6d wanted = wanted_motion(state, reference);
     const Eigen::VectorXd& f = plan_forces(state, wanted);
     lean_against(f);
@@ -94,12 +99,24 @@ class Vmc final : public Controller {
     velocity_.head<3>() = state.v_WB;
     velocity_.segment<3>(3) = state.w_WB_B;
     velocity_.tail(robot_->dof()) = state.v;
-    bias_forces(*robot_, state, bias_);
-    mass_matrix(*robot_, state, mass_);
+    dynamics_.bias_forces(state, bias_);
+    dynamics_.mass_matrix(state, mass_);
     kinematics_.center_of_mass_jacobian(J_com_);
     stance_.points_of(kinematics_, points_);
     stance_.jacobian_of(kinematics_, points_, J_);
     center_ = points_.rowwise().mean();
+  }
+
+  // What the planned forces do not explain of the momentum's change over the last tick is a push from outside.
+  void feel_push() {
+    const Eigen::Vector2d momentum = weight_ / kGravity * (J_com_.topRows<2>() * velocity_);
+    if (!first_tick_) {
+      const Eigen::Vector2d felt = (momentum - momentum_) / kTick - planned_;
+      push_ += options_.push_gain * (felt - push_);
+      push_ *= std::min(1.0, options_.push_range / std::max(push_.norm(), 1e-9));
+    }
+    momentum_ = momentum;
+    first_tick_ = false;
   }
 
   // Mean acceleration of the upper body over the tick under the card's gains, taken linearly implicitly:
@@ -145,15 +162,23 @@ class Vmc final : public Controller {
   [[nodiscard]] Vector6d wanted_motion(const RobotState& state, const Reference& reference) const {
     const Eigen::Vector2d com = kinematics_.center_of_mass().head<2>();
     const Eigen::Vector2d com_velocity = J_com_.topRows<2>() * velocity_;
-    const Eigen::Vector2d target = center_.head<2>() + shift(reference) + lean_;
+    const Eigen::Vector2d target = center_.head<2>() + shift_ + lean();
     Vector6d wanted;
     wanted.head<2>() = options_.com_stiffness * (target - com) - options_.com_damping * com_velocity;
     const double height = state.X_WB.p.z() - center_.z();
     wanted[2] =
         options_.height_stiffness * (robot_->standing_height - height) - options_.height_damping * state.v_WB.z();
-    wanted.tail<3>() = options_.tilt_stiffness * tilt_error(state, reference) -
-                       options_.tilt_damping * (state.X_WB.R * state.w_WB_B);
+    wanted.tail<3>() =
+        options_.tilt_stiffness * tilt_error(state, reference) - options_.tilt_damping * (state.X_WB.R * state.w_WB_B);
     return wanted;
+  }
+
+  // Where the centre of mass is to be against the middle of the soles so that the centre of pressure is there under the
+  // push.
+  [[nodiscard]] Eigen::Vector2d lean() const {
+    const double height = kinematics_.center_of_mass().z() - center_.z();
+    const Eigen::Vector2d lean = lean_ - height / weight_ * push_;
+    return std::min(1.0, kLeanRange / std::max(lean.norm(), 1e-9)) * lean;
   }
 
   // What of the root's place against the resting one is followed.
@@ -179,7 +204,8 @@ class Vmc final : public Controller {
     Y(2, 2) = 1.0;
     Y.bottomRightCorner<3, 3>() = state.X_WB.R.toRotationMatrix();
     const Matrix6 base_mass = mass_.topRows<6>() * T_;
-    const Vector6d base_bias = bias_.head<6>() + mass_.topRows<6>() * t_;
+    Vector6d base_bias = bias_.head<6>() + mass_.topRows<6>() * t_;
+    base_bias.noalias() -= J_com_.topLeftCorner<2, 6>().transpose() * push_;  // taken to act at the centre of mass
     const Eigen::PartialPivLU<Matrix6> solver(base_mass);
     A_ = J_.leftCols<6>().transpose();
     const Matrix6 inverse = solver.inverse();
@@ -197,16 +223,19 @@ class Vmc final : public Controller {
     return f;
   }
 
-  // Under a steady push the centre of pressure leaves the middle: lean until it is back.
+  // Under a steady push the centre of pressure leaves its place (the middle, shifted as the reference asks): lean until
+  // it is back.
   void lean_against(const Eigen::VectorXd& f) {
     double total = 0.0;
+    planned_.setZero();
     Eigen::Vector2d moment = Eigen::Vector2d::Zero();
     for (int i = 0; i < stance_.points(); ++i) {
+      planned_ += f.segment<2>(3 * i);
       total += f[3 * i + 2];
       moment += f[3 * i + 2] * points_.col(i).head<2>();
     }
     if (total < 0.1 * weight_) return;
-    lean_ -= options_.pressure_gain * kTick * (moment / total - center_.head<2>());
+    lean_ -= options_.pressure_gain * kTick * (moment / total - center_.head<2>() - shift_);
     lean_ *= std::min(1.0, kLeanRange / std::max(lean_.norm(), 1e-9));
   }
 
@@ -240,6 +269,7 @@ class Vmc final : public Controller {
   std::shared_ptr<const RobotModel> robot_;
   VmcOptions options_;
   Kinematics kinematics_;
+  Dynamics dynamics_;
   Stance stance_;
   JointCommand card_;
   Eigen::VectorXd lower_, upper_;
@@ -249,14 +279,19 @@ class Vmc final : public Controller {
   // Since reset.
   double stance_yaw_ = 0.0;
   Eigen::Vector2d root_rest_ = Eigen::Vector2d::Zero();  // of the root, with the centre of mass over the soles
-  Eigen::Vector2d lean_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d lean_ = Eigen::Vector2d::Zero();       // that brought the centre of pressure to the middle [m]
+  Eigen::Vector2d push_ = Eigen::Vector2d::Zero();       // felt from outside [N]
+  Eigen::Vector2d momentum_ = Eigen::Vector2d::Zero();   // a tick ago [N s]
+  Eigen::Vector2d planned_ = Eigen::Vector2d::Zero();    // sum of the contact forces planned then [N]
+  bool first_tick_ = true;
 
   // Of this tick.
+  Eigen::Vector2d shift_ = Eigen::Vector2d::Zero();
   Eigen::VectorXd velocity_, bias_, t_, a_, effort_, f_rest_, upper_pull_;
-  Eigen::MatrixXd mass_, J_, J_com_, J_sole_, upper_mass_;
+  Eigen::MatrixXd mass_, J_, J_com_, upper_mass_;
   Eigen::Matrix<double, Eigen::Dynamic, 6> T_;
   Eigen::Matrix3Xd points_;
-  Matrix6Xd G_, A_;
+  Matrix6Xd J_sole_, G_, A_;
   Eigen::LLT<Eigen::MatrixXd> upper_solver_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();  // of the soles' points
 };

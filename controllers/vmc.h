@@ -14,17 +14,19 @@ namespace duet {
 
 // Gains of the wanted accelerations [1/s^2 and 1/s], and the weights of missing them.
 struct VmcOptions {
-  double com_stiffness = 20.0;
-  double com_damping = 10.0;
+  double com_stiffness = 43.0;
+  double com_damping = 15.0;
   double height_stiffness = 60.0;
   double height_damping = 15.0;
   double tilt_stiffness = 80.0;
   double tilt_damping = 12.0;
   double com_weight = 1.0;
   double height_weight = 1.0;
-  double tilt_weight = 0.2;
-  double yaw_weight = 0.2;
+  double tilt_weight = 0.1;
+  double yaw_weight = 0.1;
   double pressure_gain = 0.7;        // of moving the centre of mass until the centre of pressure is central [1/s]
+  double push_gain = 0.3;            // of the estimate of a push per tick, in [0, 1]; 0: pushes are not estimated
+  double push_range = 40.0;          // largest push that is compensated [N]
   double leg_stiffness_share = 0.3;  // of the card's gains, around the predicted motion of the legs
   double leg_damping_share = 0.5;
   double friction = 0.5;  // that the planned forces rely on

@@ -149,8 +149,8 @@ class MujocoBackend final : public Backend {
 
   void check_buffers() const {
     if (d_.warning[mjWARN_CONTACTFULL].number + d_.warning[mjWARN_CNSTRFULL].number == 0) return;
-    throw std::runtime_error(fmt::format("mujoco: more than {} contacts or {} constraint rows in one step",
-                                         m_.nconmax, m_.njmax));
+    throw std::runtime_error(
+        fmt::format("mujoco: more than {} contacts or {} constraint rows in one step", m_.nconmax, m_.njmax));
   }
 
   void read_contacts() {
@@ -228,9 +228,7 @@ class MujocoBackend final : public Backend {
 
 }  // namespace
 
-EngineInfo mujoco_info() {
-  return {.name = "mujoco", .available = true, .version = mj_versionString(), .reason = ""};
-}
+EngineInfo mujoco_info() { return {.name = "mujoco", .available = true, .version = mj_versionString(), .reason = ""}; }
 
 std::unique_ptr<Backend> make_mujoco_backend(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
 

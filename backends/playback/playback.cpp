@@ -66,8 +66,8 @@ class Playback final : public Backend {
 
   void do_snapshot(Snapshot& snapshot) const override {
     std::vector<double>& values = snapshot.values;
-    values.insert(values.end(), {has_pending_ ? 1.0 : 0.0, static_cast<double>(follows_),
-                                 static_cast<double>(steps_since_follow_)});
+    values.insert(values.end(),
+                  {has_pending_ ? 1.0 : 0.0, static_cast<double>(follows_), static_cast<double>(steps_since_follow_)});
     values.insert(values.end(), pending_.X_WB.p.data(), pending_.X_WB.p.data() + 3);
     values.insert(values.end(), pending_.X_WB.R.coeffs().data(), pending_.X_WB.R.coeffs().data() + 4);
     values.insert(values.end(), pending_.q.data(), pending_.q.data() + pending_.q.size());

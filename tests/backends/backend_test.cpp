@@ -14,8 +14,8 @@
 namespace duet {
 namespace {
 
-using ::testing::HasSubstr;
 using test::thrown_message;
+using ::testing::HasSubstr;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -102,7 +102,9 @@ TEST_F(BackendChecks, FollowPartnerAndPushRefuseBadValues) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(2, zero, zero); }),
               HasSubstr("link 2 of wheel, expected 0 to 1"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(-1, zero, zero); }), HasSubstr("link -1"));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->push(0, {kNan, 0, 0}, zero); }),
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
+                backend->push(0, {kNan, 0, 0}, zero);
+              }),
               HasSubstr("not finite"));
 }
 

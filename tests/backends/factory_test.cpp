@@ -10,8 +10,8 @@
 namespace duet {
 namespace {
 
-using ::testing::HasSubstr;
 using test::thrown_message;
+using ::testing::HasSubstr;
 
 Scene sledge_scene() {
   Scene scene;
@@ -42,8 +42,7 @@ TEST(Factory, MakesWhatItListsAsAvailableAndRefusesTheRestByName) {
 }
 
 TEST(Factory, RefusesAnUnknownEngineWithTheNearestName) {
-  const std::string message =
-      thrown_message<std::invalid_argument>([] { make_backend("mujocco", sledge_scene()); });
+  const std::string message = thrown_message<std::invalid_argument>([] { make_backend("mujocco", sledge_scene()); });
   EXPECT_THAT(message, HasSubstr("unknown engine 'mujocco'"));
   EXPECT_THAT(message, HasSubstr("'mujoco'"));
   EXPECT_THAT(message, HasSubstr("playback"));

@@ -34,7 +34,8 @@ inline std::shared_ptr<RobotModel> sledge() {
   return robot;
 }
 
-// A wheel about z on a base so heavy that it does not move: the joint is alone. Wheel: 0.05 + 0.03 kg m^2 with armature.
+// A wheel about z on a base so heavy that it does not move: the joint is alone. Wheel: 0.05 + 0.03 kg m^2 with
+// armature.
 inline constexpr double kWheelInertia = 0.05;
 inline constexpr double kWheelArmature = 0.03;
 inline std::shared_ptr<RobotModel> wheel() {

@@ -1,0 +1,59 @@
+#include <gmock/gmock.h>
+
+#include "backends/factory.h"
+#include "controllers/controller.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+TEST(Controllers, AreMadeByNameAndKnowTheirs) {
+  EXPECT_EQ(controller_names(), (std::vector<std::string>{"pd", "vmc"}));
+  for (const std::string& name : controller_names()) {
+    const auto controller = make_controller(name, test::g1());
+    EXPECT_EQ(controller->name(), name);
+    EXPECT_FALSE(controller->walks());
+  }
+}
+
+TEST(Controllers, RefuseAnUnknownNameAndNoRobot) {
+  const std::string message = thrown_message<std::invalid_argument>([] { make_controller("vcm", test::g1()); });
+  EXPECT_THAT(message, HasSubstr("unknown controller 'vcm'"));
+  EXPECT_THAT(message, HasSubstr("'vmc'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_controller("pd", nullptr); }), HasSubstr("no robot"));
+}
+
+TEST(Pd, IsTheCardsGainsAroundTheReference) {
+  const auto robot = test::g1();
+  const auto pd = make_controller("pd", robot);
+  const RobotState state = robot->standing_state();
+  pd->reset(state);
+  Reference reference{state.X_WB, robot->neutral};
+  reference.q[3] += 0.1;
+  JointCommand command;
+  pd->act(state, reference, command);
+  const JointCommand expected = robot->default_command(reference.q);
+  EXPECT_EQ(command.q_target, expected.q_target);
+  EXPECT_EQ(command.kp, expected.kp);
+  EXPECT_EQ(command.kd, expected.kd);
+  EXPECT_EQ(command.tau_ff, expected.tau_ff);
+}
+
+// 2 x 40 N m/rad at the ankles hold less than m g h = 210 N m/rad: a fact of the gains, not a fault.
+TEST(Pd, FallsWithinOneToTwoSeconds) {
+  if (!engines()[1].available) GTEST_SKIP() << "not run: " << engines()[1].reason;
+  const Scene scene = test::g1_scene();
+  const auto backend = make_backend("mujoco", scene);
+  backend->reset(scene.robot->standing_state());
+  const JointCommand command = scene.robot->default_command(scene.robot->neutral);
+  while (backend->time() < 5.0 && backend->state().X_WB.p.z() > 0.45) ASSERT_EQ(backend->step(command), Outcome::kOk);
+  EXPECT_GT(backend->time(), 0.8);
+  EXPECT_LT(backend->time(), 2.0);
+}
+
+}  // namespace
+}  // namespace duet
