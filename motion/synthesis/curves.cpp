@@ -19,7 +19,10 @@ double ramp(double u) {
 }
 
 double glide(double u) {
-  const double x = 2.0 * std::clamp(u, 0.0, 1.0) - 1.0;
+  // Rounding would leave 1e-17 at the ends; a planted foot is to stand exactly still.
+  if (u <= 0.0) return 0.0;
+  if (u >= 1.0) return 1.0;
+  const double x = 2.0 * u - 1.0;
   const double x4 = x * x * x * x;
   return 0.5 + 0.5 * kGlidePeak * x * (1.0 - 0.4 * x4 + x4 * x4 / 9.0);
 }

@@ -11,10 +11,10 @@
 namespace duet::synthesis {
 namespace {
 
-constexpr double kSwingShare = 0.86;  // of the step time a foot is in the air
-constexpr double kHasty = 0.46;       // least time of a step [s]
-constexpr double kLongestStep = 0.7;  // in lengths of the leg
-constexpr double kRollShare = 0.22;   // of the step time the heel rises before the toe leaves
+constexpr double kSwingShare = 0.86;   // of the step time a foot is in the air
+constexpr double kHasty = 0.46;        // least time of a step [s]
+constexpr double kLongestStep = 0.74;  // in lengths of the leg
+constexpr double kRollShare = 0.22;    // of the step time the heel rises before the toe leaves
 
 Eigen::Vector2d rotated(double yaw, const Eigen::Vector2d& v) { return Eigen::Rotation2Dd(yaw) * v; }
 

@@ -1,0 +1,263 @@
+#include "motion/synthesis.h"
+
+#include <cmath>
+#include <set>
+
+#include "core/digest.h"
+#include "motion/synthesis/act.h"
+#include "motion/synthesis/stage.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+std::string digest(const InteractionClip& clip) {
+  Sha256 hash;
+  for (const HumanMotion* motion : {&clip.a, &clip.b}) {
+    hash.update(motion->joints.data());
+    for (const Eigen::Quaterniond& q : motion->rotations) hash.update(std::span<const double>(q.coeffs().data(), 4));
+  }
+  return hash.hex();
+}
+
+std::string refused(Task task, const SynthesisOptions& options) {
+  return test::thrown_message<std::invalid_argument>([&] { (void)synthesize(task, options); });
+}
+
+// Keys of `source` whose values differ between two clips.
+std::set<std::string> changed(const InteractionClip& a, const InteractionClip& b) {
+  std::set<std::string> keys;
+  for (const auto& [key, value] : a.source)
+    if (!b.source.contains(key) || b.source.at(key) != value) keys.insert(key);
+  for (const auto& [key, value] : b.source)
+    if (!a.source.contains(key)) keys.insert(key);
+  return keys;
+}
+
+double root_distance(const InteractionClip& clip, int frame) {
+  return (clip.a.joints.at(frame, kPelvis) - clip.b.joints.at(frame, kPelvis)).head<2>().norm();
+}
+
+double path_length(const PointTracks& joints, int joint, int begin, int end) {
+  double length = 0.0;
+  for (int t = begin + 1; t < end; ++t) length += (joints.at(t, joint) - joints.at(t - 1, joint)).norm();
+  return length;
+}
+
+TEST(Synthesis, SameArgumentsGiveTheSameBytes) {
+  for (const Task task : kTasks) {
+    SynthesisOptions options;
+    options.index = 4;
+    const InteractionClip first = synthesize(task, options), second = synthesize(task, options);
+    EXPECT_EQ(digest(first), digest(second)) << to_string(task);
+    EXPECT_EQ(first.source, second.source);
+    EXPECT_EQ(first.phases, second.phases);
+    EXPECT_EQ(first.contacts, second.contacts);
+  }
+}
+
+TEST(Synthesis, SeedIndexAndTaskChangeTheMotion) {
+  std::set<std::string> digests;
+  for (const Task task : {Task::kWave, Task::kBend})
+    for (const std::uint64_t seed : {42u, 43u})
+      for (const int index : {0, 1}) digests.insert(digest(synthesize(task, {.seed = seed, .index = index})));
+  EXPECT_EQ(digests.size(), 8u);
+}
+
+TEST(Synthesis, NamesTheClipAndRecordsWhatWasDrawn) {
+  const InteractionClip clip = synthesize(Task::kHighFive, {.seed = 42, .index = 7});
+  EXPECT_EQ(clip.id, "synth-high_five-s42-0007");
+  EXPECT_EQ(clip.task, Task::kHighFive);
+  EXPECT_EQ(clip.reactor, Person::kB);
+  for (const char* key : {"generator", "seed", "index", "a.height", "b.height", "distance", "angle", "side", "speed",
+                          "style", "duration", "target_height", "act.distance", "b.reaction"})
+    EXPECT_TRUE(clip.source.contains(key)) << key;
+}
+
+void expect_contacts_hold(const InteractionClip& clip) {
+  const double within = synthesis::act_of(clip.task).touch_distance;
+  EXPECT_EQ(clip.contacts.empty(), within == 0.0) << clip.id;
+  for (const ContactWindow& window : clip.contacts) {
+    EXPECT_GE(window.begin, clip.phases.act_begin);
+    EXPECT_LE(window.end, clip.phases.act_end + 1);
+    for (int t = window.begin; t < window.end; ++t)
+      ASSERT_LT((clip.a.joints.at(t, window.joint_a) - clip.b.joints.at(t, window.joint_b)).norm(), within)
+          << clip.id << " frame " << t;
+  }
+}
+
+TEST(Synthesis, TwentyClipsOfEachTaskAreValidAndTheirContactsHold) {
+  for (const Task task : kTasks)
+    for (int index = 0; index < 20; ++index) {
+      const InteractionClip clip = synthesize(task, {.seed = 5, .index = index});
+      ASSERT_NO_THROW(validate(clip)) << clip.id;
+      EXPECT_EQ(clip.rate_hz(), 50.0);
+      EXPECT_GT(clip.phases.act_begin, 0);
+      EXPECT_LT(clip.phases.act_begin, clip.phases.act_end);
+      EXPECT_LT(clip.phases.act_end, clip.frames());
+      EXPECT_EQ(clip.a.rotations.size(), static_cast<size_t>(clip.frames()) * kSmplJoints);
+      for (const ContactWindow& window : clip.contacts) EXPECT_GE(window.end - window.begin, 5) << clip.id;
+      expect_contacts_hold(clip);
+    }
+}
+
+TEST(Synthesis, ContactsHoldForAllBodiesSidesAndTargetHeights) {
+  for (const Task task : {Task::kHug, Task::kHandshake, Task::kHighFive}) {
+    const synthesis::Act& act = synthesis::act_of(task);
+    for (int corner = 0; corner < 32; ++corner) {
+      SynthesisOptions options;
+      options.height_a = corner & 1 ? 1.5 : 1.95;
+      options.height_b = corner & 2 ? 1.5 : 1.95;
+      options.side = corner & 4 ? Side::kLeft : Side::kRight;
+      options.target_height = corner & 8 ? act.lowest : act.highest;
+      options.distance = corner & 16 ? 2.0 : 5.0;
+      options.rate_hz = 25.0;  // only to save time
+      expect_contacts_hold(synthesize(task, options));
+    }
+  }
+}
+
+TEST(Synthesis, MeanDurationsAreThoseOfTableS6) {
+  const std::map<Task, double> mean = {{Task::kHug, 25.9},  {Task::kHandshake, 22.9}, {Task::kHighFive, 16.1},
+                                       {Task::kBend, 17.6}, {Task::kFlyKiss, 17.9},   {Task::kWave, 18.6}};
+  constexpr int kClips = 200;
+  for (const Task task : kTasks) {
+    double sum = 0.0;
+    for (int index = 0; index < kClips; ++index) {
+      synthesis::Draws draws(42, task, index);
+      const double seconds = synthesis::set_stage(task, {.index = index}, draws).frames / 50.0;
+      EXPECT_GE(seconds, 0.79 * mean.at(task));
+      EXPECT_LE(seconds, 1.21 * mean.at(task));
+      sum += seconds;
+    }
+    // Uniform within +-20 %: three standard errors of the mean are 3 * 0.2 / sqrt(3 n) = 2.5 %.
+    EXPECT_NEAR(sum / kClips, mean.at(task), 0.025 * mean.at(task)) << to_string(task);
+  }
+}
+
+TEST(Synthesis, HonoursHeightsDistanceAngleAndSpeed) {
+  SynthesisOptions options;
+  options.height_a = 1.55;
+  options.height_b = 1.90;
+  options.distance = 4.5;
+  options.angle = 0.4;
+  options.speed = 0.8;
+  const InteractionClip clip = synthesize(Task::kHandshake, options);
+  // Thighs are 0.245 of the height, give or take the legs' share of 2.5 %.
+  EXPECT_NEAR(bone_lengths(clip.a)[kLeftKnee], 0.245 * 1.55, 0.026 * 0.245 * 1.55);
+  EXPECT_NEAR(bone_lengths(clip.b)[kLeftKnee], 0.245 * 1.90, 0.026 * 0.245 * 1.90);
+  // Sway moves a standing root by less than 2 cm.
+  EXPECT_NEAR(root_distance(clip, 0), 4.5, 0.04);
+  const Eigen::Vector3d towards_b = clip.b.joints.at(0, kPelvis) - clip.a.joints.at(0, kPelvis);
+  EXPECT_NEAR(std::atan2(towards_b.y(), towards_b.x()) - heading(clip.a.joints, 0), 0.4, 0.06);
+  double fastest = 0.0;  // along A's way; over 0.2 s, so that sway and bob do not count
+  for (int t = 10; t < clip.phases.act_begin; ++t)
+    fastest =
+        std::max(fastest, (clip.a.joints.at(t, kPelvis) - clip.a.joints.at(t - 10, kPelvis)).head<2>().norm() / 0.2);
+  EXPECT_NEAR(fastest, 0.8, 0.06);
+}
+
+TEST(Synthesis, HonoursSideAndMirrorsTheHandedness) {
+  for (const Task task : {Task::kHandshake, Task::kHighFive, Task::kWave, Task::kFlyKiss})
+    for (const Side side : {Side::kLeft, Side::kRight}) {
+      SynthesisOptions options;
+      options.side = side;
+      const InteractionClip clip = synthesize(task, options);
+      const int acting = side == Side::kLeft ? kLeftHand : kRightHand;
+      for (const ContactWindow& window : clip.contacts) {
+        EXPECT_EQ(window.joint_a, acting);
+        EXPECT_EQ(window.joint_b, acting);
+      }
+      for (const HumanMotion* person : {&clip.a, &clip.b}) {
+        const int from = clip.phases.act_begin, to = clip.phases.act_end;
+        EXPECT_GT(path_length(person->joints, acting, from, to),
+                  2.0 * path_length(person->joints, kSmplMirror[acting], from, to))
+            << to_string(task);
+      }
+    }
+}
+
+TEST(Synthesis, HonoursTheTargetHeight) {
+  for (const Task task : {Task::kHug, Task::kHandshake, Task::kHighFive}) {
+    const synthesis::Act& act = synthesis::act_of(task);
+    for (const double z : {act.lowest, act.highest}) {
+      SynthesisOptions options;
+      options.target_height = z;
+      options.height_a = 1.70;
+      options.height_b = 1.75;
+      const InteractionClip clip = synthesize(task, options);
+      double sum = 0.0;
+      int n = 0;
+      for (const ContactWindow& window : clip.contacts)
+        for (int t = window.begin; t < window.end; ++t) {
+          const bool hand_of_a = window.joint_a >= kLeftHand;
+          sum += hand_of_a ? clip.a.joints.at(t, window.joint_a).z() : clip.b.joints.at(t, window.joint_b).z();
+          ++n;
+        }
+      EXPECT_NEAR(sum / n, z, 0.04) << to_string(task);
+    }
+  }
+  for (const double z : {1.5, 1.68}) {
+    const InteractionClip clip = synthesize(Task::kWave, {.side = Side::kRight, .target_height = z});
+    double highest = 0.0;
+    for (int t = 0; t < clip.frames(); ++t) highest = std::max(highest, clip.a.joints.at(t, kRightHand).z());
+    EXPECT_NEAR(highest, z, 0.03);
+  }
+}
+
+TEST(Synthesis, HonoursStyleDurationAndRate) {
+  SynthesisOptions restrained{.side = Side::kRight, .style = 0.0}, expansive{.side = Side::kRight, .style = 1.0};
+  const auto highest_hand = [](const InteractionClip& clip) {
+    double z = 0.0;
+    for (int t = 0; t < clip.frames(); ++t) z = std::max(z, clip.b.joints.at(t, kRightHand).z());
+    return z;
+  };
+  EXPECT_GT(highest_hand(synthesize(Task::kWave, expansive)), highest_hand(synthesize(Task::kWave, restrained)) + 0.1);
+  const InteractionClip clip = synthesize(Task::kBend, {.duration = 31.4, .rate_hz = 100.0});
+  EXPECT_EQ(clip.frames(), 3140);
+  EXPECT_EQ(clip.rate_hz(), 100.0);
+  EXPECT_NO_THROW(validate(clip));
+}
+
+TEST(Synthesis, OneOptionLeavesTheOtherDrawsAsTheyWere) {
+  const InteractionClip plain = synthesize(Task::kWave, {.index = 2});
+  EXPECT_EQ(changed(plain, synthesize(Task::kWave, {.index = 2, .speed = 0.77})), std::set<std::string>{"speed"});
+  EXPECT_EQ(changed(plain, synthesize(Task::kWave, {.index = 2, .angle = 0.1})), std::set<std::string>{"angle"});
+  EXPECT_EQ(changed(plain, synthesize(Task::kWave, {.index = 2, .duration = 25.0})), std::set<std::string>{"duration"});
+  const Side other = plain.source.at("side") == "right" ? Side::kLeft : Side::kRight;
+  EXPECT_EQ(changed(plain, synthesize(Task::kWave, {.index = 2, .side = other})),
+            (std::set<std::string>{"side", "left_handed"}));
+  EXPECT_EQ(changed(plain, synthesize(Task::kWave, {.index = 2, .height_a = 1.6})),
+            (std::set<std::string>{"a.height", "a.target_height"}));
+}
+
+TEST(Synthesis, RefusesOptionsOutOfRangeAndNamesTheRange) {
+  EXPECT_EQ(refused(Task::kHug, {.index = -1}), "synthesize: index -1 is out of range; expected 0 or more");
+  EXPECT_EQ(refused(Task::kHug, {.height_a = 1.2}),
+            "synthesize: height_a 1.2 m is out of range; expected [1.5, 1.95] m");
+  EXPECT_EQ(refused(Task::kHug, {.height_b = 2.1}),
+            "synthesize: height_b 2.1 m is out of range; expected [1.5, 1.95] m");
+  EXPECT_EQ(refused(Task::kHug, {.distance = 1.0}), "synthesize: distance 1 m is out of range; expected [2, 5] m");
+  EXPECT_EQ(refused(Task::kHug, {.angle = 2.0}),
+            "synthesize: angle 2 rad is out of range; expected [-1.0472, 1.0472] rad");
+  EXPECT_EQ(refused(Task::kHug, {.speed = 2.0}), "synthesize: speed 2 m/s is out of range; expected [0.6, 1.2] m/s");
+  EXPECT_EQ(refused(Task::kHug, {.style = -0.1}), "synthesize: style -0.1 is out of range; expected [0, 1]");
+  EXPECT_EQ(refused(Task::kHug, {.duration = 5.0}), "synthesize: duration 5 s is out of range; expected [10, 60] s");
+  EXPECT_EQ(refused(Task::kHug, {.rate_hz = 0.0}), "synthesize: rate_hz 0 Hz is out of range; expected [20, 240] Hz");
+  EXPECT_EQ(refused(Task::kHandshake, {.target_height = 2.0}),
+            "synthesize: target_height 2 m is out of range; expected [0.85, 1.2] m");
+  EXPECT_EQ(refused(Task::kBend, {.target_height = 1.0}),
+            "synthesize: bend has no target_height; expected none, found 1 m");
+  const double nan = std::nan("");
+  EXPECT_EQ(refused(Task::kHug, {.speed = nan}), "synthesize: speed nan m/s is out of range; expected [0.6, 1.2] m/s");
+}
+
+TEST(Synthesis, RefusesADurationThatTheWaysDoNotFitIn) {
+  const std::string message = refused(Task::kHug, {.distance = 5.0, .speed = 0.6, .duration = 10.0});
+  EXPECT_NE(message.find("synthesize: duration 10 s is too short for these ways and this act; expected ["),
+            std::string::npos)
+      << message;
+}
+
+}  // namespace
+}  // namespace duet
