@@ -48,5 +48,6 @@ struct BvhImport {
 // Person A from the first file, B from the second. Missing joints, different lengths or frame times: InputError.
 BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, Task task,
                           const BvhOptions& options = {});
+BvhImport import_bvh_pair(const Bvh& a, const Bvh& b, Task task, const BvhOptions& options = {});
 
 }  // namespace duet

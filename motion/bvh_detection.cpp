@@ -12,12 +12,13 @@
 namespace duet {
 namespace {
 
-constexpr double kUprightCosine = 0.8;             // of the mean direction head above ankles with the up axis
-constexpr double kWholeRate = 5e-4;                // relative; 29.97 Hz is 1e-3 from 30 Hz
-constexpr double kHorizontalSine = 0.34;           // arms within 20 degrees of horizontal
-constexpr double kStraightArm = 0.95;              // shoulder to wrist, of the arm's length
-constexpr double kJump = 5.0;                      // first step of the motion, in steps that follow
-constexpr double kJumpOfStature = 0.05;            // and never less than this
+constexpr double kUprightCosine = 0.8;                    // of the mean direction head above ankles with the up axis
+constexpr double kWholeRate = 5e-4;                       // relative; 29.97 Hz is 1e-3 from 30 Hz
+constexpr double kLowestRate = 0.01, kHighestRate = 1e5;  // [Hz]
+constexpr double kHorizontalSine = 0.34;                  // arms within 20 degrees of horizontal
+constexpr double kStraightArm = 0.95;                     // shoulder to wrist, of the arm's length
+constexpr double kJump = 5.0;                             // first step of the motion, in steps that follow
+constexpr double kJumpOfStature = 0.05;                   // and never less than this
 constexpr double kShortest = 1.2, kTallest = 2.1;  // bones from head to ankle [m]; the head joint is not the crown
 
 struct Unit {
@@ -77,7 +78,7 @@ double rest_stature(const BvhPerson& person) {
 BvhFinding<UpAxis> find_up_axis(const BvhPerson& a, const BvhPerson& b, const BvhOptions& options) {
   if (options.up) return {*options.up, fmt::format("up axis: {} (as told)", *options.up == UpAxis::kY ? "y" : "z")};
   const Eigen::Vector3d mean = 0.5 * (mean_upright(a) + mean_upright(b));
-  if (mean.y() < kUprightCosine && mean.z() < kUprightCosine)
+  if (!(mean.y() >= kUprightCosine || mean.z() >= kUprightCosine))  // also where it is not a number
     throw InputError(
         fmt::format("'{}': cannot tell the up axis: the heads are above the ankles along ({:.2f}, {:.2f}, {:.2f}), "
                     "expected +y or +z; state the up axis",
@@ -95,6 +96,9 @@ BvhFinding<double> find_rate(const BvhPerson& a, const BvhOptions& options) {
             fmt::format("rate: {} Hz (as told; frame time {} s)", *options.rate_hz, a.bvh.frame_time)};
   }
   const double rate_hz = 1.0 / a.bvh.frame_time;
+  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
+    throw InputError(fmt::format("'{}': a frame time of {} s is out of range ({:g} to {:g} Hz); state the rate",
+                                 a.bvh.name, a.bvh.frame_time, kLowestRate, kHighestRate));
   const double whole = std::round(rate_hz);
   const bool snap = whole > 0.0 && std::abs(rate_hz - whole) <= kWholeRate * whole;
   return {snap ? whole : rate_hz,

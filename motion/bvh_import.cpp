@@ -22,12 +22,6 @@ struct Conversion {
   int output_frames = 0;
 };
 
-BvhPerson read_person(const std::string& path) {
-  BvhPerson person{.bvh = read_bvh(path), .skeleton = {}};
-  person.skeleton = find_smpl_joints(person.bvh);
-  return person;
-}
-
 void check_same_clock(const Bvh& a, const Bvh& b) {
   if (a.frames != b.frames)
     throw InputError(fmt::format("'{}' has {} frames and '{}' {}: expected two people of the same length", a.name,
@@ -71,6 +65,14 @@ double lowest_toe(const HumanMotion& motion) {
   return lowest;
 }
 
+int output_frames(const Bvh& bvh, int frames, double rate_hz, double output_rate_hz) {
+  try {
+    return resampled_frames(frames, rate_hz, output_rate_hz);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(fmt::format("'{}': {}", bvh.name, error.what()));
+  }
+}
+
 Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& options, std::vector<std::string>& verdict) {
   require(std::isfinite(options.output_rate_hz) && options.output_rate_hz > 0.0,
           fmt::format("BVH import: expected a positive output rate, found {} Hz", options.output_rate_hz));
@@ -92,7 +94,7 @@ Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& option
                       .first_frame = first,
                       .rate_hz = rate.value,
                       .output_rate_hz = options.output_rate_hz,
-                      .output_frames = resampled_frames(frames, rate.value, options.output_rate_hz)};
+                      .output_frames = output_frames(a.bvh, frames, rate.value, options.output_rate_hz)};
   if (to.output_frames < 2)
     throw InputError(fmt::format("'{}': {} frames at {:g} Hz are fewer than 2 frames at {:g} Hz", a.bvh.name, frames,
                                  rate.value, options.output_rate_hz));
@@ -107,25 +109,29 @@ std::string file_name(const std::string& path) { return std::filesystem::path(pa
 }  // namespace
 
 BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, Task task, const BvhOptions& options) {
-  const BvhPerson a = read_person(path_a);
-  const BvhPerson b = read_person(path_b);
+  return import_bvh_pair(read_bvh(path_a), read_bvh(path_b), task, options);
+}
+
+BvhImport import_bvh_pair(const Bvh& bvh_a, const Bvh& bvh_b, Task task, const BvhOptions& options) {
+  const BvhPerson a{.bvh = bvh_a, .skeleton = find_smpl_joints(bvh_a)};
+  const BvhPerson b{.bvh = bvh_b, .skeleton = find_smpl_joints(bvh_b)};
   check_same_clock(a.bvh, b.bvh);
   BvhImport result;
   const Conversion to = plan(a, b, options, result.verdict);
   InteractionClip& clip = result.clip;
   try {
-    clip.id = stem(path_a) + "-" + stem(path_b);
+    clip.id = stem(bvh_a.name) + "-" + stem(bvh_b.name);
     clip.task = task;
     clip.a = convert(a, to);
     clip.b = convert(b, to);
     validate(clip);
   } catch (const std::invalid_argument& error) {
-    throw InputError(fmt::format("'{}', '{}': {}", path_a, path_b, error.what()));
+    throw InputError(fmt::format("'{}', '{}': {}", bvh_a.name, bvh_b.name, error.what()));
   }
   clip.phases = propose_phases(clip.a, clip.b, task);
   clip.source = {{"format", "BVH"},
-                 {"file_a", file_name(path_a)},
-                 {"file_b", file_name(path_b)},
+                 {"file_a", file_name(bvh_a.name)},
+                 {"file_b", file_name(bvh_b.name)},
                  {"metres_per_unit", fmt::format("{}", to.metres_per_unit)},
                  {"source_rate_hz", fmt::format("{}", to.rate_hz)},
                  {"first_frame", fmt::format("{}", to.first_frame)},

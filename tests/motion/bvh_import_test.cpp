@@ -99,6 +99,24 @@ TEST(BvhImport, RateIsAWholeNumberWhereTheFrameTimeIsRounded) {
   EXPECT_EQ(import_pair({}, {.rate_hz = 100.0}).clip.frames(), 3);
 }
 
+TEST(BvhImport, FrameTimesOutOfRangeAreRefused) {
+  BvhWriter writer;
+  for (const std::string frame_time : {"1e-320", "1e-9", "1e9"}) {
+    writer.frame_time = frame_time;
+    EXPECT_THAT(refusal(writer, person_b(writer)), HasSubstr("is out of range (0.01 to 100000 Hz); state the rate"));
+  }
+  writer.frame_time = "50";
+  EXPECT_THAT(refusal(writer, person_b(writer), {.output_rate_hz = 1e6}), HasSubstr("are more than 2e+06 frames"));
+}
+
+TEST(BvhImport, LengthsThatOverflowAreRefused) {
+  BvhWriter writer;
+  writer.bones[3].offset = {0, -1e305, 0};
+  writer.bones[4].offset = {0, -1e305, 0};
+  for (const BvhOptions& options : {BvhOptions{}, BvhOptions{.metres_per_unit = 1.0, .up = UpAxis::kY}})
+    EXPECT_THAT(refusal(writer, person_b(writer), options), HasSubstr("a.bvh"));
+}
+
 TEST(BvhImport, AnAddedTPoseIsDropped) {
   BvhWriter writer;
   writer.t_pose = true;
