@@ -8,6 +8,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <map>
 #include <thread>
 
@@ -106,22 +107,27 @@ TEST(PairKernel, SmoothDescentOnSlantedAxesFarFromTheOrigin) {
   expect_same_descent(make_pair_problem(clip, test::slanted_robot(), options), options, "slanted");
 }
 
-// Means over seeds: a single sequence may lie on the edge of a sign.
+// Sequences on the edge of a sign end further apart, so the usual one and the worst one are bounded.
 TEST(PairKernel, PapersScheduleEndsWhereTheReferenceDoes) {
   const PairOptions options;
-  for (const auto& [frames, seeds] : {std::pair{5, 30}, {37, 12}, {1007, 2}}) {
-    std::map<KernelKind, double> difference;
+  for (const auto& [frames, seeds] : {std::pair{5, 9}, {37, 9}, {1007, 1}}) {
+    std::map<KernelKind, std::vector<double>> differences;
     for (int seed = 1; seed <= seeds; ++seed) {
       const PairProblem problem = make_pair_problem(test::random_clip(frames, seed), test::g1(), options);
       const PairSolution reference = solve(problem, options, KernelKind::kScalar);
       const double expected = final_objective(problem, options, reference);
       for (const KernelKind kernel : lane_kernels()) {
         const PairSolution lanes = solve(problem, options, kernel);
-        difference[kernel] += relative_difference(final_objective(problem, options, lanes), expected) / seeds;
+        const double difference = relative_difference(final_objective(problem, options, lanes), expected);
+        differences[kernel].push_back(difference);
+        EXPECT_LT(difference, 1e-3) << frames << " frames, seed " << seed;
         EXPECT_LT(largest_shift(problem, lanes.x, reference.x), 5e-3) << frames << " frames, seed " << seed;
       }
     }
-    for (const auto& [kernel, mean] : difference) EXPECT_LT(mean, 1e-4) << frames << " frames, " << to_string(kernel);
+    for (auto& [kernel, all] : differences) {
+      std::sort(all.begin(), all.end());
+      EXPECT_LT(all[all.size() / 2], 1e-4) << frames << " frames, " << to_string(kernel);
+    }
   }
 }
 
