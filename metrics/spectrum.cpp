@@ -19,6 +19,7 @@ constexpr Eigen::Index kFilterPadding = 15;  // scipy's default for a fourth-ord
 // A real signal's bins other than zero and Nyquist stand for two of the full transform.
 BandEnergy fourier_energy(const Eigen::VectorXd& x, double rate_hz, double cutoff_hz, EdgeBin edge) {
   const Eigen::Index n = x.size();
+  if (n == 1) return {0.0, x.squaredNorm()};  // the transform needs two samples; one is all mean
   Eigen::FFT<double> fft;
   fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
   Eigen::VectorXcd bins;
