@@ -1,6 +1,8 @@
 // The detectors' tracks of a human and of a robot.
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "core/require.h"
 #include "core/skeleton.h"
 #include "metrics/detector.h"
@@ -32,8 +34,9 @@ Agent follow(const RobotModel& robot, int frames, PoseAt pose, JointsAt joints) 
       {robot.track_frame("lshoulder"), &agent.lshoulder}, {robot.track_frame("rshoulder"), &agent.rshoulder}};
   Kinematics kinematics(robot);
   for (int t = 0; t < frames; ++t) {
-    require(joints(t).size() == robot.dof(), fmt::format("robot agent: frame {} has {} joint angles, {} has {}", t,
-                                                         joints(t).size(), robot.name, robot.dof()));
+    if (joints(t).size() != robot.dof())
+      throw std::invalid_argument(fmt::format("robot agent: frame {} has {} joint angles, {} has {}", t,
+                                              joints(t).size(), robot.name, robot.dof()));
     kinematics.update(pose(t), joints(t));
     agent.root.col(t) = pose(t).p;
     for (const auto& [frame, track] : followers) track->col(t) = kinematics.frame_position(frame);

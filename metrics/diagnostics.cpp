@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <stdexcept>
 
 #include "core/require.h"
 #include "metrics/differences.h"
@@ -34,12 +35,15 @@ Eigen::MatrixXd joint_velocity(const Eigen::MatrixXd& q, double rate_hz, Velocit
   return (q.rightCols(q.cols() - 1) - q.leftCols(q.cols() - 1)) * rate_hz;
 }
 
-// Both figures of a row are 0 where it holds no energy.
-BandEnergy joint_energy(Eigen::VectorXd velocity, double rate_hz, const DiagnosticReadings& readings) {
-  const double raw = velocity.squaredNorm();
-  if (readings.mean == MeanHandling::kRemove) velocity.array() -= velocity.mean();
-  if (velocity.squaredNorm() <= kRoundoff * raw) return {};
-  return band_energy(velocity, rate_hz, kCutoffHz, readings.spectrum, readings.edge);
+// Both figures of a joint that does not move are 0.
+std::vector<BandEnergy> joint_energies(Eigen::MatrixXd velocity, double rate_hz, const DiagnosticReadings& readings) {
+  const Eigen::VectorXd raw = velocity.rowwise().squaredNorm();
+  if (readings.mean == MeanHandling::kRemove) velocity.colwise() -= velocity.rowwise().mean().eval();
+  const Eigen::VectorXd left = velocity.rowwise().squaredNorm();
+  std::vector<BandEnergy> energies = band_energies(velocity, rate_hz, kCutoffHz, readings.spectrum, readings.edge);
+  for (Eigen::Index j = 0; j < velocity.rows(); ++j)
+    if (left[j] <= kRoundoff * raw[j]) energies[j] = {};
+  return energies;
 }
 
 // Mean over frames and joints of |x|, mean over frames of the norm over joints, or the root of the mean square.
@@ -72,8 +76,8 @@ double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
 
 void check_poses(const std::vector<Pose>& poses, const char* name) {
   for (size_t t = 0; t < poses.size(); ++t)
-    require(poses[t].p.allFinite() && poses[t].R.coeffs().allFinite() && poses[t].R.norm() > 0.0,
-            fmt::format("root_error: {} is not a finite pose at frame {}", name, t));
+    if (!poses[t].p.allFinite() || !poses[t].R.coeffs().allFinite() || poses[t].R.norm() <= 0.0)
+      throw std::invalid_argument(fmt::format("root_error: {} is not a finite pose at frame {}", name, t));
 }
 
 // A recording as matrices: executed and reference.
@@ -101,10 +105,11 @@ Tracking tracking_of(const Recording& recording) {
   for (Eigen::Index i = 0; i < frames; ++i) {
     const RobotState& state = recording.robot[i];
     const Reference& reference = recording.reference[i];
-    require(state.q.size() == dof && state.v.size() == dof && reference.q.size() == dof,
-            fmt::format("controller diagnostics: frame {} has {} joint angles, {} velocities and {} references, "
-                        "expected {}",
-                        i, state.q.size(), state.v.size(), reference.q.size(), dof));
+    if (state.q.size() != dof || state.v.size() != dof || reference.q.size() != dof)
+      throw std::invalid_argument(
+          fmt::format("controller diagnostics: frame {} has {} joint angles, {} velocities and {} references, "
+                      "expected {}",
+                      i, state.q.size(), state.v.size(), reference.q.size(), dof));
     t.q.col(i) = state.q;
     t.v.col(i) = state.v;
     t.q_ref.col(i) = reference.q;
@@ -127,8 +132,7 @@ double hf_ratio(const Eigen::MatrixXd& q, double rate_hz, const DiagnosticReadin
   BandEnergy pooled;
   double ratios = 0.0;
   int moving = 0;
-  for (Eigen::Index j = 0; j < velocity.rows(); ++j) {
-    const BandEnergy energy = joint_energy(velocity.row(j).transpose(), rate_hz, readings);
+  for (const BandEnergy& energy : joint_energies(velocity, rate_hz, readings)) {
     pooled.high += energy.high;
     pooled.total += energy.total;
     if (energy.total > 0.0) {

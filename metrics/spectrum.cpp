@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <unsupported/Eigen/FFT>
 
 #include "core/require.h"
 
@@ -16,25 +15,61 @@ namespace {
 constexpr Eigen::Index kWelchSegment = 256;
 constexpr Eigen::Index kFilterPadding = 15;  // scipy's default for a fourth-order filter: three times five taps
 
-// A real signal's bins other than zero and Nyquist stand for two of the full transform.
-BandEnergy fourier_energy(const Eigen::VectorXd& x, double rate_hz, double cutoff_hz, EdgeBin edge) {
-  const Eigen::Index n = x.size();
-  if (n == 1) return {0.0, x.squaredNorm()};  // the transform needs two samples; one is all mean
-  Eigen::FFT<double> fft;
-  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
-  Eigen::VectorXcd bins;
-  fft.fwd(bins, x);
-  BandEnergy energy;
-  for (Eigen::Index k = 0; k <= n / 2; ++k) {
-    const bool single = k == 0 || 2 * k == n;
-    const double bin = std::norm(bins[k]) * (single ? 1.0 : 2.0) / static_cast<double>(n);
-    // k rate / n against the cut-off, without the rounding of a division.
-    const double frequency = static_cast<double>(k) * rate_hz;
-    const double limit = cutoff_hz * static_cast<double>(n);
-    energy.total += bin;
-    if (edge == EdgeBin::kAbove ? frequency > limit : frequency >= limit) energy.high += bin;
+// Bins that belong to the low band: 0 to this, not included. k rate / n is held against the cut-off without the
+// rounding of a division.
+Eigen::Index low_bins(Eigen::Index n, double rate_hz, double cutoff_hz, EdgeBin edge) {
+  const double limit = cutoff_hz * static_cast<double>(n);
+  Eigen::Index bins = 0;
+  while (bins <= n / 2) {
+    const double frequency = static_cast<double>(bins) * rate_hz;
+    if (edge == EdgeBin::kAbove ? frequency > limit : frequency >= limit) break;
+    ++bins;
   }
-  return energy;
+  return bins;
+}
+
+// cos and sin of 2 pi k t / n for bins [begin, end) as columns, cosines first. The table keeps arguments small.
+Eigen::MatrixXd fourier_basis(Eigen::Index n, Eigen::Index begin, Eigen::Index end) {
+  Eigen::VectorXd cosine(n), sine(n);
+  for (Eigen::Index t = 0; t < n; ++t) {
+    const double angle = 2.0 * std::numbers::pi * static_cast<double>(t) / static_cast<double>(n);
+    cosine[t] = std::cos(angle);
+    sine[t] = std::sin(angle);
+  }
+  const Eigen::Index bins = end - begin;
+  Eigen::MatrixXd basis(n, 2 * bins);
+  for (Eigen::Index k = 0; k < bins; ++k) {
+    for (Eigen::Index t = 0; t < n; ++t) {
+      const Eigen::Index place = (begin + k) * t % n;
+      basis(t, k) = cosine[place];
+      basis(t, bins + k) = sine[place];
+    }
+  }
+  return basis;
+}
+
+// Adds the energies of each row. Only the few bins of the low band are transformed; the rest is what the sum of squares
+// has left (Parseval). A real signal's bins other than zero and Nyquist stand for two of the full transform.
+void add_fourier_energy(const Eigen::MatrixXd& x, double rate_hz, double cutoff_hz, EdgeBin edge,
+                        std::vector<BandEnergy>& energies) {
+  constexpr Eigen::Index kBlock = 64;  // bounds the basis in memory
+  const Eigen::Index n = x.cols();
+  const Eigen::Index bins = low_bins(n, rate_hz, cutoff_hz, edge);
+  Eigen::VectorXd low = Eigen::VectorXd::Zero(x.rows());
+  for (Eigen::Index begin = 0; begin < bins; begin += kBlock) {
+    const Eigen::Index count = std::min(kBlock, bins - begin);
+    const Eigen::MatrixXd parts = x * fourier_basis(n, begin, begin + count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const bool single = begin + k == 0 || 2 * (begin + k) == n;
+      low += (parts.col(k).cwiseAbs2() + parts.col(count + k).cwiseAbs2()) *
+             ((single ? 1.0 : 2.0) / static_cast<double>(n));
+    }
+  }
+  for (Eigen::Index j = 0; j < x.rows(); ++j) {
+    const double total = x.row(j).squaredNorm();
+    energies[j].total += total;
+    energies[j].high += std::max(0.0, total - low[j]);
+  }
 }
 
 Eigen::VectorXd hann(Eigen::Index n) {
@@ -45,17 +80,13 @@ Eigen::VectorXd hann(Eigen::Index n) {
   return window;
 }
 
-BandEnergy welch_energy(const Eigen::VectorXd& x, double rate_hz, double cutoff_hz, EdgeBin edge) {
-  const Eigen::Index length = std::min(kWelchSegment, x.size());
+void add_welch_energy(const Eigen::MatrixXd& x, double rate_hz, double cutoff_hz, EdgeBin edge,
+                      std::vector<BandEnergy>& energies) {
+  const Eigen::Index length = std::min(kWelchSegment, x.cols());
   const Eigen::Index step = std::max<Eigen::Index>(1, length - length / 2);
   const Eigen::VectorXd window = hann(length);
-  BandEnergy sum;
-  for (Eigen::Index begin = 0; begin + length <= x.size(); begin += step) {
-    const BandEnergy segment = fourier_energy(x.segment(begin, length).cwiseProduct(window), rate_hz, cutoff_hz, edge);
-    sum.high += segment.high;
-    sum.total += segment.total;
-  }
-  return sum;
+  for (Eigen::Index begin = 0; begin + length <= x.cols(); begin += step)
+    add_fourier_energy(x.middleCols(begin, length) * window.asDiagonal(), rate_hz, cutoff_hz, edge, energies);
 }
 
 // Second-order high-pass section, transposed direct form II.
@@ -109,19 +140,24 @@ BandEnergy filtered_energy(const Eigen::VectorXd& x, double rate_hz, double cuto
 
 }  // namespace
 
-BandEnergy band_energy(const Eigen::Ref<const Eigen::VectorXd>& x, double rate_hz, double cutoff_hz, Spectrum spectrum,
-                       EdgeBin edge) {
+std::vector<BandEnergy> band_energies(const Eigen::MatrixXd& x, double rate_hz, double cutoff_hz, Spectrum spectrum,
+                                      EdgeBin edge) {
+  std::vector<BandEnergy> energies(x.rows());
   switch (spectrum) {
-    case Spectrum::kHann:
-      return fourier_energy(x.cwiseProduct(hann(x.size())), rate_hz, cutoff_hz, edge);
-    case Spectrum::kWelch:
-      return welch_energy(x, rate_hz, cutoff_hz, edge);
-    case Spectrum::kButterworth:
-      return filtered_energy(x, rate_hz, cutoff_hz);
     case Spectrum::kPeriodogram:
+      add_fourier_energy(x, rate_hz, cutoff_hz, edge, energies);
+      break;
+    case Spectrum::kHann:
+      add_fourier_energy(x * hann(x.cols()).asDiagonal(), rate_hz, cutoff_hz, edge, energies);
+      break;
+    case Spectrum::kWelch:
+      add_welch_energy(x, rate_hz, cutoff_hz, edge, energies);
+      break;
+    case Spectrum::kButterworth:
+      for (Eigen::Index j = 0; j < x.rows(); ++j) energies[j] = filtered_energy(x.row(j), rate_hz, cutoff_hz);
       break;
   }
-  return fourier_energy(x, rate_hz, cutoff_hz, edge);
+  return energies;
 }
 
 }  // namespace duet

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "metrics/readings.h"
 
@@ -12,7 +13,7 @@ struct BandEnergy {
   double total = 0.0;  // 0 <= high <= total but for rounding
 };
 
-// Energies of uniformly sampled `x` in the same arbitrary unit. The mean is not removed.
+// Energies of each row of `x`, uniformly sampled at `rate_hz`. The mean is not removed.
 //   kPeriodogram  the discrete Fourier transform of all samples; total is the sum of squares (Parseval)
 //   kHann         the same after a symmetric Hann window (numpy.hanning)
 //   kWelch        summed over segments of 256 samples (all of a shorter signal) that overlap by half, each under that
@@ -21,7 +22,7 @@ struct BandEnergy {
 //                 its odd extension by 15 samples): a quarter of the power remains at the cut-off. Needs a rate of more
 //                 than twice the cut-off
 // A bin exactly at the cut-off belongs to the high band only with kAtOrAbove (not used by kButterworth).
-BandEnergy band_energy(const Eigen::Ref<const Eigen::VectorXd>& x, double rate_hz, double cutoff_hz, Spectrum spectrum,
-                       EdgeBin edge);
+std::vector<BandEnergy> band_energies(const Eigen::MatrixXd& x, double rate_hz, double cutoff_hz, Spectrum spectrum,
+                                      EdgeBin edge);
 
 }  // namespace duet
