@@ -45,6 +45,7 @@ std::vector<Reference> Policy::plan(const Observation& observation) { return den
 
 std::vector<std::string> policy_names() {
   std::vector<std::string> names;
+  names.reserve(kPolicies.size());
   for (const PolicyEntry& entry : kPolicies) names.emplace_back(entry.name);
   return names;
 }
