@@ -11,7 +11,7 @@
 namespace duet {
 namespace {
 
-constexpr const char* kFormat = "duet recording";
+constexpr const char* kSchema = "duet.recording";
 constexpr std::int64_t kVersion = 1;
 
 // Rows of a (T, n) table, one after the other.
@@ -44,9 +44,10 @@ void check_sizes(const Recording& recording) {
   };
   check("reference", frames, recording.reference.size());
   check("q_target", frames, recording.q_target.size());
-  check("partner", frames, static_cast<std::size_t>(recording.partner.frames()));
+  if (!recording.partner.empty()) check("partner", frames, static_cast<std::size_t>(recording.partner.frames()));
   if (frames == 0) return;
-  check("partner's joints", kSmplJoints, static_cast<std::size_t>(recording.partner.points()));
+  if (!recording.partner.empty())
+    check("partner's joints", kSmplJoints, static_cast<std::size_t>(recording.partner.points()));
   const Eigen::Index joints = recording.robot.front().q.size();
   for (std::size_t t = 0; t < frames; ++t) {
     const bool same = recording.robot[t].q.size() == joints && recording.robot[t].v.size() == joints &&
@@ -73,6 +74,7 @@ void put_contacts(Npz& npz, const std::vector<RecordedContact>& contacts) {
   const std::size_t count = contacts.size();
   const auto put_integers = [&](const char* key, const auto& value) {
     std::vector<std::int64_t> values;
+    values.reserve(count);
     for (const RecordedContact& entry : contacts) values.push_back(static_cast<std::int64_t>(value(entry)));
     npz.set(key, std::move(values), {count});
   };
@@ -83,6 +85,7 @@ void put_contacts(Npz& npz, const std::vector<RecordedContact>& contacts) {
   put(npz, "contact_point", table(contacts, 3, [](const RecordedContact& c) { return c.contact.p_WC; }));
   put(npz, "contact_force", table(contacts, 3, [](const RecordedContact& c) { return c.contact.f_W; }));
   std::vector<double> depths;
+  depths.reserve(count);
   for (const RecordedContact& entry : contacts) depths.push_back(entry.contact.depth);
   npz.set("contact_depth", std::move(depths), {count});
 }
@@ -176,15 +179,16 @@ void get_contacts(const Npz& npz, const Reader& reader, Recording& recording) {
   }
 }
 
-void get_partner(const Reader& reader, Recording& recording) {
+void get_partner(const Npz& npz, const Reader& reader, Recording& recording) {
+  if (!npz.contains("partner")) return;
   const int frames = recording.frames();
   recording.partner = {frames, kSmplJoints, reader.numbers("partner", {frames, kSmplJoints, 3})};
 }
 
 void get_scalars(const Npz& npz, Recording& recording) {
-  if (npz.text("format") != kFormat || npz.integer("version") != kVersion)
-    refuse(npz, fmt::format("expected format '{}' version {}, found '{}' version {}", kFormat, kVersion,
-                            npz.text("format"), npz.integer("version")));
+  if (npz.text("schema") != kSchema || npz.integer("schema_version") != kVersion)
+    refuse(npz, fmt::format("expected schema '{}' version {}, found '{}' version {}", kSchema, kVersion,
+                            npz.text("schema"), npz.integer("schema_version")));
   try {
     recording.task = parse_task(npz.text("task"));
     recording.outcome = parse_outcome(npz.text("outcome"));
@@ -204,15 +208,16 @@ void save_recording(const Recording& recording, const std::string& path) {
   check_sizes(recording);
   const std::size_t joints = recording.robot.empty() ? 0 : static_cast<std::size_t>(recording.robot.front().q.size());
   Npz npz;
-  npz.set_text("format", kFormat);
-  npz.set_integer("version", kVersion);
+  npz.set_text("schema", kSchema);
+  npz.set_integer("schema_version", kVersion);
   npz.set_text("task", std::string(to_string(recording.task)));
   npz.set_text("outcome", std::string(to_string(recording.outcome)));
   npz.set_text("message", recording.message);
   npz.set_number("rate_hz", recording.rate_hz);
   npz.set("phases", std::vector<std::int64_t>{recording.phases.act_begin, recording.phases.act_end}, {2});
   put_robot(npz, recording, joints);
-  npz.set("partner", recording.partner.data(), {recording.robot.size(), kSmplJoints, 3});
+  if (!recording.partner.empty())
+    npz.set("partner", recording.partner.data(), {recording.robot.size(), kSmplJoints, 3});
   put_contacts(npz, recording.contacts);
   npz.save(path);
 }
@@ -224,7 +229,7 @@ Recording load_recording(const std::string& path) {
   const Reader reader(npz, recording.outcome != Outcome::kDiverged);
   get_robot(npz, reader, recording);
   get_reference(npz, reader, recording);
-  get_partner(reader, recording);
+  get_partner(npz, reader, recording);
   get_contacts(npz, reader, recording);
   if (!(0 <= recording.phases.act_begin && recording.phases.act_begin <= recording.phases.act_end))
     refuse(npz, fmt::format("phases: expected 0 <= act_begin <= act_end, found {} and {}", recording.phases.act_begin,

@@ -27,7 +27,7 @@ struct Recording {
   std::vector<RobotState> robot;
   std::vector<Reference> reference;
   std::vector<Eigen::VectorXd> q_target;  // the joint command's targets [rad]
-  PointTracks partner;                    // (T, 24, 3), SMPL-24 joints of the human partner
+  PointTracks partner;                    // (T, 24, 3), SMPL-24 joints of the human partner; empty: none
   std::vector<RecordedContact> contacts;  // in order of frame
   Outcome outcome = Outcome::kOk;
   std::string message;  // why, where outcome is not kOk

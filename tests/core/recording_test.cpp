@@ -101,8 +101,10 @@ TEST(Recording, WithoutFramesOrContactsIsARecording) {
   EXPECT_EQ(load_recording(folder / "r.npz").frames(), 0);
   recording = some_recording(2);
   recording.contacts.clear();
+  recording.partner = {};  // a robot alone
   save_recording(recording, folder / "r.npz");
   EXPECT_TRUE(load_recording(folder / "r.npz").contacts.empty());
+  EXPECT_TRUE(load_recording(folder / "r.npz").partner.empty());
 }
 
 TEST(Recording, OnlyADivergedOneMayHoldNumbersThatAreNotFinite) {
@@ -129,7 +131,8 @@ TEST(Recording, SaveRefusesSizesThatDisagree) {
   EXPECT_EQ(message_after([](Recording& r) { r.reference.pop_back(); }),
             "recording: expected reference of size 3, found 2");
   EXPECT_EQ(message_after([](Recording& r) { r.q_target.clear(); }), "recording: expected q_target of size 3, found 0");
-  EXPECT_EQ(message_after([](Recording& r) { r.partner = {}; }), "recording: expected partner of size 3, found 0");
+  EXPECT_EQ(message_after([](Recording& r) { r.partner = PointTracks(2, 24); }),
+            "recording: expected partner of size 3, found 2");
   EXPECT_EQ(message_after([](Recording& r) { r.partner = PointTracks(3, 22); }),
             "recording: expected partner's joints of size 24, found 22");
   EXPECT_EQ(message_after([](Recording& r) { r.robot[1].v.resize(28); }),
@@ -147,10 +150,10 @@ TEST(Recording, LoadRefusesEachKindOfFault) {
     const std::string name = "'" + (folder / "bad.npz") + "': ";
     return message.starts_with(name) ? message.substr(name.size()) : "(without the file's name) " + message;
   };
-  EXPECT_EQ(message_after([](Npz& n) { n.set_text("format", "x"); }),
-            "expected format 'duet recording' version 1, found 'x' version 1");
-  EXPECT_EQ(message_after([](Npz& n) { n.set_integer("version", 2); }),
-            "expected format 'duet recording' version 1, found 'duet recording' version 2");
+  EXPECT_EQ(message_after([](Npz& n) { n.set_text("schema", "x"); }),
+            "expected schema 'duet.recording' version 1, found 'x' version 1");
+  EXPECT_EQ(message_after([](Npz& n) { n.set_integer("schema_version", 2); }),
+            "expected schema 'duet.recording' version 1, found 'duet.recording' version 2");
   EXPECT_EQ(message_after([](Npz& n) { n.set_text("task", "hugs"); }),
             "unknown task 'hugs': did you mean 'hug'? Known: hug, handshake, high_five, wave, bend, fly_kiss");
   EXPECT_EQ(message_after([](Npz& n) { n.set_number("rate_hz", 0.0); }), "expected rate_hz above 0, found 0");
