@@ -33,7 +33,7 @@ Eigen::Matrix3d skew(const Eigen::Vector3d& v) {
   return m;
 }
 
-torch::Tensor exponential(const torch::Tensor& w) {
+torch::Tensor rotation_of(const torch::Tensor& w) {
   const auto square = (w * w).sum(-1, true) + 1e-8;
   const auto angle = square.sqrt();
   const auto a = (angle.sin() / angle).unsqueeze(-1);
@@ -59,7 +59,7 @@ class Peer {
     targets_ = to_tensor(problem.targets.data().data(), {T, kRetargetPairs, 3});
     human_ = to_tensor(problem.human.data().data(), {T, keys, 3});
     root_ = to_tensor(problem.root.data(), {T, 3});
-    heading_ = exponential(torch::cat({torch::zeros({T, 2}), to_tensor(problem.yaw.data(), {T, 1})}, 1));
+    heading_ = rotation_of(torch::cat({torch::zeros({T, 2}), to_tensor(problem.yaw.data(), {T, 1})}, 1));
     set_distances(problem);
     set_chain();
     move_ = torch::zeros({keys, kHumanOffsets});
@@ -135,7 +135,7 @@ class Peer {
     const auto s = q_.sin().unsqueeze(-1).unsqueeze(-1);
     const auto c = (1 - q_.cos()).unsqueeze(-1).unsqueeze(-1);
     const auto hinges = torch::eye(3) + s * axes_ + c * axes_squared_;
-    std::vector<torch::Tensor> R = {torch::matmul(exponential(w_), heading_)};
+    std::vector<torch::Tensor> R = {torch::matmul(rotation_of(w_), heading_)};
     std::vector<torch::Tensor> p = {root_ + offset_};
     for (int j = 0; j < chain_.dof(); ++j) {
       const ChainJoint& joint = chain_.joints[j];
