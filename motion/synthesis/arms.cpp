@@ -70,7 +70,7 @@ ArmPose ArmTrack::at(const Moment& moment) const {
   if (current == moves_.size()) return rest_(moment);
   const Move& move = moves_[current];
   const double u = (moment.t - move.begin) / (move.end - move.begin);
-  const ArmPose next = move.hold(moment);
+  ArmPose next = move.hold(moment);
   if (u >= 1.0) return next;
   const ArmPose last = current == 0 ? rest_(moment) : moves_[current - 1].hold(moment);
   const double s = ramp(u);

@@ -10,8 +10,9 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kArmSaturation = 0.9985;  // extension that no target exceeds: 6 degrees of elbow flexion
-constexpr double kTightest = 0.36;         // least distance of the ends, in shares of the limb: 138 degrees of flexion
+constexpr double kArmSaturation =
+    0.995;                          // extension that no target exceeds: 11 degrees from shoulder-elbow to elbow-hand
+constexpr double kTightest = 0.36;  // least distance of the ends, in shares of the limb: 138 degrees of flexion
 
 void place(const Body& body, int joint, Figure& figure) {
   const int parent = kSmplParents[joint];

@@ -19,7 +19,7 @@ struct Lean {
 };
 
 struct Performer {
-  Performer(const Body& a_body, const Placement& start, Hold hang)
+  Performer(const Body& a_body, const Placement& start, const Hold& hang)
       : body(a_body), gait(a_body, start), arms{ArmTrack(hang), ArmTrack(hang)} {}
 
   // Moves every channel of the trunk at once.
