@@ -55,7 +55,7 @@ inline void edit_shape(Bytes& bytes, NpyArray& array) {
   const std::size_t rows = bytes.take<std::uint8_t>() % 5;
   std::size_t row_size = 1;
   for (std::size_t d = 1; d < array.shape.size(); ++d) row_size *= array.shape[d];
-  if (array.shape.empty() || bytes.take<bool>()) {
+  if (array.shape.empty() || bytes.take<std::uint8_t>() % 2 == 0) {
     std::visit([&](auto& values) { values.resize(rows); }, array.values);
     array.shape = {rows};
   } else {
@@ -64,10 +64,8 @@ inline void edit_shape(Bytes& bytes, NpyArray& array) {
   }
 }
 
-inline std::string edited_archive(const std::string& archive, std::string_view program) {
+inline std::string edited_archive(Npz npz, std::string_view program) {
   Bytes bytes(program);
-  const Npz whole = Npz::parse(archive, "sample");
-  Npz npz = whole;
   for (int edits = 0; edits < 8 && !bytes.empty(); ++edits) {
     const std::vector<std::string> keys = npz.keys();
     const std::string key = keys[bytes.take<std::uint8_t>() % keys.size()];

@@ -16,6 +16,11 @@ const std::string& sample() {
   return bytes;
 }
 
+const duet::Npz& sample_archive() {
+  static const duet::Npz npz = duet::Npz::parse(sample(), "sample");
+  return npz;
+}
+
 }  // namespace
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t max_size,
@@ -27,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view bytes = duet::fuzz::text_of(data, size);
   return duet::fuzz::read_or_refuse([&] {
     const duet::InteractionClip clip = duet::parse_clip(
-        bytes.starts_with("PK") ? std::string(bytes) : duet::fuzz::edited_archive(sample(), bytes), "fuzz.npz");
+        bytes.starts_with("PK") ? std::string(bytes) : duet::fuzz::edited_archive(sample_archive(), bytes), "fuzz.npz");
     (void)duet::clip_bytes(duet::mirrored(clip));  // what was read can be written
   });
 }
