@@ -46,6 +46,7 @@ std::string small_sample_note(const std::vector<LeaderboardEntry>& entries) {
   }
   if (small.empty()) return "";
   std::vector<std::string> titles;
+  titles.reserve(small.size());
   for (const auto& [rank, title] : small) titles.push_back(title);
   return fmt::format("Fewer than 30 episodes: {}. Read those figures with their intervals; do not rank by them.",
                      joined(titles, ", "));
@@ -112,6 +113,7 @@ std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& 
     if (entry.task != "all") ranked.emplace(task_rank(entry.task), entry.task);
   }
   std::vector<std::string> tasks;
+  tasks.reserve(ranked.size());
   for (const auto& [rank, task] : ranked) tasks.push_back(task);
   return tasks;
 }
