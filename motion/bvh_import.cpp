@@ -89,12 +89,12 @@ Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& option
       up.sentence, t_pose.sentence, rate.sentence, unit.sentence};
   const Eigen::Quaterniond R_WF(
       Eigen::AngleAxisd(up.value == UpAxis::kY ? 0.5 * std::numbers::pi : 0.0, Eigen::Vector3d::UnitX()));
-  const Conversion to{.R_WF = R_WF,
-                      .metres_per_unit = unit.value,
-                      .first_frame = first,
-                      .rate_hz = rate.value,
-                      .output_rate_hz = options.output_rate_hz,
-                      .output_frames = output_frames(a.bvh, frames, rate.value, options.output_rate_hz)};
+  Conversion to{.R_WF = R_WF,
+                .metres_per_unit = unit.value,
+                .first_frame = first,
+                .rate_hz = rate.value,
+                .output_rate_hz = options.output_rate_hz,
+                .output_frames = output_frames(a.bvh, frames, rate.value, options.output_rate_hz)};
   if (to.output_frames < 2)
     throw InputError(fmt::format("'{}': {} frames at {:g} Hz are fewer than 2 frames at {:g} Hz", a.bvh.name, frames,
                                  rate.value, options.output_rate_hz));

@@ -53,6 +53,7 @@ void find_limbs(const JointFinder& finder, bool cmu, BvhSkeleton& skeleton) {
     const auto set = [&](SmplJoint left_joint, const std::vector<std::string>& names) {
       const auto joint = static_cast<SmplJoint>(left ? left_joint : kSmplMirror[left_joint]);
       std::vector<std::string> full_names;
+      full_names.reserve(names.size());
       for (const std::string& name : names) full_names.push_back(side + name);
       skeleton.points[joint] = at(finder.get(joint, full_names));
     };
