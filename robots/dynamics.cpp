@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+// An Eigen::Ref that is written to is passed by value, as Eigen's guide has it.
+// NOLINTBEGIN(performance-unnecessary-value-param)
 namespace duet {
 namespace {
 
@@ -134,3 +136,4 @@ void mass_matrix(const RobotModel& model, const RobotState& state, Eigen::Ref<Ei
 }
 
 }  // namespace duet
+// NOLINTEND(performance-unnecessary-value-param)

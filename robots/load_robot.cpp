@@ -72,6 +72,7 @@ class Loader {
 
   std::vector<std::string> urdf_link_names() const {
     std::vector<std::string> names;
+    names.reserve(urdf_.links.size());
     for (const UrdfLink& link : urdf_.links) names.push_back(link.name);
     return names;
   }

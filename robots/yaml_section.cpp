@@ -25,8 +25,9 @@ std::string describe(const YAML::Node& node) {
   return node.IsSequence() ? fmt::format("a list of {}", node.size()) : "a mapping";
 }
 
-YamlSection::YamlSection(std::string file, YAML::Node node, std::string where, std::initializer_list<const char*> known)
-    : file_(std::move(file)), node_(std::move(node)), where_(std::move(where)) {
+YamlSection::YamlSection(std::string file, const YAML::Node& node, std::string where,
+                         std::initializer_list<const char*> known)
+    : file_(std::move(file)), node_(node), where_(std::move(where)) {
   if (!node_.IsMap()) fail(line(), fmt::format("expected a mapping, found {}", describe(node_)));
   const std::vector<std::string> names(known.begin(), known.end());
   for (const auto& entry : node_) {

@@ -19,7 +19,7 @@ class YamlSection {
  public:
   // `where` names the mapping in messages ("joint 'left_knee_joint'"). Throws for a node that is not a mapping, a key
   // that is not in `known` (with the nearest one) and a key given twice.
-  YamlSection(std::string file, YAML::Node node, std::string where, std::initializer_list<const char*> known);
+  YamlSection(std::string file, const YAML::Node& node, std::string where, std::initializer_list<const char*> known);
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   [[nodiscard]] int line() const { return line_of(node_); }
