@@ -60,11 +60,12 @@ void check_ids(const std::vector<PairedMotion>& clips) {
 MotionFile kind_of(const std::string& path) {
   const Npz npz = Npz::load(path);
   const std::string schema = npz.text("schema");
-  if (schema.starts_with("duet.clip/")) return MotionFile::kClip;
-  if (schema.starts_with("duet.paired/")) return MotionFile::kPaired;
-  if (schema.starts_with("duet.recording/")) return MotionFile::kRecording;
-  throw InputError(fmt::format("{}: key 'schema': expected duet.clip/1, duet.paired/1 or duet.recording/1, found '{}'",
-                               path, schema));
+  if (schema == "duet.interaction_clip") return MotionFile::kClip;
+  if (schema == "duet.paired_motion") return MotionFile::kPaired;
+  if (schema == "duet.recording") return MotionFile::kRecording;
+  throw InputError(fmt::format(
+      "{}: key 'schema': expected 'duet.interaction_clip', 'duet.paired_motion' or 'duet.recording', found '{}'", path,
+      schema));
 }
 
 PairedMotion load_or_retarget(const std::string& path, const RobotModel& robot, const PairOptions& options) {

@@ -4,33 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 
 #include "backends/factory.h"
 #include "core/digest.h"
 #include "core/require.h"
+#include "policies/observation_history.h"
 
 namespace duet {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// The last kHistoryFrames frames, oldest first; the first one is repeated until there are enough.
-class History {
- public:
-  void add(const ObservationFrame& frame) {
-    if (frames_.empty()) {
-      frames_.assign(kHistoryFrames, frame);
-    } else {
-      std::rotate(frames_.begin(), frames_.begin() + 1, frames_.end());
-      frames_.back() = frame;
-    }
-  }
-  [[nodiscard]] Observation at(int tick) const { return {frames_, tick}; }
-
- private:
-  std::vector<ObservationFrame> frames_;
-};
 
 void record_tick(Recording& recording, int tick, const Backend& backend, const HumanJoints& partner,
                  const Reference& reference, const JointCommand& command) {
@@ -112,7 +95,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
       {setup.clip->task, std::string(to_string(setup.clip->task)), setup.start, &setup.reference.motion, setup.seed});
   Scheduler scheduler;
   scheduler.reset({setup.start.X_WB, setup.start.q});
-  History history;
+  ObservationHistory history;
   Sha256 hash;
   JointCommand command = backend.scene().robot->default_command(setup.start.q);
 
@@ -121,7 +104,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     const HumanJoints partner = partner_joints(people, setup.reference.clip_frame + tick);
     const HumanJoints velocities = partner_velocities(people, setup.reference.clip_frame + tick, kControlRate);
     history.add({partner, backend.state()});
-    if (tick % kTicksPerPlan == 0) scheduler.push(policy.act(history.at(tick)), tick);
+    if (tick % kTicksPerPlan == 0) scheduler.push(policy.plan(history.at(tick)), tick);
     const Reference& reference = scheduler.at(tick);
     controller.act(backend.state(), reference, command);
 

@@ -64,6 +64,17 @@ void get_enum(const YamlSection& section, const char* key, const NameTable<E>& t
   section.fail(section.line(key), unknown_name_message(key, text, known));
 }
 
+// The names of a list; none where the key is absent.
+std::vector<std::string> get_texts(const YamlSection& section, const char* key) {
+  std::vector<std::string> names;
+  for (const YAML::Node& item : section.items(key)) {
+    if (!item.IsScalar())
+      section.fail(section.line(key), fmt::format("{}: expected names, found {}", key, describe(item)));
+    names.push_back(item.Scalar());
+  }
+  return names;
+}
+
 // A section below `parent`, empty where absent.
 YamlSection below(const YamlSection& parent, const std::string& file, const char* key,
                   std::initializer_list<const char*> known) {
@@ -72,7 +83,7 @@ YamlSection below(const YamlSection& parent, const std::string& file, const char
 
 void get_names(const YamlSection& top, const char* key, const char* kind, const std::vector<std::string>& known,
                std::vector<std::string>& out) {
-  out = top.texts(key);
+  out = get_texts(top, key);
   checked(top, key, [&] {
     require(!out.empty(), fmt::format("expected at least one {}, found none", kind));
     for (const std::string& name : out)
@@ -91,7 +102,7 @@ void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed"});
   get_integer(synth, "per_task", 1, suite.clips.synth_per_task);
   get_integer<std::uint64_t>(synth, "seed", 0, suite.clips.synth_seed);
-  if (clips.has("files")) suite.clips.files = clips.texts("files");
+  if (clips.has("files")) suite.clips.files = get_texts(clips, "files");
   const bool synthetic = suite.clips.synth_per_task > 0;
   if (synthetic != suite.clips.files.empty())
     clips.fail(clips.line(),
@@ -104,7 +115,7 @@ void read_clips(const YamlSection& top, Suite& suite) {
 void read_lists(const YamlSection& top, Suite& suite) {
   if (top.has("tasks")) {
     checked(top, "tasks", [&] {
-      for (const std::string& task : top.texts("tasks")) suite.tasks.push_back(parse_task(task));
+      for (const std::string& task : get_texts(top, "tasks")) suite.tasks.push_back(parse_task(task));
       require(!suite.tasks.empty(), "expected at least one task, found none");
     });
   } else {

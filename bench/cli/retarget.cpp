@@ -45,14 +45,15 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
     const PairedMotion paired = retarget(clip, robot, options);
     const std::string path = output_path(arguments, files[i], files.size());
     save_paired_motion(paired, path);
-    const std::vector<double>& total = paired.loss.at("total");
-    lines[i] =
-        fmt::format("{}: {} frames, objective {:.4f} -> {:.4f}\n", path, paired.frames(), total.front(), total.back());
+    const std::vector<double>& kinematic = paired.loss.at("kin");
+    const std::vector<double>& contact = paired.loss.at("con");
+    lines[i] = fmt::format("{}: {} frames, L_kin {:.3f} -> {:.3f}, L_con {:.3f} -> {:.3f}\n", path, paired.frames(),
+                           kinematic.front(), kinematic.back(), contact.front(), contact.back());
     results[i] = {{"file", path},
                   {"clip", paired.clip_id},
                   {"frames", paired.frames()},
-                  {"objective_first", total.front()},
-                  {"objective_last", total.back()},
+                  {"l_kin", {kinematic.front(), kinematic.back()}},
+                  {"l_con", {contact.front(), contact.back()}},
                   {"settings", paired.settings}};
     progress.advance();
   });
