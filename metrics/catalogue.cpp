@@ -72,6 +72,7 @@ const MetricInfo& metric_info(std::string_view name) {
   for (const MetricInfo& info : kCatalogue)
     if (info.name == name) return info;
   std::vector<std::string> names;
+  names.reserve(kCatalogue.size());
   for (const MetricInfo& info : kCatalogue) names.emplace_back(info.name);
   throw std::invalid_argument(unknown_name_message("metric", name, names));
 }

@@ -39,8 +39,10 @@ struct DetectorResult {
   std::vector<bool> frames;              // evidence mask, T entries
   std::map<std::string, bool> parts;     // the printed sub-conditions by name
   std::map<std::string, double> values;  // what was measured
-  std::map<std::string, double>
-      margins;  // per threshold, signed, positive = satisfied; "overall" decides where hug has modes
+  // Per threshold, signed: by how much it could be tightened (positive) or must be loosened (negative) with the others
+  // as they are; at exactly 0 the printed comparison decides. -infinity with fewer frames than are asked for. The
+  // smallest has the sign of the verdict, for a hug "overall" (the best of its three modes) has.
+  std::map<std::string, double> margins;
 };
 
 // Throws std::invalid_argument: a track that the task needs and is empty or has another length, a value that is not
@@ -57,7 +59,8 @@ DetectorReadings strict_readings(DetectorReadings readings);
 
 // SMPL-24: hands are joints 22 and 23, head 15, root 0, torso 9 (spine3), shoulders 16 and 17.
 Agent human_agent(const PointTracks& smpl24);
-// The card's hand, head, torso and shoulder frames; root is the base link.
+// The frames that the card's `tracks` name; root is the base link. Throw std::invalid_argument for a motion of another
+// number, or other names, of joints.
 Agent robot_agent(const RobotModel& robot, const std::vector<RobotState>& states);
 Agent robot_agent(const RobotModel& robot, const RobotMotion& motion);
 
