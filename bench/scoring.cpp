@@ -10,10 +10,6 @@
 namespace duet {
 namespace {
 
-HumanMotion cut(const HumanMotion& motion, int begin, int frames) {
-  return slice(motion, begin, std::min(begin + frames, motion.frames()));
-}
-
 void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out) {
   for (const auto& [name, value] : values)
     if (std::isfinite(value)) out[name] = value;
@@ -39,23 +35,25 @@ Verdict to_verdict(const DetectorResult& result, DetectorVersion version, Thresh
   return verdict;
 }
 
-PairedMotion executed_motion(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot) {
-  const int frames = std::min(rollout.recording.frames(), setup.clip->frames() - setup.reference.clip_frame);
-  const int begin = setup.reference.clip_frame;
+PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot) {
+  const Recording& recording = rollout.recording;
+  const int begin = std::min(recording.phases.act_begin, recording.frames());
+  const int frames = std::min(recording.phases.act_end, recording.frames()) - begin;
+  const int clip_begin = setup.reference.clip_frame + begin;
   PairedMotion motion;
   motion.clip_id = setup.clip->clip_id;
   motion.task = setup.clip->task;
-  motion.phases = rollout.recording.phases;
+  motion.phases = {0, frames};
   motion.reactor = setup.clip->reactor;
-  motion.partner = cut(setup.clip->partner, begin, frames);
-  motion.source_partner = cut(setup.clip->source_partner, begin, frames);
-  motion.source_reactor = cut(setup.clip->source_reactor, begin, frames);
-  motion.reshaped = setup.clip->reshaped.slice(begin, begin + frames);
+  motion.partner = slice(setup.clip->partner, clip_begin, clip_begin + frames);
+  motion.source_partner = slice(setup.clip->source_partner, clip_begin, clip_begin + frames);
+  motion.source_reactor = slice(setup.clip->source_reactor, clip_begin, clip_begin + frames);
+  motion.reshaped = setup.clip->reshaped.slice(clip_begin, clip_begin + frames);
   motion.robot.joint_names = robot.joint_names();
   motion.robot.q.resize(robot.dof(), frames);
   for (int t = 0; t < frames; ++t) {
-    motion.robot.root.push_back(rollout.recording.robot[t].X_WB);
-    motion.robot.q.col(t) = rollout.recording.robot[t].q;
+    motion.robot.root.push_back(recording.robot[begin + t].X_WB);
+    motion.robot.q.col(t) = recording.robot[begin + t].q;
   }
   return motion;
 }
@@ -86,7 +84,7 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   constexpr int kShortest = 8;  // third differences at both ends
   if (recording.frames() < kShortest) return;
   add_finite(controller_diagnostics(recording, readings.diagnostics), row.metrics);
-  const PairedMotion executed = executed_motion(rollout, setup, robot);
+  const PairedMotion executed = executed_act(rollout, setup, robot);
   if (executed.frames() >= kShortest) add_finite(retargeting_metrics(executed, robot, readings.metrics), row.metrics);
 }
 

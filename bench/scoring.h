@@ -13,9 +13,9 @@ namespace duet {
 void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
                    const RobotModel& robot, EpisodeRow& row);
 
-// The executed motion in the place of the retargeted one: the 18 metrics then say what the engine and the controller
-// cost.
-PairedMotion executed_motion(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot);
+// The executed motion in the place of the retargeted one, over the act (A.4.4 changes what is before and after): the 18
+// metrics then say what the engine and the controller cost. As many frames as the act had before the episode ended.
+PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot);
 
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/require.h"
@@ -43,6 +44,30 @@ void validate(const RobotMotion& motion, const std::string& what) {
         throw std::invalid_argument(fmt::format("{}: angle of joint '{}' in frame {} is not finite", what,
                                                 motion.joint_names[static_cast<std::size_t>(j)], t));
   }
+}
+
+RobotMotion resample(const RobotMotion& motion, double rate_hz) {
+  require(std::isfinite(rate_hz) && rate_hz > 0.0,
+          fmt::format("resample: expected a rate above 0 Hz, found {}", rate_hz));
+  require(motion.frames() > 0, "resample: expected frames, found none");
+  constexpr double kSameInstant = 1e-9;  // of a frame: two clocks that meet, meet
+  const int last = motion.frames() - 1;
+  const double step = motion.rate_hz / rate_hz;  // source frames per new frame
+  RobotMotion result;
+  result.rate_hz = rate_hz;
+  result.joint_names = motion.joint_names;
+  const int frames = static_cast<int>(std::floor(last / step * (1.0 + kSameInstant))) + 1;
+  result.q.resize(motion.q.rows(), frames);
+  for (int t = 0; t < frames; ++t) {
+    const double instant = std::min(t * step, static_cast<double>(last));
+    const int before = static_cast<int>(instant + kSameInstant);
+    const int after = std::min(before + 1, last);
+    const double share = std::max(0.0, instant - before);
+    result.root.push_back(interpolate(motion.root[static_cast<std::size_t>(before)],
+                                      motion.root[static_cast<std::size_t>(after)], share));
+    result.q.col(t) = motion.q.col(before) + share * (motion.q.col(after) - motion.q.col(before));
+  }
+  return result;
 }
 
 }  // namespace duet

@@ -24,4 +24,8 @@ struct RobotMotion {
 // is not unit (to 1e-6), a rate that is not positive. `what` names the motion in the message.
 void validate(const RobotMotion& motion, const std::string& what);
 
+// At another rate, first instant kept: positions and angles linear, rotations slerp; frames are never skipped. Throws
+// std::invalid_argument for a motion without frames or a rate that is not positive.
+RobotMotion resample(const RobotMotion& motion, double rate_hz);
+
 }  // namespace duet

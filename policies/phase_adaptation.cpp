@@ -104,7 +104,7 @@ class Adaptation {
     }
   }
 
-  // All frames: upright on standing legs where the act begins.
+  // All frames: upright on standing legs at the act position.
   void stand() {
     const Pose stance = stance_at_act();
     for (int t = 0; t < motion_.frames(); ++t) {
@@ -127,7 +127,8 @@ class Adaptation {
  private:
   [[nodiscard]] double preparation_share(int t) const { return static_cast<double>(t) / phases_.act_begin; }
   Pose& root(int t) { return motion_.root[static_cast<std::size_t>(t)]; }
-  Pose stance_at_act() { return robot_.standing_state(root(phases_.act_begin)).X_WB; }
+  // Where the robot is in the middle of the act: a person may still be walking in its first frames.
+  Pose stance_at_act() { return robot_.standing_state(root((phases_.act_begin + phases_.act_end) / 2)).X_WB; }
 
   RobotMotion motion_;
   Phases phases_;

@@ -6,6 +6,7 @@
 
 #include "bench/benchmarks/parts.h"
 #include "core/require.h"
+#include "retarget/libtorch_peer.h"
 #include "retarget/pair_solver.h"
 
 namespace duet {
@@ -38,6 +39,17 @@ std::vector<Figure> time_kernel(const Kernel& kernel) {
   return {solver, {name + ":retarget", timing.whole, "frames/s", "", true}};
 }
 
+// The paper's way on the same clip, and how many times our best kernel is faster in the same run.
+std::vector<Figure> time_libtorch(const BenchmarkOptions&) {
+  constexpr int kIterations = 8;  // of 200: each costs the same
+  const RobotModel robot = load_robot(default_card_path());
+  const InteractionClip clip = benchmark_clip();
+  const double ours = time_pair(clip, robot, {}, kRounds).solver;
+  const double theirs = libtorch_frames_per_second(clip, robot, kIterations);
+  return {{"pair/paper/libtorch", theirs, "frames/s", "", true},
+          at_least("pair/paper/libtorch:ours_over_libtorch", ours / theirs, "1", 100.0)};
+}
+
 }  // namespace
 
 void add_pair_benchmarks(std::vector<Benchmark>& list) {
@@ -47,6 +59,8 @@ void add_pair_benchmarks(std::vector<Benchmark>& list) {
     list.push_back({fmt::format("pair/paper/{}", kernel.name), "PAIR, 200 iterations, one core, 1,007 frames",
                     [kernel](const BenchmarkOptions&) { return time_kernel(kernel); }});
   }
+  if (libtorch_available())
+    list.push_back({"pair/paper/libtorch", "the same problem in libtorch's autograd, one thread", time_libtorch});
 }
 
 }  // namespace duet

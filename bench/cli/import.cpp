@@ -53,24 +53,34 @@ void import_people(const Session& session, ImportArguments arguments) {
          {"act", {phases.act_begin, phases.act_end}}});
 }
 
-// A whole-body pickle names no joints; its columns are taken in the order of the robot card, which must fit.
-Recording play_pickle(const PickledMotion& pickled, const std::string& file,
-                      const std::shared_ptr<const RobotModel>& robot) {
+// Such pickles name no joints. As many columns as the robot has joints are taken in the card's order; six fewer are
+// GMT's 23-joint body: the same order without the wrists, which are then straight. The verdict says which.
+RobotMotion on_robot(const PickledMotion& pickled, const std::string& file, const RobotModel& robot,
+                     std::vector<std::string>& verdict) {
+  std::vector<int> rows;
+  for (int j = 0; j < robot.dof(); ++j)
+    if (robot.joints[j].name.find("wrist") == std::string::npos) rows.push_back(j);
+  const Eigen::MatrixXd& q = pickled.motion.q;
   RobotMotion motion = pickled.motion;
-  if (motion.q.rows() != robot->dof()) {
-    throw InputError(fmt::format("{}: expected {} joints for robot '{}', found {} (another card: --card)", file,
-                                 robot->dof(), robot->name, motion.q.rows()));
+  if (q.rows() == static_cast<Eigen::Index>(rows.size()) && q.rows() != robot.dof()) {
+    motion.q = Eigen::MatrixXd::Zero(robot.dof(), q.cols());
+    for (size_t i = 0; i < rows.size(); ++i) motion.q.row(rows[i]) = q.row(static_cast<Eigen::Index>(i));
+    verdict.push_back(fmt::format("{} columns: the joints of '{}' without its wrists, which are held straight",
+                                  q.rows(), robot.name));
+  } else if (q.rows() != robot.dof()) {
+    throw InputError(fmt::format("{}: expected {} joints for robot '{}' ({} without wrists), found {}", file,
+                                 robot.dof(), robot.name, rows.size(), q.rows()));
   }
-  motion.joint_names = robot->joint_names();
-  return play_back(motion, {}, Task::kHug, {0, motion.frames()}, robot);
+  motion.joint_names = robot.joint_names();
+  return motion;
 }
 
 // Worst distance between the file's own body positions and our forward kinematics, over bodies that the robot has. [m]
-double kinematics_error(const PickledMotion& pickled, const RobotModel& robot) {
+double kinematics_error(const PickledMotion& pickled, const RobotMotion& motion, const RobotModel& robot) {
   double worst = 0.0;
   Kinematics kinematics(robot);
   for (int t = 0; t < pickled.local_body_pos.frames(); ++t) {
-    kinematics.update(Pose(), pickled.motion.q.col(t));
+    kinematics.update(Pose(), motion.q.col(t));
     for (size_t b = 0; b < pickled.link_body_list.size(); ++b) {
       for (size_t f = 0; f < robot.frames.size(); ++f) {
         if (robot.frames[f].name != pickled.link_body_list[b]) continue;
@@ -86,18 +96,21 @@ void import_robot(const Session& session, const ImportArguments& arguments) {
   const auto robot =
       std::make_shared<const RobotModel>(load_robot(arguments.robot.empty() ? default_card_path() : arguments.robot));
   const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
-  const Recording recording = play_pickle(pickled, arguments.files[0], robot);
+  std::vector<std::string> verdict = pickled.verdict;
+  const RobotMotion motion = on_robot(pickled, arguments.files[0], *robot, verdict);
+  const RobotMotion resampled = resample(motion, kControlRate);
+  verdict.push_back(fmt::format("resampled: {} frames at {:.4g} Hz -> {} frames at {:g} Hz", motion.frames(),
+                                motion.rate_hz, resampled.frames(), kControlRate));
+  const double error = kinematics_error(pickled, motion, *robot);
+  if (!pickled.link_body_list.empty())
+    verdict.push_back(fmt::format("its body positions and our kinematics differ by {:.2e} m at most", error));
+  const Recording recording = play_back(resampled, {}, Task::kHug, {0, resampled.frames()}, robot);
   save_recording(recording, arguments.output);
-  const double error = kinematics_error(pickled, *robot);
-  print(
-      session,
-      fmt::format(
-          "{}  largest difference between its body positions and our kinematics: {:.2e} m\n{}: recording of {} frames",
-          bulleted(pickled.verdict), error, arguments.output, recording.frames()),
-      {{"file", arguments.output},
-       {"frames", recording.frames()},
-       {"kinematics_error_m", error},
-       {"verdict", pickled.verdict}});
+  print(session, fmt::format("{}{}: recording of {} frames", bulleted(verdict), arguments.output, recording.frames()),
+        {{"file", arguments.output},
+         {"frames", recording.frames()},
+         {"kinematics_error_m", error},
+         {"verdict", verdict}});
 }
 
 void run_import(const Session& session, const ImportArguments& arguments) {

@@ -55,5 +55,46 @@ TEST(RobotMotion, RefusesEachKindOfFault) {
             "walk.npz: angle of joint 'right_knee' in frame 2 is not finite");
 }
 
+RobotMotion ramp(int frames, double rate_hz) {
+  RobotMotion motion;
+  motion.rate_hz = rate_hz;
+  motion.joint_names = {"knee"};
+  motion.q.resize(1, frames);
+  for (int t = 0; t < frames; ++t) {
+    const double time = t / rate_hz;
+    motion.root.push_back(
+        {Eigen::Quaterniond(Eigen::AngleAxisd(time, Eigen::Vector3d::UnitZ())), {2.0 * time, 0.0, 0.7}});
+    motion.q(0, t) = 3.0 * time;
+  }
+  return motion;
+}
+
+TEST(RobotMotion, ResamplingAConstantVelocityIsExact) {
+  for (const double rate : {30.0, 29.97, 50.0, 120.0}) {
+    const RobotMotion result = resample(ramp(61, rate), 50.0);
+    EXPECT_EQ(result.rate_hz, 50.0);
+    EXPECT_NEAR((result.frames() - 1) / 50.0, 60.0 / rate, 0.02) << rate;
+    for (int t = 0; t < result.frames(); ++t) {
+      EXPECT_NEAR(result.q(0, t), 3.0 * t / 50.0, 1e-9) << rate << " Hz, frame " << t;
+      EXPECT_NEAR(result.root[static_cast<std::size_t>(t)].p.x(), 2.0 * t / 50.0, 1e-9);
+      EXPECT_NEAR(yaw_of(result.root[static_cast<std::size_t>(t)].R), t / 50.0, 1e-9);
+    }
+  }
+}
+
+TEST(RobotMotion, ResamplingToItsOwnRateChangesNothing) {
+  const RobotMotion motion = ramp(20, 50.0);
+  const RobotMotion result = resample(motion, 50.0);
+  EXPECT_EQ(result.q, motion.q);
+  EXPECT_EQ(result.frames(), motion.frames());
+}
+
+TEST(RobotMotion, ResamplingRefusesNonsense) {
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { resample(ramp(3, 50.0), 0.0); }),
+            "resample: expected a rate above 0 Hz, found 0");
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { resample(RobotMotion(), 50.0); }),
+            "resample: expected frames, found none");
+}
+
 }  // namespace
 }  // namespace duet
