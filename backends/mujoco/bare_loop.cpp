@@ -1,6 +1,7 @@
 #include "backends/mujoco/bare_loop.h"
 
 #include <fmt/format.h>
+#include <mujoco/mujoco.h>
 
 #include <algorithm>
 #include <ctime>

@@ -1,6 +1,7 @@
 #include "backends/mujoco/mujoco_model.h"
 
 #include <fmt/format.h>
+#include <mujoco/mujoco.h>
 
 #include <algorithm>
 #include <array>
@@ -91,6 +92,9 @@ void find_human(const Scene& scene, MujocoModel& compiled) {
 }
 
 }  // namespace
+
+void MujocoDelete::operator()(mjModel* model) const { mj_deleteModel(model); }
+void MujocoDelete::operator()(mjData* data) const { mj_deleteData(data); }
 
 MujocoModel compile_mujoco(const Scene& scene) {
   install_handlers();

@@ -1,8 +1,6 @@
-// A scene compiled by MuJoCo, and where the robot's joints and shapes are in its arrays. Includes the vendor's header:
-// only for the files of this folder that are built with MuJoCo.
+// A scene compiled by MuJoCo, and where the robot's joints and shapes are in its arrays. For the files of this folder
+// that are built with MuJoCo; the vendor's types are only named here.
 #pragma once
-
-#include <mujoco/mujoco.h>
 
 #include <memory>
 #include <vector>
@@ -10,6 +8,9 @@
 #include "backends/scene.h"
 #include "core/contact.h"
 #include "core/robot_state.h"
+
+struct mjModel_;
+struct mjData_;
 
 namespace duet {
 
@@ -20,14 +21,14 @@ struct MujocoGeom {
 };
 
 struct MujocoDelete {
-  void operator()(mjModel* model) const { mj_deleteModel(model); }
-  void operator()(mjData* data) const { mj_deleteData(data); }
+  void operator()(mjModel_* model) const;
+  void operator()(mjData_* data) const;
 };
 
 // One compiled copy per backend: gains and capsule lengths are written into it. Not shared between threads.
 struct MujocoModel {
-  std::unique_ptr<mjModel, MujocoDelete> model;
-  std::unique_ptr<mjData, MujocoDelete> data;
+  std::unique_ptr<mjModel_, MujocoDelete> model;
+  std::unique_ptr<mjData_, MujocoDelete> data;
   std::vector<int> q_address;     // of joint i in qpos
   std::vector<int> v_address;     // of joint i in qvel
   std::vector<int> link_body;     // body of link i
@@ -39,7 +40,7 @@ struct MujocoModel {
 // Throws std::runtime_error with MuJoCo's message where it refuses the document. Thread-safe (compiling is serialised).
 MujocoModel compile_mujoco(const Scene& scene);
 
-void write_state(const RobotState& state, const MujocoModel& from, mjData& to);
+void write_state(const RobotState& state, const MujocoModel& from, mjData_& to);
 void read_state(const MujocoModel& from, RobotState& state);
 
 }  // namespace duet

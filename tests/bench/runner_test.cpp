@@ -27,7 +27,7 @@ TEST(Runner, RunsTheNullArmBesideEveryPolicy) {
   const RunSummary summary = run(test::playback_suite(), folder / "run");
   EXPECT_EQ(summary.planned, 4);
   EXPECT_EQ(summary.run, 4);
-  const Run loaded = load_run(folder / "run");
+  const duet::Run loaded = load_run(folder / "run");
   int null_rows = 0;
   for (const EpisodeRow& row : loaded.rows) null_rows += row.arm == "null" ? 1 : 0;
   EXPECT_EQ(null_rows, 2);
