@@ -142,7 +142,7 @@ TEST(CommandLine, BadInputIsOneSentenceAndTwo) {
            {"synth hug --side up -o x", "left or right"},
            {"retarget x.npz --option kernel=v9 -o x", "v9"},
            {"bench pairr", "pair"}}) {
-    const Answer answer = duet_program(bad.arguments);
+    const Answer answer = duet_program(bad.arguments + " -q");
     EXPECT_EQ(answer.code, 2) << bad.arguments;
     EXPECT_THAT(answer.err, HasSubstr(bad.names)) << bad.arguments;
     EXPECT_EQ(std::count(answer.err.begin(), answer.err.end(), '\n'), 1) << answer.err;
