@@ -7,6 +7,7 @@
 #include "bench/rollout.h"
 #include "metrics/catalogue.h"
 #include "metrics/detector.h"
+#include "robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -18,6 +19,13 @@ const std::vector<std::pair<std::string, std::string>>& detector_rows() {
       {"robot_detected", "task detected, robot"},
       {"paper_detected", "task detected, as printed"}};
   return rows;
+}
+
+// The robot's points of the 16 pairs over time.
+PointTracks pair_tracks(const RobotMotion& motion, const RobotModel& robot) {
+  std::vector<int> frames;
+  for (const RetargetPair& pair : robot.pairs) frames.push_back(pair.frame);
+  return frame_tracks(robot, motion, frames);
 }
 
 nlohmann::json finite_or_null(const std::map<std::string, double>& values) {
@@ -81,6 +89,10 @@ ClipScore score_clip(const PairedMotion& motion, std::shared_ptr<const RobotMode
   score.clip = motion.clip_id;
   score.task = to_string(motion.task);
   score.metrics = retargeting_metrics(motion, *robot, readings.metrics);
+  // Two figures whose other reading people quote as often: printed beside the default ones.
+  const PointTracks pairs = pair_tracks(motion.robot, *robot);
+  score.metrics["jpe.pelvis"] = jpe(pairs, motion.reshaped, JpeFrame::kPelvis);
+  score.metrics["large_angle_ratio.entry"] = large_angle_ratio(hinge_magnitudes(motion.robot.q), LargeAngle::kEntry);
   score.contacts = retargeting_contact_counts(motion, *robot, readings.metrics);
   const Recording played = play_back(motion.robot, motion.partner.joints, motion.task, motion.phases, robot);
   const Agent human = human_agent(played.partner);
@@ -124,6 +136,8 @@ std::string score_table(const std::map<std::string, std::map<std::string, double
     if (metric.group == MetricGroup::kRetargeting && summary.at(columns.front()).contains(name))
       add_row(name, metric.unit, name, false);
   }
+  add_row("jpe, pelvis-aligned", "m", "jpe.pelvis", false);
+  add_row("large angles, per joint", "1", "large_angle_ratio.entry", false);
   for (const auto& [name, title] : detector_rows()) add_row(title, "", name, true);
   return text;
 }

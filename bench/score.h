@@ -17,7 +17,7 @@ namespace duet {
 
 struct ClipScore {
   std::string clip, task;
-  std::map<std::string, double> metrics;  // by catalogue name; NaN where undefined
+  std::map<std::string, double> metrics;  // the 18, jpe.pelvis and large_angle_ratio.entry; NaN where undefined
   std::array<ContactCounts, 3> contacts;
   bool source_detected = false;  // person against person, the reactor as performer
   bool robot_detected = false;   // version `robot`, played back

@@ -75,17 +75,16 @@ RobotMotion on_robot(const PickledMotion& pickled, const std::string& file, cons
   return motion;
 }
 
-// Worst distance between the file's own body positions and our forward kinematics, over bodies that the robot has. [m]
+// Worst distance between the file's own body positions and our forward kinematics, over the robot's links. [m]
 double kinematics_error(const PickledMotion& pickled, const RobotMotion& motion, const RobotModel& robot) {
   double worst = 0.0;
   Kinematics kinematics(robot);
   for (int t = 0; t < pickled.local_body_pos.frames(); ++t) {
     kinematics.update(Pose(), motion.q.col(t));
     for (size_t b = 0; b < pickled.link_body_list.size(); ++b) {
-      for (size_t f = 0; f < robot.frames.size(); ++f) {
-        if (robot.frames[f].name != pickled.link_body_list[b]) continue;
-        worst = std::max(worst, (kinematics.frame_position(f) - pickled.local_body_pos.at(t, b)).norm());
-        break;
+      for (size_t i = 0; i < robot.links.size(); ++i) {
+        if (robot.links[i].name != pickled.link_body_list[b]) continue;
+        worst = std::max(worst, (kinematics.p_WL(static_cast<int>(i)) - pickled.local_body_pos.at(t, b)).norm());
       }
     }
   }

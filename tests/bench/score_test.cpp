@@ -32,10 +32,11 @@ TEST(Score, UndefinedFiguresStayOutOfMeans) {
   EXPECT_DOUBLE_EQ(summarize_scores({a, b}, {}).at("hug").at("jpe"), 0.2);
 }
 
-TEST(Score, RetargetedClipHasAllEighteenAndItsTaskIsSeen) {
+TEST(Score, RetargetedClipHasAllEighteenAndTwoOtherReadings) {
   const auto robot = test::g1();
   const ClipScore score = score_clip(test::paired(Task::kHandshake, *robot), robot, {});
-  EXPECT_EQ(score.metrics.size(), 18u);
+  EXPECT_EQ(score.metrics.size(), 20u);
+  EXPECT_LT(score.metrics.at("large_angle_ratio.entry"), score.metrics.at("large_angle_ratio"));
   EXPECT_TRUE(score.source_detected);
   EXPECT_TRUE(score.robot_detected);
   EXPECT_NE(score_table(summarize_scores({score}, {})).find("jpe"), std::string::npos);
