@@ -51,16 +51,23 @@ std::vector<MetricColumn> metric_columns() {
                                                                      : "";
     columns.push_back({std::string(metric.name), std::string(metric.title), std::string(metric.unit), direction});
   }
+  columns.insert(columns.end(), {{"jpe.pelvis", "Joint position error, pelvis-aligned", "m", "lower"},
+                                 {"large_angle_ratio.entry", "Large-angle ratio, per joint", "1", "lower"},
+                                 {"source_detected", "Task detected, people", "1", "higher"},
+                                 {"robot_detected", "Task detected, robot", "1", "higher"},
+                                 {"paper_detected", "Task detected, as printed", "1", "higher"},
+                                 {"clips", "Clips", "", ""}});
   return columns;
 }
 
 std::vector<std::string> notes_of(const Suite& suite) {
   return {
-      fmt::format("Suite {} {}: start `{}`, partner `{}`, physics step {:g} ms, headline detector version `{}` with "
-                  "`{}` thresholds.",
-                  suite.name, suite.version, to_string(suite.start), to_string(suite.partner), 1000.0 * suite.dt,
-                  to_string(suite.detector), to_string(suite.thresholds)),
-      "Start `auto` means: a controller that cannot walk starts at the act position; one that walks approaches.",
+      fmt::format(
+          "Suite {} {}: start \"{}\", partner \"{}\", physics step {:g} ms, headline detector version \"{}\" with "
+          "\"{}\" thresholds.",
+          suite.name, suite.version, to_string(suite.start), to_string(suite.partner), 1000.0 * suite.dt,
+          to_string(suite.detector), to_string(suite.thresholds)),
+      "Start \"auto\" means: a controller that cannot walk starts at the act position; one that walks approaches.",
       "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
       "same episodes.",
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -35,7 +34,7 @@ mjModel* load(const std::string& document) {
   const std::unique_ptr<mjVFS> files = std::make_unique<mjVFS>();  // about a megabyte: too large for the stack
   mj_defaultVFS(files.get());
   mj_makeEmptyFileVFS(files.get(), kName, static_cast<int>(document.size()));
-  std::memcpy(files->filedata[mj_findFileVFS(files.get(), kName)], document.data(), document.size());
+  document.copy(static_cast<char*>(files->filedata[mj_findFileVFS(files.get(), kName)]), document.size());
   std::array<char, 1000> error{};
   mjModel* model = mj_loadXML(kName, files.get(), error.data(), static_cast<int>(error.size()));
   mj_deleteVFS(files.get());

@@ -45,6 +45,7 @@ std::vector<Listed> list_engines() {
 
 std::vector<Listed> named(const std::vector<std::string>& names) {
   std::vector<Listed> list;
+  list.reserve(names.size());
   for (const std::string& name : names) list.push_back({name, ""});
   return list;
 }
