@@ -42,9 +42,9 @@ bool is_leg_joint(std::string_view name);
 //   (height and orientation as there) straight to the first act frame, the upper body from neutral; legs as in the
 //   clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral.
 // kAct: the clip from `lead` before the act on (all of it, where the preparation is shorter). With hold_stance the root
-//   stands upright at x, y and yaw of the act's middle frame at the robot's standing height, legs standing; the upper body
-//   goes from neutral to the first act frame, through the act and back. Without hold_stance root and legs wait in the
-//   first act frame, go through the act to the bit and stay in its last frame.
+//   stands upright at x, y and yaw of the act's middle frame at the robot's standing height, legs standing; the upper
+//   body goes from neutral to the first act frame, through the act and back. Without hold_stance root and legs wait in
+//   the first act frame, go through the act to the bit and stay in its last frame.
 // A follow-up shorter than `return_time` ends on the way to neutral: no frame is added, the partner has none for it.
 // The seed matters to kApproach only: the same seed gives the same bits.
 // Throws std::invalid_argument where the motion is not valid, not at 50 Hz or not of this robot's joints in its order,
