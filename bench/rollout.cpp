@@ -127,7 +127,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
 }
 
 Recording play_back(const RobotMotion& motion, const PointTracks& partner, Task task, const Phases& phases,
-                    std::shared_ptr<const RobotModel> robot) {
+                    const std::shared_ptr<const RobotModel>& robot) {
   require(motion.frames() >= 2, fmt::format("playback needs 2 frames or more, found {}", motion.frames()));
   require(partner.empty() || partner.frames() == motion.frames(),
           fmt::format("playback: {} frames of the robot but {} of the partner", motion.frames(), partner.frames()));

@@ -47,6 +47,6 @@ bool has_fallen(const RobotState& state);
 
 // Plays a robot motion in the playback backend: a Recording without physics.
 Recording play_back(const RobotMotion& motion, const PointTracks& partner, Task task, const Phases& phases,
-                    std::shared_ptr<const RobotModel> robot);
+                    const std::shared_ptr<const RobotModel>& robot);
 
 }  // namespace duet

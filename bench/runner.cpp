@@ -137,7 +137,7 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
 }
 
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
-                       std::shared_ptr<const RobotModel> robot, const std::string& trajectory_folder) {
+                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder) {
   EpisodeRow row = row_for(spec, suite, hash, *robot);
   row.started_at = utc_now();
   const Clock::time_point begin = Clock::now();

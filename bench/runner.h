@@ -37,7 +37,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
 // One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`.
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks);
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
-                       std::shared_ptr<const RobotModel> robot, const std::string& trajectory_folder = "");
+                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "");
 
 // Thrown by run_episode when the user stopped the run: the episode leaves no row and runs again on resume.
 struct EpisodeInterrupted {};

@@ -84,7 +84,8 @@ std::string cell(double value, bool percent) {
 
 }  // namespace
 
-ClipScore score_clip(const PairedMotion& motion, std::shared_ptr<const RobotModel> robot, const Readings& readings) {
+ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const RobotModel>& robot,
+                     const Readings& readings) {
   ClipScore score;
   score.clip = motion.clip_id;
   score.task = to_string(motion.task);

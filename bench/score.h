@@ -24,7 +24,8 @@ struct ClipScore {
   bool paper_detected = false;   // version `paper`, played back
 };
 
-ClipScore score_clip(const PairedMotion& motion, std::shared_ptr<const RobotModel> robot, const Readings& readings);
+ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const RobotModel>& robot,
+                     const Readings& readings);
 
 // Per task and "all": mean of each metric over clips (contact figures from summed counts: micro average), detector
 // rates under "source_detected", "robot_detected", "paper_detected", and "clips".
