@@ -18,13 +18,16 @@ constexpr const char* kSchemaSql = R"sql(
 CREATE TABLE episodes (
   key TEXT PRIMARY KEY, suite TEXT NOT NULL, suite_version TEXT NOT NULL, suite_hash TEXT NOT NULL,
   task TEXT NOT NULL, clip TEXT NOT NULL, episode INTEGER NOT NULL, seed TEXT NOT NULL,
-  engine TEXT NOT NULL, engine_version TEXT NOT NULL, controller TEXT NOT NULL, policy TEXT NOT NULL,
+  engine TEXT NOT NULL, engine_version TEXT NOT NULL, engine_profile TEXT NOT NULL, profile_digest TEXT NOT NULL,
+  controller TEXT NOT NULL, policy TEXT NOT NULL,
   perturbation TEXT NOT NULL, robot_digest TEXT NOT NULL, arm TEXT NOT NULL,
   outcome TEXT NOT NULL, message TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
   fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
   contact_peak_n REAL, contact_impulse_ns REAL, late_plans INTEGER NOT NULL,
   state_hash TEXT NOT NULL, started_at TEXT NOT NULL);
 CREATE TABLE metrics (
+  key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
+CREATE TABLE forces (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE verdicts (
   key TEXT NOT NULL REFERENCES episodes(key), version TEXT NOT NULL, thresholds TEXT NOT NULL,
@@ -118,18 +121,16 @@ class RowWriter {
   explicit RowWriter(Database& database)
       : database_(database),
         episode_(database.prepare("INSERT INTO episodes VALUES "
-                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
+                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
         metric_(database.prepare("INSERT INTO metrics VALUES (?,?,?)")),
+        force_(database.prepare("INSERT INTO forces VALUES (?,?,?)")),
         verdict_(database.prepare("INSERT INTO verdicts VALUES (?,?,?,?,?)")),
         value_(database.prepare("INSERT INTO verdict_values VALUES (?,?,?,?,?,?)")) {}
 
   void write(const EpisodeRow& row) {
     write_episode(row);
-    for (const auto& [name, value] : row.metrics) {
-      if (!std::isfinite(value)) continue;
-      Parameters(metric_.get()).text(row.key).text(name).number(value);
-      database_.step(metric_.get());
-    }
+    write_finite(row.key, row.metrics, metric_.get());
+    write_finite(row.key, row.forces, force_.get());
     for (const Verdict& verdict : row.verdicts) write_verdict(row.key, verdict);
   }
 
@@ -147,6 +148,8 @@ class RowWriter {
         .text(fmt::format("{}", row.seed))
         .text(row.engine)
         .text(row.engine_version)
+        .text(row.engine_profile)
+        .text(row.profile_digest)
         .text(row.controller)
         .text(row.policy)
         .text(row.perturbation)
@@ -166,6 +169,14 @@ class RowWriter {
         .text(row.state_hash)
         .text(row.started_at);
     database_.step(episode_.get());
+  }
+
+  void write_finite(const std::string& key, const std::map<std::string, double>& values, sqlite3_stmt* statement) {
+    for (const auto& [name, value] : values) {
+      if (!std::isfinite(value)) continue;
+      Parameters(statement).text(key).text(name).number(value);
+      database_.step(statement);
+    }
   }
 
   void write_verdict(const std::string& key, const Verdict& verdict) {
@@ -192,7 +203,7 @@ class RowWriter {
   }
 
   Database& database_;
-  StatementHandle episode_, metric_, verdict_, value_;
+  StatementHandle episode_, metric_, force_, verdict_, value_;
 };
 
 void fill(const std::vector<EpisodeRow>& rows, const std::string& file, const std::string& shown_path) {

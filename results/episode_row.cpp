@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "core/digest.h"
 #include "core/names.h"
@@ -88,10 +90,71 @@ std::string arm_from(const std::string& name) {
   throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", name, known)));
 }
 
-void read_identity(JsonFields& fields, EpisodeRow& row) {
-  if (const std::int64_t schema = fields.integer("schema"); schema != kRowSchema) {
-    throw InputError(fmt::format("episode row: expected schema {}, found {}", kRowSchema, schema));
+// What is wrong with a trace, "" where nothing is.
+std::string fault_of(const StateTrace& trace) {
+  if (trace.mm.empty()) return "";
+  if (!std::isfinite(trace.rate_hz) || trace.rate_hz <= 0.0) {
+    return fmt::format("key 'rate_hz': expected a number above 0, found {}", trace.rate_hz);
   }
+  const std::set<std::string> distinct(trace.points.begin(), trace.points.end());
+  if (trace.points.empty() || distinct.size() != trace.points.size()) {
+    return "key 'points': expected at least one name, each once";
+  }
+  for (std::size_t frame = 0; frame < trace.mm.size(); ++frame) {
+    if (trace.mm[frame].size() == 3 * trace.points.size()) continue;
+    return fmt::format("key 'mm': frame {}: expected {} whole numbers (3 for each of {} points), found {}", frame,
+                       3 * trace.points.size(), trace.points.size(), trace.mm[frame].size());
+  }
+  return "";
+}
+
+nlohmann::json to_json(const StateTrace& trace) {
+  const std::string fault = fault_of(trace);
+  require(fault.empty(), "episode row: trace: " + fault);
+  if (trace.mm.empty()) return nullptr;
+  return {{"rate_hz", trace.rate_hz}, {"points", trace.points}, {"mm", trace.mm}};
+}
+
+// A list of T that nlohmann would convert without a word from other types.
+template <typename T, typename Holds>
+std::vector<T> list_of(const nlohmann::json& json, const std::string& where, const char* expected, Holds holds) {
+  if (!json.is_array() || !std::all_of(json.begin(), json.end(), holds)) {
+    throw InputError(fmt::format("episode row: trace: {}: expected a list of {}", where, expected));
+  }
+  return json.get<std::vector<T>>();
+}
+
+bool is_small_integer(const nlohmann::json& json) {
+  if (!json.is_number_integer()) return false;
+  const auto value = json.get<double>();
+  return std::abs(value) <= std::numeric_limits<int>::max();
+}
+
+StateTrace trace_from_json(const nlohmann::json& json) {
+  StateTrace trace;
+  if (json.is_null()) return trace;
+  JsonFields fields(json, "episode row: trace");
+  trace.rate_hz = fields.number("rate_hz");
+  trace.points = list_of<std::string>(fields.at("points"), "key 'points'", "names",
+                                      [](const nlohmann::json& name) { return name.is_string(); });
+  const nlohmann::json& frames = fields.at("mm");
+  if (!frames.is_array() || frames.empty()) throw InputError("episode row: trace: key 'mm': expected a list of frames");
+  for (const nlohmann::json& frame : frames) {
+    const std::string where = fmt::format("key 'mm': frame {}", trace.mm.size());
+    trace.mm.push_back(list_of<int>(frame, where, "whole numbers of 32 bits", is_small_integer));
+  }
+  fields.refuse_unknown();
+  if (const std::string fault = fault_of(trace); !fault.empty()) throw InputError("episode row: trace: " + fault);
+  return trace;
+}
+
+std::int64_t read_schema(JsonFields& fields) {
+  const std::int64_t schema = fields.integer("schema");
+  if (schema >= 1 && schema <= kRowSchema) return schema;
+  throw InputError(fmt::format("episode row: expected schema 1 to {}, found {}", kRowSchema, schema));
+}
+
+void read_identity(JsonFields& fields, EpisodeRow& row) {
   row.key = fields.text("key");
   if (row.key.empty()) throw InputError("episode row: key 'key': expected a digest, found \"\"");
   row.suite = fields.text("suite");
@@ -127,6 +190,14 @@ void read_result(JsonFields& fields, EpisodeRow& row) {
   row.started_at = fields.text("started_at");
 }
 
+// New in schema 2.
+void read_engine_details(JsonFields& fields, EpisodeRow& row) {
+  row.engine_profile = fields.text("engine_profile");
+  row.profile_digest = fields.text("profile_digest");
+  row.forces = fields.numbers("forces", false);
+  row.trace = trace_from_json(fields.at("trace"));
+}
+
 }  // namespace
 
 std::string episode_key(const EpisodeRow& row) {
@@ -155,6 +226,8 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"seed", row.seed},
           {"engine", row.engine},
           {"engine_version", row.engine_version},
+          {"engine_profile", row.engine_profile},
+          {"profile_digest", row.profile_digest},
           {"controller", row.controller},
           {"policy", row.policy},
           {"perturbation", row.perturbation},
@@ -171,6 +244,8 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"wall_s", number_or_null(row.wall_s)},
           {"contact_peak_n", number_or_null(row.contact_peak_n)},
           {"contact_impulse_ns", number_or_null(row.contact_impulse_ns)},
+          {"forces", finite_only(row.forces)},
+          {"trace", to_json(row.trace)},
           {"late_plans", row.late_plans},
           {"state_hash", row.state_hash},
           {"started_at", row.started_at}};
@@ -179,8 +254,10 @@ nlohmann::json to_json(const EpisodeRow& row) {
 EpisodeRow row_from_json(const nlohmann::json& json) {
   JsonFields fields(json, "episode row");
   EpisodeRow row;
+  const std::int64_t schema = read_schema(fields);
   read_identity(fields, row);
   read_result(fields, row);
+  if (schema >= 2) read_engine_details(fields, row);
   fields.refuse_unknown();
   return row;
 }

@@ -13,7 +13,7 @@
 
 namespace duet {
 
-inline constexpr int kRowSchema = 1;
+inline constexpr int kRowSchema = 2;  // rows of schema 1 are read too; what they lack stays empty
 
 struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"
@@ -25,13 +25,22 @@ struct Verdict {           // of one detector
   int frames = 0;                         // number of evidence frames
 };
 
+// Where a few points were, to tell when two engines part on one episode.
+struct StateTrace {
+  double rate_hz = 10.0;             // frame i is at i / rate_hz [s]
+  std::vector<std::string> points;   // "root", "left_hand", "right_hand"
+  std::vector<std::vector<int>> mm;  // per frame x, y, z of each point in turn [mm], frame W; empty: not recorded
+};
+
 struct EpisodeRow {
   std::string key;  // SHA-256 of what makes the episode what it is (episode_key)
   std::string suite, suite_version, suite_hash;
   std::string task, clip;
   int episode = 0;
   std::uint64_t seed = 0;
-  std::string engine, engine_version, controller, policy, perturbation = "clean", robot_digest;
+  std::string engine, engine_version;
+  std::string engine_profile, profile_digest;  // "parity"; SHA-256 of the engine's resolved profile
+  std::string controller, policy, perturbation = "clean", robot_digest;
   std::string arm = "main";  // "main", "null", "oracle"
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
@@ -42,15 +51,21 @@ struct EpisodeRow {
   int frames = 0;
   double sim_s = 0.0, wall_s = 0.0;
   double contact_peak_n = 0.0, contact_impulse_ns = 0.0;  // of the human on the robot
+  // Finite values only, by dotted name ("human.chest.peak_n"); the ending is the unit: _n [N], _ns [N s], _s [s],
+  // _n_cm2 [N/cm^2].
+  std::map<std::string, double> forces;
+  StateTrace trace;
   int late_plans = 0;
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
 };
 
-// SHA-256 over suite hash, task, clip, policy, controller, engine, perturbation, episode.
+// SHA-256 over suite hash, task, clip, policy, controller, engine, perturbation, episode. The profiles of the engines
+// are in the suite hash.
 std::string episode_key(const EpisodeRow& row);
 
-// NaN and infinity are never written: such metrics are left out, all other such numbers become null.
+// NaN and infinity are never written: such metrics and forces are left out, all other such numbers become null.
+// Throws std::invalid_argument for a trace whose frames do not fit its points.
 nlohmann::json to_json(const EpisodeRow& row);
 // null reads as NaN. Throws InputError naming the key and the fault; unknown keys are refused.
 EpisodeRow row_from_json(const nlohmann::json& json);

@@ -25,8 +25,17 @@ std::string dump(const nlohmann::json& json, int indent = -1) {
 }
 
 nlohmann::json to_json(const RunInfo& info) {
-  return {{"schema", kRunSchema},          {"suite", info.suite}, {"suite_version", info.suite_version},
-          {"suite_hash", info.suite_hash}, {"argv", info.argv},   {"created_at", info.created_at}};
+  nlohmann::json json = {{"schema", kRunSchema},          {"suite", info.suite}, {"suite_version", info.suite_version},
+                         {"suite_hash", info.suite_hash}, {"argv", info.argv},   {"created_at", info.created_at}};
+  if (!info.certificate.is_null()) json["certificate"] = info.certificate;
+  return json;
+}
+
+nlohmann::json read_certificate(const nlohmann::json& json, JsonFields& fields, const std::string& path) {
+  if (!json.contains("certificate")) return nullptr;
+  const nlohmann::json& certificate = fields.at("certificate");
+  if (certificate.is_object()) return certificate;
+  throw InputError(fmt::format("{}: key 'certificate': expected an object, found {}", path, certificate.type_name()));
 }
 
 std::vector<std::string> read_argv(JsonFields& fields, const std::string& path) {
@@ -54,6 +63,7 @@ RunInfo read_identity(const std::string& folder) {
   info.suite_hash = fields.text("suite_hash");
   info.argv = read_argv(fields, path);
   info.created_at = fields.text("created_at");
+  info.certificate = read_certificate(json, fields, path);
   fields.refuse_unknown();
   return info;
 }
@@ -96,8 +106,9 @@ void require_same_suite(const std::string& folder, const RunInfo& found, const R
 
 // Another machine or another program may go on with a run; who wrote which row is then told by the times.
 void record_resumption(const std::string& folder, const RunInfo& info) {
-  LineAppender lines(beside(folder, "resumed.jsonl"));
-  lines.append(dump({{"at", info.created_at}, {"argv", info.argv}, {"environment", info.environment}}));
+  nlohmann::json json = {{"at", info.created_at}, {"argv", info.argv}, {"environment", info.environment}};
+  if (!info.certificate.is_null()) json["certificate"] = info.certificate;
+  LineAppender(beside(folder, "resumed.jsonl")).append(dump(json));
 }
 
 EpisodeRow parse_row(std::string_view line, const std::string& where, const RunInfo& info) {

@@ -19,6 +19,7 @@ struct RunInfo {
   std::vector<std::string> argv;
   std::string created_at;      // UTC, ISO 8601
   nlohmann::json environment;  // results/environment.h
+  nlohmann::json certificate;  // parity certificate of the engines (results/certificate.h), null where none is attached
 };
 
 class RunDirectory {

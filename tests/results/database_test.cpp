@@ -50,6 +50,11 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
               testing::ElementsAre("hug|hug-003|7|18364758544493064720|fell|1|1|1|NULL|" + row.message));
   EXPECT_THAT(query(path, "SELECT name FROM metrics ORDER BY name"), testing::ElementsAre("hf_ratio", "jpe"));
   EXPECT_THAT(query(path, "SELECT value = 0.1 + 0.2 FROM metrics WHERE name = 'jpe'"), testing::ElementsAre("1"));
+  EXPECT_THAT(
+      query(path, "SELECT engine_profile, substr(profile_digest, 1, 4) FROM episodes WHERE suite = 'hhoi-core'"),
+      testing::ElementsAre("parity|dddd"));
+  EXPECT_THAT(query(path, "SELECT name, value FROM forces ORDER BY name"),
+              testing::ElementsAre("ground.mean_n|343.125", "human.chest.quasi_static_n|12.3"));
   EXPECT_THAT(query(path, "SELECT version, thresholds, success, frames FROM verdicts"),
               testing::ElementsAre("paper|strict|1|31"));
   EXPECT_THAT(

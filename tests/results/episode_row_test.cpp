@@ -37,6 +37,55 @@ TEST(EpisodeRow, SurvivesTheWayThroughText) {
   EXPECT_EQ(back.verdicts[0].frames, 31);
   EXPECT_EQ(back.late_plans, 2);
   EXPECT_EQ(back.started_at, row.started_at);
+  EXPECT_EQ(back.engine_profile, "parity");
+  EXPECT_EQ(back.profile_digest, row.profile_digest);
+  EXPECT_EQ(back.forces, row.forces);  // bit for bit
+  EXPECT_EQ(back.trace.rate_hz, 12.5);
+  EXPECT_EQ(back.trace.points, row.trace.points);
+  EXPECT_EQ(back.trace.mm, row.trace.mm);
+}
+
+TEST(EpisodeRow, ReadsRowsOfTheFirstSchema) {
+  nlohmann::json json = to_json(full_row());
+  json["schema"] = 1;
+  EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
+  for (const char* key : {"engine_profile", "profile_digest", "forces", "trace"}) json.erase(key);
+  const EpisodeRow row = row_from_json(json);
+  EXPECT_EQ(row.key, full_row().key);
+  EXPECT_EQ(row.late_plans, 2);
+  EXPECT_EQ(row.engine_profile, "");
+  EXPECT_EQ(row.profile_digest, "");
+  EXPECT_TRUE(row.forces.empty());
+  EXPECT_TRUE(row.trace.mm.empty());
+}
+
+TEST(EpisodeRow, ATraceWithoutFramesIsNull) {
+  EpisodeRow row = full_row();
+  row.trace.mm.clear();
+  EXPECT_TRUE(to_json(row).at("trace").is_null());
+  EXPECT_TRUE(row_from_json(to_json(row)).trace.mm.empty());
+}
+
+TEST(EpisodeRow, ATraceHasThreeWholeNumbersForEachPoint) {
+  const auto with = [](const char* key, nlohmann::json value) {
+    nlohmann::json json = to_json(full_row());
+    json["trace"][key] = std::move(value);
+    return refusal(json);
+  };
+  using Json = nlohmann::json;
+  EXPECT_EQ(with("mm", Json::array({{0, 0, 0, 0, 0, 0}, {1, 2, 3}})),
+            "episode row: trace: key 'mm': frame 1: expected 6 whole numbers (3 for each of 2 points), found 3");
+  EXPECT_THAT(with("mm", Json::array({{0, 0, 0, 0, 0, 0.5}})), HasSubstr("frame 0: expected a list of whole numbers"));
+  EXPECT_THAT(with("mm", Json::array({{0, 0, 0, 0, 0, 3000000000}})), HasSubstr("frame 0: expected a list of whole"));
+  EXPECT_THAT(with("mm", Json::array()), HasSubstr("key 'mm': expected a list of frames"));
+  EXPECT_THAT(with("mm", 3), HasSubstr("key 'mm': expected a list of frames"));
+  EXPECT_THAT(with("points", {"root", "root"}), HasSubstr("key 'points': expected at least one name, each once"));
+  EXPECT_THAT(with("points", {"root", 1}), HasSubstr("key 'points': expected a list of names"));
+  EXPECT_THAT(with("rate_hz", 0), HasSubstr("key 'rate_hz': expected a number above 0, found 0"));
+  EXPECT_THAT(with("rat_hz", 10), HasSubstr("trace: unknown key 'rat_hz': did you mean 'rate_hz'?"));
+  EpisodeRow row = full_row();
+  row.trace.mm[1].pop_back();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { to_json(row); }), HasSubstr("frame 1: expected 6"));
 }
 
 TEST(EpisodeRow, NoVerdictIsNotFailure) {
@@ -53,6 +102,7 @@ TEST(EpisodeRow, NumbersThatAreNotFiniteAreNeverWritten) {
   row.metrics = {{"jpe", nan}, {"awd", -infinity}, {"lar", 0.5}};
   row.verdicts[0].values = {{"distance", infinity}, {"frames", 3.0}};
   row.verdicts[0].margins = {{"overall", nan}};
+  row.forces = {{"ground.peak_n", infinity}, {"ground.mean_n", 343.0}};
   row.contact_peak_n = infinity;
   row.wall_s = nan;
   const std::string text = to_json(row).dump();
@@ -60,6 +110,7 @@ TEST(EpisodeRow, NumbersThatAreNotFiniteAreNeverWritten) {
   EXPECT_EQ(text.find("inf"), std::string::npos);
   const EpisodeRow back = row_from_json(nlohmann::json::parse(text));
   EXPECT_EQ(back.metrics, (std::map<std::string, double>{{"lar", 0.5}}));
+  EXPECT_EQ(back.forces, (std::map<std::string, double>{{"ground.mean_n", 343.0}}));
   EXPECT_TRUE(std::isnan(back.verdicts[0].values.at("distance")));
   EXPECT_EQ(back.verdicts[0].values.at("frames"), 3.0);
   EXPECT_TRUE(std::isnan(back.verdicts[0].margins.at("overall")));
@@ -104,7 +155,7 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
     json[key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_THAT(with("schema", 2), HasSubstr("expected schema 1, found 2"));
+  EXPECT_THAT(with("schema", 3), HasSubstr("expected schema 1 to 2, found 3"));
   EXPECT_THAT(with("key", ""), HasSubstr("key 'key'"));
   EXPECT_THAT(with("episode", -1), HasSubstr("key 'episode': expected a whole number of at least 0, found -1"));
   EXPECT_THAT(with("episode", 1.5), HasSubstr("key 'episode': expected a whole number, found 1.5"));
@@ -113,6 +164,9 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
   EXPECT_THAT(with("outcome", "exploded"), HasSubstr("key 'outcome'"));
   EXPECT_THAT(with("success", "yes"), HasSubstr("key 'success': expected true or false, found \"yes\""));
   EXPECT_THAT(with("metrics", {{"jpe", nullptr}}), HasSubstr("key 'metrics.jpe': expected a number, found null"));
+  EXPECT_THAT(with("forces", {{"ground.peak_n", nullptr}}),
+              HasSubstr("key 'forces.ground.peak_n': expected a number, found null"));
+  EXPECT_THAT(with("engine_profile", 2), HasSubstr("key 'engine_profile': expected a string, found 2"));
   EXPECT_THAT(with("sim_s", "5"), HasSubstr("key 'sim_s': expected a number or null"));
   EXPECT_THAT(with("verdicts", {{"paper", 1}}), HasSubstr("expected a list, found object"));
   EXPECT_EQ(refusal(nlohmann::json::array()), "episode row: expected an object, found array");
@@ -134,6 +188,9 @@ TEST(EpisodeKey, IsOfWhatTheEpisodeIsAndOfNothingElse) {
   other = row;
   other.success = false;
   other.wall_s = 9.0;
+  other.engine_profile = "fast";  // the suite hash covers what it means
+  other.profile_digest = std::string(64, 'e');
+  other.forces.clear();
   other.key = "";
   EXPECT_EQ(episode_key(other), row.key);
 }

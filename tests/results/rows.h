@@ -19,6 +19,8 @@ inline EpisodeRow full_row() {
   row.seed = 0xfedcba9876543210ULL;
   row.engine = "mujoco";
   row.engine_version = "2.2.2";
+  row.engine_profile = "parity";
+  row.profile_digest = std::string(64, 'd');
   row.controller = "wbc-sim";
   row.policy = "replay";
   row.perturbation = "jitter_0.05";
@@ -41,6 +43,9 @@ inline EpisodeRow full_row() {
   row.wall_s = 0.75;
   row.contact_peak_n = 81.5;
   row.contact_impulse_ns = 3.25;
+  row.forces = {{"ground.mean_n", 343.125}, {"human.chest.quasi_static_n", 12.1 + 0.2}};
+  row.trace = {
+      .rate_hz = 12.5, .points = {"root", "left_hand"}, .mm = {{0, -1, 790, 210, 180, 900}, {1, 0, 789, 2, 3, 4}}};
   row.late_plans = 2;
   row.state_hash = std::string(64, 'c');
   row.started_at = "2026-01-02T03:04:05Z";

@@ -75,6 +75,22 @@ TEST(RunDirectory, ResumesWithoutForgettingOrRewriting) {
   EXPECT_EQ(resumption.at("environment"), later.environment);
 }
 
+TEST(RunDirectory, KeepsTheParityCertificateWhole) {
+  const ScratchFolder scratch;
+  RunInfo info = tiny_run();
+  info.certificate = {{"schema", "duet.certificate/1"}, {"figures", {0.1, 1e-300}}};
+  RunDirectory::open(scratch / "run", info);
+  EXPECT_EQ(load_run(scratch / "run").info.certificate, info.certificate);
+  const nlohmann::json first = info.certificate;
+  info.certificate["effort"] = "full";
+  RunDirectory::open(scratch / "run", info);
+  EXPECT_EQ(load_run(scratch / "run").info.certificate, first);
+  EXPECT_EQ(nlohmann::json::parse(read_file(scratch / "run/resumed.jsonl")).at("certificate"), info.certificate);
+  RunDirectory::open(scratch / "plain", tiny_run());
+  EXPECT_EQ(read_file(scratch / "plain/run.json").find("certificate"), std::string::npos);
+  EXPECT_TRUE(load_run(scratch / "plain").info.certificate.is_null());
+}
+
 TEST(RunDirectory, AKilledRunLosesOnlyTheLineItWasWriting) {
   const ScratchFolder scratch;
   RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
@@ -221,6 +237,12 @@ TEST(LoadRun, RefusesWhatIsNoRun) {
   std::ofstream(scratch / "run/run.json", std::ios::trunc) << R"({"schema": "duet.run/9"})";
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "run"); }),
               HasSubstr("expected schema duet.run/1, found duet.run/9"));
+  RunDirectory::open(scratch / "other", tiny_run());
+  nlohmann::json json = nlohmann::json::parse(read_file(scratch / "other/run.json"));
+  json["certificate"] = "yes";
+  std::ofstream(scratch / "other/run.json", std::ios::trunc) << json;
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "other"); }),
+              HasSubstr("run.json: key 'certificate': expected an object, found string"));
 }
 
 TEST(Environment, HasWhatResultsDependOnAndNamesNobody) {
