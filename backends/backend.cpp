@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "core/require.h"
@@ -10,6 +11,14 @@ namespace duet {
 namespace {
 
 constexpr double kUnitTolerance = 1e-6;
+
+void check_link(const RobotLink& link) {
+  require(std::isfinite(link.mass) && link.mass > 0.0,
+          fmt::format("Scene: link '{}' has mass {} kg, expected more than 0", link.name, link.mass));
+  const Eigen::Vector3d moments = link.inertia.selfadjointView<Eigen::Lower>().eigenvalues();
+  require(link.inertia.allFinite() && moments.minCoeff() > 0.0,
+          fmt::format("Scene: the inertia of link '{}' is not positive definite", link.name));
+}
 
 Scene checked(Scene scene) {
   require(scene.robot != nullptr, "Scene: no robot");
@@ -21,8 +30,12 @@ Scene checked(Scene scene) {
   not_negative(scene.friction.robot_ground, "friction robot_ground");
   not_negative(scene.friction.robot_human, "friction robot_human");
   not_negative(scene.friction.robot_robot, "friction robot_robot");
-  not_negative(scene.human_stiffness, "human_stiffness");
-  not_negative(scene.human_damping, "human_damping");
+  for (const HumanCapsule& capsule : scene.human.capsules) {
+    not_negative(capsule.skin.stiffness, "skin stiffness");
+    not_negative(capsule.skin.damping, "skin damping");
+  }
+  require(scene.gravity.allFinite(), "Scene: gravity is not finite");
+  for (const RobotLink& link : scene.robot->links) check_link(link);
   return scene;
 }
 

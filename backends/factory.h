@@ -1,4 +1,6 @@
-// Engines by name. What this build lacks is listed with its reason and refused by name (MissingError).
+// Engines by name: playback, and the modules duet_<engine>.so that are found (backends/engine_module.h) in the folder
+// $DUET_ENGINES if it is set, else in `engines` beside the program or where it was built. What is missing is listed
+// with its reason and refused by name (MissingError). Thread-safe; a module is loaded once and stays.
 #pragma once
 
 #include <memory>
@@ -6,6 +8,7 @@
 #include <vector>
 
 #include "backends/backend.h"
+#include "backends/engine_module.h"
 
 namespace duet {
 
@@ -13,12 +16,18 @@ struct EngineInfo {
   std::string name;
   bool available = false;
   std::string version;  // where available
-  std::string reason;   // why not, where not ("built without MuJoCo (DUET_WITH_MUJOCO=OFF)")
+  std::string reason;   // why not, where not ("libode.so.8: cannot open shared object file")
+  bool physics = true;  // false: playback
 };
 
+// Playback, then the five engines of the benchmark whether present or not, then other modules by name.
 std::vector<EngineInfo> engines();
 
-// Throws std::invalid_argument for an unknown name (with the nearest), MissingError for one that this build lacks.
+// Throws std::invalid_argument for an unknown name (with the nearest), options that the engine does not have and a
+// scene that it refuses; MissingError for an engine that this machine lacks.
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene);
+
+// Of a physics engine. Throws as make_backend; std::invalid_argument for playback, which has none.
+const EngineModule& engine_module(const std::string& engine);
 
 }  // namespace duet

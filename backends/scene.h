@@ -2,9 +2,12 @@
 // every engine.
 #pragma once
 
+#include <Eigen/Core>
+#include <map>
 #include <memory>
 #include <string>
 
+#include "robots/dynamics.h"
 #include "robots/human_body.h"
 #include "robots/robot_model.h"
 
@@ -20,14 +23,19 @@ struct PairFriction {
   double robot_robot = 0.5;
 };
 
+// Settings of one engine by name (iterations, solver, ...), as its module lists them: EngineModule::options.
+using EngineOptions = std::map<std::string, std::string>;
+
 struct Scene {
   std::shared_ptr<const RobotModel> robot;  // shared by all episodes and threads; read-only
-  HumanBody human;
+  HumanBody human;                          // its capsules carry the skin
   PartnerMode partner = PartnerMode::kGhost;
   PairFriction friction;
-  double dt = 0.002;                 // physics step [s]
-  double human_stiffness = 20000.0;  // skin of the solid partner [N/m]
-  double human_damping = 200.0;      // [N s/m]
+  double dt = 0.002;  // physics step [s]
+  // In W [m/s^2]. A tilted one is an incline.
+  Eigen::Vector3d gravity = {0.0, 0.0, -kGravity};
+  bool self_collision = true;  // the pairs of RobotModel::self_collision touch
+  EngineOptions options;       // of the engine that it goes to; what is not named has the engine's default
 };
 
 }  // namespace duet

@@ -28,13 +28,17 @@ for room in "${!may[@]}"; do
     esac
   done < <(grep -rnE '^#include "[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
 done
-vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in .cpp files of FOLDER
+vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
   hits=$(grep -rnE "^#include [<\"]($2)" core motion robots nn retarget backends controllers policies metrics results bench \
-    --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/[^:]*\.cpp:" || true)
-  if [ -n "$hits" ]; then echo "$hits"; echo "only $1/*.cpp may include $2"; bad=1; fi
+    --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)
+  if [ -n "$hits" ]; then echo "$hits"; echo "only $1/ may include $2"; bad=1; fi
 }
 vendor backends/mujoco 'mujoco/'
+vendor backends/bullet 'bt[A-Z]|Bullet'
+vendor backends/ode 'ode/'
+vendor backends/simbody 'Simbody|SimTK|simbody'
+vendor backends/dart 'dart/'
 vendor results 'sqlite3\.h'
 vendor robots 'urdf_'
 [ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms"

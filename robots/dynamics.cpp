@@ -13,12 +13,20 @@ Eigen::Matrix3d shifted_inertia(double mass, const Eigen::Vector3d& d) {
 
 }  // namespace
 
-Dynamics::Dynamics(const RobotModel& model, double gravity)
+Dynamics::Dynamics(const RobotModel& model, const Eigen::Vector3d& gravity_W)
     : model_(&model),
-      gravity_(gravity),
+      gravity_(gravity_W),
       kinematics_(model),
       bodies_(model.links.size()),
-      zero_(Eigen::VectorXd::Zero(6 + model.dof())) {}
+      zero_(Eigen::VectorXd::Zero(6 + model.dof())),
+      bias_(zero_),
+      mass_(Eigen::MatrixXd::Zero(6 + model.dof(), 6 + model.dof())) {}
+
+void Dynamics::update(const RobotState& state) {
+  newton_euler(state, zero_, bias_);
+  accumulate_composites();
+  project_composites(mass_);
+}
 
 void Dynamics::bias_forces(const RobotState& state, Eigen::Ref<Eigen::VectorXd> out) {
   newton_euler(state, zero_, out);
@@ -41,7 +49,7 @@ void Dynamics::newton_euler(const RobotState& state, const Eigen::Ref<const Eige
     if (i == 0) {
       body.w.noalias() = R * state.w_WB_B;
       body.dw.noalias() = R * a.segment<3>(3);
-      body.a = a.head<3>() + gravity_ * Eigen::Vector3d::UnitZ();
+      body.a = a.head<3>() - gravity_;
     } else {
       const Body& parent = bodies_[link.parent];
       const Eigen::Vector3d r = kinematics_.p_WL(i) - kinematics_.p_WL(link.parent);
@@ -95,6 +103,11 @@ void Dynamics::accumulate_composites() {
 void Dynamics::mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> out) {
   kinematics_.update(state.X_WB, state.q);
   accumulate_composites();
+  project_composites(out);
+  for (int j = 0; j < model_->dof(); ++j) out(6 + j, 6 + j) += model_->joints[j].armature;
+}
+
+void Dynamics::project_composites(Eigen::Ref<Eigen::MatrixXd> out) const {
   out.setZero();
   const Eigen::Matrix3d& R = kinematics_.R_WL(0);
   const Eigen::Vector3d& p_WB = kinematics_.p_WL(0);
@@ -107,7 +120,6 @@ void Dynamics::mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> 
       out(5 + i, 5 + k) = value;
       out(5 + k, 5 + i) = value;
     }
-    out(5 + i, 5 + i) += model_->joints[i - 1].armature;
     out.block<3, 1>(0, 5 + i) = f;
     out.block<3, 1>(3, 5 + i) = R.transpose() * (n_com + (body.com - p_WB).cross(f));
     out.block<1, 3>(5 + i, 0) = out.block<3, 1>(0, 5 + i).transpose();

@@ -15,7 +15,12 @@ inline constexpr double kGravity = 9.81;  // [m/s^2], along -z of W
 // a reference to the model, which must outlive it.
 class Dynamics {
  public:
-  explicit Dynamics(const RobotModel& model, double gravity = kGravity);
+  explicit Dynamics(const RobotModel& model, const Eigen::Vector3d& gravity_W = {0.0, 0.0, -kGravity});
+
+  // Poses, velocities, mass matrix and bias forces of `state` in one pass; the accessors below are then of it.
+  void update(const RobotState& state);
+  [[nodiscard]] const Eigen::MatrixXd& mass() const { return mass_; }  // without armature
+  [[nodiscard]] const Eigen::VectorXd& bias() const { return bias_; }  // as bias_forces()
 
   void bias_forces(const RobotState& state, Eigen::Ref<Eigen::VectorXd> out);
   void inverse_dynamics(const RobotState& state, const Eigen::Ref<const Eigen::VectorXd>& a,
@@ -30,6 +35,7 @@ class Dynamics {
   void newton_euler(const RobotState& state, const Eigen::Ref<const Eigen::VectorXd>& a,
                     Eigen::Ref<Eigen::VectorXd> out);
   void accumulate_composites();
+  void project_composites(Eigen::Ref<Eigen::MatrixXd> out) const;
 
   struct Body {  // all in W
     Eigen::Vector3d axis = Eigen::Vector3d::Zero();
@@ -42,10 +48,11 @@ class Dynamics {
   };
 
   const RobotModel* model_;
-  double gravity_;
+  Eigen::Vector3d gravity_;
   Kinematics kinematics_;
   std::vector<Body> bodies_;
-  Eigen::VectorXd zero_;
+  Eigen::VectorXd zero_, bias_;
+  Eigen::MatrixXd mass_;
 };
 
 // Generalised forces that give zero generalised acceleration: Coriolis, centrifugal and gravity terms, (6 + dof).

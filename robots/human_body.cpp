@@ -55,7 +55,23 @@ constexpr Part kParts[] = {
     {"right_foot", "foot", kRightAnkle, kRightToe, 0.0, 1.3, 0.035, 0.135, Scale::kBone},
 };
 
+struct RegionStiffness {
+  std::string_view region;
+  double newton_per_millimetre;
+};
+// ISO/TS 15066's effective spring constants as hardware.md 4.4 prints them. A head capsule takes the face's, which is
+// softer than the skull; the foot, which the standard leaves out, the shin's.
+constexpr RegionStiffness kStiffness[] = {{"head", 75.0}, {"neck", 50.0},   {"chest", 25.0},     {"abdomen", 10.0},
+                                          {"back", 35.0}, {"pelvis", 25.0}, {"upper_arm", 30.0}, {"forearm", 40.0},
+                                          {"hand", 75.0}, {"thigh", 50.0},  {"shin", 60.0},      {"foot", 60.0}};
+
 }  // namespace
+
+Skin default_skin(std::string_view region) {
+  for (const RegionStiffness& entry : kStiffness)
+    if (entry.region == region) return {.stiffness = 1000.0 * entry.newton_per_millimetre};
+  throw std::invalid_argument(fmt::format("human body: no region '{}'", region));
+}
 
 std::array<Eigen::Vector3d, 2> HumanCapsule::ends(const Eigen::Ref<const Eigen::Matrix3Xd>& joints) const {
   const Eigen::Vector3d a = joints.col(joint_a), bone = joints.col(joint_b) - a;
@@ -77,7 +93,8 @@ HumanBody make_human_body(const std::array<double, 24>& bone_lengths) {
                              .joint_b = part.b,
                              .radius = part.radius * length / part.reference,
                              .begin = part.begin,
-                             .end = part.end});
+                             .end = part.end,
+                             .skin = default_skin(part.region)});
   }
   return body;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "core/point_tracks.h"
@@ -21,6 +22,8 @@ class Kinematics {
   [[nodiscard]] const RobotModel& model() const { return *model_; }
   [[nodiscard]] const Eigen::Matrix3d& R_WL(int link) const { return R_WL_[link]; }
   [[nodiscard]] const Eigen::Vector3d& p_WL(int link) const { return p_WL_[link]; }
+  [[nodiscard]] std::span<const Eigen::Matrix3d> rotations() const { return R_WL_; }  // R_WL of all links
+  [[nodiscard]] std::span<const Eigen::Vector3d> positions() const { return p_WL_; }  // p_WL
   [[nodiscard]] Pose X_WL(int link) const { return {Eigen::Quaterniond(R_WL_[link]), p_WL_[link]}; }
   [[nodiscard]] Eigen::Vector3d frame_position(int frame) const;
   [[nodiscard]] Pose frame_pose(int frame) const;

@@ -7,6 +7,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/pose.h"
@@ -76,8 +77,9 @@ struct RobotModel {
   std::vector<Keypoint> keypoints;    // card order: head, shoulders, elbows, wrists, hands; left before right
   std::map<std::string, int> tracks;  // frames that detectors follow: "head", "lhand", "rhand", "torso", "lshoulder",
                                       // "rshoulder" (those that the card names)
-  std::vector<int> feet;              // shapes that are the soles' contact sites (left foot's first)
-  Eigen::VectorXd neutral;            // neutral pose of A.4.4 with the standing legs [rad]
+  std::vector<std::pair<int, int>> self_collision;  // pairs of shapes, on different links, that may touch
+  std::vector<int> feet;                            // shapes that are the soles' contact sites (left foot's first)
+  Eigen::VectorXd neutral;                          // neutral pose of A.4.4 with the standing legs [rad]
   double standing_height = 0.0;  // of the base over flat ground in the neutral pose [m]; 0 where no shape is a sole
   std::string digest;            // SHA-256 over URDF and card
 

@@ -31,9 +31,9 @@ void write_options(Out out, const Scene& scene) {
   fmt::format_to(out,
                  "<mujoco><compiler angle='radian' inertiafromgeom='false' boundmass='0' boundinertia='0' "
                  "balanceinertia='false'/><size njmax='{}' nconmax='{}'/>"
-                 "<option timestep='{}' gravity='0 0 {}' integrator='Euler' solver='Newton' cone='elliptic' "
+                 "<option timestep='{}' gravity='{}' integrator='Euler' solver='Newton' cone='elliptic' "
                  "iterations='20' tolerance='1e-8' impratio='10' jacobian='dense'/>",
-                 sizes.rows, sizes.contacts, scene.dt, -kGravity);
+                 sizes.rows, sizes.contacts, scene.dt, numbers(scene.gravity));
 }
 
 void write_shape(Out out, const Scene& scene, int index) {

@@ -7,19 +7,15 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "backends/engine_module.h"
+#include "backends/link_pushes.h"
+#include "backends/mujoco/bare_loop.h"
 #include "backends/mujoco/mjcf.h"
-#include "backends/mujoco/mujoco.h"
 #include "backends/mujoco/mujoco_model.h"
 #include "backends/partner.h"
 
 namespace duet {
 namespace {
-
-struct Push {
-  Eigen::Vector3d f_W = Eigen::Vector3d::Zero();
-  Eigen::Vector3d p_L = Eigen::Vector3d::Zero();
-};
-constexpr int kPushValues = 6;
 
 class MujocoBackend final : public Backend {
  public:
@@ -42,8 +38,7 @@ class MujocoBackend final : public Backend {
     mj_resetData(&m_, &d_);
     write_state(state_, compiled_, d_);
     partner_ = {};
-    std::fill(pushes_.begin(), pushes_.end(), Push{});
-    pushed_ = false;
+    pushes_.clear();
   }
 
   void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) override {
@@ -54,7 +49,7 @@ class MujocoBackend final : public Backend {
     place_partner();
     apply_torques(command);
     mj_step1(&m_, &d_);
-    if (pushed_) apply_pushes();
+    if (pushes_.any()) apply_pushes();
     move_partner_contacts();
     mj_step2(&m_, &d_);
     partner_.advance(scene().dt);
@@ -122,14 +117,13 @@ class MujocoBackend final : public Backend {
   void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) override {
     mj_kinematics(&m_, &d_);
     const int body = compiled_.link_body[link];
-    pushes_[link] = {f_W, rotation(body).transpose() * (p_W - position(body))};
-    pushed_ = true;
+    pushes_.set(link, f_W, rotation(body).transpose() * (p_W - position(body)));
   }
 
   void apply_pushes() {
-    for (size_t link = 0; link < pushes_.size(); ++link) {
+    for (size_t link = 0; link < pushes_.all().size(); ++link) {
       const int body = compiled_.link_body[link];
-      const Push& push = pushes_[link];
+      const LinkPushes::Push& push = pushes_.all()[link];
       const Eigen::Vector3d p_W = position(body) + rotation(body) * push.p_L;
       const Eigen::Vector3d arm = p_W - Eigen::Map<const Eigen::Vector3d>(d_.xipos + 3 * body);
       Eigen::Map<Eigen::Vector3d>(d_.xfrc_applied + 6 * body) = push.f_W;
@@ -190,11 +184,7 @@ class MujocoBackend final : public Backend {
     values.insert(values.end(), d_.qvel, d_.qvel + m_.nv);
     values.insert(values.end(), d_.qacc_warmstart, d_.qacc_warmstart + m_.nv);
     values.push_back(d_.time);
-    values.push_back(pushed_ ? 1.0 : 0.0);
-    for (const Push& push : pushes_) {
-      values.insert(values.end(), push.f_W.data(), push.f_W.data() + 3);
-      values.insert(values.end(), push.p_L.data(), push.p_L.data() + 3);
-    }
+    pushes_.append_to(values);
     partner_.append_to(values);
   }
 
@@ -209,11 +199,8 @@ class MujocoBackend final : public Backend {
     take(m_.nv, d_.qvel);
     take(m_.nv, d_.qacc_warmstart);
     take(1, &d_.time);
-    pushed_ = *from++ != 0.0;
-    for (Push& push : pushes_) {
-      push = {Eigen::Vector3d(from), Eigen::Vector3d(from + 3)};
-      from += kPushValues;
-    }
+    pushes_.read_from({from, pushes_.size()});
+    from += pushes_.size();
     partner_.read_from({from, MovingPartner::kValues});
   }
 
@@ -222,15 +209,24 @@ class MujocoBackend final : public Backend {
   mjData& d_;
   MovingPartner partner_;
   Eigen::VectorXd applied_;  // torques without the damping that the integrator adds
-  std::vector<Push> pushes_;
-  bool pushed_ = false;
+  LinkPushes pushes_;
   std::vector<int> order_;
 };
 
 }  // namespace
 
-EngineInfo mujoco_info() { return {.name = "mujoco", .available = true, .version = mj_versionString(), .reason = ""}; }
+namespace {
 
-std::unique_ptr<Backend> make_mujoco_backend(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
+std::string engine_version() { return mj_versionString(); }
+std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
 
+const EngineModule kModule = {.name = "mujoco",
+                              .version = engine_version,
+                              .make = make,
+                              .options = {},
+                              .bare_step_seconds = mujoco_bare_step_seconds};
+
+}  // namespace
 }  // namespace duet
+
+DUET_ENGINE_MODULE(duet::kModule)

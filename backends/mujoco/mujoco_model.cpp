@@ -52,7 +52,7 @@ int id_of(const mjModel& model, int type, char letter, int index) {
 // coefficients give R = 1 / (dt D + dt^2 K), k = K R, b = (D + dt K) R, d = A / (A + R); the direct form of solref
 // holds k d and b d.
 void set_skin(const Scene& scene, int geom, mjModel& model) {
-  const double dt = scene.dt, K = scene.human_stiffness, D = scene.human_damping;
+  const double dt = scene.dt, K = Skin().stiffness, D = Skin().damping;
   const double virtual_mass = dt * D + dt * dt * K;  // 1 / R
   const double A = model.body_invweight0[2 * model.geom_bodyid[geom]];
   const double d = std::clamp(A * virtual_mass / (A * virtual_mass + 1.0), mjMINIMP, mjMAXIMP);

@@ -2,7 +2,6 @@
 #include <memory>
 
 #include "backends/factory.h"
-#include "backends/mujoco/bare_loop.h"
 #include "bench/benchmarks/parts.h"
 #include "bench/benchmarks/timer.h"
 #include "robots/robot_model.h"
@@ -40,7 +39,8 @@ StepTimes time_steps(const BenchmarkOptions& options) {
   const double begin = wall_seconds();
   do {
     times.ours = std::min(times.ours, backend_step_seconds(*backend, start, command));
-    times.bare = std::min(times.bare, mujoco_bare_step_seconds(scene, start, command, kSteps) / kSteps);
+    times.bare =
+        std::min(times.bare, engine_module("mujoco").bare_step_seconds(scene, start, command, kSteps) / kSteps);
   } while (wall_seconds() - begin < 3.0 * options.seconds);
   return times;
 }

@@ -52,8 +52,10 @@ TEST(Backend, RefusesNegativeFrictionAndSkinByName) {
     EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_ground = bad; }), HasSubstr("friction robot_ground"));
     EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_human = bad; }), HasSubstr("friction robot_human"));
     EXPECT_THAT(refused_scene([&](Scene& s) { s.friction.robot_robot = bad; }), HasSubstr("friction robot_robot"));
-    EXPECT_THAT(refused_scene([&](Scene& s) { s.human_stiffness = bad; }), HasSubstr("human_stiffness"));
-    EXPECT_THAT(refused_scene([&](Scene& s) { s.human_damping = bad; }), HasSubstr("human_damping"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.human.capsules = {{.skin = {.stiffness = bad}}}; }),
+                HasSubstr("skin stiffness"));
+    EXPECT_THAT(refused_scene([&](Scene& s) { s.human.capsules = {{.skin = {.damping = bad}}}; }),
+                HasSubstr("skin damping"));
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "backends/mujoco/bare_loop.h"
 #include "core/require.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -26,7 +25,7 @@ TEST(Factory, ListsEachEngineOnceWithVersionOrReason) {
     EXPECT_EQ(info.available, !info.version.empty()) << info.name;
     EXPECT_EQ(info.available, info.reason.empty()) << info.name;
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"playback", "mujoco"}));
+  EXPECT_EQ(names, (std::vector<std::string>{"playback", "mujoco", "bullet", "ode", "simbody", "dart"}));
 }
 
 TEST(Factory, MakesWhatItListsAsAvailableAndRefusesTheRestByName) {
@@ -48,18 +47,28 @@ TEST(Factory, RefusesAnUnknownEngineWithTheNearestName) {
   EXPECT_THAT(message, HasSubstr("playback"));
 }
 
-TEST(Factory, BareLoopRunsWhereMujocoIsAndIsRefusedWhereItIsNot) {
+TEST(Factory, EveryEngineThatIsThereHasABareLoop) {
   const Scene scene = sledge_scene();
   const RobotState state = test::state_of(*scene.robot, {0.0, 0.0, 0.1});
   const JointCommand command = test::no_torque(*scene.robot);
-  if (!engines()[1].available) {
-    EXPECT_THAT(thrown_message<MissingError>([&] { mujoco_bare_step_seconds(scene, state, command, 10); }),
-                HasSubstr("MuJoCo"));
-    return;
+  for (const EngineInfo& info : engines()) {
+    if (!info.available || !info.physics) continue;
+    const EngineModule& module = engine_module(info.name);
+    EXPECT_GT(module.bare_step_seconds(scene, state, command, 100), 0.0) << info.name;
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { module.bare_step_seconds(scene, state, command, 0); }),
+                HasSubstr("steps is 0"))
+        << info.name;
   }
-  EXPECT_GT(mujoco_bare_step_seconds(scene, state, command, 100), 0.0);
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { mujoco_bare_step_seconds(scene, state, command, 0); }),
-              HasSubstr("steps is 0"));
+}
+
+TEST(Factory, RefusesAnOptionThatTheEngineDoesNotHave) {
+  for (const EngineInfo& info : engines()) {
+    if (!info.available) continue;
+    Scene scene = sledge_scene();
+    scene.options["itterations"] = "10";
+    EXPECT_THAT(thrown_message<std::invalid_argument>([&] { make_backend(info.name, scene); }),
+                HasSubstr("'itterations'"));
+  }
 }
 
 }  // namespace

@@ -151,7 +151,8 @@ TEST_F(MujocoContact, SkinIsTheSpringOfTheSceneAtRest) {
     if (contact.side != ContactSide::kHuman) continue;
     EXPECT_EQ(contact.other, 0);
     EXPECT_EQ(contact.link, 0);
-    EXPECT_NEAR(contact.f_W.norm(), scene.human_stiffness * contact.depth, 0.01 * contact.f_W.norm());
+    EXPECT_NEAR(contact.f_W.norm(), scene.human.capsules[contact.other].skin.stiffness * contact.depth,
+                0.01 * contact.f_W.norm());
     force += contact.f_W;
   }
   EXPECT_LT(force.x(), -10.0);                                                               // away from the hand

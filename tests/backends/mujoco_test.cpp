@@ -140,7 +140,7 @@ TEST_F(Mujoco, DivergenceIsAValueAndFinalUntilReset) {
 
 TEST_F(Mujoco, RefusesAModelThatItCannotCompileWithItsMessage) {
   auto robot = test::wheel();
-  robot->links[1].inertia = -Eigen::Matrix3d::Identity();
+  robot->links[1].inertia = Eigen::Vector3d(1.0, 1.0, 5.0).asDiagonal();  // no body has this
   EXPECT_NE(test::thrown_message<std::runtime_error>([&] { make(robot); }).find("MuJoCo refuses the scene"),
             std::string::npos);
 }

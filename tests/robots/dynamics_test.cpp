@@ -164,7 +164,7 @@ TEST(Dynamics, NothingActsAtRestWithoutGravity) {
   state.w_WB_B.setZero();
   state.v.setZero();
   Eigen::VectorXd bias(35);
-  Dynamics(g1(), 0.0).bias_forces(state, bias);
+  Dynamics(g1(), Eigen::Vector3d::Zero()).bias_forces(state, bias);
   EXPECT_EQ(bias.cwiseAbs().maxCoeff(), 0.0);  // uniform motion costs nothing
 }
 
@@ -174,7 +174,7 @@ TEST(Dynamics, SpinningRigidRobotObeysEulersEquations) {
   state.w_WB_B = {0.3, -1.2, 2.0};
   Eigen::VectorXd bias(35);
   Eigen::MatrixXd M(35, 35);
-  Dynamics dynamics(g1(), 0.0);
+  Dynamics dynamics(g1(), Eigen::Vector3d::Zero());
   dynamics.bias_forces(state, bias);
   dynamics.mass_matrix(state, M);
   const Eigen::Matrix3d I_B = M.block<3, 3>(3, 3);  // about the base's origin

@@ -1,0 +1,37 @@
+// An engine is a shared object beside the program, duet_<name>.so, loaded when it is first asked for: a machine that
+// lacks one engine's library still runs the others, and a new engine needs no change to duet. docs/adding-a-backend.md.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+
+#include "backends/backend.h"
+#include "backends/engine_options.h"
+
+namespace duet {
+
+// Changes whenever this struct, Backend, Scene or RobotModel does: a module built against others is refused.
+inline constexpr int kEngineInterface = 1;
+
+struct EngineModule {
+  int interface = kEngineInterface;
+  const char* name = "";
+  std::string (*version)() = nullptr;  // the engine's own
+  // Throws std::invalid_argument (scene, options) and std::runtime_error with the engine's message where it refuses.
+  std::unique_ptr<Backend> (*make)(const Scene& scene) = nullptr;
+  std::span<const EngineOption> options;  // what a profile may set
+  // What the engine itself costs, against which the overhead of Backend::step is measured: CPU seconds for `steps`
+  // steps from `state` under `command`, by the least code that makes the same engine calls under the same torque law
+  // and reads the state back. Throws std::invalid_argument for steps < 1.
+  double (*bare_step_seconds)(const Scene& scene, const RobotState& state, const JointCommand& command,
+                              int steps) = nullptr;
+};
+
+}  // namespace duet
+
+// The one symbol that a module exports. DUET_ENGINE_MODULE(module) defines it.
+extern "C" const duet::EngineModule* duet_engine_module();
+
+#define DUET_ENGINE_MODULE(module) \
+  extern "C" __attribute__((visibility("default"))) const duet::EngineModule* duet_engine_module() { return &(module); }

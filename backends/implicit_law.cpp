@@ -1,0 +1,67 @@
+#include "backends/implicit_law.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace duet {
+
+ImplicitLaw::ImplicitLaw(const Scene& scene)
+    : robot_(scene.robot),
+      dt_(scene.dt),
+      dynamics_(*robot_, scene.gravity),
+      factor_(*robot_),
+      drive_(Eigen::VectorXd::Zero(robot_->dof())),
+      inertia_(Eigen::VectorXd::Zero(robot_->dof())),
+      a_(Eigen::VectorXd::Zero(6 + robot_->dof())) {}
+
+void ImplicitLaw::begin(const RobotState& state, const JointCommand& command) {
+  dynamics_.update(state);
+  for (int i = 0; i < robot_->dof(); ++i) {
+    const double kp = command.kp[i], kd = command.kd[i];
+    inertia_[i] = robot_->joints[i].armature + dt_ * kd + dt_ * dt_ * kp;
+    drive_[i] = kp * (command.q_target[i] - state.q[i] - dt_ * state.v[i]) - kd * state.v[i] + command.tau_ff[i];
+  }
+  factorise();
+}
+
+void ImplicitLaw::factorise() {
+  if (!factor_.compute(dynamics_.mass(), inertia_))
+    throw std::runtime_error("the mass matrix is not positive definite");
+}
+
+void ImplicitLaw::forces(const Eigen::VectorXd& Q, Eigen::VectorXd& out) const {
+  out = Q - dynamics_.bias();
+  out.tail(robot_->dof()) += drive_;
+}
+
+void ImplicitLaw::solve(const Eigen::VectorXd& Q) {
+  forces(Q, a_);
+  factor_.solve(a_);
+  if (!saturate(a_)) return;
+  forces(Q, a_);
+  factor_.solve(a_);
+}
+
+bool ImplicitLaw::saturate(const Eigen::VectorXd& a) {
+  bool changed = false;
+  for (int i = 0; i < robot_->dof(); ++i) {
+    const RobotJoint& joint = robot_->joints[i];
+    const double torque = drive_[i] - (inertia_[i] - joint.armature) * a[6 + i];
+    if (std::abs(torque) <= joint.effort) continue;
+    drive_[i] = std::copysign(joint.effort, torque);
+    inertia_[i] = joint.armature;
+    changed = true;
+  }
+  if (changed) factorise();
+  return changed;
+}
+
+void ImplicitLaw::equivalent_torques(const Eigen::VectorXd& a, Eigen::VectorXd& out) const {
+  out = drive_ - inertia_.cwiseProduct(a.tail(robot_->dof()));
+}
+
+void ImplicitLaw::torques(const Eigen::VectorXd& a, Eigen::VectorXd& out) const {
+  for (int i = 0; i < robot_->dof(); ++i) out[i] = drive_[i] - (inertia_[i] - robot_->joints[i].armature) * a[6 + i];
+}
+
+}  // namespace duet

@@ -1,0 +1,73 @@
+// Where the robot touches the ground, the human and itself: closed forms for spheres, capsules and the plane z = 0, the
+// same for every engine that takes contacts from outside. Friction and skin are those of the pair, so no engine's rule
+// for combining two bodies' values matters. Buffers are sized on construction; the order of points is that of the
+// shapes, so a continuation does not depend on history.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "backends/partner.h"
+#include "backends/scene.h"
+#include "core/contact.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+
+struct ContactPoint {
+  int link = -1;  // as in Contact: of the robot, touched by the other side
+  ContactSide side = ContactSide::kGround;
+  int other = -1;
+  Eigen::Vector3d p_W = Eigen::Vector3d::Zero();   // in the middle of the overlap [m]
+  Eigen::Vector3d n_W = Eigen::Vector3d::UnitZ();  // unit, from the other side towards the link
+  double depth = 0.0;                              // > 0 [m]
+  double friction = 0.0;
+  Skin skin = {};                                       // of a human contact; elsewhere the engine's own rigid contact
+  Eigen::Vector3d v_other_W = Eigen::Vector3d::Zero();  // of the human or the ground at p_W [m/s]; not of a link
+};
+
+// A contact as it is reported. `f_W`: force of the other side on the link [N].
+Contact reported(const ContactPoint& point, const Eigen::Vector3d& f_W);
+
+class NarrowPhase {
+ public:
+  explicit NarrowPhase(const Scene& scene);  // keeps the robot model alive
+
+  // Touching points of the links at these poses. Valid until the next call.
+  std::span<const ContactPoint> collide(const Kinematics& kinematics, const MovingPartner& partner);
+  std::span<const ContactPoint> collide(std::span<const Eigen::Matrix3d> R_WL, std::span<const Eigen::Vector3d> p_WL,
+                                        const MovingPartner& partner);
+  [[nodiscard]] std::span<const ContactPoint> points() const { return points_; }
+  // More points than this cannot occur on the ground and the declared pairs; with the human it is the most that are
+  // kept (a std::runtime_error says so beyond it).
+  [[nodiscard]] std::size_t capacity() const { return points_.capacity(); }
+
+ private:
+  struct Segment {  // of a shape or capsule, in W
+    Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero(), center = Eigen::Vector3d::Zero();
+    double radius = 0.0, reach = 0.0;  // of a sphere around it
+  };
+  void collide_ground();
+  void collide_self();
+  void collide_human(const MovingPartner& partner);
+  void add(const ContactPoint& point);
+
+  std::shared_ptr<const RobotModel> robot_;
+  HumanBody human_;
+  PartnerMode mode_;
+  PairFriction friction_;
+  bool self_collision_;
+  std::vector<Segment> shapes_, capsules_;
+  std::vector<Eigen::Matrix3d> R_LS_;
+  std::vector<ContactPoint> points_;
+};
+
+// Nearest points of segments a1 b1 and a2 b2. Of parallel ones: the middle of where they run side by side.
+struct NearestPoints {
+  Eigen::Vector3d p1, p2;
+};
+NearestPoints nearest_points(const Eigen::Vector3d& a1, const Eigen::Vector3d& b1, const Eigen::Vector3d& a2,
+                             const Eigen::Vector3d& b2);
+
+}  // namespace duet
