@@ -156,8 +156,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   check_filters(options, suite);
   check_engines(suite);
   const std::string hash = suite_hash(suite);
-  const auto robot =
-      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  const auto robot = load_shared_robot(suite.robot);
   RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
                                                     utc_now(), capture_environment()});
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);

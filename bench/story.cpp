@@ -100,8 +100,7 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int 
   content.columns = metric_columns();
   if (!with_clips) return content;
 
-  const auto robot =
-      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  const auto robot = load_shared_robot(suite.robot);
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);
   const Readings readings = readings_of(suite);
   std::vector<ClipScore> scores(clips.size());

@@ -3,11 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <cstdlib>
-#include <filesystem>
-
 #include "core/names.h"
 #include "core/require.h"
+#include "core/share.h"
 
 namespace duet {
 namespace {
@@ -80,25 +78,10 @@ JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const 
   return command;
 }
 
-std::string default_card_path() {
-  namespace fs = std::filesystem;
-  const fs::path card = fs::path("robots") / "g1" / "g1.yaml";
-  std::vector<std::string> places;
-  if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0')
-    places.push_back((fs::path(share) / card).string());
-  places.push_back((fs::path(DUET_SOURCE_DIR) / card).string());
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  if (!program.empty())
-    places.push_back((program.parent_path() / ".." / "share" / "duet" / card).lexically_normal().string());
-  return first_card(places);
-}
+std::string default_card_path() { return share_file("robot card", "robots/g1/g1.yaml"); }
 
-std::string first_card(const std::vector<std::string>& places) {
-  std::error_code ignored;
-  for (const std::string& place : places)
-    if (std::filesystem::exists(place, ignored)) return place;
-  throw MissingError(fmt::format("no robot card: looked at {}", fmt::join(places, ", ")));
+std::shared_ptr<const RobotModel> load_shared_robot(const std::string& card_path) {
+  return std::make_shared<const RobotModel>(load_robot(card_path.empty() ? default_card_path() : card_path));
 }
 
 }  // namespace duet

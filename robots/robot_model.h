@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -110,7 +111,8 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
 // program. Throws MissingError naming the places looked at.
 std::string default_card_path();
 
-// The first of `places` that exists; throws MissingError naming them all where none does.
-std::string first_card(const std::vector<std::string>& places);
+// The robot of a card, or where the path is empty of the one that ships with duet, to be shared by episodes and
+// threads.
+std::shared_ptr<const RobotModel> load_shared_robot(const std::string& card_path = "");
 
 }  // namespace duet

@@ -13,7 +13,7 @@ constexpr int kSteps = 500;  // 1 s at 2 ms: the robot still stands on its feet
 
 Scene standing_scene() {
   Scene scene;
-  scene.robot = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+  scene.robot = load_shared_robot();
   scene.partner = PartnerMode::kNone;
   return scene;
 }

@@ -61,7 +61,7 @@ void run_doctor(Session& session, const std::vector<std::string>& needed) {
         throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
     }
     Scene scene;  // an unknown name is refused with the nearest one
-    scene.robot = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+    scene.robot = load_shared_robot();
     make_backend(engine, scene);
   }
 }

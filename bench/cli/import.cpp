@@ -92,8 +92,7 @@ double kinematics_error(const PickledMotion& pickled, const RobotMotion& motion,
 }
 
 void import_robot(const Session& session, const ImportArguments& arguments) {
-  const auto robot =
-      std::make_shared<const RobotModel>(load_robot(arguments.robot.empty() ? default_card_path() : arguments.robot));
+  const auto robot = load_shared_robot(arguments.robot);
   const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
   std::vector<std::string> verdict = pickled.verdict;
   const RobotMotion motion = on_robot(pickled, arguments.files[0], *robot, verdict);

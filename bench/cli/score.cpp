@@ -31,8 +31,7 @@ void run_score(const Session& session, const ScoreArguments& arguments) {
     const auto [option, value] = split_assignment(choice);
     set_reading(readings, option, value);
   }
-  const auto robot =
-      std::make_shared<const RobotModel>(load_robot(arguments.card.empty() ? default_card_path() : arguments.card));
+  const auto robot = load_shared_robot(arguments.card);
   const std::vector<std::string> files = find_motion_files(arguments.inputs);
   std::vector<ClipScore> scores(files.size());
   Progress progress(session.progress());

@@ -42,8 +42,7 @@ std::vector<Check> run_again(const Run& run, const VerifyArguments& arguments, P
   if (suite_hash(suite) != run.info.suite_hash)
     throw InputError(fmt::format("'{}': the suite's clips are not what they were (hash {:.8}, was {:.8})",
                                  arguments.run, suite_hash(suite), run.info.suite_hash));
-  const auto robot =
-      std::make_shared<const RobotModel>(load_robot(suite.robot.empty() ? default_card_path() : suite.robot));
+  const auto robot = load_shared_robot(suite.robot);
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, arguments.threads, progress);
   const std::vector<EpisodeSpec> plan = plan_episodes(suite, clips);
   std::vector<Check> checks;

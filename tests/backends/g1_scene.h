@@ -8,9 +8,7 @@
 
 namespace duet::test {
 
-inline std::shared_ptr<const RobotModel> g1() {
-  return std::make_shared<const RobotModel>(load_robot(default_card_path()));
-}
+inline std::shared_ptr<const RobotModel> g1() { return load_shared_robot(); }
 
 inline Scene g1_scene(PartnerMode partner = PartnerMode::kNone) {
   Scene scene;

@@ -15,7 +15,7 @@ namespace duet::test {
 inline constexpr double kAlgebra = 1e-13;
 
 inline std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+  static const auto robot = load_shared_robot();
   return robot;
 }
 

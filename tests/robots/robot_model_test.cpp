@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <thread>
 
+#include "core/share.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {
@@ -102,7 +103,7 @@ TEST(DefaultCard, IsTheSourceTreesUnlessDuetShareHasOne) {
 TEST(DefaultCard, NamesThePlacesLookedAt) {
   const test::ScratchFolder folder;
   EXPECT_EQ(thrown_message<MissingError>([&] {
-              first_card({folder / "a", folder / "b"});
+              first_existing("robot card", {folder / "a", folder / "b"});
             }),
             "no robot card: looked at " + folder / "a" + ", " + folder / "b");
 }
