@@ -60,6 +60,14 @@ void TreeFactor::half_solve(Columns& x) const {
   }
 }
 
+void TreeFactor::half_solve(std::span<const int> rows, Triple& x) const {
+  for (const int i : rows) {
+    const Eigen::RowVector3d scaled = inverse_[i] * x.row(i);
+    x.row(i) = scaled;
+    for (const int j : ancestors_[i]) x.row(j) -= L_(i, j) * scaled;
+  }
+}
+
 void TreeFactor::solve(Columns& x) const {
   half_solve(x);
   for (int i = 0; i < static_cast<int>(parent_.size()); ++i) {

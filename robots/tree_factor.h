@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "robots/robot_model.h"
@@ -13,6 +14,7 @@ namespace duet {
 class TreeFactor {
  public:
   using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using Triple = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
   // Of the generalised velocity of robots/kinematics.h: 6 + dof rows.
   explicit TreeFactor(const RobotModel& model);
@@ -24,6 +26,8 @@ class TreeFactor {
   void solve(Columns& x) const;
   // x <- L^-T x: the products of two such columns are those of the columns with H^-1 between them.
   void half_solve(Columns& x) const;
+  // The same for three columns that are zero outside `rows`, which fall and hold the ancestors of all they hold.
+  void half_solve(std::span<const int> rows, Triple& x) const;
 
  private:
   std::vector<int> parent_;                  // of each row: the next row that its joint's motion reaches; -1: none

@@ -1,0 +1,75 @@
+// Contacts and joint stops of one step as soft unilateral rows with Coulomb's cone, seen through an inertia A = M + S
+// (backends/implicit_law.h). For engines without a contact solver of their own and for those that must foresee theirs.
+// With the velocity v0 that the step would end with, the impulses p [N s] and the velocity u of the other side,
+//   v = v0 + A^-1 J^T p,   0 <= p_n  complementary to  n (J v - u) + cfm p_n / dt - erp depth / dt >= 0,
+//   |p_t| <= friction p_n, against the slip where equal.
+// Where all contacts stick, one factorisation gives the answer; else block Gauss-Seidel goes on from there. No history:
+// equal input gives bitwise equal output. No allocation after construction.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "backends/narrow_phase.h"
+#include "robots/tree_factor.h"
+
+namespace duet {
+
+// Of a row: the share of the depth that one step removes, and the compliance [m/(N s)].
+struct Softness {
+  double erp = 1.0;
+  double cfm = 0.0;
+};
+// Of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt; not both 0.
+Softness spring_damper(double stiffness, double damping, double dt);
+
+class ContactSolver {
+ public:
+  // `contacts`: the most that are added for one step, stops apart. `sweeps`: the most of Gauss-Seidel. Keeps a
+  // reference to the model, which must outlive it.
+  ContactSolver(const RobotModel& robot, std::size_t contacts, double dt, int sweeps);
+
+  void clear();
+  // A touching point; with the poses of all links.
+  void add(const ContactPoint& point, const Softness& softness, std::span<const Eigen::Matrix3d> R_WL,
+           std::span<const Eigen::Vector3d> p_WL);
+  // The stop of a joint, which pushes towards `side`: +1 at the lower stop, -1 at the upper. `depth` [rad] is how far
+  // it is passed; a negative one is a gap, which the step may close. At most one a joint.
+  void add_stop(int joint, double side, double depth, const Softness& softness);
+
+  // The generalised velocity (robots/kinematics.h) from v0 to v, with the factor of A.
+  void solve(const TreeFactor& factor, Eigen::VectorXd& v);
+
+  [[nodiscard]] std::size_t size() const { return used_; }  // contacts and stops, in the order in which they were added
+  [[nodiscard]] Eigen::Vector3d impulse(std::size_t i) const { return rows_[i].axes_W * rows_[i].p; }  // on the link, W
+  [[nodiscard]] double stop_impulse(std::size_t i) const { return rows_[i].p.x(); }  // >= 0, towards its side [N m s]
+  [[nodiscard]] const Eigen::VectorXd& generalized_impulse() const { return generalized_; }  // J^T p
+
+ private:
+  struct Row {                        // a contact: its normal and two tangents; a stop has the first only
+    std::vector<int> support;         // entries of the generalised velocity that matter to it, falling
+    TreeFactor::Triple J, Y;          // Jacobian transposed and L^-T times that, A = L^T L; zero outside the support
+    Eigen::Matrix3d axes_W, inverse;  // directions as columns; Y^T Y, the inverse inertia along them
+    Eigen::Vector3d target, missing;  // velocities wanted, and less those of v0 [m/s]
+    double friction = 0.0, compliance = 0.0;
+    Eigen::Vector3d p;
+  };
+  Row& next_row(const Softness& softness);
+  void add_link(Row& row, int link, double sign, const Eigen::Vector3d& p_W, std::span<const Eigen::Matrix3d> R_WL,
+                std::span<const Eigen::Vector3d> p_WL) const;
+  void project(const TreeFactor& factor, const Eigen::VectorXd& v);
+  bool stick();
+  void slide();
+  double sweep();
+
+  const RobotModel* robot_;
+  double dt_;
+  int sweeps_;
+  std::size_t used_ = 0;
+  std::vector<Row> rows_;
+  Eigen::MatrixXd G_;  // of all rows, where they are few
+  Eigen::VectorXd sticking_, half_, generalized_, change_;
+};
+
+}  // namespace duet
