@@ -126,6 +126,7 @@ std::string html_report(const ReportContent& content) {
     if (!body.empty()) sections.push_back({id, title, std::move(body)});
   };
   add("leaderboard", "Leaderboard", leaderboard_section(content));
+  add("engines", "Across engines", cross_engine_html(content));
   add("retargeting", "Retargeting", retargeting_html(content));
   add("clips", "Clips", stories_section(content));
   add("environment", "Environment", environment_section(content));

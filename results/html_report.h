@@ -3,11 +3,14 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "results/cross_engine.h"
 #include "results/leaderboard.h"
+#include "results/metric_column.h"
 
 namespace duet {
 
@@ -26,9 +29,6 @@ struct ClipStory {  // one retargeted clip or rolled-out episode
   std::map<std::string, std::vector<double>> loss;  // term -> value per iteration
   std::map<std::string, double> metrics;            // catalogue names
 };
-struct MetricColumn {
-  std::string name, title, unit, direction;  // direction: "lower", "higher", ""
-};
 struct ReportContent {
   std::string title;
   nlohmann::json environment;
@@ -37,6 +37,8 @@ struct ReportContent {
   std::vector<MetricColumn> columns;                                 // how to head metric columns
   std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
   std::vector<ClipStory> stories;
+  std::optional<CrossEngine> cross_engine;  // section "Across engines"
+  nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
 };
 
 std::string html_report(const ReportContent& content);

@@ -25,6 +25,11 @@ std::string key_frames_svg(const std::vector<KeyFrame>& frames);
 // there are none.
 std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss);
 
+// The drawing of engine_plot_svg within the report, styled by it.
+std::string engine_plot_html(const CrossEngine& result);
+// Tables, plot and parity certificate; "" where the content has no comparison of engines.
+std::string cross_engine_html(const ReportContent& content);
+
 std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
 std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts
 std::string episode_metrics_html(const ReportContent& content);                 // "" without metrics

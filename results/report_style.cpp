@@ -58,6 +58,17 @@ th[aria-sort=descending] button::after{content:"\25BE"}
 .bar .null{stroke:var(--null);stroke-width:2.4}
 .control .bar .range{stroke:var(--source)}
 .control .bar .dot{fill:var(--source)}
+.intervals{max-width:100%;height:auto;display:block;margin:10px 0}
+.intervals text{fill:var(--ink);font-size:13px}
+.intervals .s{fill:var(--soft);font-size:11px}
+.intervals .t{font-weight:600}
+.intervals .g{stroke:var(--line)}
+.intervals .b{stroke:var(--bar);stroke-width:7;stroke-linecap:round;opacity:.35}
+.intervals .d{fill:var(--bar)}
+.intervals .o .b{stroke:var(--source)}
+.intervals .h{fill:none;stroke:var(--source);stroke-width:2}
+.intervals .m{stroke:var(--null);stroke-width:3}
+.intervals .r{fill:var(--null);opacity:.13}
 .legend{color:var(--soft);font-size:13px;display:flex;gap:18px;flex-wrap:wrap;align-items:center;margin:4px 0 0}
 .legend svg{vertical-align:-3px;display:inline-block;margin:0 5px 0 0}
 .filter{display:flex;gap:8px;flex-wrap:wrap;margin:12px 0}

@@ -11,6 +11,7 @@
 
 #include "core/random.h"
 #include "core/require.h"
+#include "results/order_statistics.h"
 
 namespace duet {
 namespace {
@@ -60,14 +61,6 @@ std::vector<Cluster> clusters_of(std::span<const double> values, std::span<const
     ++clusters[found->second].count;
   }
   return clusters;
-}
-
-// Linear between order statistics (the usual "type 7").
-double quantile_of_sorted(const std::vector<double>& sorted, double p) {
-  const double place = p * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<std::size_t>(place);
-  const std::size_t above = std::min(below + 1, sorted.size() - 1);
-  return sorted[below] + (place - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
 
 struct PowerQuantiles {

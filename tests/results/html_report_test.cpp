@@ -102,6 +102,48 @@ TEST(HtmlReport, ShowsMachineNotesTablesAndClips) {
   }
 }
 
+std::vector<EpisodeRow> two_engines() {
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 6; ++i) {
+    for (const char* engine : {"mujoco", "ode", "playback"}) {
+      rows.push_back(test::engine_episode(engine, "replay", i, i < 4));
+      rows.back().metrics = {{"jpe", 0.125}};
+      rows.back().forces = {{"human.peak_n", 80.0}};
+    }
+  }
+  return rows;
+}
+
+TEST(HtmlReport, HasASectionAcrossEngines) {
+  ReportContent across = content();
+  const std::string evil = "\"><script>x</script>&'";
+  std::vector<EpisodeRow> rows = two_engines();
+  for (EpisodeRow& row : rows) {
+    if (row.engine == "ode") row.engine = evil;
+  }
+  across.cross_engine = cross_engine(rows, across.columns, {.resamples = 100});
+  std::string html = html_report(across);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"engines\""), HasSubstr("Across engines"), HasSubstr("class=\"intervals\""),
+                          HasSubstr("Success per engine"), HasSubstr("Time until engines part"),
+                          HasSubstr("No parity certificate is attached (duet validate makes one)."),
+                          Not(HasSubstr("<script>x")), Not(HasSubstr("http:"))));
+  across.certificate = {{"schema", "duet.certificate/1"}, {"engines", {{{"name", evil}, {"passed", 20}}}}};
+  html = html_report(across);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(html,
+              AllOf(HasSubstr("Parity certificate"), HasSubstr("<td>20</td>"), Not(HasSubstr("<script>x")),
+                    HasSubstr("The certificate does not cover mujoco."), Not(HasSubstr("No parity certificate"))));
+}
+
+TEST(HtmlReport, SaysWhereThereIsOneEngineOnly) {
+  ReportContent alone = content();
+  alone.cross_engine = cross_engine({test::engine_episode("mujoco", "replay", 0, true)}, {});
+  const std::string html = html_report(alone);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("these results have one physics engine, mujoco."), Not(HasSubstr("<h3>Spread"))));
+}
+
 TEST(HtmlReport, EmptyContentHasNoEmptySections) {
   const std::string html = html_report({});
   EXPECT_EQ(unbalanced_tag(html), "");

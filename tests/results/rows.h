@@ -72,4 +72,14 @@ inline EpisodeRow episode(const std::string& policy, const std::string& task, in
   return row;
 }
 
+// The same in a physics engine of choice.
+inline EpisodeRow engine_episode(const std::string& engine, const std::string& policy, int number, bool success,
+                                 const std::string& controller = "vmc") {
+  EpisodeRow row = episode(policy, "hug", number, success);
+  row.engine = engine;
+  row.controller = controller;
+  row.key = episode_key(row);
+  return row;
+}
+
 }  // namespace duet::test

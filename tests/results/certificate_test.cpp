@@ -1,0 +1,57 @@
+#include "results/certificate.h"
+
+#include <gmock/gmock.h>
+
+#include "core/digest.h"
+
+namespace duet {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+nlohmann::json certificate() {
+  return nlohmann::json::parse(R"({"schema": "duet.certificate/1", "effort": "full",
+    "created_at": "2026-01-02T03:04:05Z", "engines": [
+      {"name": "mujoco", "version": "2.2.2", "profile": "parity", "passed": 20, "failed": 0, "deviations": 1},
+      {"name": "ode", "version": "0.16.2", "profile": "parity", "passed": ["a", "b"], "failed": [], "deviations": {}}
+    ]})");
+}
+
+TEST(Certificate, IsATableOfEngines) {
+  const std::string text = certificate_markdown(certificate());
+  EXPECT_THAT(text, AllOf(HasSubstr("### Parity certificate\n"),
+                          HasSubstr("| mujoco | 2.2.2   | parity  |            20 |                   1 |      0 |"),
+                          HasSubstr("| ode    | 0.16.2  | parity  |             2 |                   0 |      0 |"),
+                          HasSubstr("Effort full, made 2026-01-02T03:04:05Z, digest " +
+                                    certificate_digest(certificate()).substr(0, 12) + ".")));
+  EXPECT_EQ(certificate_digest({{"b", 1}, {"a", "x"}}), sha256_hex(R"({"a":"x","b":1})"));
+}
+
+TEST(Certificate, WithoutOneSaysHowToMakeOne) {
+  EXPECT_EQ(certificate_markdown(nullptr),
+            "### Parity certificate\n\nNo parity certificate is attached (duet validate makes one).\n");
+}
+
+TEST(Certificate, IsReadTolerantly) {
+  EXPECT_THAT(certificate_markdown({{"schema", "duet.certificate/9"}, {"engines", {{{"name", "dart"}, {"x", 1}}, 3}}}),
+              AllOf(HasSubstr("| dart   | -       | -       |             - |                   - |      - |"),
+                    HasSubstr("Effort -, made -"), HasSubstr("Its schema is duet.certificate/9, expected")));
+  EXPECT_THAT(certificate_markdown({{"engines", "none"}}), HasSubstr("It names no engine."));
+  EXPECT_THAT(certificate_markdown("yes"), HasSubstr("is no JSON object and is not shown"));
+  EXPECT_THAT(certificate_markdown({{"effort", "a\xff"}}), HasSubstr("digest"));
+}
+
+TEST(Certificate, NamesEnginesThatItDoesNotCoverAsTheyWereRun) {
+  const std::string text = certificate_markdown(
+      certificate(), {{"mujoco", "2.2.2", "parity"}, {"ode", "0.16.2", "fast"}, {"dart", "6.12", "parity"}});
+  EXPECT_THAT(text, AllOf(HasSubstr("The certificate does not cover dart."),
+                          HasSubstr("These results are of ode 0.16.2 with profile fast, the certificate of 0.16.2 "
+                                    "with profile parity."),
+                          Not(HasSubstr("are of mujoco"))));
+  EXPECT_THAT(certificate_markdown(certificate(), {{"ode", "", ""}}), Not(HasSubstr("These results")));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,212 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "results/cross_engine.h"
+#include "results/interval_plot.h"
+#include "tests/results/rows.h"
+
+namespace duet {
+namespace {
+
+using test::engine_episode;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+// Three engines and playback, two policies, six episodes of two clips each.
+std::vector<EpisodeRow> benchmark() {
+  struct Engine {
+    const char* name;
+    int a, b;  // successes of six
+    double drift;
+    int parts_at;
+    double force;
+  };
+  std::vector<EpisodeRow> rows;
+  for (const Engine& engine : {Engine{"mujoco", 6, 3, 0.01, 9, 100.0}, Engine{"bullet", 5, 4, 0.02, 5, 120.0},
+                               Engine{"ode", 2, 3, 0.05, 2, 80.0}, Engine{"playback", 6, 6, 0.0, 9, 0.0}}) {
+    for (int i = 0; i < 12; ++i) {
+      const bool second = i >= 6;
+      EpisodeRow row =
+          engine_episode(engine.name, second ? "diffuse" : "replay", i % 6, i % 6 < (second ? engine.b : engine.a));
+      row.metrics = {{"jpe", 0.1 + engine.drift}};
+      row.trace.points = {"root"};
+      for (int frame = 0; frame < 8; ++frame) row.trace.mm.push_back({frame >= engine.parts_at ? 100 : 0, 0, 0});
+      if (engine.force > 0.0) row.forces = {{"human.peak_n", engine.force}};
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+CrossEngine compared(const std::vector<EpisodeRow>& rows) {
+  return cross_engine(rows, {{"jpe", "Joint position error", "m", "lower"}, {"awd", "AWD", "m", "lower"}},
+                      {.resamples = 1000});
+}
+
+TEST(CrossEngineMarkdown, IsAsBlessed) {
+  EXPECT_EQ(cross_engine_markdown(compared(benchmark())), R"md(### Success per engine
+
+Controller vmc, perturbation clean.
+
+| Policy  |   n |            bullet |              mujoco |               ode |            playback |
+| :------ | --: | ----------------: | ------------------: | ----------------: | ------------------: |
+| diffuse |   6 | 66.7 [30.0, 90.3] |   50.0 [18.8, 81.2] | 50.0 [18.8, 81.2] | 100.0 [61.0, 100.0] |
+| replay  |   6 | 83.3 [43.6, 97.0] | 100.0 [61.0, 100.0] |  33.3 [9.7, 70.0] | 100.0 [61.0, 100.0] |
+
+Success in % of the episodes that all engines of the row ran, with 95 % Wilson intervals. Playback has no physics and is in no mean.
+
+### Spread between engines
+
+Controller vmc, perturbation clean.
+
+| Policy  | Engines |               Mean |   SD | Range | Noise SD | Beyond noise |
+| :------ | ------: | -----------------: | ---: | ----: | -------: | -----------: |
+| diffuse |       3 | 55.6 [11.1, 100.0] |  9.6 |  16.7 |     21.9 |          0.0 |
+| replay  |       3 |  72.2 [55.6, 88.9] | 34.7 |  66.7 |     15.5 |         31.0 |
+
+Mean over engines in %, each engine counting the same. Its 95 % interval draws clips again, the same clips in all engines: it covers which clips were taken, not which engines; those are the ones at hand.
+In points: SD, the sample standard deviation of the engines' rates; range, the highest minus the lowest; noise SD, what chance in so many episodes gives if engines do not differ; beyond noise, the SD that is left when chance is taken off (tau by the method of moments, not below 0). Engines share their episodes, so chance is smaller than assumed and what is left errs low.
+
+### Stability of ranks
+
+| Engines        | tau-b of combinations | Swapped |
+| :------------- | --------------------: | ------: |
+| bullet, mujoco |                  1.00 |  0 of 1 |
+| bullet, ode    |                 -1.00 |  1 of 1 |
+| mujoco, ode    |                 -1.00 |  1 of 1 |
+
+Ranks of combinations: mean tau-b -0.33 over 3 pairs of engines; 1 of 1 pairs swap their order between some two engines.
+By success; combinations are of controller and policy. tau-b (Kendall): 1 the same order in both engines, 0 none in common, -1 the reverse; not defined where all are tied. Swapped: pairs in opposite order in the two engines.
+
+### Drift of metrics from playback
+
+Controller vmc.
+
+| Metric               | Unit | Pairs | playback |             bullet |             mujoco |                ode |
+| :------------------- | :--- | ----: | -------: | -----------------: | -----------------: | -----------------: |
+| Joint position error | m    |    12 |      0.1 | +0.02 [0.02, 0.02] | +0.01 [0.01, 0.01] | +0.05 [0.05, 0.05] |
+
+Mean of engine minus playback over the same episodes, with a 95 % interval that draws clips again. Playback: its own mean.
+
+### Time until engines part
+
+| Engines        | Episodes | First quartile [s] | Median [s] | Third quartile [s] | Never part [%] |
+| :------------- | -------: | -----------------: | ---------: | -----------------: | -------------: |
+| bullet, mujoco |       12 |                0.5 |        0.5 |                0.5 |            0.0 |
+| bullet, ode    |       12 |                0.2 |        0.2 |                0.2 |            0.0 |
+| mujoco, ode    |       12 |                0.2 |        0.2 |                0.2 |            0.0 |
+
+First time at which a traced point (root, hands) is more than 5 cm away from where it is in the other engine in the same episode, or at which the robot falls or diverges in one engine alone. Quartiles by Kaplan and Meier: an episode that ends before that counts for as long as it lasted.
+
+### Agreement of contact forces
+
+| Force        | Unit | Episodes | Typical | Spread [%] | bullet | mujoco |   ode |
+| :----------- | :--- | -------: | ------: | ---------: | -----: | -----: | ----: |
+| human.peak_n | N    |       12 |     100 |       40.0 |  1.200 |  1.000 | 0.800 |
+
+Medians over the episodes in which some engine has the force. Typical: the engines' median. Spread: highest minus lowest over the mean of the engines. Below an engine: its force over the engines' median.
+)md");
+}
+
+TEST(CrossEngineMarkdown, IsOneLineForOneEngine) {
+  std::vector<EpisodeRow> rows = benchmark();
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.engine == "ode" || row.engine == "bullet"; });
+  EXPECT_EQ(cross_engine_markdown(compared(rows)),
+            "Nothing to compare across engines: these results have one physics engine, mujoco.\n");
+  EXPECT_EQ(cross_engine_markdown(compared({})),
+            "Nothing to compare across engines: these results have no physics engine.\n");
+}
+
+TEST(CrossEngineMarkdown, SaysWhatIsMissing) {
+  std::vector<EpisodeRow> rows = benchmark();
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.engine == "playback" || row.policy == "diffuse"; });
+  rows.erase(rows.begin());
+  for (EpisodeRow& row : rows) {
+    row.trace.mm.clear();
+    row.forces.clear();
+  }
+  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+              AllOf(HasSubstr("Ranks of combinations: not defined with fewer than two of them."),
+                    HasSubstr("1 episodes that only some of the engines ran are left out"),
+                    HasSubstr("No episode was also run by the engine playback"),
+                    HasSubstr("No episode has traces of two engines that can be compared."),
+                    HasSubstr("No episode has a contact force in two engines."), Not(HasSubstr("nan")),
+                    Not(HasSubstr("Playback has no physics"))));
+}
+
+TEST(CrossEngineMarkdown, TiesThroughoutAreNotDefined) {
+  std::vector<EpisodeRow> rows = benchmark();
+  for (EpisodeRow& row : rows) row.success = true;
+  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+              AllOf(HasSubstr("tau-b is not defined for any two engines (all tied)"),
+                    HasSubstr("| bullet, mujoco |           not defined |  0 of 1 |")));
+}
+
+TEST(CrossEngineMarkdown, SeveralControllersHaveColumnsAndDriftsOfTheirOwn) {
+  std::vector<EpisodeRow> rows = benchmark();
+  for (const EpisodeRow& row : benchmark()) {
+    if (row.engine == "playback") continue;
+    rows.push_back(row);
+    rows.back().controller = "wbc";
+  }
+  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+              AllOf(HasSubstr("| Controller | Policy  |"), HasSubstr("Controller vmc.\n"),
+                    HasSubstr("Controller wbc.\n"), HasSubstr("| Controller | Engines        | Episodes |"),
+                    HasSubstr("tau-b of controllers"), HasSubstr("tau-b of policies")));
+}
+
+TEST(CrossEngineCsv, HasOneFigurePerLine) {
+  const std::string text = cross_engine_csv(compared(benchmark()));
+  EXPECT_THAT(text, StartsWith("table,perturbation,controller,policy,engine,engine_b,name,unit,figure,n,value,"));
+  EXPECT_THAT(text, AllOf(HasSubstr("\r\nsuccess,clean,vmc,diffuse,mujoco,,,1,rate,6,0.5,"),
+                          HasSubstr("\r\nsuccess,clean,vmc,replay,playback,,,1,rate,6,1,"),
+                          HasSubstr("\r\nranks,,,,bullet,mujoco,combinations,1,tau_b,2,1,,\r\n"),
+                          HasSubstr("\r\ndrift,,vmc,,ode,,jpe,m,difference,12,0.0"),
+                          HasSubstr("\r\nparting,,vmc,,bullet,ode,,s,median,12,0.2,,\r\n"),
+                          HasSubstr("\r\nforces,,,,ode,,human.peak_n,1,ratio,12,0.8,,\r\n"), Not(HasSubstr("nan"))));
+}
+
+TEST(CrossEngineLatex, HasATabularPerTable) {
+  const std::string text = cross_engine_latex(compared(benchmark()));
+  EXPECT_THAT(text, AllOf(HasSubstr("% Success per engine\n"), HasSubstr("\\begin{tabular}{lrrrrr}"),
+                          HasSubstr("Spread [\\%]"), HasSubstr("human.peak\\_n & N & 12 & 100")));
+  EXPECT_THAT(cross_engine_latex({}), StartsWith("% Nothing to compare"));
+}
+
+TEST(CrossEngineJson, HasEveryPartAndNoNan) {
+  std::vector<EpisodeRow> rows = benchmark();
+  for (EpisodeRow& row : rows) row.success = true;
+  const nlohmann::json json = cross_engine_json(compared(rows));
+  EXPECT_EQ(json.at("schema"), "duet.cross_engine/1");
+  EXPECT_EQ(json.at("success").at(0).at("engines").size(), 3U);
+  EXPECT_EQ(json.at("success").at(0).at("playback").at("k"), 6);
+  EXPECT_TRUE(json.at("ranks").at(0).at("mean_tau_b").is_null());
+  EXPECT_EQ(json.at("drift").size(), 3U);
+  EXPECT_EQ(json.at("parting").size(), 3U);
+  EXPECT_EQ(json.at("forces").at(0).at("ratio").at("bullet"), 1.2);
+}
+
+TEST(EnginePlot, HasALinePerEngineAndABarForTheMean) {
+  std::vector<EpisodeRow> rows = benchmark();
+  for (EpisodeRow& row : rows) {
+    if (row.engine == "ode") row.engine = "o<d>e";
+  }
+  const std::string svg = engine_plot_svg(compared(rows));
+  EXPECT_THAT(svg, AllOf(StartsWith("<svg xmlns="), HasSubstr(">replay</text>"), HasSubstr("o&lt;d&gt;e"),
+                         HasSubstr("prefers-color-scheme:dark"), HasSubstr(">mean 72.2 ["), Not(HasSubstr("nan"))));
+  const auto count = [&](const std::string& piece) {
+    std::size_t found = 0;
+    for (std::size_t at = svg.find(piece); at != std::string::npos; at = svg.find(piece, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("<circle class=\"d\""), 6U);
+  EXPECT_EQ(count("<circle class=\"h\""), 2U);  // playback
+  EXPECT_EQ(count("<line class=\"m\""), 2U);
+  EXPECT_THAT(engine_plot_svg({}), testing::EndsWith("</svg>\n"));
+}
+
+}  // namespace
+}  // namespace duet

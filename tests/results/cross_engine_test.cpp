@@ -1,0 +1,422 @@
+#include "results/cross_engine.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "core/require.h"
+#include "results/cross_engine_parts.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::engine_episode;
+using test::thrown_message;
+using testing::HasSubstr;
+
+using Rows = std::vector<EpisodeRow>;
+
+// k of n episodes of one engine succeed, the first ones.
+void add_rate(Rows& rows, const std::string& engine, const std::string& policy, int k, int n,
+              const std::string& controller = "vmc") {
+  for (int i = 0; i < n; ++i) rows.push_back(engine_episode(engine, policy, i, i < k, controller));
+}
+
+CrossEngineOptions few_resamples() { return {.resamples = 200}; }
+
+CrossEngine compared(const Rows& rows) { return cross_engine(rows, {}, few_resamples()); }
+
+TEST(EngineSuccess, CountsPerEngineAndOverEngines) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 4, 6);
+  add_rate(rows, "bullet", "replay", 5, 6);
+  add_rate(rows, "ode", "replay", 3, 6);
+  const CrossEngine result = compared(rows);
+  ASSERT_EQ(result.success.size(), 1U);
+  const EngineSuccess& success = result.success[0];
+  ASSERT_EQ(success.engines.size(), 3U);
+  EXPECT_EQ(success.engines[0].engine, "bullet");
+  EXPECT_EQ(success.engines[0].k, 5);
+  EXPECT_EQ(success.engines[0].n, 6);
+  EXPECT_EQ(success.engines[0].interval.low, wilson(5, 6).low);
+  EXPECT_DOUBLE_EQ(success.mean, 12.0 / 18.0);
+  EXPECT_DOUBLE_EQ(success.sd, 1.0 / 6.0);  // of 5/6, 4/6, 3/6
+  EXPECT_DOUBLE_EQ(success.range, 2.0 / 6.0);
+  // p (1 - p) / 5 of the three: 5/180, 8/180, 9/180.
+  EXPECT_DOUBLE_EQ(success.noise_sd, std::sqrt(22.0 / 180.0 / 3.0));
+  EXPECT_EQ(success.excess_sd, 0.0);
+  EXPECT_FALSE(success.playback.has_value());
+}
+
+TEST(EngineSuccess, SpreadBeyondChanceIsWhatIsLeftOfTheVariance) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 40, 50);
+  add_rate(rows, "ode", "replay", 10, 50);
+  const EngineSuccess success = compared(rows).success.at(0);
+  EXPECT_DOUBLE_EQ(success.sd * success.sd, 0.18);                     // (0.8 - 0.2)^2 / 2
+  EXPECT_DOUBLE_EQ(success.noise_sd * success.noise_sd, 0.16 / 49.0);  // both 0.16 / 49
+  EXPECT_NEAR(success.excess_sd, std::sqrt(0.18 - 0.16 / 49.0), 1e-15);
+}
+
+TEST(EngineSuccess, TheBootstrapDrawsTheSameClipsInAllEngines) {
+  // One engine succeeds where the other fails: whichever clips are drawn, the mean over the two is a half.
+  Rows rows;
+  for (int i = 0; i < 30; ++i) {
+    rows.push_back(engine_episode("mujoco", "replay", i, i < 15));
+    rows.push_back(engine_episode("ode", "replay", i, i >= 15));
+  }
+  const EngineSuccess opposite = compared(rows).success.at(0);
+  EXPECT_EQ(opposite.mean_interval.low, 0.5);
+  EXPECT_EQ(opposite.mean_interval.high, 0.5);
+  // Both succeed in the same clips: as wide as for one engine.
+  for (EpisodeRow& row : rows) row.success = row.episode < 15;
+  const EngineSuccess same = compared(rows).success.at(0);
+  EXPECT_LT(same.mean_interval.low, 0.4);
+  EXPECT_GT(same.mean_interval.high, 0.6);
+}
+
+TEST(EngineSuccess, OneClipSaysNothingOfOtherClips) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 2, 3);  // all of hug-0
+  add_rate(rows, "ode", "replay", 1, 3);
+  const EngineSuccess success = compared(rows).success.at(0);
+  EXPECT_EQ(success.mean_interval.low, success.mean_interval.high);
+}
+
+TEST(EngineSuccess, IsOverTheEpisodesThatAllEnginesRan) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 4, 6);
+  add_rate(rows, "ode", "replay", 4, 4);
+  const EngineSuccess success = compared(rows).success.at(0);
+  EXPECT_EQ(success.n, 4);
+  EXPECT_EQ(success.left_out, 2);
+  EXPECT_DOUBLE_EQ(success.mean, 1.0);
+  Rows apart;
+  apart.push_back(engine_episode("mujoco", "replay", 0, true));
+  apart.push_back(engine_episode("ode", "replay", 1, true));
+  const EngineSuccess none = compared(apart).success.at(0);
+  EXPECT_EQ(none.n, 0);
+  EXPECT_TRUE(std::isnan(none.mean));
+  EXPECT_TRUE(std::isnan(none.mean_interval.low));
+}
+
+TEST(EngineSuccess, PlaybackIsApart) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 2, 6);
+  add_rate(rows, "ode", "replay", 2, 6);
+  add_rate(rows, "playback", "replay", 6, 6, "none");  // its controller does not matter
+  const CrossEngine result = compared(rows);
+  ASSERT_EQ(result.success.size(), 1U);
+  EXPECT_DOUBLE_EQ(result.success[0].mean, 2.0 / 6.0);
+  ASSERT_TRUE(result.success[0].playback.has_value());
+  EXPECT_EQ(result.success[0].playback->k, 6);
+  ASSERT_EQ(result.engines.size(), 2U);
+  EXPECT_TRUE(result.has_playback);
+  add_rate(rows, "playback", "replay", 1, 6, "vmc");  // the same controller comes first
+  EXPECT_EQ(compared(rows).success.at(0).playback->k, 1);
+}
+
+TEST(EngineSuccess, OnlyTheArmAskedForCounts) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 4, 6);
+  add_rate(rows, "ode", "replay", 4, 6);
+  for (const char* engine : {"mujoco", "ode"}) {
+    rows.push_back(engine_episode(engine, "null", 0, true));
+    rows.back().arm = "null";
+  }
+  EXPECT_EQ(compared(rows).success.size(), 1U);
+  CrossEngineOptions null_arm = few_resamples();
+  null_arm.arm = "null";
+  EXPECT_EQ(cross_engine(rows, {}, null_arm).success.at(0).policy, "null");
+}
+
+TEST(EngineSuccess, WhatDidNotEndWellFails) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 3, 3);
+  add_rate(rows, "ode", "replay", 3, 3);
+  rows[5].outcome = Outcome::kDiverged;
+  EXPECT_EQ(compared(rows).success.at(0).engines.at(1).k, 2);
+}
+
+TEST(CrossEngineComparison, SaysVersionAndProfileOfEachEngine) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 1, 2);
+  add_rate(rows, "ode", "replay", 1, 2);
+  rows[0].engine_version = rows[1].engine_version = "2.2.2";
+  rows[0].engine_profile = "parity";
+  rows[1].engine_profile = "fast";
+  const CrossEngine result = compared(rows);
+  EXPECT_EQ(result.engines[0].name, "mujoco");
+  EXPECT_EQ(result.engines[0].version, "2.2.2");
+  EXPECT_EQ(result.engines[0].profile, "fast, parity");
+  EXPECT_EQ(result.engines[1].version, "");
+}
+
+TEST(CrossEngineComparison, FewerThanTwoPhysicsEnginesHaveNoTables) {
+  Rows rows;
+  add_rate(rows, "mujoco", "replay", 4, 6);
+  add_rate(rows, "playback", "replay", 6, 6);
+  const CrossEngine one = compared(rows);
+  EXPECT_EQ(one.engines.size(), 1U);
+  EXPECT_TRUE(one.success.empty() && one.ranks.empty() && one.drift.empty() && one.parting.empty());
+  EXPECT_TRUE(compared({}).engines.empty());
+}
+
+TEST(CrossEngineComparison, RefusesMixedSuitesAndEpisodesThatAreThereTwice) {
+  Rows rows = {engine_episode("mujoco", "replay", 0, true), engine_episode("ode", "replay", 0, true)};
+  rows[1].suite_version = "2.0.0";
+  EXPECT_THAT(thrown_message<InputError>([&] { compared(rows); }), HasSubstr("tiny@2.0.0"));
+  rows[1] = rows[0];
+  EXPECT_THAT(thrown_message<InputError>([&] { compared(rows); }),
+              HasSubstr("the episode hug hug-0 0 of mujoco/vmc/replay clean (main arm) is there twice"));
+}
+
+TEST(RankStability, CountsSwapsAndTau) {
+  Rows rows;
+  // Success of policies a, b, c: 1, 2, 3 of 4 in mujoco; 1, 3, 2 in ode; 3, 2, 1 in bullet.
+  for (const auto& [engine, a, b, c] : {std::tuple("mujoco", 1, 2, 3), {"ode", 1, 3, 2}, {"bullet", 3, 2, 1}}) {
+    add_rate(rows, engine, "a", a, 4);
+    add_rate(rows, engine, "b", b, 4);
+    add_rate(rows, engine, "c", c, 4);
+  }
+  const std::vector<RankStability> ranks = compared(rows).ranks;
+  ASSERT_EQ(ranks.size(), 1U);  // one controller: policies alone would be the same
+  EXPECT_EQ(ranks[0].of, "combinations");
+  EXPECT_EQ(ranks[0].items, 3);
+  ASSERT_EQ(ranks[0].engines.size(), 3U);
+  const EnginePairRanks& bullet_mujoco = ranks[0].engines[0];
+  EXPECT_EQ(bullet_mujoco.engine_a + bullet_mujoco.engine_b, "bulletmujoco");
+  EXPECT_EQ(bullet_mujoco.swapped, 3);
+  EXPECT_DOUBLE_EQ(bullet_mujoco.tau_b, -1.0);
+  EXPECT_DOUBLE_EQ(ranks[0].engines[1].tau_b, -1.0 / 3.0);  // bullet, ode: only b and c in the same order
+  EXPECT_DOUBLE_EQ(ranks[0].engines[2].tau_b, 1.0 / 3.0);   // mujoco, ode
+  EXPECT_EQ(ranks[0].engines[2].swapped, 1);
+  EXPECT_DOUBLE_EQ(ranks[0].mean_tau_b, -1.0 / 3.0);
+  EXPECT_EQ(ranks[0].item_pairs, 3);
+  EXPECT_EQ(ranks[0].swapped, 3);
+}
+
+TEST(RankStability, OfControllersAndPoliciesAloneIsOfTheirMeans) {
+  Rows rows;
+  // mujoco: x/a 4, x/b 2, y/a 3, y/b 1 of 4; ode: x/a 1, x/b 3, y/a 2, y/b 4.
+  const auto add = [&](const char* engine, int xa, int xb, int ya, int yb) {
+    add_rate(rows, engine, "a", xa, 4, "x");
+    add_rate(rows, engine, "b", xb, 4, "x");
+    add_rate(rows, engine, "a", ya, 4, "y");
+    add_rate(rows, engine, "b", yb, 4, "y");
+  };
+  add("mujoco", 4, 2, 3, 1);
+  add("ode", 3, 1, 4, 2);
+  const std::vector<RankStability> ranks = compared(rows).ranks;
+  ASSERT_EQ(ranks.size(), 3U);
+  EXPECT_EQ(ranks[0].items, 4);
+  // Of six pairs only the two between controllers for one policy are swapped.
+  EXPECT_EQ(ranks[0].engines[0].swapped, 2);
+  EXPECT_DOUBLE_EQ(ranks[0].mean_tau_b, 2.0 / 6.0);
+  EXPECT_EQ(ranks[1].of, "controllers");
+  EXPECT_DOUBLE_EQ(ranks[1].mean_tau_b, -1.0);  // x 6, y 4 in mujoco; x 4, y 6 in ode
+  EXPECT_EQ(ranks[2].of, "policies");
+  EXPECT_DOUBLE_EQ(ranks[2].mean_tau_b, 1.0);  // a 7, b 3 in both
+}
+
+TEST(RankStability, IsNotDefinedForOneCombinationOrTiesThroughout) {
+  Rows rows;
+  add_rate(rows, "mujoco", "a", 1, 4);
+  add_rate(rows, "ode", "a", 2, 4);
+  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).mean_tau_b));
+  EXPECT_EQ(compared(rows).ranks.at(0).items, 1);
+  add_rate(rows, "mujoco", "b", 1, 4);
+  add_rate(rows, "ode", "b", 3, 4);
+  const RankStability tied = compared(rows).ranks.at(0);
+  EXPECT_EQ(tied.items, 2);
+  EXPECT_EQ(tied.defined, 0);
+  EXPECT_TRUE(std::isnan(tied.engines.at(0).tau_b));
+  EXPECT_EQ(tied.swapped, 0);
+}
+
+TEST(MetricDrift, IsEngineMinusPlaybackInTheSameEpisode) {
+  Rows rows;
+  for (int i = 0; i < 6; ++i) {
+    rows.push_back(engine_episode("playback", "replay", i, true, "none"));
+    rows.back().metrics = {{"jpe", 0.1 * i}};
+    rows.push_back(engine_episode("mujoco", "replay", i, true));
+    rows.back().metrics = {{"jpe", 0.1 * i + (i < 3 ? 0.01 : 0.03)}, {"awd", 1.0}};
+    rows.push_back(engine_episode("ode", "replay", i, true));
+    if (i < 2) rows.back().metrics = {{"jpe", 0.1 * i - 0.5}};
+  }
+  rows.push_back(engine_episode("mujoco", "replay", 9, true));  // playback lacks it
+  rows.back().metrics = {{"jpe", 99.0}};
+  rows.push_back(engine_episode("mujoco", "other", 0, true));
+  rows.back().metrics = {{"jpe", 99.0}};
+  const std::vector<MetricDrift> drift =
+      cross_engine(rows, {{"awd", "", "m", "lower"}, {"jpe", "", "m", "lower"}}, few_resamples()).drift;
+  ASSERT_EQ(drift.size(), 2U);  // playback has no awd
+  EXPECT_EQ(drift[0].engine, "mujoco");
+  EXPECT_EQ(drift[0].controller, "vmc");
+  EXPECT_EQ(drift[0].metric, "jpe");
+  EXPECT_EQ(drift[0].pairs, 6);
+  EXPECT_NEAR(drift[0].mean, 0.02, 1e-15);
+  EXPECT_NEAR(drift[0].playback, 0.25, 1e-15);
+  // Two clips, one with 0.01 throughout, one with 0.03: one in four resamples has only the one or only the other.
+  EXPECT_NEAR(drift[0].interval.low, 0.01, 1e-15);
+  EXPECT_NEAR(drift[0].interval.high, 0.03, 1e-15);
+  EXPECT_EQ(drift[1].engine, "ode");
+  EXPECT_EQ(drift[1].pairs, 2);
+  EXPECT_NEAR(drift[1].mean, -0.5, 1e-15);
+}
+
+// The root at (x, 0, 0) mm in each frame, a hand at its side.
+EpisodeRow traced(const std::string& engine, int number, const std::vector<int>& x_mm) {
+  EpisodeRow row = engine_episode(engine, "replay", number, true);
+  row.trace.points = {"root", "left_hand"};
+  for (const int x : x_mm) row.trace.mm.push_back({x, 0, 0, 0, 300, 900});
+  return row;
+}
+
+Lifetime together(const EpisodeRow& a, const EpisodeRow& b) {
+  const std::optional<Lifetime> lifetime = time_together(a, b, 0.05);
+  EXPECT_TRUE(lifetime.has_value());
+  const std::optional<Lifetime> turned = time_together(b, a, 0.05);
+  EXPECT_EQ(turned->time, lifetime->time);
+  EXPECT_EQ(turned->ended, lifetime->ended);
+  return lifetime.value_or(Lifetime{});
+}
+
+TEST(EngineParting, IsTheFirstFrameFurtherApartThanAsked) {
+  const EpisodeRow still = traced("mujoco", 0, {0, 0, 0, 0});
+  Lifetime lifetime = together(still, traced("ode", 0, {0, 50, 51, 0}));
+  EXPECT_TRUE(lifetime.ended);
+  EXPECT_DOUBLE_EQ(lifetime.time, 0.2);
+  lifetime = together(still, traced("ode", 0, {0, 50, -50, 0}));
+  EXPECT_FALSE(lifetime.ended);
+  EXPECT_DOUBLE_EQ(lifetime.time, 0.3);
+  EpisodeRow hand = still;
+  hand.trace.mm[1] = {0, 0, 0, 30, 330, 930};  // 52 mm along the diagonal
+  EXPECT_DOUBLE_EQ(together(still, hand).time, 0.1);
+}
+
+TEST(EngineParting, PointsAreFoundByName) {
+  const EpisodeRow a = traced("mujoco", 0, {0, 0, 0});
+  EpisodeRow b = a;
+  b.trace.points = {"left_hand", "head", "root"};
+  for (std::vector<int>& frame : b.trace.mm) frame = {0, 300, 900, 7, 7, 7, 0, 0, 0};
+  EXPECT_FALSE(together(a, b).ended);
+  b.trace.mm[2][6] = 100;
+  EXPECT_DOUBLE_EQ(together(a, b).time, 0.2);
+}
+
+TEST(EngineParting, AFallInOneEngineAloneIsAParting) {
+  const EpisodeRow whole = traced("mujoco", 0, {0, 0, 0, 0, 0, 0});
+  for (const Outcome outcome : {Outcome::kFell, Outcome::kDiverged}) {
+    EpisodeRow fallen = traced("ode", 0, {0, 0, 0});
+    fallen.outcome = outcome;
+    EXPECT_TRUE(together(whole, fallen).ended);
+    EXPECT_DOUBLE_EQ(together(whole, fallen).time, 0.2);
+    EpisodeRow also_fallen = whole;
+    also_fallen.outcome = Outcome::kFell;
+    EXPECT_FALSE(together(also_fallen, fallen).ended);
+    EpisodeRow cut_short = traced("mujoco", 0, {0, 0});  // timed out before the other fell
+    cut_short.outcome = Outcome::kTimedOut;
+    EXPECT_FALSE(together(cut_short, fallen).ended);
+    EXPECT_DOUBLE_EQ(together(cut_short, fallen).time, 0.1);
+  }
+}
+
+TEST(EngineParting, TracesThatCannotBeComparedAreNone) {
+  const EpisodeRow a = traced("mujoco", 0, {0, 0});
+  EpisodeRow b = a;
+  b.trace.rate_hz = 20.0;
+  EXPECT_FALSE(time_together(a, b, 0.05).has_value());
+  b = a;
+  b.trace.mm.clear();
+  EXPECT_FALSE(time_together(a, b, 0.05).has_value());
+  b = a;
+  b.trace.points = {"head", "feet"};
+  EXPECT_FALSE(time_together(a, b, 0.05).has_value());
+}
+
+TEST(EngineParting, QuartilesAreThoseOfKaplanAndMeier) {
+  const std::vector<int> still(10, 0);
+  const auto moved_at = [&](std::size_t frame) {
+    std::vector<int> x = still;
+    x[frame] = 80;
+    return x;
+  };
+  // Parted after 0.3, 0.3 and 0.7 s, one seen for 0.4 s only: 1/2 left after 0.3 s, none after 0.7 s.
+  Rows rows;
+  for (int i = 0; i < 5; ++i) rows.push_back(traced("mujoco", i, still));
+  rows.push_back(traced("ode", 0, moved_at(3)));
+  rows.push_back(traced("ode", 1, moved_at(7)));
+  rows.push_back(traced("ode", 2, std::vector<int>(5, 0)));
+  rows.push_back(traced("ode", 3, moved_at(3)));
+  rows.push_back(traced("ode", 4, {}));
+  const EngineParting parting = compared(rows).parting.at(0);
+  EXPECT_EQ(parting.pairs, 4);
+  EXPECT_EQ(parting.parted, 3);
+  EXPECT_EQ(parting.without_trace, 1);
+  EXPECT_DOUBLE_EQ(parting.lower_quartile, 0.3);
+  EXPECT_DOUBLE_EQ(parting.median, 0.3);
+  EXPECT_DOUBLE_EQ(parting.upper_quartile, 0.7);
+}
+
+TEST(ForceAgreement, IsPerEpisodeAndThenTheMedian) {
+  Rows rows;
+  const auto add = [&](int number, std::initializer_list<std::pair<const char*, double>> in_engine) {
+    for (const auto& [engine, value] : in_engine) {
+      rows.push_back(engine_episode(engine, "replay", number, true));
+      rows.back().forces = {{"human.peak_n", value}};
+    }
+  };
+  add(0, {{"mujoco", 100.0}, {"ode", 110.0}, {"bullet", 90.0}});   // spread 0.2, median 100
+  add(1, {{"mujoco", 100.0}, {"ode", 100.0}, {"bullet", 130.0}});  // spread 30 / 110, median 100
+  add(2, {{"mujoco", 0.0}, {"ode", 0.0}, {"bullet", 0.0}});
+  add(3, {{"mujoco", 500.0}});
+  add(4, {{"mujoco", 0.0}, {"ode", 0.0}, {"bullet", 300.0}});  // spread 3, median 0: no ratio
+  rows[0].forces["ground.mean_n"] = 343.0;                     // in one engine only
+  const std::vector<ForceAgreement> forces = compared(rows).forces;
+  ASSERT_EQ(forces.size(), 1U);
+  EXPECT_EQ(forces[0].name, "human.peak_n");
+  EXPECT_EQ(forces[0].unit, "N");
+  EXPECT_EQ(forces[0].episodes, 3);
+  EXPECT_DOUBLE_EQ(forces[0].typical, 100.0);
+  EXPECT_DOUBLE_EQ(forces[0].spread, 30.0 / 110.0);
+  EXPECT_DOUBLE_EQ(forces[0].ratio.at("mujoco"), 1.0);
+  EXPECT_DOUBLE_EQ(forces[0].ratio.at("ode"), 1.05);
+  EXPECT_DOUBLE_EQ(forces[0].ratio.at("bullet"), 1.1);
+}
+
+TEST(ForceUnit, IsTheEndingOfTheName) {
+  EXPECT_EQ(force_unit("human.chest.peak_n"), "N");
+  EXPECT_EQ(force_unit("human.impulse_ns"), "N s");
+  EXPECT_EQ(force_unit("human.contact_s"), "s");
+  EXPECT_EQ(force_unit("human.chest.pressure_n_cm2"), "N/cm^2");
+  EXPECT_EQ(force_unit("human.count"), "");
+}
+
+TEST(CrossEngineComparison, DoesNotDependOnTheOrderOfRows) {
+  Rows rows;
+  std::mt19937 random(7);
+  for (const char* engine : {"ode", "mujoco", "bullet", "playback"}) {
+    for (const char* policy : {"a", "b"}) {
+      for (int i = 0; i < 9; ++i) {
+        rows.push_back(traced(engine, i, {0, static_cast<int>(random() % 90), 0}));
+        rows.back().policy = policy;
+        rows.back().success = random() % 3 != 0;
+        rows.back().metrics = {{"jpe", 1e-3 * static_cast<double>(random() % 1000)}};
+        rows.back().forces = {{"human.peak_n", static_cast<double>(random() % 100)}};
+      }
+    }
+  }
+  const std::vector<MetricColumn> metrics = {{"jpe", "", "m", "lower"}};
+  const nlohmann::json before = cross_engine_json(cross_engine(rows, metrics, few_resamples()));
+  EXPECT_EQ(cross_engine_json(cross_engine(rows, metrics, few_resamples())), before);
+  std::shuffle(rows.begin(), rows.end(), random);
+  EXPECT_EQ(cross_engine_json(cross_engine(rows, metrics, few_resamples())), before);
+}
+
+}  // namespace
+}  // namespace duet
