@@ -1,0 +1,13 @@
+// What DART itself costs: the loop against which the overhead of Backend::step is measured.
+#pragma once
+
+#include "backends/scene.h"
+#include "core/robot_state.h"
+
+namespace duet {
+
+// As EngineModule::bare_step_seconds: the same contacts, torque law and calls of DART as the backend's, without its
+// checks, reports and pushes.
+double dart_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps);
+
+}  // namespace duet

@@ -1,0 +1,71 @@
+// All points at which the robot touches in one step as one DART constraint: a normal row and two friction rows each.
+// Friction is a pyramid whose first side is the direction in which the point would slide if nothing held it.
+#pragma once
+
+#include <dart/constraint/ConstraintBase.hpp>
+#include <dart/dynamics/BodyNode.hpp>
+#include <dart/dynamics/Skeleton.hpp>
+#include <span>
+#include <vector>
+
+#include "backends/dart/implicit_hinge.h"
+#include "backends/narrow_phase.h"
+
+namespace duet {
+
+// Of the rigid contacts with the ground and of the robot with itself.
+struct RigidContact {
+  double erp = 0.0;             // share of the depth that is recovered in a step
+  double recovery_speed = 0.0;  // at most [m/s]
+  double cfm = 0.0;             // added to the diagonal, as a share of it
+};
+
+class ContactRows final : public dart::constraint::ConstraintBase {
+ public:
+  // `bodies` by link. At most `capacity` points.
+  ContactRows(dart::dynamics::SkeletonPtr skeleton, std::vector<dart::dynamics::BodyNode*> bodies,
+              const RigidContact& rigid, double dt, std::size_t capacity);
+
+  // The points of the coming step; they must stay as they are until it ends.
+  void set(std::span<const ContactPoint> points);
+  // Of the step that has ended: force of the other side on the link at points[index], mean over the step. [N], W.
+  [[nodiscard]] Eigen::Vector3d force(std::size_t index) const;
+
+ private:
+  struct Row {
+    Eigen::Vector6d J = Eigen::Vector6d::Zero();        // of the link, in its frame: moment, then force
+    Eigen::Vector6d J_other = Eigen::Vector6d::Zero();  // of the other link, where there is one
+    double velocity = 0.0;                              // change that is asked for [m/s]
+    double softness = 0.0;                              // added to the diagonal [1/kg]
+    double impulse = 0.0;                               // [N s]
+  };
+  struct Point {
+    dart::dynamics::BodyNode* body = nullptr;
+    dart::dynamics::BodyNode* other = nullptr;  // null: the ground or the human
+    Eigen::Matrix3d axes_W;                     // columns: normal, two tangents
+  };
+
+  void update() override;
+  void getInformation(dart::constraint::ConstraintInfo* info) override;
+  void applyUnitImpulse(std::size_t row) override;
+  void getVelocityChange(double* change, bool with_cfm) override;
+  void excite() override;
+  void unexcite() override;
+  void applyImpulse(double* impulses) override;
+  [[nodiscard]] bool isActive() const override { return !points_.empty(); }
+  [[nodiscard]] dart::dynamics::SkeletonPtr getRootSkeleton() const override;
+
+  void aim(const ContactPoint& contact, Point& point);
+  void fill_rows(const ContactPoint& contact, const Point& point, Row* rows) const;
+
+  dart::dynamics::SkeletonPtr skeleton_;
+  std::vector<dart::dynamics::BodyNode*> bodies_;
+  RigidContact rigid_;
+  double dt_;
+  std::span<const ContactPoint> contacts_;
+  std::vector<Point> points_;
+  std::vector<Row> rows_;
+  std::size_t applied_ = 0;  // row of the last unit impulse
+};
+
+}  // namespace duet

@@ -1,0 +1,72 @@
+// A scene as DART sees it: one skeleton without shapes, its contact rows and joint stops, and the step of
+// simulation::World taken apart so that the torque law can look at what the contacts did.
+#pragma once
+
+#include <dart/constraint/ConstraintSolver.hpp>
+#include <dart/dynamics/FreeJoint.hpp>
+#include <dart/dynamics/Skeleton.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "backends/dart/contact_rows.h"
+#include "backends/dart/implicit_hinge.h"
+#include "backends/engine_options.h"
+#include "backends/link_pushes.h"
+#include "backends/narrow_phase.h"
+#include "backends/scene.h"
+#include "core/robot_state.h"
+
+namespace duet {
+
+std::span<const EngineOption> dart_options();
+
+class DartWorld {
+ public:
+  DartWorld(const Scene& scene, std::size_t contact_capacity);  // keeps the robot model alive
+
+  void write_state(const RobotState& state);
+  void read_state(RobotState& state) const;
+  // DART's own coordinates, from which a run continues bitwise: 2 (6 + dof) numbers.
+  void append_to(std::vector<double>& values) const;
+  void read_from(std::span<const double> values);
+
+  // Poses of the links at the current state.
+  void read_poses(std::vector<Eigen::Matrix3d>& R_WL, std::vector<Eigen::Vector3d>& p_WL) const;
+  // Forces of the coming step beside the law and the contacts.
+  void apply(const LinkPushes& pushes);
+  // `state`: as read_state() gives it. False where the velocities left any sensible range: then the state is useless.
+  [[nodiscard]] bool step(const JointCommand& command, const RobotState& state, std::span<const ContactPoint> points);
+
+  [[nodiscard]] Eigen::Vector3d contact_force(std::size_t index) const { return rows_->force(index); }
+  void read_torques(Eigen::VectorXd& torques) const;  // of the law in the last step
+
+ private:
+  struct Law {                      // of one joint in the coming step, as in backends/implicit_law.h
+    double drive = 0.0;             // t0 [N m]
+    double implicit_inertia = 0.0;  // s - armature [kg m^2]
+    double torque = 0.0;            // [N m]
+  };
+
+  void build(const Scene& scene);
+  void build_link(const RobotModel& robot, int index);
+  void set_law(const JointCommand& command, const RobotState& state);
+  void use_law();
+  [[nodiscard]] bool velocities_are_sensible() const;
+  bool saturate(const RobotState& state);
+  void find_torques(const RobotState& state);
+  bool move();
+  void limit_joints();
+
+  std::shared_ptr<const RobotModel> robot_;
+  double dt_;
+  dart::dynamics::SkeletonPtr skeleton_;
+  dart::dynamics::FreeJoint* base_ = nullptr;
+  std::vector<ImplicitHinge*> hinges_;
+  std::vector<dart::dynamics::BodyNode*> bodies_;
+  std::shared_ptr<ContactRows> rows_;
+  std::unique_ptr<dart::constraint::ConstraintSolver> solver_;
+  std::vector<Law> law_;
+};
+
+}  // namespace duet

@@ -1,0 +1,18 @@
+#include "backends/dart/implicit_hinge.h"
+
+namespace duet {
+
+ImplicitHinge::ImplicitHinge(const Properties& properties) : RevoluteJoint(properties) {}
+
+dart::dynamics::Joint* ImplicitHinge::clone() const { return new ImplicitHinge(getRevoluteJointProperties()); }
+
+void ImplicitHinge::updateInvProjArtInertia(const Eigen::Matrix6d& inertia) {
+  const Eigen::Vector6d& S = GenericJoint<dart::math::R1Space>::getRelativeJacobianStatic();
+  mInvProjArtInertia(0, 0) = 1.0 / (S.dot(inertia * S) + added_inertia_);
+}
+
+void ImplicitHinge::updateInvProjArtInertiaImplicit(const Eigen::Matrix6d&, double) {
+  mInvProjArtInertiaImplicit = mInvProjArtInertia;
+}
+
+}  // namespace duet

@@ -1,0 +1,30 @@
+// DART's revolute joint with the torque law's inertia added to the one that it projects on its axis: the armature, and
+// what damping and spring weigh at the end of the step. DART's own springs and dampers are missing where it computes
+// responses to contact impulses; here accelerations and responses see the same inertia.
+#pragma once
+
+#include <Eigen/Core>
+
+// libdart is built for 16-byte alignment: a unit with wider vectors would lay out the same types differently.
+static_assert(EIGEN_MAX_ALIGN_BYTES == 16, "DART and AVX do not go together: compile for x86-64-v2 at most");
+
+#include <dart/dynamics/RevoluteJoint.hpp>
+
+namespace duet {
+
+class ImplicitHinge final : public dart::dynamics::RevoluteJoint {
+ public:
+  explicit ImplicitHinge(const Properties& properties);
+
+  // s of backends/implicit_law.h [kg m^2]. DART does not notice: Skeleton::dirtyArticulatedInertia() is the caller's.
+  void set_added_inertia(double inertia) { added_inertia_ = inertia; }
+
+ private:
+  Joint* clone() const override;
+  void updateInvProjArtInertia(const Eigen::Matrix6d& inertia) override;
+  void updateInvProjArtInertiaImplicit(const Eigen::Matrix6d& inertia, double dt) override;
+
+  double added_inertia_ = 0.0;
+};
+
+}  // namespace duet
