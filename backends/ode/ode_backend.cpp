@@ -1,0 +1,64 @@
+// ODE behind the Backend interface. README.md says what maps to what.
+#include "backends/engine_module.h"
+#include "backends/ode/bare_loop.h"
+#include "backends/ode/ode_library.h"
+#include "backends/ode/ode_options.h"
+#include "backends/ode/ode_stepper.h"
+#include "backends/physics_backend.h"
+
+namespace duet {
+namespace {
+
+class OdeBackend final : public PhysicsBackend {
+ public:
+  explicit OdeBackend(const Scene& scene) : PhysicsBackend(scene), stepper_(scene, narrow_phase_.capacity()) {}
+  ~OdeBackend() override { enter_ode(); }
+  OdeBackend(const OdeBackend&) = delete;
+  OdeBackend& operator=(const OdeBackend&) = delete;
+
+  [[nodiscard]] std::string_view name() const override { return "ode"; }
+  [[nodiscard]] std::string version() const override { return ode_version(); }
+
+ private:
+  void place() override {
+    enter_ode();
+    stepper_.world().place(state_);
+  }
+
+  Outcome advance(const JointCommand& command) override {
+    enter_ode();
+    const OdeWorld& world = stepper_.world();
+    const std::span<const ContactPoint> points = narrow_phase_.collide(world.rotations(), world.positions(), partner_);
+    if (!stepper_.advance(command, points, pushes_.any() ? &pushes_ : nullptr, state_)) return Outcome::kDiverged;
+    stepper_.torques(torques_);
+    contacts_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i) contacts_.push_back(reported(points[i], stepper_.contact_force(i)));
+    return Outcome::kOk;
+  }
+
+  void append_to(std::vector<double>& values) const override {
+    const std::size_t begin = values.size();
+    values.resize(begin + stepper_.world().size());
+    stepper_.world().write_to(std::span(values).subspan(begin));
+  }
+
+  void read_from(std::span<const double> values) override {
+    enter_ode();
+    stepper_.world().read_from(values);
+  }
+
+  OdeStepper stepper_;
+};
+
+std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<OdeBackend>(scene); }
+
+const EngineModule kModule = {.name = "ode",
+                              .version = ode_version,
+                              .make = make,
+                              .options = ode_option_table(),
+                              .bare_step_seconds = ode_bare_step_seconds};
+
+}  // namespace
+}  // namespace duet
+
+DUET_ENGINE_MODULE(duet::kModule)

@@ -1,0 +1,23 @@
+// What a profile may set for ODE, with its defaults.
+#pragma once
+
+#include <span>
+
+#include "backends/contact_solver.h"
+#include "backends/engine_options.h"
+
+namespace duet {
+
+struct OdeOptions {
+  Softness joint = {};    // of hinges
+  Softness stop = {};     // of joint stops
+  Softness contact = {};  // of contacts with the ground and between links
+  bool stick = true;      // contacts that are foreseen to stick are given to ODE without a bound on friction
+  int sweeps = 0;         // of the contact solver that foresees ODE's forces
+};
+
+std::span<const EngineOption> ode_option_table();
+// Throws std::invalid_argument (check_options).
+OdeOptions ode_options(const EngineOptions& options);
+
+}  // namespace duet
