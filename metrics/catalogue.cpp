@@ -19,6 +19,9 @@ constexpr auto kEpisode = MetricGroup::kEpisode;
 constexpr std::string_view kC21 = "supplement C.2.1";
 constexpr std::string_view kS4 = "supplement A.4.6, Table S4";
 constexpr std::string_view kDetectors = "supplement C.3.1, Algorithms 1-6";
+constexpr std::string_view kSafety = "duet: contact safety";
+constexpr std::string_view kLimits =
+    "duet: contact safety, table in the form of ISO/TS 15066, unverified unless it names who checked it";
 
 constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"jpe", "m", kDown, kRetarget, "Joint position error", kC21},
@@ -56,8 +59,10 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"fell", "1", kDown, kEpisode, "Falls", "duet: outcomes"},
     {"time_to_fall", "s", kUp, kEpisode, "Time to fall", "duet: outcomes"},
     {"evidence_frames", "1", kPlain, kEpisode, "Frames of evidence", kDetectors},
-    {"contact_peak", "N", kDown, kEpisode, "Peak contact force with the partner", "duet: partner safety"},
-    {"contact_impulse", "N s", kPlain, kEpisode, "Contact impulse with the partner", "duet: partner safety"},
+    {"contact_peak_force", "N", kDown, kEpisode, "Peak contact force on a region of the partner", kSafety},
+    {"contact_quasi_static_force", "N", kDown, kEpisode, "Contact force held for more than 0.5 s", kSafety},
+    {"contact_impulse", "N s", kPlain, kEpisode, "Contact impulse with the partner", kSafety},
+    {"contact_limit_ratio", "1", kDown, kEpisode, "Largest contact load over its limit", kLimits},
     {"late_plans", "1", kDown, kEpisode, "Ticks without a plan in time", "supplement F"},
     {"frames", "1", kPlain, kEpisode, "Frames", "duet: episode"},
     {"sim_s", "s", kPlain, kEpisode, "Simulated time", "duet: episode"},

@@ -1,0 +1,113 @@
+#include "metrics/contact_limits.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <utility>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "core/share.h"
+#include "robots/yaml_section.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kSchema = "duet.contact_limits/1";
+
+std::optional<double> optional_positive(const YamlSection& section, const char* key) {
+  const std::optional<double> value = section.optional_number(key);
+  if (value && *value <= 0.0)
+    section.fail(section.line(key), fmt::format("'{}': expected a number > 0, found {}", key, *value));
+  return value;
+}
+
+void read_transient(const YamlSection& section, RegionLimits& limits) {
+  constexpr const char* kKey = "transient_n";
+  if (!section.has(kKey)) return;
+  const YAML::Node node = section.node(kKey);
+  if (node.IsScalar() && node.Scalar() == "not_allowed") {
+    if (!limits.quasi_static_n)
+      section.fail(section.line(kKey), "'transient_n': 'not_allowed' needs 'quasi_static_n', found none");
+    limits.transient_allowed = false;
+    return;
+  }
+  double value = 0.0;
+  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value) || value <= 0.0)
+    section.fail(section.line(kKey),
+                 fmt::format("'{}': expected a number > 0 or 'not_allowed', found {}", kKey, describe(node)));
+  if (limits.quasi_static_n && value < *limits.quasi_static_n)
+    section.fail(section.line(kKey), fmt::format("'{}': expected at least 'quasi_static_n' = {}, found {}", kKey,
+                                                 *limits.quasi_static_n, value));
+  limits.transient_n = value;
+}
+
+RegionLimits read_region(const std::string& file, const YAML::Node& node) {
+  const YamlSection section(file, node, "contact limits of a region",
+                            {"region", "quasi_static_n", "transient_n", "pressure_n_cm2", "stiffness_n_mm", "mass_kg"});
+  RegionLimits limits{.region = section.text("region"),
+                      .quasi_static_n = optional_positive(section, "quasi_static_n"),
+                      .transient_n = std::nullopt,
+                      .pressure_n_cm2 = optional_positive(section, "pressure_n_cm2"),
+                      .stiffness_n_mm = optional_positive(section, "stiffness_n_mm"),
+                      .mass_kg = optional_positive(section, "mass_kg")};
+  read_transient(section, limits);
+  return limits;
+}
+
+// The key must be there; nothing or blanks behind it mean that nobody has checked the table.
+std::string read_verified_by(const YamlSection& top) {
+  const YAML::Node node = top.node("verified_by");
+  if (node.IsNull()) return "";
+  if (!node.IsScalar())
+    top.fail(top.line("verified_by"),
+             fmt::format("'verified_by': expected a name or nothing, found {}", describe(node)));
+  const std::string& name = node.Scalar();
+  return name.find_first_not_of(" \t\n") == std::string::npos ? "" : name;
+}
+
+std::vector<std::string> region_names(const ContactLimits& limits) {
+  std::vector<std::string> names;
+  for (const RegionLimits& entry : limits.regions) names.push_back(entry.region);
+  return names;
+}
+
+}  // namespace
+
+std::string ContactLimits::mark() const {
+  return verified() ? "limits verified by " + verified_by : "unverified limits";
+}
+
+const RegionLimits& ContactLimits::region(std::string_view wanted) const {
+  for (const RegionLimits& entry : regions)
+    if (entry.region == wanted) return entry;
+  throw std::invalid_argument(fmt::format("contact limits '{}': expected an entry for the region '{}', found {}", name,
+                                          wanted, fmt::join(region_names(*this), ", ")));
+}
+
+ContactLimits parse_contact_limits(const std::string& text, const std::string& file) {
+  const YamlSection top(file, parse_yaml(text, file), "contact limits",
+                        {"schema", "name", "source", "verified_by", "regions"});
+  if (const std::string schema = top.text("schema"); schema != kSchema)
+    top.fail(top.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kSchema, schema));
+  ContactLimits limits{
+      .name = top.text("name"), .source = top.text("source"), .verified_by = read_verified_by(top), .regions = {}};
+  (void)top.node("regions");
+  for (const YAML::Node& node : top.items("regions")) {
+    RegionLimits entry = read_region(file, node);
+    for (const RegionLimits& earlier : limits.regions)
+      if (earlier.region == entry.region)
+        top.fail(node.Mark().line + 1, fmt::format("expected each region once, found '{}' again", entry.region));
+    limits.regions.push_back(std::move(entry));
+  }
+  return limits;
+}
+
+ContactLimits load_contact_limits(const std::string& path) { return parse_contact_limits(read_file(path), path); }
+
+std::string default_contact_limits_path() {
+  return share_file("table of contact limits", "metrics/limits/iso_ts_15066.yaml");
+}
+
+}  // namespace duet

@@ -1,0 +1,511 @@
+#include "metrics/contact_safety.h"
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "metrics/catalogue.h"
+#include "tests/robots/allocations.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using Eigen::Vector3d;
+using test::thrown_message;
+using ::testing::HasSubstr;
+using ::testing::Key;
+using ::testing::UnorderedElementsAre;
+
+constexpr double kRounding = 1e-9;  // of sums over some thousand steps
+
+// Capsules of the test's body.
+enum Capsule { kChestA, kChestB, kHead, kHandLeft, kHandRight, kFoot };
+
+HumanBody body() {
+  HumanBody human;
+  const auto add = [&](const char* name, const char* region, double radius) {
+    HumanCapsule capsule;
+    capsule.name = name;
+    capsule.region = region;
+    capsule.radius = radius;
+    human.capsules.push_back(capsule);
+  };
+  add("upper_chest", "chest", 0.12);
+  add("lower_chest", "chest", 0.12);
+  add("head", "head", 0.1);
+  add("left_hand", "hand", 0.03);
+  add("right_hand", "hand", 0.03);
+  add("left_foot", "foot", 0.035);
+  return human;
+}
+
+// Nothing is stated for the foot.
+ContactLimits table() {
+  return {.name = "table",
+          .source = "test",
+          .verified_by = "",
+          .regions = {{.region = "chest", .quasi_static_n = 140.0, .transient_n = 280.0, .pressure_n_cm2 = 120.0},
+                      {.region = "head", .quasi_static_n = 65.0, .transient_allowed = false, .pressure_n_cm2 = 110.0},
+                      {.region = "hand", .quasi_static_n = 140.0, .transient_n = 280.0},
+                      {.region = "foot"}}};
+}
+
+constexpr double kDepth = 0.02;  // wide patches: no pressure near its limit
+
+Contact touch(int capsule, const Vector3d& force, int link = 0, double depth = kDepth) {
+  return {.link = link, .side = ContactSide::kHuman, .other = capsule, .f_W = force, .depth = depth};
+}
+
+Contact touch(int capsule, double force, int link = 0, double depth = kDepth) {
+  return touch(capsule, Vector3d(force, 0.0, 0.0), link, depth);
+}
+
+using ContactsAt = std::function<std::vector<Contact>(double)>;  // by time in the middle of a step
+
+ContactSafetyResult fed(double duration, const ContactsAt& contacts, double dt = 0.002,
+                        const ContactSafetyOptions& options = {}, const ContactLimits& limits = table()) {
+  ContactSafety safety(body(), limits, dt, options);
+  const int steps = static_cast<int>(std::lround(duration / dt));
+  for (int k = 0; k < steps; ++k) safety.add(contacts((k + 0.5) * dt));
+  return safety.result();
+}
+
+// `force` on one capsule within [begin, end).
+ContactsAt pulse(int capsule, double force, double begin, double end) {
+  return [=](double t) { return t > begin && t < end ? std::vector{touch(capsule, force)} : std::vector<Contact>(); };
+}
+
+const RegionContact& region(const ContactSafetyResult& result, std::string_view name) {
+  for (const RegionContact& entry : result.regions)
+    if (entry.region == name) return entry;
+  throw std::out_of_range("no region");
+}
+
+TEST(ContactSafety, AConstantForceHasItsClosedForm) {
+  const ContactSafetyResult result = fed(2.0, pulse(kChestA, 50.0, 0.5, 1.5));
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_EQ(chest.peak_force, 50.0);
+  EXPECT_EQ(chest.peak_pair_force, 50.0);
+  EXPECT_EQ(chest.quasi_static_force, 50.0);
+  EXPECT_EQ(chest.transient_force, 50.0);
+  EXPECT_EQ(chest.windowed_mean, 50.0);
+  EXPECT_NEAR(chest.impulse, 50.0, kRounding);
+  EXPECT_NEAR(chest.longest, 1.0, kRounding);
+  EXPECT_EQ(chest.contacts, 1);
+  EXPECT_EQ(chest.transient_contacts, 0);
+  EXPECT_NEAR(*chest.quasi_static_ratio, 50.0 / 140.0, kRounding);
+  EXPECT_NEAR(*chest.transient_ratio, 50.0 / 280.0, kRounding);
+  EXPECT_EQ(chest.worst_ratio, chest.quasi_static_ratio);
+  EXPECT_EQ(chest.verdict, ContactVerdict::kWithin);
+  EXPECT_EQ(result.peak_force, 50.0);
+  EXPECT_EQ(result.quasi_static_force, 50.0);
+  EXPECT_NEAR(result.duration, 2.0, kRounding);
+
+  ASSERT_EQ(result.events.size(), 1u);
+  const ContactEvent& event = result.events[0];
+  EXPECT_EQ(event.link, 0);
+  EXPECT_EQ(event.capsule, kChestA);
+  EXPECT_EQ(result.regions[event.region].region, "chest");
+  EXPECT_NEAR(event.begin, 0.5, kRounding);
+  EXPECT_NEAR(event.duration, 1.0, kRounding);
+  EXPECT_EQ(event.peak_force, 50.0);
+  EXPECT_NEAR(event.impulse, 50.0, kRounding);
+  EXPECT_EQ(event.windowed_mean, 50.0);
+}
+
+TEST(ContactSafety, AHalfSineHasItsClosedForm) {
+  constexpr double kLength = 2.0, kPeak = 100.0, kPi = std::numbers::pi;
+  const auto half_sine = [](double t) {
+    return std::vector{touch(kChestA, t < kLength ? kPeak * std::sin(kPi * t / kLength) : 0.0)};
+  };
+  for (const double dt : {0.001, 0.002}) {
+    const ContactSafetyResult result = fed(2.5, half_sine, dt);
+    const RegionContact& chest = region(result, "chest");
+    const double slope = kPeak * kPi / kLength;  // the steepest [N/s]
+    EXPECT_NEAR(chest.peak_force, kPeak, slope * dt);
+    EXPECT_NEAR(chest.impulse, kPeak * 2.0 * kLength / kPi, slope * dt);
+    // The level held for 0.5 s around the peak; the mean over 20 ms may look 10 ms further in, and a step more.
+    EXPECT_NEAR(chest.quasi_static_force, kPeak * std::cos(kPi * 0.25 / kLength), slope * (0.01 + dt));
+    EXPECT_GE(chest.quasi_static_force, kPeak * std::cos(kPi * 0.25 / kLength) - slope * dt);
+    EXPECT_NEAR(chest.transient_force, kPeak * std::sin(kPi * 0.5 / kLength), slope * dt);
+    const double angle = kPi * 0.05 / kLength;  // of half the window of the mean
+    EXPECT_NEAR(chest.windowed_mean, kPeak * std::sin(angle) / angle, slope * dt);
+    EXPECT_NEAR(chest.longest, kLength, dt);
+  }
+}
+
+TEST(ContactSafety, AShortPulseIsTransientOnly) {
+  const ContactSafetyResult result = fed(1.5, pulse(kChestA, 200.0, 0.2, 0.6));
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_EQ(chest.quasi_static_force, 0.0);
+  EXPECT_EQ(chest.transient_force, 200.0);
+  EXPECT_EQ(chest.transient_contacts, 1);
+  EXPECT_EQ(chest.verdict, ContactVerdict::kWithin);  // over 140 N, but not held
+  EXPECT_NEAR(*chest.worst_ratio, 200.0 / 280.0, kRounding);
+}
+
+TEST(ContactSafety, HalfASecondIsTransientAndOneStepMoreIsHeld) {
+  for (const double dt : {0.001, 0.002, 0.005}) {
+    const RegionContact& chest = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5), dt).regions[0];
+    EXPECT_EQ(chest.quasi_static_force, 0.0) << dt;
+    EXPECT_EQ(chest.transient_contacts, 1) << dt;
+    const RegionContact& longer = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5 + dt), dt).regions[0];
+    EXPECT_EQ(longer.quasi_static_force, 50.0) << dt;
+    EXPECT_EQ(longer.transient_contacts, 0) << dt;
+  }
+}
+
+TEST(ContactSafety, ABlowInALongContactIsHeldAgainstTheTransientLimit) {
+  const ContactSafetyResult result =
+      fed(3.0, [](double t) { return std::vector{touch(kChestA, t > 2.0 && t < 2.05 ? 300.0 : 20.0)}; });
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_EQ(chest.peak_force, 300.0);
+  EXPECT_EQ(chest.quasi_static_force, 20.0);
+  EXPECT_EQ(chest.transient_force, 20.0);  // of the first 0.5 s
+  EXPECT_EQ(chest.verdict, ContactVerdict::kOver);
+  EXPECT_NEAR(*chest.worst_ratio, 300.0 / 280.0, kRounding);
+}
+
+TEST(ContactSafety, CapsulesOfOneRegionSumAsVectors) {
+  const ContactSafetyResult result = fed(1.0, [](double) {
+    return std::vector{touch(kChestA, {30.0, 0.0, 0.0}, 3), touch(kChestB, {0.0, 40.0, 0.0}, 3)};
+  });
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_DOUBLE_EQ(chest.peak_force, 50.0);
+  EXPECT_DOUBLE_EQ(chest.peak_pair_force, 40.0);
+  EXPECT_EQ(chest.contacts, 1);
+  EXPECT_EQ(result.events.size(), 2u);
+}
+
+TEST(ContactSafety, PointsOfOnePairSumAsVectorsBeforeTheyAreCompared) {
+  const ContactSafetyResult result = fed(1.0, [](double) {
+    return std::vector{touch(kChestA, {30.0, 0.0, 0.0}, 3, 0.001), touch(kChestA, {30.0, 0.0, 0.0}, 3, 0.004)};
+  });
+  EXPECT_EQ(region(result, "chest").peak_pair_force, 60.0);
+  ASSERT_EQ(result.events.size(), 1u);
+  EXPECT_EQ(result.events[0].peak_force, 60.0);
+  EXPECT_EQ(result.events[0].depth, 0.004);
+}
+
+TEST(ContactSafety, ASqueezeFromTwoSidesDoesNotCancel) {
+  const ContactSafetyResult result = fed(1.0, [](double) {
+    return std::vector{touch(kChestA, 90.0, 1), touch(kChestA, -90.0, 2)};
+  });
+  EXPECT_EQ(region(result, "chest").peak_force, 90.0);
+  EXPECT_EQ(region(result, "chest").quasi_static_force, 90.0);
+}
+
+// Two links in turn, 50 ms each: the region bears 50 N without a break, each pair's contacts end.
+TEST(ContactSafety, AlternatingLinksAreOneContactOfTheRegionAndManyEvents) {
+  const ContactSafetyResult result =
+      fed(1.0, [](double t) { return std::vector{touch(kChestA, 50.0, static_cast<int>(t / 0.05) % 2)}; });
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_EQ(chest.contacts, 1);
+  EXPECT_EQ(chest.quasi_static_force, 50.0);
+  ASSERT_EQ(result.events.size(), 20u);
+  for (int e = 0; e < 20; ++e) {
+    EXPECT_EQ(result.events[e].link, e % 2);
+    EXPECT_NEAR(result.events[e].begin, 0.05 * e, kRounding);
+    EXPECT_NEAR(result.events[e].duration, 0.05, kRounding);
+    EXPECT_NEAR(result.events[e].impulse, 2.5, kRounding);
+    EXPECT_NEAR(result.events[e].windowed_mean, 25.0, kRounding);  // half of the window
+  }
+}
+
+TEST(ContactSafety, AlternatingCapsulesKeepTheirRegionsApart) {
+  const ContactSafetyResult result = fed(
+      2.0, [](double t) { return std::vector{touch(static_cast<int>(t / 0.4) % 2 == 0 ? kChestA : kHandLeft, 50.0)}; });
+  EXPECT_EQ(region(result, "chest").contacts, 3);
+  EXPECT_EQ(region(result, "hand").contacts, 2);
+  EXPECT_EQ(region(result, "chest").quasi_static_force, 0.0);
+  EXPECT_NEAR(region(result, "chest").impulse, 60.0, kRounding);
+  EXPECT_NEAR(region(result, "hand").impulse, 40.0, kRounding);
+  EXPECT_NEAR(result.impulse, 100.0, kRounding);
+}
+
+TEST(ContactSafety, GapsUpToTheBridgeDoNotEndAContact) {
+  const auto with_gap = [](double gap) {
+    return fed(1.0, [=](double t) {
+      return t < 0.3 || t > 0.3 + gap ? std::vector{touch(kChestA, 50.0)} : std::vector<Contact>();
+    });
+  };
+  const ContactSafetyResult bridged = with_gap(0.02);
+  EXPECT_EQ(bridged.events.size(), 1u);
+  EXPECT_NEAR(bridged.events[0].duration, 1.0, kRounding);
+  EXPECT_NEAR(bridged.events[0].impulse, 50.0 * 0.98, kRounding);
+  EXPECT_EQ(region(bridged, "chest").contacts, 1);
+  const ContactSafetyResult apart = with_gap(0.022);
+  EXPECT_EQ(apart.events.size(), 2u);
+  EXPECT_EQ(region(apart, "chest").contacts, 2);
+}
+
+// A contact that chatters step by step presses with its mean.
+TEST(ContactSafety, AChatteringForceIsHeldAtItsMean) {
+  int k = 0;
+  const ContactSafetyResult result =
+      fed(1.0, [&](double) { return k++ % 2 == 0 ? std::vector{touch(kChestA, 80.0)} : std::vector<Contact>(); });
+  const RegionContact& chest = region(result, "chest");
+  EXPECT_EQ(chest.contacts, 1);
+  EXPECT_NEAR(chest.quasi_static_force, 40.0, kRounding);
+  EXPECT_EQ(chest.peak_force, 80.0);
+}
+
+TEST(ContactSafety, FiguresDoNotDependOnTheStep) {
+  const ContactsAt bump = [](double t) {
+    const double x = (t - 1.0) / 0.4;
+    return std::vector{touch(kChestA, {30.0, 200.0 * std::exp(-x * x), 0.0}, 0, 0.01 * std::exp(-x * x)),
+                       touch(kChestB, {20.0, 0.0, 0.0}, 1)};
+  };
+  constexpr double kSlope = 200.0 * 0.86 / 0.4;  // the steepest [N/s]
+  const ContactSafetyResult fine = fed(2.0, bump, 0.001), coarse = fed(2.0, bump, 0.002);
+  const RegionContact &a = region(fine, "chest"), &b = region(coarse, "chest");
+  EXPECT_NEAR(a.peak_force, b.peak_force, kSlope * 0.002);
+  EXPECT_NEAR(a.quasi_static_force, b.quasi_static_force, kSlope * 0.002);
+  EXPECT_NEAR(a.transient_force, b.transient_force, kSlope * 0.002);
+  EXPECT_NEAR(a.windowed_mean, b.windowed_mean, kSlope * 0.002);
+  EXPECT_NEAR(a.impulse, b.impulse, 1e-3 * a.impulse);
+  EXPECT_NEAR(a.pressure_n_cm2, b.pressure_n_cm2, 1e-3 * a.pressure_n_cm2);
+  EXPECT_NEAR(a.longest, b.longest, kRounding);
+  ASSERT_EQ(fine.events.size(), coarse.events.size());
+  EXPECT_NEAR(fine.events[0].windowed_mean, coarse.events[0].windowed_mean, kSlope * 0.002);
+}
+
+TEST(ContactSafety, ALimitThatIsReachedIsKeptAndTheNextNumberIsOver) {
+  // 65.3 and 0.1 are no binary fractions: the mean over a window may round.
+  for (const double limit : {140.0, 65.3, 0.1}) {
+    ContactLimits limits = table();
+    limits.regions[0] = {.region = "chest", .quasi_static_n = limit, .transient_n = limit};
+    const RegionContact at = fed(1.0, pulse(kChestA, limit, 0.1, 0.9), 0.002, {}, limits).regions[0];
+    EXPECT_EQ(at.verdict, ContactVerdict::kWithin) << limit;
+    EXPECT_NEAR(*at.worst_ratio, 1.0, kRounding);
+    const RegionContact past = fed(1.0, pulse(kChestA, limit * 1.000001, 0.1, 0.9), 0.002, {}, limits).regions[0];
+    EXPECT_EQ(past.verdict, ContactVerdict::kOver) << limit;
+    EXPECT_GT(*past.worst_ratio, 1.0);
+  }
+}
+
+TEST(ContactSafety, ATransientContactOfTheHeadIsNotAllowedHoweverLight) {
+  const ContactSafetyResult brief = fed(1.0, pulse(kHead, 6.5, 0.1, 0.3));
+  EXPECT_EQ(region(brief, "head").verdict, ContactVerdict::kNotAllowed);
+  EXPECT_NEAR(*region(brief, "head").worst_ratio, 1.1, kRounding);
+  EXPECT_EQ(brief.verdict, ContactVerdict::kNotAllowed);
+
+  const ContactSafetyResult held = fed(1.0, pulse(kHead, 6.5, 0.1, 0.9));
+  EXPECT_EQ(region(held, "head").verdict, ContactVerdict::kWithin);
+  EXPECT_NEAR(*region(held, "head").worst_ratio, 0.1, kRounding);
+}
+
+// Without an allowance for blows, the peak of a longer contact counts in full.
+TEST(ContactSafety, ABlowInALongContactOfTheHeadIsOver) {
+  const ContactSafetyResult result =
+      fed(2.0, [](double t) { return std::vector{touch(kHead, t > 1.0 && t < 1.01 ? 130.0 : 5.0)}; });
+  EXPECT_EQ(region(result, "head").verdict, ContactVerdict::kOver);
+  EXPECT_NEAR(*region(result, "head").worst_ratio, 2.0, kRounding);
+}
+
+TEST(ContactSafety, WhatHasNoLimitIsUnlimited) {
+  const ContactSafetyResult result = fed(1.0, pulse(kFoot, 1e4, 0.0, 1.0));
+  EXPECT_EQ(region(result, "foot").verdict, ContactVerdict::kUnlimited);
+  EXPECT_FALSE(region(result, "foot").worst_ratio);
+  EXPECT_FALSE(result.worst_ratio);
+  EXPECT_EQ(result.verdict, ContactVerdict::kUnlimited);
+}
+
+TEST(ContactSafety, PressureIsForceOverTheOverlapOfTwoSpheres) {
+  const ContactSafetyOptions options{.link_radius = {0.0, 0.06}, .default_link_radius = 0.04};
+  const auto pressure = [&](int link, double depth) {
+    return fed(
+               0.1, [=](double) { return std::vector{touch(kChestA, 100.0, link, depth)}; }, 0.002, options)
+        .regions[0]
+        .pressure_n_cm2;
+  };
+  constexpr double kPi = std::numbers::pi;
+  // 1/R = 1/0.12 + 1/0.06 = 1/0.04; 1/0.12 + 1/0.04 = 1/0.03.
+  EXPECT_NEAR(pressure(1, 0.01), 1e-4 * 100.0 / (2.0 * kPi * 0.04 * 0.01), kRounding);
+  for (const int link : {0, 2, -1})
+    EXPECT_NEAR(pressure(link, 0.01), 1e-4 * 100.0 / (2.0 * kPi * 0.03 * 0.01), kRounding);
+  EXPECT_NEAR(pressure(1, 0.0), 100.0, kRounding);    // the floor of 1 cm^2
+  EXPECT_NEAR(pressure(1, -0.01), 100.0, kRounding);  // a gap
+}
+
+TEST(ContactSafety, PressureIsHeldAgainstItsLimit) {
+  const ContactSafetyResult result = fed(0.1, [](double) { return std::vector{touch(kChestA, 130.0, 0, 0.0)}; });
+  EXPECT_NEAR(*region(result, "chest").pressure_ratio, 130.0 / 120.0, kRounding);
+  EXPECT_EQ(region(result, "chest").verdict, ContactVerdict::kOver);
+}
+
+TEST(ContactSafety, NothingHappenedWithoutContact) {
+  Contact ground = touch(-1, 400.0);
+  ground.side = ContactSide::kGround;
+  const ContactSafetyResult result = fed(1.0, [&](double) {
+    return std::vector{ground, touch(kChestA, 0.0), touch(kHead, 1e-6)};
+  });
+  EXPECT_EQ(result.peak_force, 0.0);
+  EXPECT_EQ(result.impulse, 0.0);
+  EXPECT_EQ(result.worst_ratio, 0.0);
+  EXPECT_EQ(result.verdict, ContactVerdict::kWithin);
+  EXPECT_TRUE(result.events.empty());
+  EXPECT_EQ(result.regions.size(), 4u);
+  for (const RegionContact& entry : result.regions) EXPECT_EQ(entry.contacts, 0);
+  EXPECT_EQ(fed(0.0, [](double) { return std::vector<Contact>(); }).duration, 0.0);
+}
+
+TEST(ContactSafety, EventsPastTheCapAreCounted) {
+  const ContactsAt taps = [](double t) {
+    return std::fmod(t, 0.1) < 0.05 ? std::vector{touch(kChestA, 50.0)} : std::vector<Contact>();
+  };
+  const ContactSafetyResult result = fed(1.0, taps, 0.002, {.max_events = 4});
+  EXPECT_EQ(result.events.size(), 4u);
+  EXPECT_EQ(result.events_left_out, 6);
+  EXPECT_EQ(region(result, "chest").contacts, 10);
+}
+
+TEST(ContactSafety, PairsPastTheCapStillPressOnTheirRegion) {
+  const ContactsAt two = [](double) { return std::vector{touch(kChestA, 50.0, 1), touch(kHandLeft, 70.0, 2)}; };
+  const ContactSafetyResult result = fed(1.0, two, 0.002, {.max_pairs = 1});
+  EXPECT_EQ(result.contacts_unfollowed, 500);
+  EXPECT_EQ(result.events.size(), 1u);
+  EXPECT_EQ(region(result, "hand").quasi_static_force, 70.0);
+  EXPECT_GT(region(result, "hand").pressure_n_cm2, 0.0);
+}
+
+TEST(ContactSafety, ForcesThatAreNotFiniteAreCountedAndIgnored) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const ContactSafetyResult result = fed(0.002, [&](double) {
+    return std::vector{touch(kChestA, nan), touch(kChestA, infinity), touch(kChestA, 5.0, 0, nan), touch(kChestA, 5.0)};
+  });
+  EXPECT_EQ(result.contacts_not_finite, 3);
+  EXPECT_EQ(result.peak_force, 5.0);
+}
+
+TEST(ContactSafety, ResultMayBeAskedForAtAnyTime) {
+  ContactSafety asked(body(), table(), 0.002), left_alone(body(), table(), 0.002);
+  for (int k = 0; k < 400; ++k) {
+    const std::vector<Contact> contacts{touch(kChestA, 50.0 + k % 3)};
+    asked.add(contacts);
+    left_alone.add(contacts);
+    if (k == 100) {
+      const ContactSafetyResult now = asked.result();
+      EXPECT_EQ(region(now, "chest").transient_contacts, 1);
+      ASSERT_EQ(now.events.size(), 1u);
+      EXPECT_NEAR(now.events[0].duration, 101 * 0.002, kRounding);
+    }
+  }
+  EXPECT_EQ(contact_forces(asked.result()), contact_forces(left_alone.result()));
+  EXPECT_EQ(asked.result().events.size(), 1u);
+}
+
+TEST(ContactSafety, AddDoesNotAllocate) {
+  if (!test::counts_allocations()) GTEST_SKIP() << "not run: a sanitizer replaces malloc";
+  ContactSafety safety(body(), table(), 0.002, {.max_events = 8});
+  std::array<Contact, 3> contacts{touch(kChestA, 50.0, 1), touch(kChestB, 20.0, 2), touch(kHead, 20.0, 3)};
+  const long before = test::allocations();
+  for (int k = 0; k < 3000; ++k)
+    safety.add(std::span(contacts).first(k % 100 < 50 ? static_cast<std::size_t>(k % 4) : 0));
+  EXPECT_EQ(test::allocations(), before);
+}
+
+TEST(ContactSafety, EveryRegionOfTheBodyNeedsAnEntry) {
+  ContactLimits limits = table();
+  limits.regions.pop_back();
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { ContactSafety(body(), limits, 0.002); }),
+            "contact limits 'table': expected an entry for the region 'foot', found chest, head, hand");
+  limits = table();
+  limits.regions[1].quasi_static_n.reset();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { ContactSafety(body(), limits, 0.002); }),
+              HasSubstr("region 'head': a transient limit of 'not_allowed' needs a quasi-static one"));
+}
+
+TEST(ContactSafety, MisuseIsRefused) {
+  const auto message = [](const ContactSafetyOptions& options, double dt = 0.002) {
+    return thrown_message<std::invalid_argument>([&] { ContactSafety(body(), table(), dt, options); });
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(message({}, 0.0), "contact safety: 'dt': expected a finite number > 0, found 0");
+  EXPECT_EQ(message({}, nan), "contact safety: 'dt': expected a finite number > 0, found nan");
+  EXPECT_EQ(message({}, 0.6), "contact safety: 'dt': expected at most 'hold', found 0.6");
+  EXPECT_THAT(message({.hold = -1.0}), HasSubstr("'hold': expected a finite number > 0, found -1"));
+  EXPECT_THAT(message({.bridge = -1.0}), HasSubstr("'bridge': expected a finite number >= 0, found -1"));
+  EXPECT_THAT(message({.bridge = 0.7}), HasSubstr("'bridge': expected at most 'hold', found 0.7"));
+  EXPECT_THAT(message({.mean_window = 0.0}), HasSubstr("'mean_window'"));
+  EXPECT_THAT(message({.least_force = nan}), HasSubstr("'least_force'"));
+  EXPECT_THAT(message({.least_patch = 0.0}), HasSubstr("'least_patch'"));
+  EXPECT_THAT(message({.link_radius = {0.1, -0.1}}),
+              HasSubstr("'link_radius': expected a finite number >= 0, found -0.1"));
+  EXPECT_THAT(message({.default_link_radius = 0.0}), HasSubstr("'default_link_radius'"));
+  EXPECT_THAT(message({.max_events = -1}), HasSubstr("'max_events': expected a number >= 0, found -1"));
+  EXPECT_THAT(message({.max_pairs = -1}), HasSubstr("'max_pairs'"));
+  for (const int capsule : {-1, 6})
+    EXPECT_THAT(thrown_message<std::invalid_argument>(
+                    [&] { fed(0.002, [&](double) { return std::vector{touch(capsule, 1.0)}; }); }),
+                HasSubstr("expected a capsule below 6, found"));
+}
+
+TEST(ContactSafety, LinkRadiusIsTheSmallestOfTheLinksShapes) {
+  RobotModel robot;
+  robot.links.resize(3);
+  for (const auto& [link, radius] : {std::pair(0, 0.1), std::pair(2, 0.05), std::pair(2, 0.02)}) {
+    RobotShape& shape = robot.shapes.emplace_back();
+    shape.link = link;
+    shape.radius = radius;
+  }
+  EXPECT_EQ(link_radii(robot), (std::vector{0.1, 0.0, 0.02}));
+}
+
+TEST(ContactForces, NameWhatWasTouched) {
+  const ContactSafetyResult result = fed(1.0, [](double) {
+    return std::vector{touch(kChestA, 50.0, 0, 0.01), touch(kFoot, 30.0, 1)};
+  });
+  const std::map<std::string, double> forces = contact_forces(result);
+  EXPECT_THAT(forces, UnorderedElementsAre(Key("human.peak_n"), Key("human.impulse_ns"), Key("human.worst_ratio"),
+                                           Key("human.limits_verified"), Key("human.chest.peak_n"),
+                                           Key("human.chest.quasi_static_n"), Key("human.chest.transient_n"),
+                                           Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"),
+                                           Key("human.chest.worst_ratio"), Key("human.foot.peak_n"),
+                                           Key("human.foot.quasi_static_n"), Key("human.foot.transient_n"),
+                                           Key("human.foot.impulse_ns"), Key("human.foot.pressure_n_cm2")));
+  EXPECT_EQ(forces.at("human.peak_n"), 50.0);
+  EXPECT_NEAR(forces.at("human.impulse_ns"), 80.0, kRounding);
+  EXPECT_EQ(forces.at("human.foot.quasi_static_n"), 30.0);
+  EXPECT_EQ(forces.at("human.worst_ratio"), forces.at("human.chest.worst_ratio"));
+}
+
+TEST(ContactSafetyMetrics, AreInTheCatalogue) {
+  const std::map<std::string, double> metrics = contact_safety_metrics(fed(1.0, pulse(kChestA, 70.0, 0.0, 1.0)));
+  EXPECT_EQ(metrics.at("contact_peak_force"), 70.0);
+  EXPECT_EQ(metrics.at("contact_quasi_static_force"), 70.0);
+  EXPECT_NEAR(metrics.at("contact_impulse"), 70.0, kRounding);
+  EXPECT_NEAR(metrics.at("contact_limit_ratio"), 0.5, kRounding);
+  for (const auto& [name, value] : metrics) EXPECT_EQ(metric_info(name).group, MetricGroup::kEpisode) << name;
+  EXPECT_EQ(metric_info("contact_limit_ratio").direction, Direction::kLower);
+  EXPECT_EQ(metric_info("contact_limit_ratio").unit, "1");
+}
+
+TEST(ContactSafety, OutputsSayWhetherTheLimitsAreVerified) {
+  const ContactsAt press = [](double) {
+    return std::vector{touch(kChestA, 70.0, 0, 0.02), touch(kFoot, 10.0, 0, 0.02)};
+  };
+  const ContactSafetyResult result = fed(1.0, press);
+  EXPECT_EQ(result.limits, "table (unverified limits)");
+  EXPECT_EQ(contact_forces(result).at("human.limits_verified"), 0.0);
+  EXPECT_THAT(contact_safety_text(result), HasSubstr("limits table (unverified limits): unlimited\n"));
+  EXPECT_THAT(contact_safety_text(result), HasSubstr("  chest: peak 70.0 N, held 70.0 N, 70.00 N s, about 2.3 N/cm2, "
+                                                     "0.50 of the limit, within\n"));
+  EXPECT_THAT(contact_safety_text(result), HasSubstr(" N/cm2, unlimited\n"));
+
+  ContactLimits limits = table();
+  limits.verified_by = "A. Person";
+  const ContactSafetyResult verified = fed(1.0, press, 0.002, {}, limits);
+  EXPECT_EQ(verified.limits, "table (limits verified by A. Person)");
+  EXPECT_EQ(contact_forces(verified).at("human.limits_verified"), 1.0);
+}
+
+}  // namespace
+}  // namespace duet
