@@ -38,6 +38,10 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::strin
   row.episode = spec.episode;
   row.seed = spec.seed;
   row.engine = spec.engine;
+  if (spec.engine != "playback") {
+    row.engine_profile = suite.profile.name;
+    row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
+  }
   row.controller = spec.controller;
   row.policy = spec.policy;
   row.arm = spec.arm;

@@ -24,21 +24,44 @@ void record_tick(Recording& recording, int tick, const Backend& backend, const H
   for (const Contact& contact : backend.contacts()) recording.contacts.push_back({tick, contact});
 }
 
-// Contact forces of the human over one physics step.
-void add_human_contacts(const Backend& backend, Rollout& rollout) {
-  for (const Contact& contact : backend.contacts()) {
-    if (contact.side != ContactSide::kHuman) continue;
-    const double force = contact.f_W.norm();
-    rollout.contact_peak = std::max(rollout.contact_peak, force);
-    rollout.contact_impulse += force * backend.scene().dt;
+// What is measured at every physics step.
+class StepMeter {
+ public:
+  StepMeter(const Backend& backend, const std::optional<ContactLimits>& limits) : backend_(backend) {
+    const Scene& scene = backend.scene();
+    if (scene.partner != PartnerMode::kSolid || !limits) return;
+    ContactSafetyOptions options;
+    options.link_radius = link_radii(*scene.robot);
+    safety_.emplace(scene.human, *limits, scene.dt, options);
   }
-}
 
-Outcome advance(Backend& backend, const JointCommand& command, int steps, Rollout& rollout) {
+  void add() {
+    Eigen::Vector3d ground = Eigen::Vector3d::Zero();
+    for (const Contact& contact : backend_.contacts())
+      if (contact.side == ContactSide::kGround) ground += contact.f_W;
+    ++steps_;
+    vertical_ += ground.z();
+    peak_ = std::max(peak_, ground.norm());
+    if (safety_) safety_->add(backend_.contacts());
+  }
+
+  void finish(Rollout& rollout) const {
+    rollout.ground = {steps_ > 0 ? vertical_ / static_cast<double>(steps_) : 0.0, peak_};
+    if (safety_) rollout.safety = safety_->result();
+  }
+
+ private:
+  const Backend& backend_;
+  std::optional<ContactSafety> safety_;
+  long steps_ = 0;
+  double vertical_ = 0.0, peak_ = 0.0;
+};
+
+Outcome advance(Backend& backend, const JointCommand& command, int steps, StepMeter& meter) {
   for (int i = 0; i < steps; ++i) {
     const Outcome outcome = backend.step(command);
     if (outcome != Outcome::kOk) return outcome;
-    add_human_contacts(backend, rollout);
+    meter.add();
   }
   return has_fallen(backend.state()) ? Outcome::kFell : Outcome::kOk;
 }
@@ -98,6 +121,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   ObservationHistory history;
   Sha256 hash;
   JointCommand command = backend.scene().robot->default_command(setup.start.q);
+  StepMeter meter(backend, setup.limits);
 
   int tick = 0;
   for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
@@ -112,13 +136,14 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     hash.update(backend.state());
     backend.set_partner(partner, velocities);
     backend.follow(reference);
-    recording.outcome = advance(backend, command, steps_per_tick, rollout);
+    recording.outcome = advance(backend, command, steps_per_tick, meter);
     if (recording.outcome == Outcome::kOk && Clock::now() > deadline) recording.outcome = Outcome::kTimedOut;
     if (setup.stop_asked && setup.stop_asked()) {
       rollout.interrupted = true;
       recording.outcome = Outcome::kTimedOut;
     }
   }
+  meter.finish(rollout);
   trim(recording, tick);
   recording.message = describe(recording.outcome, tick);
   rollout.late_plans = scheduler.late_ticks();

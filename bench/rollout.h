@@ -4,10 +4,12 @@
 
 #include <chrono>
 #include <functional>
+#include <optional>
 
 #include "backends/backend.h"
 #include "controllers/controller.h"
 #include "core/recording.h"
+#include "metrics/contact_safety.h"
 #include "motion/paired_motion.h"
 #include "policies/phase_adaptation.h"
 #include "policies/policy.h"
@@ -17,21 +19,28 @@ namespace duet {
 
 inline constexpr double kControlRate = 50.0;  // [Hz]
 
+// Ground reaction on the robot, over all physics steps.
+struct GroundForce {
+  double mean = 0.0;  // of the vertical component [N]
+  double peak = 0.0;  // largest magnitude of one step's sum [N]
+};
+
 struct RolloutSetup {
   const PairedMotion* clip = nullptr;
   AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
   RobotState start;
   std::uint64_t seed = 0;
-  double wall_limit = 120.0;         // [s]
-  std::function<bool()> stop_asked;  // polled once a tick; the episode then ends as kTimedOut with `interrupted`
+  double wall_limit = 120.0;            // [s]
+  std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
+  std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
 };
 
 struct Rollout {
   Recording recording;
   std::string state_hash;  // SHA-256 over the states at 50 Hz
   int late_plans = 0;
-  double contact_peak = 0.0;     // of one human contact on the robot, any physics step [N]
-  double contact_impulse = 0.0;  // of all of them [N s]
+  GroundForce ground;
+  std::optional<ContactSafetyResult> safety;  // of a solid partner, at physics rate
   bool interrupted = false;
 };
 

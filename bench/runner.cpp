@@ -14,6 +14,7 @@
 #include "bench/parallel.h"
 #include "bench/scoring.h"
 #include "core/require.h"
+#include "metrics/contact_limits.h"
 #include "results/environment.h"
 
 namespace duet {
@@ -63,11 +64,20 @@ void check_filters(const RunOptions& options, const Suite& suite) {
   check_filter(options.tasks, tasks, "task");
 }
 
-void check_engines(const Suite& suite) {
+// Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
+std::map<std::string, std::string> absent_engines(const Suite& suite, const RunOptions& options) {
+  std::map<std::string, std::string> absent;
+  int present = 0;
   for (const EngineInfo& engine : engines()) {
-    if (!engine.available && std::find(suite.engines.begin(), suite.engines.end(), engine.name) != suite.engines.end())
-      throw MissingError(fmt::format("engine '{}' is absent: {}", engine.name, engine.reason));
+    if (std::find(suite.engines.begin(), suite.engines.end(), engine.name) == suite.engines.end()) continue;
+    if (!chosen(options.engines, engine.name)) continue;
+    if (engine.available)
+      ++present;
+    else
+      absent[engine.name] = fmt::format("engine '{}' is absent: {}", engine.name, engine.reason);
   }
+  if (present == 0 && !absent.empty()) throw MissingError(absent.begin()->second);
+  return absent;
 }
 
 std::string trajectory_path(const std::string& folder, const EpisodeRow& row) {
@@ -81,12 +91,7 @@ bool keep_trajectory(const Suite& suite, const EpisodeRow& row) {
 
 void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
               const std::string& trajectory_folder, EpisodeRow& row) {
-  Scene scene;
-  scene.robot = robot;
-  scene.human = make_human_body(bone_lengths(spec.clip->partner));
-  scene.partner = suite.partner;
-  scene.dt = suite.dt;
-  const std::unique_ptr<Backend> backend = make_backend(spec.engine, scene);
+  const std::unique_ptr<Backend> backend = make_backend(spec.engine, episode_scene(spec, suite, robot));
   const std::unique_ptr<Controller> controller = make_controller(spec.controller, robot);
   const std::unique_ptr<Policy> policy = make_policy(spec.policy, robot);
   row.engine_version = backend->version();
@@ -122,6 +127,17 @@ class StopSign {
 
 }  // namespace
 
+Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot) {
+  const EngineSettings settings = suite.profile.settings(spec.engine);
+  Scene scene;
+  scene.robot = robot;
+  scene.human = make_human_body(bone_lengths(spec.clip->partner));
+  scene.partner = suite.partner;
+  scene.dt = settings.dt;
+  scene.options = settings.options;
+  return scene;
+}
+
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks) {
   AdaptationOptions options;
   options.start = start_mode(suite, walks);
@@ -132,6 +148,9 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
   setup.start = robot.standing_state(setup.reference.motion.root.front());
   setup.seed = spec.seed;
   setup.wall_limit = suite.wall_limit;
+  if (suite.partner == PartnerMode::kSolid)
+    setup.limits =
+        load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
   setup.stop_asked = [] { return interrupt() != Interrupt::kNone; };
   return setup;
 }
@@ -143,6 +162,10 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::s
   const Clock::time_point begin = Clock::now();
   try {
     simulate(spec, suite, robot, trajectory_folder, row);
+  } catch (const MissingError& error) {
+    row.outcome = Outcome::kUnsupported;
+    row.message = error.what();
+    row.success = false;
   } catch (const std::exception& error) {
     row.outcome = Outcome::kError;
     row.message = error.what();
@@ -154,7 +177,6 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::s
 
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
   check_filters(options, suite);
-  check_engines(suite);
   const std::string hash = suite_hash(suite);
   const auto robot = load_shared_robot(suite.robot);
   RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
@@ -162,6 +184,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
 
   RunSummary summary;
+  summary.absent_engines = absent_engines(suite, options);
   std::vector<EpisodeSpec> missing;
   for (const EpisodeSpec& spec : plan_episodes(suite, clips)) {
     if (!selected(options, spec)) continue;

@@ -26,13 +26,16 @@ enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
 
 struct RunSummary {
   int planned = 0, already_there = 0, run = 0;
-  std::map<std::string, int> outcomes;  // of those run now
+  std::map<std::string, int> outcomes;                // of those run now
+  std::map<std::string, std::string> absent_engines;  // name -> reason; their episodes are rows with `unsupported`
   RunEnd end = RunEnd::kComplete;
 };
 
-// Throws InputError (suite, clips, run directory, a full disk), MissingError (an engine that is absent),
+// Throws InputError (suite, clips, run directory, a full disk), MissingError (none of its engines is there),
 // std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
+
+Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot);
 
 // One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`.
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks);

@@ -6,6 +6,7 @@
 #include "metrics/detector.h"
 #include "metrics/diagnostics.h"
 #include "metrics/retargeting.h"
+#include "robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -15,7 +16,38 @@ void add_finite(const std::map<std::string, double>& values, std::map<std::strin
     if (std::isfinite(value)) out[name] = value;
 }
 
+void add_contacts(const Rollout& rollout, EpisodeRow& row) {
+  row.forces = {{"ground.mean_n", rollout.ground.mean}, {"ground.peak_n", rollout.ground.peak}};
+  if (!rollout.safety) return;
+  row.contact_peak_n = rollout.safety->peak_force;
+  row.contact_impulse_ns = rollout.safety->impulse;
+  add_finite(contact_forces(*rollout.safety), row.forces);
+  add_finite(contact_safety_metrics(*rollout.safety), row.metrics);
+}
+
+// [mm]
+void append_point(const Eigen::Vector3d& p_W, std::vector<int>& to) {
+  for (const double value : p_W) to.push_back(static_cast<int>(std::lround(1000.0 * value)));
+}
+
 }  // namespace
+
+StateTrace state_trace(const Recording& recording, const RobotModel& robot) {
+  StateTrace trace;
+  trace.points = {"root", "left_hand", "right_hand"};
+  const int stride = static_cast<int>(std::lround(recording.rate_hz / trace.rate_hz));
+  const int left = robot.track_frame("lhand"), right = robot.track_frame("rhand");
+  Kinematics kinematics(robot);
+  for (int t = 0; t < recording.frames(); t += stride) {
+    const RobotState& state = recording.robot[t];
+    kinematics.update(state.X_WB, state.q);
+    std::vector<int>& frame = trace.mm.emplace_back();
+    append_point(state.X_WB.p, frame);
+    append_point(kinematics.frame_position(left), frame);
+    append_point(kinematics.frame_position(right), frame);
+  }
+  return trace;
+}
 
 Readings readings_of(const Suite& suite) {
   Readings readings;
@@ -69,8 +101,8 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.frames = recording.frames();
   row.sim_s = recording.frames() / recording.rate_hz;
   row.late_plans = rollout.late_plans;
-  row.contact_peak_n = rollout.contact_peak;
-  row.contact_impulse_ns = rollout.contact_impulse;
+  add_contacts(rollout, row);
+  row.trace = state_trace(recording, robot);
   row.state_hash = rollout.state_hash;
   row.success = false;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {

@@ -63,9 +63,9 @@ std::vector<MetricColumn> metric_columns() {
 std::vector<std::string> notes_of(const Suite& suite) {
   return {
       fmt::format(
-          "Suite {} {}: start \"{}\", partner \"{}\", physics step {:g} ms, headline detector version \"{}\" with "
+          "Suite {} {}: start \"{}\", partner \"{}\", engine profile \"{}\", headline detector version \"{}\" with "
           "\"{}\" thresholds.",
-          suite.name, suite.version, to_string(suite.start), to_string(suite.partner), 1000.0 * suite.dt,
+          suite.name, suite.version, to_string(suite.start), to_string(suite.partner), suite.profile.name,
           to_string(suite.detector), to_string(suite.thresholds)),
       "Start \"auto\" means: a controller that cannot walk starts at the act position; one that walks approaches.",
       "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "

@@ -58,9 +58,13 @@ std::string resolved_yaml(const Suite& suite) {
   text +=
       fmt::format("tasks: [{}]\nengines: [{}]\ncontrollers: [{}]\npolicies: [{}]\n", fmt::join(tasks, ", "),
                   fmt::join(suite.engines, ", "), fmt::join(suite.controllers, ", "), fmt::join(suite.policies, ", "));
-  text +=
-      fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\ndt: {}\n", suite.episodes_per_clip,
-                  to_string(suite.start), suite.start_radius, to_string(suite.partner), suite.dt);
+  text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\n", suite.episodes_per_clip,
+                      to_string(suite.start), suite.start_radius, to_string(suite.partner));
+  text += fmt::format("profile:\n  name: {}\n  engines:\n", suite.profile.name);
+  for (const std::string& engine : suite.engines)
+    if (engine != "playback")
+      text += fmt::format("    {}: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
+  if (!suite.contact_limits.empty()) text += fmt::format("contact_limits: \"{}\"\n", suite.contact_limits);
   if (!suite.robot.empty()) text += fmt::format("robot: \"{}\"\n", suite.robot);
   text += fmt::format("detector: {{version: {}, thresholds: {}}}\n", to_string(suite.detector),
                       to_string(suite.thresholds));
@@ -79,6 +83,7 @@ std::string resolved_yaml(const Suite& suite) {
 std::string suite_hash(const Suite& suite) {
   Suite by_content = suite;  // where a file lies does not matter, what is in it does
   for (std::string& file : by_content.clips.files) file = sha256_file(file);
+  if (!suite.contact_limits.empty()) by_content.contact_limits = sha256_file(suite.contact_limits);
   return sha256_hex(resolved_yaml(by_content));
 }
 

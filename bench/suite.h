@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "backends/scene.h"
+#include "bench/profile.h"
 #include "core/task.h"
 #include "metrics/detector.h"
 #include "policies/phase_adaptation.h"
@@ -35,9 +36,10 @@ struct Suite {
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
   PartnerMode partner = PartnerMode::kGhost;
-  double dt = 0.002;  // physics step [s]
+  Profile profile;  // step and solver settings of the suite's engines
   DetectorVersion detector = DetectorVersion::kRobot;
   ThresholdSet thresholds = ThresholdSet::kPaper;
+  std::string contact_limits;                   // table; empty: the one that ships with duet
   std::string robot;                            // card; empty: the one that ships with duet
   std::map<std::string, std::string> retarget;  // pair option -> value
   std::map<std::string, std::string> readings;  // "family.option" -> reading

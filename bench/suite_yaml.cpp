@@ -97,6 +97,11 @@ std::vector<std::string> engine_names() {
   return names;
 }
 
+std::string from_folder_of(const Suite& suite, const std::string& file) {
+  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
+  return std::filesystem::absolute(folder / file).lexically_normal().string();
+}
+
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = below(top, suite.file, "clips", {"synth", "files"});
   const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed"});
@@ -107,9 +112,17 @@ void read_clips(const YamlSection& top, Suite& suite) {
   if (synthetic != suite.clips.files.empty())
     clips.fail(clips.line(),
                fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
-  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
-  for (std::string& file : suite.clips.files)
-    file = std::filesystem::absolute(folder / file).lexically_normal().string();
+  for (std::string& file : suite.clips.files) file = from_folder_of(suite, file);
+}
+
+// `all`: playback and every engine that this machine has.
+void read_engines(const YamlSection& top, Suite& suite) {
+  if (!top.has("engines") || !top.node("engines").IsScalar() || top.text("engines") != "all") {
+    get_names(top, "engines", "engine", engine_names(), suite.engines);
+    return;
+  }
+  for (const EngineInfo& engine : engines())
+    if (engine.available) suite.engines.push_back(engine.name);
 }
 
 void read_lists(const YamlSection& top, Suite& suite) {
@@ -121,9 +134,30 @@ void read_lists(const YamlSection& top, Suite& suite) {
   } else {
     suite.tasks.assign(kTasks.begin(), kTasks.end());
   }
-  get_names(top, "engines", "engine", engine_names(), suite.engines);
+  read_engines(top, suite);
   get_names(top, "controllers", "controller", controller_names(), suite.controllers);
   get_names(top, "policies", "policy", policy_names(), suite.policies);
+}
+
+// A name, a path (from the suite's folder or from here), or the mapping that a run directory keeps. `dt` is the step of
+// all engines.
+void read_profile_key(const YamlSection& top, Suite& suite) {
+  checked(top, "profile", [&] {
+    if (top.has("profile") && top.node("profile").IsMap()) {
+      suite.profile = read_profile(top.node("profile"), suite.file);
+      return;
+    }
+    const std::string name = top.has("profile") ? top.text("profile") : "parity";
+    const std::filesystem::path beside = std::filesystem::path(suite.file).parent_path() / name;
+    suite.profile = load_profile(std::filesystem::is_regular_file(beside) ? beside.string() : name);
+  });
+  if (!top.has("dt")) return;
+  const double dt = top.number("dt");
+  checked(top, "dt", [&] { check_step(dt); });
+  for (const std::string& engine : suite.engines) {
+    const EngineSettings settings = suite.profile.settings(engine);
+    suite.profile.engines[engine] = {dt, settings.options};
+  }
 }
 
 void read_episode(const YamlSection& top, Suite& suite) {
@@ -135,13 +169,8 @@ void read_episode(const YamlSection& top, Suite& suite) {
             fmt::format("expected 0 to 5 m, found {}", suite.start_radius));
   });
   get_enum(top, "partner", partner_names(), suite.partner);
-  get(top, "dt", suite.dt);
-  checked(top, "dt", [&] {
-    const double steps = 0.02 / suite.dt;
-    require(suite.dt > 0.0 && std::abs(steps - std::round(steps)) < 1e-9,
-            fmt::format("expected a step [s] that divides 0.02, found {}", suite.dt));
-  });
   get(top, "robot", suite.robot);
+  if (top.has("contact_limits")) suite.contact_limits = from_folder_of(suite, top.text("contact_limits"));
   if (top.has("null_arm")) suite.null_arm = top.flag_or("null_arm", true);
   const YamlSection detector = below(top, suite.file, "detector", {"version", "thresholds"});
   get_enum(detector, "version", version_names(), suite.detector);
@@ -178,11 +207,11 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   Suite suite;
   suite.file = file;
   const YamlSection top(file, document, "suite",
-                        {"schema",   "name",         "version",     "seed",     "clips",
-                         "tasks",    "engines",      "controllers", "policies", "episodes_per_clip",
-                         "start",    "start_radius", "partner",     "dt",       "robot",
-                         "detector", "limits",       "record",      "null_arm", "retarget",
-                         "readings"});
+                        {"schema",         "name",         "version",     "seed",     "clips",
+                         "tasks",          "engines",      "controllers", "policies", "episodes_per_clip",
+                         "start",          "start_radius", "partner",     "dt",       "profile",
+                         "contact_limits", "robot",        "detector",    "limits",   "record",
+                         "null_arm",       "retarget",     "readings"});
   const std::string schema = top.text("schema");
   if (schema != "duet.suite/1")
     top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));
@@ -191,6 +220,7 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   get_integer<std::uint64_t>(top, "seed", 0, suite.seed);
   read_clips(top, suite);
   read_lists(top, suite);
+  read_profile_key(top, suite);
   read_episode(top, suite);
   PairOptions pair;
   Readings readings;

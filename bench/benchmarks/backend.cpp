@@ -1,20 +1,36 @@
+#include <unistd.h>
+
 #include <algorithm>
+#include <fstream>
 #include <memory>
+#include <thread>
 
 #include "backends/factory.h"
 #include "bench/benchmarks/parts.h"
 #include "bench/benchmarks/timer.h"
+#include "bench/profile.h"
 #include "robots/robot_model.h"
 
 namespace duet {
 namespace {
 
-constexpr int kSteps = 500;  // 1 s at 2 ms: the robot still stands on its feet
+constexpr int kSteps = 500;             // 1 s at 2 ms: the robot still stands on its feet
+constexpr double kOverheadLimit = 5.0;  // [%]
 
-Scene standing_scene() {
+struct EngineTarget {
+  const char* engine;
+  double step_us;
+};
+constexpr EngineTarget kTargets[] = {
+    {"mujoco", 25.0}, {"bullet", 80.0}, {"dart", 130.0}, {"ode", 220.0}, {"simbody", 120.0}};
+
+Scene standing_scene(const std::string& engine) {
+  const EngineSettings settings = load_profile("parity").settings(engine);
   Scene scene;
   scene.robot = load_shared_robot();
   scene.partner = PartnerMode::kNone;
+  scene.dt = settings.dt;
+  scene.options = settings.options;
   return scene;
 }
 
@@ -30,38 +46,115 @@ struct StepTimes {
   double ours = 1e9, bare = 1e9;  // best of interleaved rounds [s]
 };
 
-StepTimes time_steps(const BenchmarkOptions& options) {
-  const Scene scene = standing_scene();
-  const std::unique_ptr<Backend> backend = make_backend("mujoco", scene);
+StepTimes time_steps(const std::string& engine, const BenchmarkOptions& options) {
+  const Scene scene = standing_scene(engine);
+  const std::unique_ptr<Backend> backend = make_backend(engine, scene);
+  const EngineModule& module = engine_module(engine);
   const RobotState start = scene.robot->standing_state();
   const JointCommand command = scene.robot->default_command(start.q);
   StepTimes times;
   const double begin = wall_seconds();
   do {
     times.ours = std::min(times.ours, backend_step_seconds(*backend, start, command));
-    times.bare =
-        std::min(times.bare, engine_module("mujoco").bare_step_seconds(scene, start, command, kSteps) / kSteps);
+    times.bare = std::min(times.bare, module.bare_step_seconds(scene, start, command, kSteps) / kSteps);
   } while (wall_seconds() - begin < 3.0 * options.seconds);
   return times;
 }
 
-std::vector<Figure> time_step(const BenchmarkOptions& options) {
-  const StepTimes times = time_steps(options);
-  return {at_most("backend/mujoco/step", 1e6 * times.ours, "us", 25.0),
-          at_least("backend/mujoco/step:real_time_factor", 0.002 / times.ours, "1", 80.0)};
+std::vector<Figure> time_step(const EngineTarget& target, const BenchmarkOptions& options) {
+  const StepTimes times = time_steps(target.engine, options);
+  const std::string name = std::string("backend/") + target.engine + "/step";
+  const double dt = standing_scene(target.engine).dt;
+  return {at_most(name, 1e6 * times.ours, "us", target.step_us),
+          at_least(name + ":real_time_factor", dt / times.ours, "1", 20.0)};
 }
 
-std::vector<Figure> time_overhead(const BenchmarkOptions& options) {
-  const StepTimes times = time_steps(options);
-  return {at_most("backend/mujoco/overhead", 100.0 * (times.ours / times.bare - 1.0), "%", 5.0),
-          {"backend/mujoco/overhead:bare_step", 1e6 * times.bare, "us", "", true}};
+std::vector<Figure> time_overhead(const std::string& engine, const BenchmarkOptions& options) {
+  const StepTimes times = time_steps(engine, options);
+  const std::string name = "backend/" + engine + "/overhead";
+  return {at_most(name, 100.0 * (times.ours / times.bare - 1.0), "%", kOverheadLimit),
+          {name + ":bare_step", 1e6 * times.bare, "us", "", true}};
+}
+
+// Wall time in which `worlds` robots, divided over the threads, each stand for a second. [s]
+double stand_seconds(const std::string& engine, int worlds, int threads) {
+  const Scene scene = standing_scene(engine);
+  const RobotState start = scene.robot->standing_state();
+  const JointCommand command = scene.robot->default_command(start.q);
+  const auto work = [&](int first) {
+    for (int i = first; i < worlds; i += threads) backend_step_seconds(*make_backend(engine, scene), start, command);
+  };
+  const double begin = wall_seconds();
+  std::vector<std::thread> pool;
+  for (int i = 0; i < threads; ++i) pool.emplace_back(work, i);
+  for (std::thread& thread : pool) thread.join();
+  return wall_seconds() - begin;
+}
+
+std::vector<Figure> time_scaling(const std::string& engine, const BenchmarkOptions& options) {
+  constexpr int kWorlds = 8;
+  double one = 1e9, many = 1e9;
+  const double begin = wall_seconds();
+  do {
+    one = std::min(one, stand_seconds(engine, kWorlds, 1));
+    many = std::min(many, stand_seconds(engine, kWorlds, options.threads));
+  } while (wall_seconds() - begin < 3.0 * options.seconds);
+  const std::string name = "backend/" + engine + "/scaling";
+  // The target is for two cores; with another number the figure is printed as it is.
+  return {options.threads == 2 ? at_least(name, one / many, "1", 1.9) : Figure{name, one / many, "1", "", true},
+          {name + ":threads", static_cast<double>(options.threads), "1", "", true}};
+}
+
+double resident_kib() {
+  std::ifstream file("/proc/self/statm");
+  double all = 0.0, resident = 0.0;
+  file >> all >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1024.0;
+}
+
+// Memory is that of worlds beyond the first, which also pays for what all share.
+std::vector<Figure> time_world(const std::string& engine, const BenchmarkOptions&) {
+  constexpr int kWorlds = 16;
+  const Scene scene = standing_scene(engine);
+  const RobotState start = scene.robot->standing_state();
+  const JointCommand command = scene.robot->default_command(start.q);
+  std::vector<std::unique_ptr<Backend>> worlds;
+  double build = 1e9, before = 0.0;
+  for (int i = 0; i <= kWorlds; ++i) {
+    const double begin = cpu_seconds();
+    worlds.push_back(make_backend(engine, scene));
+    build = std::min(build, cpu_seconds() - begin);
+    worlds.back()->reset(start);
+    for (int step = 0; step < 5; ++step) worlds.back()->step(command);
+    if (i == 0) before = resident_kib();
+  }
+  const double memory = (resident_kib() - before) / kWorlds;
+  const double reset = best_call_seconds([&] { worlds.front()->reset(start); }, 0.1);
+  const std::string name = "backend/" + engine + "/world";
+  return {at_most(name + ":memory", memory, "KiB", 1024.0), at_most(name + ":build", 1e3 * build, "ms", 10.0),
+          at_most(name + ":reset", 1e6 * reset, "us", 200.0)};
+}
+
+bool is_available(const std::string& engine) {
+  const std::vector<EngineInfo> all = engines();
+  return std::any_of(all.begin(), all.end(), [&](const EngineInfo& e) { return e.name == engine && e.available; });
 }
 
 }  // namespace
 
 void add_backend_benchmarks(std::vector<Benchmark>& list) {
-  list.push_back({"backend/mujoco/step", "one step of 2 ms, G1 on its feet under PD, state read back", time_step});
-  list.push_back({"backend/mujoco/overhead", "the same over a bare mj_step loop with the same model", time_overhead});
+  for (const EngineTarget& target : kTargets) {
+    const std::string engine = target.engine, name = "backend/" + engine;
+    if (!is_available(engine)) continue;
+    list.push_back({name + "/step", "one step of the parity profile, G1 on its feet under PD, state read back",
+                    [target](const BenchmarkOptions& options) { return time_step(target, options); }});
+    list.push_back({name + "/overhead", "the same over a bare loop of the same engine calls",
+                    [engine](const BenchmarkOptions& options) { return time_overhead(engine, options); }});
+    list.push_back({name + "/scaling", "worlds on all threads against one",
+                    [engine](const BenchmarkOptions& options) { return time_scaling(engine, options); }});
+    list.push_back({name + "/world", "memory, building and resetting of a world",
+                    [engine](const BenchmarkOptions& options) { return time_world(engine, options); }});
+  }
 }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include "backends/factory.h"
 #include "bench/benchmarks/benchmark.h"
 #include "bench/cli/command.h"
+#include "bench/profile.h"
 #include "controllers/controller.h"
 #include "core/names.h"
 #include "core/require.h"
@@ -40,6 +41,26 @@ std::vector<Listed> list_engines() {
   std::vector<Listed> list;
   for (const EngineInfo& engine : engines())
     list.push_back({engine.name, engine.available ? engine.version : "absent: " + engine.reason});
+  return list;
+}
+
+std::vector<Listed> list_profiles() {
+  std::vector<Listed> list;
+  for (const std::string& name : profile_names()) list.push_back({name, load_profile(name).about});
+  return list;
+}
+
+std::vector<Listed> list_engine_options() {
+  std::vector<Listed> list;
+  for (const EngineInfo& engine : engines()) {
+    if (!engine.available || !engine.physics) continue;
+    for (const EngineOption& option : engine_module(engine.name).options) {
+      const std::string values = option.choices.empty() ? fmt::format("{:g} to {:g}", option.low, option.high)
+                                                        : fmt::format("{}", fmt::join(option.choices, ", "));
+      list.push_back(
+          {engine.name + "." + option.name, fmt::format("default {} ({}): {}", option.value, values, option.meaning)});
+    }
+  }
   return list;
 }
 
@@ -91,6 +112,8 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
   static const std::vector<std::pair<std::string, Listing>> table = {
       {"tasks", list_tasks},
       {"engines", list_engines},
+      {"engine-options", list_engine_options},
+      {"profiles", list_profiles},
       {"controllers", [] { return named(controller_names()); }},
       {"policies", [] { return named(policy_names()); }},
       {"metrics", list_metrics},
@@ -125,8 +148,10 @@ void add_list(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
   auto what = std::make_shared<std::string>();
   command
-      ->add_option("what", *what,
-                   "tasks, engines, controllers, policies, metrics, readings, pair-options, robots, benchmarks")
+      ->add_option(
+          "what", *what,
+          "tasks, engines, engine-options, profiles, controllers, policies, metrics, readings, pair-options, robots, "
+          "benchmarks")
       ->required();
   command->callback([&session, what] { run_list(session, *what); });
 }

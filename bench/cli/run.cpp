@@ -16,7 +16,7 @@ namespace duet::cli {
 namespace {
 
 struct RunArguments {
-  std::string suite, output, start, partner;
+  std::string suite, output, start, partner, profile, certificate;
   std::vector<std::string> overrides, clips;
   bool dry_run = false;
   RunOptions options;
@@ -35,6 +35,7 @@ Suite read_suite(const RunArguments& arguments) {
   for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));
   if (!arguments.start.empty()) overrides.emplace_back("start", arguments.start);
   if (!arguments.partner.empty()) overrides.emplace_back("partner", arguments.partner);
+  if (!arguments.profile.empty()) overrides.emplace_back("profile", arguments.profile);
   Suite suite = load_suite(arguments.suite, overrides);
   use_clips(arguments.clips, suite);
   return suite;
@@ -50,7 +51,8 @@ int exit_code(const RunSummary& summary) {
     case RunEnd::kComplete:
       break;
   }
-  return summary.outcomes.contains("error") ? kExitErrors : kExitOk;
+  const bool faults = summary.outcomes.contains("error") || summary.outcomes.contains("unsupported");
+  return faults ? kExitErrors : kExitOk;
 }
 
 std::string describe(const RunSummary& summary, const Suite& suite, const std::string& output) {
@@ -60,6 +62,8 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
                                  summary.already_there + summary.run, summary.planned, output, summary.already_there,
                                  summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "),
                                  to_string(suite.start), to_string(suite.partner));
+  for (const auto& [engine, reason] : summary.absent_engines)
+    text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
   if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
   return text;
 }
@@ -107,7 +111,8 @@ void add_run(CLI::App& app, Session& session) {
                       "clips or paired motions (NPZ, folders) in the place of the suite's");
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
   command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
-  command->add_option("--partner", arguments->partner, "ghost or solid");
+  command->add_option("--partner", arguments->partner, "none, ghost or solid");
+  command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");
   command->add_option("--engines", options.engines, "only these")->delimiter(',');
   command->add_option("--controllers", options.controllers, "only these")->delimiter(',');
   command->add_option("--policies", options.policies, "only these (the null arm always runs)")->delimiter(',');

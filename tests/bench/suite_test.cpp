@@ -32,7 +32,8 @@ TEST(Suite, DefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(suite.detector, DetectorVersion::kRobot);
   EXPECT_EQ(suite.start, SuiteStart::kAuto);
   EXPECT_TRUE(suite.null_arm);
-  EXPECT_EQ(suite.dt, 0.002);
+  EXPECT_EQ(suite.profile.name, "parity");
+  EXPECT_EQ(suite.profile.settings("mujoco").dt, 0.002);
 }
 
 TEST(Suite, ResolvedTextReadsBackToTheSameHash) {
