@@ -9,6 +9,8 @@ ImplicitLaw::ImplicitLaw(const Scene& scene)
     : robot_(scene.robot),
       dt_(scene.dt),
       dynamics_(*robot_, scene.gravity),
+      mass_(&dynamics_.mass()),
+      bias_(&dynamics_.bias()),
       factor_(*robot_),
       drive_(Eigen::VectorXd::Zero(robot_->dof())),
       inertia_(Eigen::VectorXd::Zero(robot_->dof())),
@@ -16,6 +18,13 @@ ImplicitLaw::ImplicitLaw(const Scene& scene)
 
 void ImplicitLaw::begin(const RobotState& state, const JointCommand& command) {
   dynamics_.update(state);
+  begin(state, command, dynamics_.mass(), dynamics_.bias());
+}
+
+void ImplicitLaw::begin(const RobotState& state, const JointCommand& command, const Eigen::MatrixXd& mass,
+                        const Eigen::VectorXd& bias) {
+  mass_ = &mass;
+  bias_ = &bias;
   for (int i = 0; i < robot_->dof(); ++i) {
     const double kp = command.kp[i], kd = command.kd[i];
     inertia_[i] = robot_->joints[i].armature + dt_ * kd + dt_ * dt_ * kp;
@@ -25,12 +34,12 @@ void ImplicitLaw::begin(const RobotState& state, const JointCommand& command) {
 }
 
 void ImplicitLaw::factorise() {
-  if (!factor_.compute(dynamics_.mass(), inertia_))
+  if (!factor_.compute(*mass_, inertia_))
     throw std::runtime_error("the mass matrix is not positive definite");
 }
 
 void ImplicitLaw::forces(const Eigen::VectorXd& Q, Eigen::VectorXd& out) const {
-  out = Q - dynamics_.bias();
+  out = Q - *bias_;
   out.tail(robot_->dof()) += drive_;
 }
 

@@ -22,6 +22,10 @@ class ImplicitLaw {
   // Model of `state`, law of `command`, without the limit; factors M + S. Throws std::runtime_error where M + S is not
   // positive definite (a state that has diverged).
   void begin(const RobotState& state, const JointCommand& command);
+  // The same on an engine's own mass matrix (without armature) and bias forces, in the layout of robots/kinematics.h;
+  // both must live until the step is over. dynamics() and kinematics() are not updated.
+  void begin(const RobotState& state, const JointCommand& command, const Eigen::MatrixXd& mass,
+             const Eigen::VectorXd& bias);
   // Accelerations under `Q` (6 + dof), the limit applied where it is passed. Q = 0: no contact.
   void solve(const Eigen::VectorXd& Q);
   // Takes the limit where acceleration() passes it and factors again; true where that changed anything. For adapters
@@ -47,6 +51,8 @@ class ImplicitLaw {
   std::shared_ptr<const RobotModel> robot_;
   double dt_;
   Dynamics dynamics_;
+  const Eigen::MatrixXd* mass_;
+  const Eigen::VectorXd* bias_;
   TreeFactor factor_;
   Eigen::VectorXd drive_, inertia_, a_;
 };
