@@ -1,0 +1,56 @@
+#include <fmt/format.h>
+
+#include "backends/bullet/bare_loop.h"
+#include "backends/bullet/bullet_world.h"
+#include "backends/engine_module.h"
+#include "backends/physics_backend.h"
+
+namespace duet {
+namespace {
+
+constexpr double kAbsurd = 1e4;  // [m/s], [rad/s]
+
+std::string engine_version() { return fmt::format("{}.{}", btGetVersion() / 100, btGetVersion() % 100); }
+
+class BulletBackend final : public PhysicsBackend {
+ public:
+  explicit BulletBackend(const Scene& scene) : PhysicsBackend(scene), world_(this->scene(), narrow_phase_.capacity()) {
+    world_.articulation().write(state_);
+  }
+
+  [[nodiscard]] std::string_view name() const override { return "bullet"; }
+  [[nodiscard]] std::string version() const override { return engine_version(); }
+
+ private:
+  void place() override { world_.articulation().write(state_); }
+
+  Outcome advance(const JointCommand& command) override {
+    if (!world_.begin(state_, command)) return Outcome::kDiverged;
+    const std::span<const ContactPoint> points = narrow_phase_.collide(world_.kinematics(), partner_);
+    world_.step(points, &pushes_, state_, torques_);
+    const Eigen::Map<const Eigen::VectorXd> velocity = std::as_const(world_).articulation().velocity();
+    if (!(velocity.cwiseAbs().maxCoeff() < kAbsurd)) return Outcome::kDiverged;
+    contacts_.clear();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      contacts_.push_back(reported(points[i], world_.rows().contact_force(i)));
+    return Outcome::kOk;
+  }
+
+  void append_to(std::vector<double>& values) const override { world_.articulation().append_to(values); }
+  void read_from(std::span<const double> values) override { world_.articulation().read_from(values); }
+
+  BulletWorld world_;
+};
+
+std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<BulletBackend>(scene); }
+
+const EngineModule kModule = {.name = "bullet",
+                              .version = engine_version,
+                              .make = make,
+                              .options = bullet_options(),
+                              .bare_step_seconds = bullet_bare_step_seconds};
+
+}  // namespace
+}  // namespace duet
+
+DUET_ENGINE_MODULE(duet::kModule)

@@ -1,0 +1,165 @@
+#include "backends/bullet/row_solver.h"
+
+#include <algorithm>
+
+namespace duet {
+namespace {
+
+constexpr double kNear = 0.01;      // stops that the step without contacts leaves nearer than this get a row [rad]
+constexpr double kSoftest = 1e-12;  // of the sum h K + D of a skin [N s/m]
+constexpr double kNoLimit = 1e10;   // impulse [N s]
+
+}  // namespace
+
+RowSolver::RowSolver(const Scene& scene, const RowSettings& settings, std::size_t contacts)
+    : robot_(scene.robot), settings_(settings), dt_(scene.dt), contacts_(contacts) {
+  const int n = 6 + robot_->dof(), stops = robot_->dof(), rows = 3 * static_cast<int>(contacts) + stops;
+  row_ = Eigen::VectorXd::Zero(n);
+  response_ = Eigen::VectorXd::Zero(n);
+  for (ContactRows& contact : contacts_) contact.J = Columns::Zero(n, 3);
+  m_multiBodyNonContactConstraints.reserve(stops);
+  m_multiBodyNormalContactConstraints.reserve(static_cast<int>(contacts));
+  m_multiBodyFrictionContactConstraints.reserve(2 * static_cast<int>(contacts));
+  m_data.m_jacobians.reserve(rows * n);
+  m_data.m_deltaVelocitiesUnitImpulse.reserve(rows * n);
+  m_data.m_deltaVelocities.reserve(n);
+  info_.m_timeStep = dt_;
+  info_.m_numIterations = settings_.iterations;
+  info_.m_splitImpulse = 0;
+  info_.m_solverMode = SOLVER_USE_2_FRICTION_DIRECTIONS;  // the two rows of a contact are limited by a cone
+}
+
+void RowSolver::set_contacts(std::span<const ContactPoint> points, const Kinematics& kinematics) {
+  used_ = 0;
+  for (const ContactPoint& point : points) {
+    ContactRows& rows = contacts_[used_++];
+    const Eigen::Vector3d tangent = point.n_W.unitOrthogonal();
+    rows.axes_W << point.n_W, tangent, point.n_W.cross(tangent);
+    rows.J.setZero();
+    add_link(rows.J, rows.axes_W, point.link, 1.0, point.p_W, kinematics);
+    if (point.side == ContactSide::kRobot) add_link(rows.J, rows.axes_W, point.other, -1.0, point.p_W, kinematics);
+    rows.friction = point.friction;
+    rows.v_target = rows.axes_W.transpose() * point.v_other_W;
+    if (point.side == ContactSide::kHuman) {
+      const double softness = std::max(dt_ * point.skin.stiffness + point.skin.damping, kSoftest);
+      rows.cfm = 1.0 / (dt_ * softness);
+      rows.v_target[0] += point.skin.stiffness * point.depth / softness;
+    } else {
+      const double depth = point.depth - settings_.slop;
+      rows.cfm = 0.0;
+      rows.v_target[0] += (depth > 0.0 ? settings_.erp : 1.0) * depth / dt_;
+    }
+  }
+}
+
+void RowSolver::add_link(Columns& J, const Eigen::Matrix3d& axes_W, int link, double sign, const Eigen::Vector3d& p_W,
+                         const Kinematics& kinematics) const {
+  const Eigen::Matrix3d axes = sign * axes_W;
+  J.topRows<3>() += axes;
+  const Eigen::Vector3d arm = p_W - kinematics.p_WL(0);
+  for (int i = 0; i < 3; ++i)
+    J.block<3, 1>(3, i) += kinematics.R_WL(0).transpose() * arm.cross(Eigen::Vector3d(axes.col(i)));
+  for (int k = link; k > 0; k = robot_->links[k].parent) {
+    const Eigen::Vector3d hinge = kinematics.R_WL(k) * robot_->links[k].axis;
+    J.row(5 + k) += hinge.cross(p_W - kinematics.p_WL(k)).transpose() * axes;
+  }
+}
+
+void RowSolver::solve(Articulation& articulation, const TreeFactor& factor, const Kinematics& kinematics,
+                      const Eigen::VectorXd& q) {
+  articulation_ = &articulation;
+  factor_ = &factor;
+  q_ = &q;
+  R_WB_ = kinematics.R_WL(0);
+  r_W_ = R_WB_ * robot_->links[0].com;
+  solveMultiBodyGroup(nullptr, 0, nullptr, 0, nullptr, 0, nullptr, 0, info_, nullptr, nullptr);
+  articulation.body().processDeltaVeeMultiDof2();
+}
+
+btScalar RowSolver::solveGroupCacheFriendlySetup(btCollisionObject** bodies, int bodies_size,
+                                                 btPersistentManifold** manifolds, int manifolds_size,
+                                                 btTypedConstraint** constraints, int constraints_size,
+                                                 const btContactSolverInfo& info, btIDebugDraw* draw) {
+  const btScalar residual = btMultiBodyConstraintSolver::solveGroupCacheFriendlySetup(
+      bodies, bodies_size, manifolds, manifolds_size, constraints, constraints_size, info, draw);
+  m_data.m_deltaVelocities.resize(articulation_->size(), 0.0);
+  add_stops();
+  for (std::size_t i = 0; i < used_; ++i) add_contact(contacts_[i]);
+  return residual;
+}
+
+void RowSolver::add_stops() {
+  const Eigen::Map<const Eigen::VectorXd> v = std::as_const(*articulation_).velocity();
+  for (int i = 0; i < robot_->dof(); ++i) {
+    const RobotJoint& joint = robot_->joints[i];
+    const bool lower = (*q_)[i] + dt_ * v[6 + i] < 0.5 * (joint.lower + joint.upper);
+    const double side = lower ? 1.0 : -1.0, gap = lower ? (*q_)[i] - joint.lower : joint.upper - (*q_)[i];
+    if (gap + dt_ * side * v[6 + i] > kNear) continue;
+    row_.setZero();
+    row_[6 + i] = side;
+    btMultiBodySolverConstraint& row =
+        add_row(m_multiBodyNonContactConstraints, row_, 0.0, -(gap < 0.0 ? settings_.stop_erp : 1.0) * gap / dt_);
+    row.m_upperLimit = kNoLimit;
+  }
+}
+
+void RowSolver::add_contact(const ContactRows& contact) {
+  const int normal_index = m_multiBodyNormalContactConstraints.size();
+  btMultiBodySolverConstraint& normal =
+      add_row(m_multiBodyNormalContactConstraints, contact.J.col(0), contact.cfm, contact.v_target[0]);
+  normal.m_upperLimit = kNoLimit;
+  normal.m_frictionIndex = m_multiBodyFrictionContactConstraints.size();
+  const int first = normal.m_frictionIndex;
+  for (int i = 1; i < 3; ++i) {
+    btMultiBodySolverConstraint& row =
+        add_row(m_multiBodyFrictionContactConstraints, contact.J.col(i), 0.0, contact.v_target[i]);
+    row.m_friction = contact.friction;
+    row.m_frictionIndex = normal_index;
+  }
+  // One step size for both, or friction would not oppose the slip.
+  btMultiBodySolverConstraint &a = m_multiBodyFrictionContactConstraints[first],
+                              &b = m_multiBodyFrictionContactConstraints[first + 1];
+  const double step = std::min(a.m_jacDiagABInv, b.m_jacDiagABInv);
+  for (btMultiBodySolverConstraint* row : {&a, &b}) {
+    row->m_rhs *= step / row->m_jacDiagABInv;
+    row->m_jacDiagABInv = step;
+  }
+}
+
+btMultiBodySolverConstraint& RowSolver::add_row(btMultiBodyConstraintArray& rows, const Eigen::VectorXd& J, double cfm,
+                                                double v_target) {
+  const int n = static_cast<int>(J.size()), at = m_data.m_jacobians.size();
+  response_ = J;
+  factor_->solve(response_);
+  const double inverse = 1.0 / (J.dot(response_) + cfm);
+
+  m_data.m_jacobians.resize(at + n);
+  m_data.m_deltaVelocitiesUnitImpulse.resize(at + n);
+  Eigen::Map<Eigen::VectorXd> jacobian(&m_data.m_jacobians[at], n), unit(&m_data.m_deltaVelocitiesUnitImpulse[at], n);
+  const Eigen::Vector3d force = J.head<3>(), spin = R_WB_ * response_.segment<3>(3);
+  jacobian << R_WB_ * J.segment<3>(3) - r_W_.cross(force), force, J.tail(n - 6);
+  unit << spin, response_.head<3>() + spin.cross(r_W_), response_.tail(n - 6);
+
+  btMultiBodySolverConstraint& row = rows.expand(btMultiBodySolverConstraint());
+  row.m_multiBodyA = &articulation_->body();
+  row.m_deltaVelAindex = 0;
+  row.m_jacAindex = at;
+  row.m_jacDiagABInv = inverse;
+  row.m_rhs = (v_target - jacobian.dot(std::as_const(*articulation_).velocity())) * inverse;
+  row.m_rhsPenetration = 0.0;
+  row.m_cfm = cfm * inverse;
+  row.m_lowerLimit = 0.0;
+  row.m_upperLimit = 0.0;
+  row.m_appliedImpulse = 0.0;
+  row.m_appliedPushImpulse = 0.0;
+  return row;
+}
+
+Eigen::Vector3d RowSolver::contact_force(std::size_t i) const {
+  const btMultiBodySolverConstraint& normal = m_multiBodyNormalContactConstraints[static_cast<int>(i)];
+  const btMultiBodySolverConstraint* friction = &m_multiBodyFrictionContactConstraints[normal.m_frictionIndex];
+  const Eigen::Vector3d impulse(normal.m_appliedImpulse, friction[0].m_appliedImpulse, friction[1].m_appliedImpulse);
+  return contacts_[i].axes_W * impulse / dt_;
+}
+
+}  // namespace duet
