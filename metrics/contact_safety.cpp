@@ -240,8 +240,6 @@ void ContactSafety::begin_contact(Region& region) {
   ++region.figures.transient_contacts;
   region.begin = step_;
   region.lasting = false;
-  region.bridge_mean.clear();
-  region.held.clear();
 }
 
 void ContactSafety::close(std::size_t pair) {

@@ -53,11 +53,6 @@ class SlidingMinimum {
     return count_ < length ? 0.0 : candidates_[first_].sample;
   }
 
-  void clear() {
-    size_ = 0;
-    count_ = 0;
-  }
-
  private:
   struct Candidate {
     std::int64_t index = 0;

@@ -162,6 +162,24 @@ TEST(ContactSafety, HalfASecondIsTransientAndOneStepMoreIsHeld) {
   }
 }
 
+// 250 steps are half a second, 251 are longer.
+TEST(ContactSafety, WithinALongContactTheSpanCountsToo) {
+  for (const auto& [steps, held] : {std::pair(250, 10.0), std::pair(251, 50.0)}) {
+    const double end = 0.4 + 0.002 * steps;
+    const ContactSafetyResult result =
+        fed(1.5, [=](double t) { return std::vector{touch(kChestA, t > 0.4 && t < end ? 50.0 : 10.0)}; }, 0.002,
+            {.bridge = 0.0});
+    EXPECT_EQ(region(result, "chest").quasi_static_force, held) << steps;
+  }
+}
+
+TEST(ContactSafety, TwoShortContactsAreNotHeld) {
+  const ContactSafetyResult result = fed(
+      1.0, [](double t) { return t < 0.48 || t > 0.51 ? std::vector{touch(kChestA, 50.0)} : std::vector<Contact>(); });
+  EXPECT_EQ(region(result, "chest").quasi_static_force, 0.0);
+  EXPECT_EQ(region(result, "chest").transient_contacts, 2);
+}
+
 TEST(ContactSafety, ABlowInALongContactIsHeldAgainstTheTransientLimit) {
   const ContactSafetyResult result =
       fed(3.0, [](double t) { return std::vector{touch(kChestA, t > 2.0 && t < 2.05 ? 300.0 : 20.0)}; });
@@ -278,8 +296,8 @@ TEST(ContactSafety, FiguresDoNotDependOnTheStep) {
 }
 
 TEST(ContactSafety, ALimitThatIsReachedIsKeptAndTheNextNumberIsOver) {
-  // 65.3 and 0.1 are no binary fractions: the mean over a window may round.
-  for (const double limit : {140.0, 65.3, 0.1}) {
+  for (int tenths = 1; tenths <= 100; ++tenths) {  // the mean over a window may round
+    const double limit = 0.1 * tenths;
     ContactLimits limits = table();
     limits.regions[0] = {.region = "chest", .quasi_static_n = limit, .transient_n = limit};
     const RegionContact at = fed(1.0, pulse(kChestA, limit, 0.1, 0.9), 0.002, {}, limits).regions[0];
