@@ -38,9 +38,11 @@ class Backend {
 
   // Puts the robot into `state`; clears contacts, warm starts and pushes, and takes the partner away until the next
   // set_partner(): the same state gives bitwise the same continuation. Throws std::invalid_argument for wrong sizes,
-  // values that are not finite and a quaternion that is not unit.
+  // values that are not finite and a quaternion that is not unit; in an engine also for links that overlap or are below
+  // the ground by more than start_overlap.h allows, by name.
   void reset(const RobotState& state);
-  // Partner joints now; each following step moves them on at `velocities` until the next call.
+  // Partner joints now; each following step moves them on at `velocities` until the next call. The first call after a
+  // reset throws std::invalid_argument in an engine where the solid partner is inside the robot (start_overlap.h).
   void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
   // The reference being tracked. Engines ignore it; playback moves the robot there.
   void follow(const Reference& reference);

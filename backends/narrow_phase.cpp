@@ -8,9 +8,8 @@
 namespace duet {
 namespace {
 
-constexpr std::size_t kHumanContacts = 64;  // more than a body's surface takes at once
-constexpr double kCoincident = 1e-9;        // [m]
-constexpr double kParallel = 1e-6;          // of the squared sine between two axes
+constexpr double kCoincident = 1e-9;  // [m]
+constexpr double kParallel = 1e-6;    // of the squared sine between two axes
 
 // Where the middle of the overlap of [0, 1] and [t0, t1] is, or the end of [0, 1] that is nearest to it.
 double middle_of_overlap(double t0, double t1) {
@@ -54,7 +53,7 @@ NearestPoints nearest_points(const Eigen::Vector3d& a1, const Eigen::Vector3d& b
   return {a1 + s * d1, a2 + t * d2};
 }
 
-NarrowPhase::NarrowPhase(const Scene& scene)
+NarrowPhase::NarrowPhase(const Scene& scene, std::size_t human_contacts)
     : robot_(scene.robot),
       human_(scene.human),
       mode_(scene.partner),
@@ -68,7 +67,7 @@ NarrowPhase::NarrowPhase(const Scene& scene)
   }
   capsules_.resize(human_.capsules.size());
   points_.reserve(ends + (self_collision_ ? robot_->self_collision.size() : 0) +
-                  (mode_ == PartnerMode::kSolid ? kHumanContacts : 0));
+                  (mode_ == PartnerMode::kSolid ? human_contacts : 0));
 }
 
 std::span<const ContactPoint> NarrowPhase::collide(const Kinematics& kinematics, const MovingPartner& partner) {

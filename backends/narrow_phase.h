@@ -32,7 +32,9 @@ Contact reported(const ContactPoint& point, const Eigen::Vector3d& f_W);
 
 class NarrowPhase {
  public:
-  explicit NarrowPhase(const Scene& scene);  // keeps the robot model alive
+  // Keeps the robot model alive. `human_contacts`: the most that are kept with the human; the default is more than a
+  // body's surface takes at once.
+  explicit NarrowPhase(const Scene& scene, std::size_t human_contacts = 64);
 
   // Touching points of the links at these poses. Valid until the next call.
   std::span<const ContactPoint> collide(const Kinematics& kinematics, const MovingPartner& partner);

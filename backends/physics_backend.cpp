@@ -1,5 +1,7 @@
 #include "backends/physics_backend.h"
 
+#include "backends/start_overlap.h"
+
 namespace duet {
 
 PhysicsBackend::PhysicsBackend(const Scene& scene)
@@ -8,12 +10,14 @@ PhysicsBackend::PhysicsBackend(const Scene& scene)
 }
 
 void PhysicsBackend::do_reset() {
+  refuse_robot_overlap(scene(), state_);
   partner_ = {};
   pushes_.clear();
   place();
 }
 
 void PhysicsBackend::do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) {
+  if (!partner_.present) refuse_partner_overlap(scene(), state_, joints);
   partner_.set(joints, velocities);
 }
 

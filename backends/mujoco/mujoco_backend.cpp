@@ -13,6 +13,7 @@
 #include "backends/mujoco/mjcf.h"
 #include "backends/mujoco/mujoco_model.h"
 #include "backends/partner.h"
+#include "backends/start_overlap.h"
 
 namespace duet {
 namespace {
@@ -35,6 +36,7 @@ class MujocoBackend final : public Backend {
 
  private:
   void do_reset() override {
+    refuse_robot_overlap(scene(), state_);
     mj_resetData(&m_, &d_);
     write_state(state_, compiled_, d_);
     partner_ = {};
@@ -42,6 +44,7 @@ class MujocoBackend final : public Backend {
   }
 
   void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) override {
+    if (!partner_.present) refuse_partner_overlap(scene(), state_, joints);
     partner_.set(joints, velocities);
   }
 

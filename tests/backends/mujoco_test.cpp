@@ -22,6 +22,7 @@ struct Mujoco : ::testing::Test {
     scene.robot = std::move(robot);
     scene.partner = PartnerMode::kNone;
     scene.dt = dt;
+    scene.self_collision = false;
     return make_backend("mujoco", scene);
   }
 };
