@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <set>
 
 #include "core/names.h"
@@ -115,6 +116,13 @@ CardPoint read_human_point(const std::string& file, const YAML::Node& node, cons
   return point;
 }
 
+CardRegions read_regions(const YamlSection& root, const YAML::Node& node) {
+  const int line = node.Mark().line + 1;
+  if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar() || !node[1].IsScalar())
+    root.fail(line, fmt::format("'self_collision': expected a pair of regions, found {}", describe(node)));
+  return {.line = line, .first = node[0].Scalar(), .second = node[1].Scalar()};
+}
+
 std::vector<CardPoint> read_tracks(const std::string& file, const YamlSection& root) {
   if (!root.has("tracks")) return {};
   const YamlSection section(file, root.node("tracks"), "tracks",
@@ -136,9 +144,9 @@ void refuse_repeats(const YamlSection& root, const std::vector<Entry>& entries, 
 }  // namespace
 
 RobotCard parse_card(const std::string& text, const std::string& file) {
-  const YamlSection root(
-      file, parse_yaml(text, file), "robot card",
-      {"name", "urdf", "base", "joints", "locked", "frames", "shapes", "pairs", "keypoints", "tracks"});
+  const YamlSection root(file, parse_yaml(text, file), "robot card",
+                         {"name", "urdf", "base", "joints", "locked", "frames", "shapes", "pairs", "keypoints",
+                          "tracks", "self_collision"});
   RobotCard card;
   card.name = root.text("name");
   card.urdf = root.text("urdf");
@@ -152,10 +160,14 @@ RobotCard parse_card(const std::string& text, const std::string& file) {
   for (const YAML::Node& node : root.items("keypoints"))
     card.keypoints.push_back(read_human_point(file, node, "keypoint", true));
   card.tracks = read_tracks(file, root);
+  for (const YAML::Node& node : root.items("self_collision")) card.self_collision.push_back(read_regions(root, node));
   refuse_repeats(root, card.joints, "joint", [](const CardJoint& joint) { return joint.name; });
   refuse_repeats(root, card.locked, "locked joint", [](const CardLock& lock) { return lock.joint; });
   refuse_repeats(root, card.frames, "frame", [](const CardFrame& frame) { return frame.name; });
   refuse_repeats(root, card.keypoints, "keypoint", [](const CardPoint& keypoint) { return keypoint.name; });
+  refuse_repeats(root, card.self_collision, "pair of regions", [](const CardRegions& pair) {
+    return fmt::format("{}, {}", std::min(pair.first, pair.second), std::max(pair.first, pair.second));
+  });
   return card;
 }
 

@@ -52,6 +52,12 @@ struct CardPoint {
   int smpl = -1;
 };
 
+// Two body regions whose shapes touch one another.
+struct CardRegions {
+  int line = 0;
+  std::string first, second;
+};
+
 struct RobotCard {
   std::string name, urdf, base;
   int base_line = 0;
@@ -60,6 +66,7 @@ struct RobotCard {
   std::vector<CardFrame> frames;
   std::vector<CardShape> shapes;
   std::vector<CardPoint> pairs, keypoints, tracks;
+  std::vector<CardRegions> self_collision;
 };
 
 // Names of tracks that detectors know.

@@ -19,6 +19,9 @@
 namespace duet {
 namespace {
 
+// Shapes of links that so few joints join touch, or cannot meet, whatever the joints do.
+constexpr int kJointsApart = 3;
+
 // Two bodies as one: mass, centre of mass and inertia of `part`, posed in the frame of `link`, added to it.
 void add_body(RobotLink& link, const UrdfLink& part, const Pose& X_LPart) {
   if (part.mass <= 0.0) return;
@@ -51,6 +54,8 @@ class Loader {
     for (const CardPoint& point : card_.keypoints)
       model_.keypoints.push_back({point.name, frame_of(point), point.smpl});
     for (const CardPoint& track : card_.tracks) model_.tracks[track.name] = frame_of(track);
+    for (const CardRegions& regions : card_.self_collision) add_self_collision(regions);
+    std::sort(model_.self_collision.begin(), model_.self_collision.end());
     check_links();
     set_standing_height();
     return std::move(model_);
@@ -250,6 +255,33 @@ class Loader {
     if (card.kind == ShapeKind::kCapsule) X_FS.R.setFromTwoVectors(Eigen::Vector3d::UnitZ(), axis);
     if (card.sole) model_.feet.push_back(static_cast<int>(model_.shapes.size()));
     model_.shapes.push_back({card.kind, place.link, place.X * X_FS, card.radius, 0.5 * axis.norm(), card.region});
+  }
+
+  void add_self_collision(const CardRegions& regions) {
+    check_region(regions.first, regions.line);
+    check_region(regions.second, regions.line);
+    const int n = static_cast<int>(model_.shapes.size());
+    for (int i = 0; i < n; ++i)
+      for (int j = i + 1; j < n; ++j) {
+        const RobotShape &a = model_.shapes[i], &b = model_.shapes[j];
+        const bool named = (a.region == regions.first && b.region == regions.second) ||
+                           (a.region == regions.second && b.region == regions.first);
+        if (named && joints_between(a.link, b.link) > kJointsApart) model_.self_collision.emplace_back(i, j);
+      }
+  }
+
+  void check_region(const std::string& name, int line) const {
+    std::vector<std::string> known;
+    for (const CardShape& shape : card_.shapes)
+      if (std::find(known.begin(), known.end(), shape.region) == known.end()) known.push_back(shape.region);
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      fail_card(line, fmt::format("'self_collision': {}", unknown_name_message("region", name, known)));
+  }
+
+  int joints_between(int a, int b) const {
+    int joints = 0;
+    for (; a != b; ++joints) (a > b ? a : b) = model_.links[std::max(a, b)].parent;
+    return joints;
   }
 
   void check_links() const {

@@ -78,9 +78,11 @@ struct RobotModel {
   std::vector<Keypoint> keypoints;    // card order: head, shoulders, elbows, wrists, hands; left before right
   std::map<std::string, int> tracks;  // frames that detectors follow: "head", "lhand", "rhand", "torso", "lshoulder",
                                       // "rshoulder" (those that the card names)
-  std::vector<std::pair<int, int>> self_collision;  // pairs of shapes, on different links, that may touch
-  std::vector<int> feet;                            // shapes that are the soles' contact sites (left foot's first)
-  Eigen::VectorXd neutral;                          // neutral pose of A.4.4 with the standing legs [rad]
+  // Pairs of shapes that may touch: those of the card's pairs of regions whose links more than three joints join. Each
+  // once, the lower index first, in ascending order.
+  std::vector<std::pair<int, int>> self_collision;
+  std::vector<int> feet;         // shapes that are the soles' contact sites (left foot's first)
+  Eigen::VectorXd neutral;       // neutral pose of A.4.4 with the standing legs [rad]
   double standing_height = 0.0;  // of the base over flat ground in the neutral pose [m]; 0 where no shape is a sole
   std::string digest;            // SHA-256 over URDF and card
 

@@ -76,6 +76,57 @@ TEST(Card, CapsuleCanBeASole) {
   EXPECT_NEAR(test::load_small(card, replaced(kSmallUrdf, " rpy=\"0.1 0.2 0.3\"", "")).standing_height, 0.23, 1e-15);
 }
 
+// A chain of hinges with a sphere on every link but the base: links c0 to c5, regions "low" (c0, c1) and "high" (c4,
+// c5).
+std::string chain_urdf() {
+  std::string text = R"(<robot name="chain"><link name="base">)";
+  const std::string body = R"(<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>)"
+                           "</inertial></link>";
+  text += body;
+  for (int i = 0; i < 6; ++i)
+    text += fmt::format(
+                R"(<joint name="j{0}" type="revolute"><parent link="{1}"/><child link="c{0}"/><origin xyz="0 0 1"/>)"
+                R"(<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="c{0}">)",
+                i, i == 0 ? "base" : fmt::format("c{}", i - 1)) +
+            body;
+  return text + "</robot>";
+}
+
+std::string chain_card(const std::string& pairs) {
+  std::string text = "name: chain\nurdf: small.urdf\nbase: base\njoints:\n";
+  for (int i = 0; i < 6; ++i) text += fmt::format("  - {{name: j{}, armature: 0, kp: 0, kd: 0}}\n", i);
+  text += "shapes:\n";
+  for (const int i : {5, 0, 1, 4})
+    text += fmt::format("  - {{link: c{}, kind: sphere, center: [0, 0, 0], radius: 0.1, region: {}}}\n", i,
+                        i < 2 ? "low" : "high");
+  return text + "self_collision:\n" + pairs;
+}
+
+TEST(Card, SelfCollisionTakesShapesThatMoreThanThreeJointsJoin) {
+  using Pairs = std::vector<std::pair<int, int>>;
+  const auto pairs = [](const std::string& text) {
+    return test::load_small(chain_card(text), chain_urdf()).self_collision;
+  };
+  // c5 is shape 0, c0 1, c1 2, c4 3; c1 and c4 are three joints apart.
+  const Pairs expected = {{0, 1}, {0, 2}, {1, 3}};
+  EXPECT_EQ(pairs("  - [low, high]\n"), expected);
+  EXPECT_EQ(pairs("  - [high, low]\n"), expected);
+  EXPECT_EQ(pairs("  - [high, high]\n  - [low, low]\n"), Pairs());
+  EXPECT_EQ(test::load_small().self_collision, Pairs());
+}
+
+TEST(CardErrors, SelfCollision) {
+  const auto error = [](const std::string& pair) {
+    return card_error("tracks: {rhand: tip}", "self_collision:\n  - " + pair + "\ntracks: {rhand: tip}");
+  };
+  EXPECT_EQ(error("[hand]"), "c.yaml:14: robot card: 'self_collision': expected a pair of regions, found a list of 1");
+  EXPECT_EQ(error("hand"), "c.yaml:14: robot card: 'self_collision': expected a pair of regions, found 'hand'");
+  EXPECT_EQ(error("[hand, arm]\n  - [arm, hand]"),
+            "c.yaml:15: robot card: expected each pair of regions once, found 'arm, hand' again");
+  EXPECT_EQ(load_error("tracks: {rhand: tip}", "tracks: {rhand: tip}\nself_collision:\n  - [hand, amr]"),
+            "small.yaml:15: 'self_collision': unknown region 'amr': did you mean 'arm'? Known: arm, hand");
+}
+
 TEST(CardErrors, Yaml) {
   EXPECT_EQ(test::thrown_message<InputError>([] { parse_card("a: [1, 2\nb: 3", "c.yaml"); }),
             "c.yaml:2: expected YAML, found: end of sequence flow not found");
@@ -88,7 +139,7 @@ TEST(CardErrors, Yaml) {
 TEST(CardErrors, Keys) {
   EXPECT_EQ(card_error("urdf:", "urfd:"),
             "c.yaml:2: robot card: unknown key 'urfd': did you mean 'urdf'? Known: name, urdf, base, joints, locked, "
-            "frames, shapes, pairs, keypoints, tracks");
+            "frames, shapes, pairs, keypoints, tracks, self_collision");
   EXPECT_EQ(card_error("armature: 0.01", "armatur: 0.01"),
             "c.yaml:5: joint 'shoulder': unknown key 'armatur': did you mean 'armature'? Known: name, armature, kp, "
             "kd, neutral, lower, upper, effort, velocity");

@@ -189,6 +189,58 @@ TEST(G1, ShapesAreSymmetricAndAboveTheSoles) {
   }
 }
 
+struct SegmentInWorld {
+  Eigen::Vector3d from, along;
+  double radius;
+};
+
+SegmentInWorld segment_of(const Kinematics& kinematics, int shape) {
+  const RobotShape& s = g1().shapes[shape];
+  const Eigen::Vector3d half = kinematics.R_WL(s.link) * (s.X_LS.R * Eigen::Vector3d(0, 0, s.half_length));
+  return {kinematics.shape_position(shape) - half, 2.0 * half, s.radius};
+}
+
+// By sampling both axes: an upper bound of the clearance to a few millimetres.
+double sampled_clearance(const Kinematics& kinematics, int first, int second) {
+  const SegmentInWorld a = segment_of(kinematics, first), b = segment_of(kinematics, second);
+  constexpr int kSamples = 40;
+  double nearest = 10.0;
+  for (int i = 0; i <= kSamples; ++i)
+    for (int k = 0; k <= kSamples; ++k)
+      nearest = std::min(
+          nearest, (a.from + a.along * i / kSamples - b.from - b.along * k / kSamples).norm() - a.radius - b.radius);
+  return nearest;
+}
+
+TEST(G1, NoDeclaredPairIsNearInTheNeutralPose) {
+  Kinematics kinematics(g1());
+  kinematics.update({}, g1().neutral);
+  double smallest = 10.0;
+  for (const auto& [first, second] : g1().self_collision)
+    smallest = std::min(smallest, sampled_clearance(kinematics, first, second));
+  EXPECT_NEAR(smallest, 0.084, 0.002);  // elbow and chest
+}
+
+TEST(G1, DeclaredPairsAreThoseOfHandsForearmsThighsTrunkAndHead) {
+  std::map<std::pair<std::string, std::string>, int> found;
+  for (const auto& [first, second] : g1().self_collision) {
+    const RobotShape &a = g1().shapes[first], &b = g1().shapes[second];
+    EXPECT_LT(first, second);
+    ++found[std::minmax(a.region, b.region)];
+    if (a.region != "thigh") continue;
+    const std::string &link = g1().links[a.link].name, &other = g1().links[b.link].name;
+    if (b.region == "thigh") {
+      EXPECT_NE(link[0], other[0]) << link << " " << other;  // of two legs
+    }
+  }
+  const std::map<std::pair<std::string, std::string>, int> expected = {
+      {{"hand", "hand"}, 1},      {{"forearm", "hand"}, 4},  {{"hand", "thigh"}, 8},      {{"hand", "pelvis"}, 2},
+      {{"hand", "torso"}, 4},     {{"hand", "head"}, 2},     {{"forearm", "forearm"}, 4}, {{"forearm", "thigh"}, 16},
+      {{"forearm", "pelvis"}, 4}, {{"forearm", "torso"}, 8}, {{"forearm", "head"}, 4},    {{"thigh", "thigh"}, 4}};
+  EXPECT_EQ(found, expected);
+  EXPECT_EQ(g1().self_collision.size(), 61U);
+}
+
 TEST(G1, ArmatureIsPositiveEverywhere) {
   for (const RobotJoint& joint : g1().joints) EXPECT_GT(joint.armature, 0.003) << joint.name;
   EXPECT_EQ(g1().joints[g1().joint_index("left_ankle_pitch_joint")].armature,
