@@ -1,0 +1,71 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "backends/engine_module.h"
+#include "backends/physics_backend.h"
+#include "backends/simbody/bare_loop.h"
+#include "backends/simbody/simbody_stepper.h"
+
+namespace duet {
+namespace {
+
+constexpr double kAbsurd = 1e4;  // [m/s], [rad/s]
+
+std::runtime_error named(const std::exception& error) {
+  return std::runtime_error(fmt::format("simbody: {}", error.what()));
+}
+
+class SimbodyBackend final : public PhysicsBackend {
+ public:
+  explicit SimbodyBackend(const Scene& scene) : PhysicsBackend(scene), stepper_(scene) {}
+
+  [[nodiscard]] std::string_view name() const override { return "simbody"; }
+  [[nodiscard]] std::string version() const override { return simbody_version(); }
+
+ private:
+  // Simbody's state is written anew from state_ in every step, and nothing else is kept between steps.
+  void place() override {}
+  void append_to(std::vector<double>&) const override {}
+  void read_from(std::span<const double>) override {}
+
+  Outcome advance(const JointCommand& command) override {
+    try {
+      stepper_.step(state_, command, pushes_, partner_, narrow_phase_);
+    } catch (const std::exception& error) {
+      throw named(error);
+    }
+    stepper_.law().torques(stepper_.acceleration(), torques_);
+    report_contacts();
+    return absurd() ? Outcome::kDiverged : Outcome::kOk;
+  }
+
+  void report_contacts() {
+    contacts_.clear();
+    const std::span<const ContactPoint> points = narrow_phase_.points();
+    for (std::size_t i = 0; i < points.size(); ++i)
+      contacts_.push_back(reported(points[i], stepper_.contacts().impulse(i) / scene().dt));
+  }
+
+  // Also where a velocity is not a number.
+  [[nodiscard]] bool absurd() const {
+    const auto sane = [](const auto& v) { return (v.array().abs() < kAbsurd).all(); };
+    return !(sane(state_.v_WB) && sane(state_.w_WB_B) && sane(state_.v));
+  }
+
+  SimbodyStepper stepper_;
+};
+
+std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<SimbodyBackend>(scene); }
+
+const EngineModule kModule = {.name = "simbody",
+                              .version = simbody_version,
+                              .make = make,
+                              .options = simbody_options(),
+                              .bare_step_seconds = simbody_bare_step_seconds};
+
+}  // namespace
+}  // namespace duet
+
+DUET_ENGINE_MODULE(duet::kModule)

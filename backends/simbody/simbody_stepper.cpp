@@ -1,0 +1,88 @@
+#include "backends/simbody/simbody_stepper.h"
+
+#include <Eigen/Geometry>
+
+namespace duet {
+namespace {
+
+constexpr double kSmallAngle = 1e-9;  // [rad]
+
+// The rotation by the vector `turn`, angle times axis.
+Eigen::Quaterniond rotation_of(const Eigen::Vector3d& turn) {
+  const double angle = turn.norm();
+  if (angle < kSmallAngle) return Eigen::Quaterniond(1.0, 0.5 * turn.x(), 0.5 * turn.y(), 0.5 * turn.z());
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle));
+}
+
+}  // namespace
+
+SimbodyStepper::SimbodyStepper(const Scene& scene)
+    : robot_(scene.robot),
+      dt_(scene.dt),
+      settings_(simbody_settings(scene.options)),
+      rigid_(spring_damper(settings_.contact_stiffness, settings_.contact_damping, scene.dt)),
+      model_(scene.robot, scene.gravity),
+      law_(scene),
+      contacts_(*robot_, NarrowPhase(scene).capacity(), scene.dt, settings_.sweeps),
+      no_force_(Eigen::VectorXd::Zero(6 + robot_->dof())),
+      v_begin_(no_force_),
+      v_(no_force_),
+      a_(no_force_) {}
+
+void SimbodyStepper::step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
+                          const MovingPartner& partner, NarrowPhase& narrow_phase) {
+  model_.update(state);
+  if (pushes.any()) apply(pushes);
+  const std::span<const ContactPoint> points = narrow_phase.collide(model_.rotations(), model_.positions(), partner);
+  v_begin_ << state.v_WB, state.w_WB_B, state.v;
+  law_.begin(state, command, model_.mass(), model_.update_bias());
+  solve(state, points);
+  if (law_.saturate(a_)) solve(state, points);
+  advance(state);
+}
+
+void SimbodyStepper::apply(const LinkPushes& pushes) {
+  for (std::size_t link = 0; link < pushes.all().size(); ++link)
+    model_.apply(static_cast<int>(link), pushes.all()[link].f_W, pushes.all()[link].p_L);
+}
+
+// Velocity and acceleration under the law as it stands.
+void SimbodyStepper::solve(const RobotState& state, std::span<const ContactPoint> points) {
+  law_.forces(no_force_, a_);
+  law_.factor().solve(a_);
+  v_ = v_begin_ + dt_ * a_;
+  contacts_.clear();
+  for (const ContactPoint& point : points) {
+    const bool human = point.side == ContactSide::kHuman;
+    contacts_.add(point, human ? spring_damper(point.skin.stiffness, point.skin.damping, dt_) : rigid_,
+                  model_.rotations(), model_.positions());
+  }
+  add_stops(state);
+  if (contacts_.size() == 0) return;
+  contacts_.solve(law_.factor(), v_);
+  a_ = (v_ - v_begin_) / dt_;
+}
+
+// Of joints that would end the step beyond a stop.
+void SimbodyStepper::add_stops(const RobotState& state) {
+  const Softness soft = {.erp = settings_.stop_erp, .cfm = 0.0};
+  for (int i = 0; i < robot_->dof(); ++i) {
+    const RobotJoint& joint = robot_->joints[i];
+    const double next = state.q[i] + dt_ * v_[6 + i];
+    if (next < joint.lower)
+      contacts_.add_stop(i, 1.0, joint.lower - state.q[i], soft);
+    else if (next > joint.upper)
+      contacts_.add_stop(i, -1.0, state.q[i] - joint.upper, soft);
+  }
+}
+
+void SimbodyStepper::advance(RobotState& state) const {
+  state.v_WB = v_.head<3>();
+  state.w_WB_B = v_.segment<3>(3);
+  state.v = v_.tail(robot_->dof());
+  state.X_WB.p += dt_ * state.v_WB;
+  state.X_WB.R = (state.X_WB.R * rotation_of(dt_ * state.w_WB_B)).normalized();
+  state.q += dt_ * state.v;
+}
+
+}  // namespace duet

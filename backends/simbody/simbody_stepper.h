@@ -1,0 +1,46 @@
+// One step around Simbody's dynamics: the torque law (backends/implicit_law.h) and contacts (backends/contact_solver.h)
+// on Simbody's mass matrix and bias, then semi-implicit Euler. A function of the state alone.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "backends/contact_solver.h"
+#include "backends/implicit_law.h"
+#include "backends/link_pushes.h"
+#include "backends/narrow_phase.h"
+#include "backends/partner.h"
+#include "backends/simbody/simbody_model.h"
+#include "backends/simbody/simbody_options.h"
+
+namespace duet {
+
+class SimbodyStepper {
+ public:
+  explicit SimbodyStepper(const Scene& scene);  // throws std::invalid_argument for its options, and what Simbody does
+
+  // Moves `state` on by dt; points() and contacts() are then of the step.
+  void step(RobotState& state, const JointCommand& command, const LinkPushes& pushes, const MovingPartner& partner,
+            NarrowPhase& narrow_phase);
+
+  [[nodiscard]] const ContactSolver& contacts() const { return contacts_; }  // contact i is of point i
+  [[nodiscard]] const ImplicitLaw& law() const { return law_; }
+  [[nodiscard]] const Eigen::VectorXd& acceleration() const { return a_; }  // (6 + dof), mean over the step
+
+ private:
+  void apply(const LinkPushes& pushes);
+  void solve(const RobotState& state, std::span<const ContactPoint> points);
+  void add_stops(const RobotState& state);
+  void advance(RobotState& state) const;
+
+  std::shared_ptr<const RobotModel> robot_;
+  double dt_;
+  SimbodySettings settings_;
+  Softness rigid_;
+  SimbodyModel model_;
+  ImplicitLaw law_;
+  ContactSolver contacts_;
+  Eigen::VectorXd no_force_, v_begin_, v_, a_;
+};
+
+}  // namespace duet
