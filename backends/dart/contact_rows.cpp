@@ -30,9 +30,14 @@ Eigen::Vector6d wrench_on(const BodyNode& body, const Eigen::Vector3d& p_W, cons
 
 }  // namespace
 
-ContactRows::ContactRows(dart::dynamics::SkeletonPtr skeleton, std::vector<BodyNode*> bodies, const RigidContact& rigid,
-                         double dt, std::size_t capacity)
-    : skeleton_(std::move(skeleton)), bodies_(std::move(bodies)), rigid_(rigid), dt_(dt) {
+ContactRows::ContactRows(dart::dynamics::SkeletonPtr skeleton, std::vector<BodyNode*> bodies, LinkResponses responses,
+                         const RigidContact& rigid, double dt, std::size_t capacity)
+    : skeleton_(std::move(skeleton)),
+      bodies_(std::move(bodies)),
+      rigid_(rigid),
+      dt_(dt),
+      responses_(std::move(responses)),
+      answers_(bodies_.size()) {
   points_.reserve(capacity);
   rows_.reserve(3 * capacity);
 }
@@ -51,10 +56,14 @@ Eigen::Vector3d ContactRows::force(std::size_t index) const {
 
 // Velocities are those at the end of the step without constraints, poses those at its begin.
 void ContactRows::update() {
+  responses_.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     aim(contacts_[i], points_[i]);
     fill_rows(contacts_[i], points_[i], &rows_[3 * i]);
+    responses_.add(contacts_[i].link);
+    if (points_[i].other != nullptr) responses_.add(contacts_[i].other);
   }
+  if (!points_.empty()) responses_.update();
 }
 
 void ContactRows::aim(const ContactPoint& contact, Point& point) {
@@ -106,6 +115,7 @@ void ContactRows::getInformation(dart::constraint::ConstraintInfo* info) {
 
 void ContactRows::applyUnitImpulse(std::size_t row) {
   applied_ = row;
+  if (alone_) return;
   const Point& point = points_[row / 3];
   skeleton_->clearConstraintImpulses();
   if (point.other == nullptr)
@@ -115,13 +125,27 @@ void ContactRows::applyUnitImpulse(std::size_t row) {
   skeleton_->updateVelocityChange();
 }
 
+// With `with_cfm` DART asks for the answer to this constraint's own last impulse, else to another's.
 void ContactRows::getVelocityChange(double* change, bool with_cfm) {
+  if (with_cfm) answer(applied_);
+  const auto answer_of = [&](int link) -> const Eigen::Vector6d& {
+    return with_cfm ? answers_[link] : bodies_[link]->getBodyVelocityChange();
+  };
   for (std::size_t i = 0; i < rows_.size(); ++i) {
-    const Point& point = points_[i / 3];
-    change[i] = rows_[i].J.dot(point.body->getBodyVelocityChange());
-    if (point.other != nullptr) change[i] += rows_[i].J_other.dot(point.other->getBodyVelocityChange());
+    const ContactPoint& contact = contacts_[i / 3];
+    change[i] = rows_[i].J.dot(answer_of(contact.link));
+    if (contact.side == ContactSide::kRobot) change[i] += rows_[i].J_other.dot(answer_of(contact.other));
   }
   if (with_cfm) change[applied_] += rigid_.cfm * change[applied_] + rows_[applied_].softness;
+}
+
+void ContactRows::answer(std::size_t row) {
+  const ContactPoint& contact = contacts_[row / 3];
+  for (const int link : responses_.links()) {
+    answers_[link].noalias() = responses_.of(link, contact.link) * rows_[row].J;
+    if (contact.side == ContactSide::kRobot)
+      answers_[link].noalias() += responses_.of(link, contact.other) * rows_[row].J_other;
+  }
 }
 
 void ContactRows::excite() { skeleton_->setImpulseApplied(true); }

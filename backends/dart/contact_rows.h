@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "backends/dart/implicit_hinge.h"
+#include "backends/dart/link_responses.h"
 #include "backends/narrow_phase.h"
 
 namespace duet {
@@ -24,10 +24,12 @@ class ContactRows final : public dart::constraint::ConstraintBase {
  public:
   // `bodies` by link. At most `capacity` points.
   ContactRows(dart::dynamics::SkeletonPtr skeleton, std::vector<dart::dynamics::BodyNode*> bodies,
-              const RigidContact& rigid, double dt, std::size_t capacity);
+              LinkResponses responses, const RigidContact& rigid, double dt, std::size_t capacity);
 
   // The points of the coming step; they must stay as they are until it ends.
   void set(std::span<const ContactPoint> points);
+  // Whether other constraints share the coming solution: they read unit impulses from the skeleton.
+  void set_alone(bool alone) { alone_ = alone; }
   // Of the step that has ended: force of the other side on the link at points[index], mean over the step. [N], W.
   [[nodiscard]] Eigen::Vector3d force(std::size_t index) const;
 
@@ -56,6 +58,7 @@ class ContactRows final : public dart::constraint::ConstraintBase {
   [[nodiscard]] dart::dynamics::SkeletonPtr getRootSkeleton() const override;
 
   void aim(const ContactPoint& contact, Point& point);
+  void answer(std::size_t row);
   void fill_rows(const ContactPoint& contact, const Point& point, Row* rows) const;
 
   dart::dynamics::SkeletonPtr skeleton_;
@@ -65,6 +68,9 @@ class ContactRows final : public dart::constraint::ConstraintBase {
   std::span<const ContactPoint> contacts_;
   std::vector<Point> points_;
   std::vector<Row> rows_;
+  LinkResponses responses_;
+  std::vector<Eigen::Vector6d> answers_;  // by link: change of velocity by the last unit impulse
+  bool alone_ = true;
   std::size_t applied_ = 0;  // row of the last unit impulse
 };
 

@@ -5,9 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <dart/collision/dart/DARTCollisionDetector.hpp>
-#include <dart/constraint/BoxedLcpConstraintSolver.hpp>
 #include <dart/constraint/DantzigBoxedLcpSolver.hpp>
 #include <dart/constraint/PgsBoxedLcpSolver.hpp>
+#include <dart/dynamics/FreeJoint.hpp>
+#include <dart/dynamics/Skeleton.hpp>
+
+#include "backends/dart/contact_rows.h"
+#include "backends/dart/group_solver.h"
+#include "backends/dart/implicit_hinge.h"
 
 namespace duet {
 namespace {
@@ -17,26 +22,32 @@ using dart::dynamics::FreeJoint;
 using dart::dynamics::Joint;
 using dart::dynamics::Skeleton;
 
-constexpr double kFastest = 1e4;  // [m/s], [rad/s]; beyond it a run has diverged
+// Beyond these a run has diverged. Debian's libdart ends the process at the first NaN (assertions are on in it), so
+// nothing that could overflow may reach it.
+constexpr double kFastest = 1e4;     // [m/s], [rad/s]
+constexpr double kFarthest = 1e9;    // [m], [rad]
+constexpr double kStrongest = 1e15;  // [N], [N m]
 
 Eigen::Isometry3d isometry(const Pose& pose) {
   Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
-  X.linear() = pose.R.toRotationMatrix();
+  X.linear() = pose.R.normalized().toRotationMatrix();
   X.translation() = pose.p;
   return X;
 }
 
-std::unique_ptr<dart::constraint::ConstraintSolver> make_solver(const Scene& scene) {
+std::unique_ptr<GroupSolver> make_solver(const Scene& scene) {
   namespace dc = dart::constraint;
   const auto pgs = std::make_shared<dc::PgsBoxedLcpSolver>();
   pgs->setOption(dc::PgsBoxedLcpSolver::Option(option_integer(scene.options, dart_options(), "pgs_iterations")));
   const bool dantzig = option_choice(scene.options, dart_options(), "solver") == "dantzig";
-  auto solver = dantzig
-                    ? std::make_unique<dc::BoxedLcpConstraintSolver>(std::make_shared<dc::DantzigBoxedLcpSolver>(), pgs)
-                    : std::make_unique<dc::BoxedLcpConstraintSolver>(pgs, nullptr);
-  solver->setTimeStep(scene.dt);
-  solver->setCollisionDetector(dart::collision::DARTCollisionDetector::create());
+  auto solver = dantzig ? std::make_unique<GroupSolver>(std::make_shared<dc::DantzigBoxedLcpSolver>(), pgs, scene.dt)
+                        : std::make_unique<GroupSolver>(pgs, nullptr, scene.dt);
+  solver->setCollisionDetector(dart::collision::DARTCollisionDetector::create());  // without shapes the cheapest
   return solver;
+}
+
+bool positions_are_sensible(const RobotState& state) {
+  return state.X_WB.p.cwiseAbs().sum() < kFarthest && state.q.cwiseAbs().sum() < kFarthest;
 }
 
 RigidContact rigid_contact(const EngineOptions& options) {
@@ -60,11 +71,14 @@ std::span<const EngineOption> dart_options() {
 DartWorld::DartWorld(const Scene& scene, std::size_t contact_capacity)
     : robot_(scene.robot), dt_(scene.dt), solver_(make_solver(scene)), law_(scene.robot->joints.size()) {
   build(scene);
-  rows_ = std::make_shared<ContactRows>(skeleton_, bodies_, rigid_contact(scene.options), dt_, contact_capacity);
+  rows_ = std::make_shared<ContactRows>(skeleton_, bodies_, LinkResponses(robot_, bodies_, hinges_),
+                                        rigid_contact(scene.options), dt_, contact_capacity);
   solver_->addSkeleton(skeleton_);
   solver_->getCollisionGroup()->unsubscribeFrom(skeleton_.get());
   solver_->addConstraint(rows_);
 }
+
+DartWorld::~DartWorld() = default;
 
 void DartWorld::build(const Scene& scene) {
   skeleton_ = Skeleton::create("robot");
@@ -162,9 +176,10 @@ void DartWorld::apply(const LinkPushes& pushes) {
 
 bool DartWorld::step(const JointCommand& command, const RobotState& state, std::span<const ContactPoint> points) {
   const Eigen::Vector6d V = base_->getVelocitiesStatic();
+  solver_->clear_failure();
   rows_->set(points);
   set_law(command, state);
-  if (!move()) return false;
+  if (!forces_are_sensible() || !positions_are_sensible(state) || !velocities_are_sensible() || !move()) return false;
   if (saturate(state)) {
     base_->setVelocitiesStatic(V);
     for (std::size_t i = 0; i < hinges_.size(); ++i) hinges_[i]->setVelocity(0, state.v[static_cast<Eigen::Index>(i)]);
@@ -199,13 +214,19 @@ bool DartWorld::move() {
   skeleton_->computeForwardDynamics();
   skeleton_->integrateVelocities(dt_);
   if (!velocities_are_sensible()) return false;
-  limit_joints();
+  rows_->set_alone(!limit_joints());
   solver_->solve();
   if (skeleton_->isImpulseApplied()) {
     skeleton_->computeImpulseForwardDynamics();
     skeleton_->setImpulseApplied(false);
   }
-  return velocities_are_sensible();
+  return !solver_->failed() && velocities_are_sensible();
+}
+
+bool DartWorld::forces_are_sensible() const {
+  return std::all_of(law_.begin(), law_.end(), [](const Law& law) { return std::abs(law.drive) < kStrongest; }) &&
+         std::all_of(bodies_.begin(), bodies_.end(),
+                     [](const BodyNode* body) { return body->getExternalForceLocal().cwiseAbs().sum() < kStrongest; });
 }
 
 bool DartWorld::velocities_are_sensible() const {
@@ -217,13 +238,17 @@ bool DartWorld::velocities_are_sensible() const {
 }
 
 // DART makes a constraint for every joint whose limits are enforced and then looks whether the step would pass them;
-// here the limits of the others are not enforced in this step.
-void DartWorld::limit_joints() {
+// the limits of the others are not enforced in this step. True where one is.
+bool DartWorld::limit_joints() {
+  bool any = false;
   for (std::size_t i = 0; i < hinges_.size(); ++i) {
     const RobotJoint& joint = robot_->joints[i];
     const double q = hinges_[i]->getPositionsStatic()[0], next = q + dt_ * hinges_[i]->getVelocitiesStatic()[0];
-    hinges_[i]->setLimitEnforcement(std::min(q, next) < joint.lower || std::max(q, next) > joint.upper);
+    const bool limited = std::min(q, next) < joint.lower || std::max(q, next) > joint.upper;
+    hinges_[i]->setLimitEnforcement(limited);
+    any = any || limited;
   }
+  return any;
 }
 
 // Where the law's torque passes its limit with the accelerations of the step, the limit becomes the drive: the step is
@@ -248,6 +273,8 @@ void DartWorld::find_torques(const RobotState& state) {
     law_[i].torque = law_[i].drive - law_[i].implicit_inertia * acceleration;
   }
 }
+
+Eigen::Vector3d DartWorld::contact_force(std::size_t index) const { return rows_->force(index); }
 
 void DartWorld::read_torques(Eigen::VectorXd& torques) const {
   for (std::size_t i = 0; i < law_.size(); ++i) torques[static_cast<Eigen::Index>(i)] = law_[i].torque;

@@ -2,6 +2,7 @@
 // simulation::World taken apart so that the torque law can look at what the contacts did.
 #pragma once
 
+#include <Eigen/Core>
 #include <dart/constraint/ConstraintSolver.hpp>
 #include <dart/dynamics/FreeJoint.hpp>
 #include <dart/dynamics/Skeleton.hpp>
@@ -9,21 +10,30 @@
 #include <span>
 #include <vector>
 
-#include "backends/dart/contact_rows.h"
-#include "backends/dart/implicit_hinge.h"
 #include "backends/engine_options.h"
 #include "backends/link_pushes.h"
 #include "backends/narrow_phase.h"
 #include "backends/scene.h"
 #include "core/robot_state.h"
 
+namespace dart::dynamics {
+class BodyNode;
+class FreeJoint;
+class Skeleton;
+}  // namespace dart::dynamics
+
 namespace duet {
+
+class ContactRows;
+class GroupSolver;
+class ImplicitHinge;
 
 std::span<const EngineOption> dart_options();
 
 class DartWorld {
  public:
   DartWorld(const Scene& scene, std::size_t contact_capacity);  // keeps the robot model alive
+  ~DartWorld();
 
   void write_state(const RobotState& state);
   void read_state(RobotState& state) const;
@@ -38,7 +48,8 @@ class DartWorld {
   // `state`: as read_state() gives it. False where the velocities left any sensible range: then the state is useless.
   [[nodiscard]] bool step(const JointCommand& command, const RobotState& state, std::span<const ContactPoint> points);
 
-  [[nodiscard]] Eigen::Vector3d contact_force(std::size_t index) const { return rows_->force(index); }
+  // Of points[index] in the last step, on the link, mean over the step. [N], frame W.
+  [[nodiscard]] Eigen::Vector3d contact_force(std::size_t index) const;
   void read_torques(Eigen::VectorXd& torques) const;  // of the law in the last step
 
  private:
@@ -52,20 +63,21 @@ class DartWorld {
   void build_link(const RobotModel& robot, int index);
   void set_law(const JointCommand& command, const RobotState& state);
   void use_law();
+  [[nodiscard]] bool forces_are_sensible() const;
   [[nodiscard]] bool velocities_are_sensible() const;
   bool saturate(const RobotState& state);
   void find_torques(const RobotState& state);
   bool move();
-  void limit_joints();
+  bool limit_joints();
 
   std::shared_ptr<const RobotModel> robot_;
   double dt_;
-  dart::dynamics::SkeletonPtr skeleton_;
+  std::shared_ptr<dart::dynamics::Skeleton> skeleton_;
   dart::dynamics::FreeJoint* base_ = nullptr;
   std::vector<ImplicitHinge*> hinges_;
   std::vector<dart::dynamics::BodyNode*> bodies_;
   std::shared_ptr<ContactRows> rows_;
-  std::unique_ptr<dart::constraint::ConstraintSolver> solver_;
+  std::unique_ptr<GroupSolver> solver_;
   std::vector<Law> law_;
 };
 

@@ -19,6 +19,11 @@ class ImplicitHinge final : public dart::dynamics::RevoluteJoint {
   // s of backends/implicit_law.h [kg m^2]. DART does not notice: Skeleton::dirtyArticulatedInertia() is the caller's.
   void set_added_inertia(double inertia) { added_inertia_ = inertia; }
 
+  // Motion of the child body per unit velocity, in its frame: angular, then linear.
+  [[nodiscard]] const Eigen::Vector6d& motion() const;
+  // Of the articulated inertia projected on the axis, with what is added. [1/(kg m^2)]
+  [[nodiscard]] double inverse_inertia() const { return getInvProjArtInertia()(0, 0); }
+
  private:
   Joint* clone() const override;
   void updateInvProjArtInertia(const Eigen::Matrix6d& inertia) override;

@@ -1,0 +1,57 @@
+// How links answer to impulses on links: 6 x 6 blocks of the inverse inertia, made of DART's articulated inertias along
+// the paths between the links and the base. DART's own impulse test passes through the whole tree for each row of each
+// contact; here it is done once for each touched link. Source: Featherstone, Rigid Body Dynamics Algorithms, chapter 7.
+#pragma once
+
+#include <dart/dynamics/BodyNode.hpp>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "backends/dart/implicit_hinge.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+class LinkResponses {
+ public:
+  // `bodies` by link, `hinges` by joint.
+  LinkResponses(std::shared_ptr<const RobotModel> robot, std::vector<dart::dynamics::BodyNode*> bodies,
+                std::vector<ImplicitHinge*> hinges);
+
+  // The links that matter now are those of add() since clear(). Poses and inertias are read by update().
+  void clear();
+  void add(int link);
+  void update();
+  [[nodiscard]] std::span<const int> links() const { return added_; }
+  // Change of velocity of link `moved` per unit impulse on `hit`: both as DART has them, angular above linear, about
+  // the link's origin in its frame.
+  [[nodiscard]] const Eigen::Matrix6d& of(int moved, int hit) const {
+    return blocks_[slot_[hit] * slots_ + slot_[moved]];
+  }
+
+ private:
+  struct Link {  // on a path
+    bool needed = false;
+    Eigen::Matrix3d R;  // of the link in its parent
+    Eigen::Vector3d p;
+    Eigen::Vector6d S, U;           // motion of the hinge; articulated inertia times that
+    double inverse = 0.0;           // of the inertia that the hinge feels
+    Eigen::Matrix<double, 1, 6> h;  // impulse on the hinge
+    Eigen::Matrix6d V;              // velocities
+  };
+  void read(int link);
+  void hit(int link);
+
+  std::shared_ptr<const RobotModel> robot_;
+  std::vector<dart::dynamics::BodyNode*> bodies_;
+  std::vector<ImplicitHinge*> hinges_;
+  std::vector<Link> links_;
+  Eigen::Matrix6d base_inverse_;
+  std::vector<int> added_;  // links
+  std::vector<int> slot_;   // of a link that has a shape, else -1
+  int slots_ = 0;
+  std::vector<Eigen::Matrix6d> blocks_;
+};
+
+}  // namespace duet
