@@ -1,0 +1,102 @@
+// The conformance suite: small scenes that every physics engine runs through the public Backend interface, each against
+// a closed form or against our own integration of our own dynamics. A scene measures; a verdict comes from a stated
+// tolerance and from one table of asserted deviations (deviations.h). docs/conformance.md. Thread-safe: no state.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "backends/scene.h"
+
+namespace duet::conformance {
+
+// quick: seconds per engine. full: more step sizes (2, 1, 1/2 and 1/4 of `dt`) and longer runs.
+enum class Effort { kQuick, kFull };
+
+// How one engine is run: what an engine profile holds.
+struct Settings {
+  double dt = 0.002;      // [s]
+  EngineOptions options;  // what is not named has the engine's default
+  Effort effort = Effort::kQuick;
+  std::shared_ptr<const RobotModel> g1;  // null: the card that ships with duet
+};
+
+struct Measurement {
+  std::string scene, quantity, unit;  // unit "" for a pure number
+  double dt = 0.0;                    // that it was found with [s]
+  double value = 0.0, expected = 0.0;
+  double tolerance = 0.0;       // of |value - expected|, or of that over |expected|
+  bool relative = false;        // which of the two
+  bool across_engines = false;  // `expected` is the median of the engines that ran (agree), until then a stored figure
+  std::string note;             // what `expected` is and what the tolerance stands for
+};
+
+// |value - expected|, over |expected| where relative; NaN for a value that is not finite.
+double error_of(const Measurement& measurement);
+
+// Error against cost of one scene at one step size: a dot of the certificate's plots.
+struct AccuracyPoint {
+  double dt = 0.0;     // [s]
+  double error = 0.0;  // SceneRun::error, in its unit
+  double cost = 0.0;   // CPU seconds of this thread per simulated second
+};
+
+struct SceneRun {
+  std::vector<Measurement> measurements;
+  std::string error, error_unit;  // what `accuracy` plots, "" where the scene has no such thing
+  std::vector<AccuracyPoint> accuracy;
+};
+
+class Trial;
+
+struct ConformanceScene {
+  std::string_view name;   // "free-flight"
+  std::string_view shows;  // one sentence
+  void (*measure)(Trial& trial);
+};
+
+std::span<const ConformanceScene> scenes();
+// Throws std::invalid_argument with the nearest and all known names.
+const ConformanceScene& find_scene(std::string_view name);
+
+// What an engine throws, or its divergence, becomes a failed measurement "ran to its end" with the message. Throws what
+// make_backend throws for an engine's name (unknown, absent).
+SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);
+
+// kDeviation: outside its tolerance, inside the bound of its entry in deviations().
+enum class Verdict { kPass, kFail, kDeviation };
+std::string_view to_string(Verdict verdict);  // "pass", "FAIL", "deviation"
+
+Verdict verdict_on(const std::string& engine, const Measurement& measurement);
+
+struct SceneReport {
+  std::string name;
+  SceneRun run;
+};
+
+struct EngineReport {
+  std::string engine, version;
+  Settings settings;
+  std::vector<SceneReport> scenes;
+};
+
+// `names`: scenes to run; empty for all. Throws std::invalid_argument for unknown names, MissingError for an engine
+// that is not there.
+EngineReport run_suite(const std::string& engine, const Settings& settings, std::span<const std::string> names = {});
+
+// Measurements across engines are compared with their median over `reports` where two or more have them.
+void agree(std::span<EngineReport> reports);
+
+struct Tally {
+  int passed = 0, failed = 0, deviations = 0;
+};
+Tally tally(const EngineReport& report);
+
+// Entries of deviations() for this engine that deviate no more: the quantity was measured and every one passed. Only
+// for the default options at 2 ms, which the table is about; empty for other settings.
+std::vector<std::string> stale_deviations(const EngineReport& report);
+
+}  // namespace duet::conformance

@@ -1,0 +1,164 @@
+// The torque law of JointCommand at one joint, and in all joints of the G1 at their effort.
+#include <algorithm>
+#include <cmath>
+
+#include "backends/conformance/reference.h"
+#include "backends/conformance/scenes.h"
+#include "backends/conformance/small_robots.h"
+#include "backends/conformance/trial.h"
+#include "backends/implicit_law.h"
+
+namespace duet::conformance {
+namespace {
+
+constexpr double kInertia = kWheelInertia + kWheelArmature;
+constexpr double kBaseGivesWay = 1e-6;  // relative: the wheel's inertia over the base's
+
+void start_wheel(World& world) {
+  world.reset(state_at(world.robot(), {0.0, 0.0, 50.0}));
+  hold_base(world.backend());
+}
+
+// Velocity that one step from rest gives. [rad/s^2] as an acceleration.
+double first_acceleration(World& world, const JointCommand& command) {
+  start_wheel(world);
+  world.step(command);
+  return world.state().v[0] / world.dt();
+}
+
+struct Oscillator {
+  double natural, damping, target;  // [rad/s], ratio, [rad]
+
+  [[nodiscard]] double position(double t) const {
+    const double decay = natural * damping, omega = natural * std::sqrt(1.0 - damping * damping);
+    return target * (1.0 - std::exp(-decay * t) * (std::cos(omega * t) + decay / omega * std::sin(omega * t)));
+  }
+};
+
+// Each joint towards the target 0.6 rad away, by turns in either direction.
+JointCommand step_of_all_joints(const RobotModel& robot) {
+  JointCommand command = robot.default_command(robot.neutral);
+  for (int j = 0; j < robot.dof(); ++j) command.q_target[j] += j % 2 == 0 ? 0.6 : -0.6;
+  return command;
+}
+
+// Our own law and dynamics by semi-implicit Euler, without contact.
+RobotState integrate_law(const Scene& scene, RobotState state, const JointCommand& command, double seconds) {
+  ImplicitLaw law(scene);
+  const Eigen::VectorXd no_force = Eigen::VectorXd::Zero(6 + scene.robot->dof());
+  const int steps = steps_in(seconds, scene.dt);
+  for (int i = 0; i < steps; ++i) {
+    law.begin(state, command);
+    law.solve(no_force);
+    const Eigen::VectorXd& a = law.acceleration();
+    state.v_WB += scene.dt * a.head<3>();
+    state.w_WB_B += scene.dt * a.segment<3>(3);
+    state.v += scene.dt * a.tail(scene.robot->dof());
+    state.X_WB.p += scene.dt * state.v_WB;
+    const double angle = scene.dt * state.w_WB_B.norm();
+    if (angle > 0.0) state.X_WB.R = state.X_WB.R * Eigen::AngleAxisd(angle, state.w_WB_B.normalized());
+    state.X_WB.R.normalize();
+    state.q += scene.dt * state.v;
+  }
+  return state;
+}
+
+}  // namespace
+
+void measure_armature(Trial& trial) {
+  World world(trial, trial.scene(wheel(), trial.dt()));
+  JointCommand command = no_torque(world.robot());
+  command.tau_ff[0] = 0.5;
+  start_wheel(world);
+  world.run(0.2, command);
+  trial.relative("acceleration under 0.5 N m", "rad/s^2", trial.dt(), world.state().v[0] / world.time(), 0.5 / kInertia,
+                 2.0 * kBaseGivesWay, "torque over inertia plus armature");
+  trial.relative("reported torque", "N m", trial.dt(), world.backend().torques()[0], 0.5, 1e-9, "the feed-forward");
+}
+
+void measure_effort(Trial& trial) {
+  World world(trial, trial.scene(wheel(), trial.dt()));
+  const double limit = kWheelEffort / kInertia;
+  JointCommand command = no_torque(world.robot());
+  command.tau_ff[0] = 10.0 * kWheelEffort;
+  trial.relative("acceleration under ten times the effort", "rad/s^2", trial.dt(), first_acceleration(world, command),
+                 limit, 2.0 * kBaseGivesWay, "effort over inertia plus armature");
+  trial.relative("reported torque at the limit", "N m", trial.dt(), world.backend().torques()[0], kWheelEffort, 1e-9,
+                 "the effort");
+  command.tau_ff[0] = 0.0;
+  command.kp[0] = 1000.0;
+  command.kd[0] = 1.0;
+  command.q_target[0] = -1.0;
+  trial.relative("acceleration under a stiff spring", "rad/s^2", trial.dt(), first_acceleration(world, command), -limit,
+                 2.0 * kBaseGivesWay, "the limit holds for the PD part");
+  command.kp[0] = 30.0;
+  command.kd[0] = 0.0;
+  command.q_target[0] = 0.5;
+  command.tau_ff[0] = -10.0;
+  const double stiffening = trial.dt() * trial.dt() * command.kp[0] / kInertia;
+  trial.relative("acceleration under 15 - 10 N m", "rad/s^2", trial.dt(), first_acceleration(world, command),
+                 5.0 / kInertia, 1.5 * stiffening + 2.0 * kBaseGivesWay,
+                 "the sum is limited, not its parts; the implicit spring adds dt^2 kp to the inertia");
+}
+
+void measure_step_response(Trial& trial) {
+  const Oscillator exact{.natural = 10.0, .damping = 0.25, .target = 0.2};
+  std::vector<double> errors;
+  for (const double dt : trial.step_sizes()) {
+    World world(trial, trial.scene(wheel(), dt));
+    JointCommand command = no_torque(world.robot());
+    command.q_target[0] = exact.target;
+    command.kp[0] = kInertia * exact.natural * exact.natural;
+    command.kd[0] = 2.0 * kInertia * exact.natural * exact.damping;
+    start_wheel(world);
+    double error = 0.0;
+    const int steps = steps_in(1.0, dt);
+    for (int i = 0; i < steps; ++i) {
+      world.step(command);
+      error = std::max(error, std::abs(world.state().q[0] - exact.position(world.time())));
+    }
+    errors.push_back(error);
+    trial.at_most("largest error in 1 s", "rad", dt, error, exact.target * exact.natural * dt,
+                  "against the damped oscillator; target times natural frequency times dt");
+    trial.dot("largest error of the step response", "rad", dt, error, world.cost());
+  }
+  trial.first_order("order of the error", trial.step_sizes(), errors);
+}
+
+void measure_saturation(Trial& trial) {
+  const double seconds = 0.2;
+  const auto robot = without_stops(*trial.g1());
+  const RobotState start = state_at(*robot, {0.0, 0.0, 50.0});
+  const JointCommand command = step_of_all_joints(*robot);
+  const RobotState end = integrate_law(trial.scene(robot, 1e-4), start, command, seconds);
+  std::vector<double> errors;
+  for (const double dt : trial.step_sizes()) {
+    World world(trial, trial.scene(robot, dt));
+    world.reset(start);
+    world.run(seconds, command);
+    errors.push_back(largest_joint_error(world.state(), end));
+    trial.at_most("joint error after 0.2 s", "rad", dt, errors.back(), 20.0 * dt,
+                  "0.6 rad target step in all joints; our law at 0.1 ms. First order, 0.04 rad at 2 ms");
+    trial.dot("joint error after 0.2 s at the effort limit", "rad", dt, errors.back(), world.cost());
+  }
+}
+
+void measure_joint_stop(Trial& trial) {
+  World world(trial, trial.scene(wheel(), trial.dt()));
+  JointCommand command = no_torque(world.robot());
+  command.tau_ff[0] = kWheelEffort;
+  start_wheel(world);
+  double highest = 0.0;
+  const int steps = steps_in(2.0, trial.dt());
+  for (int i = 0; i < steps; ++i) {
+    world.step(command);
+    highest = std::max(highest, world.state().q[0]);
+  }
+  const double stop = world.robot().joints[0].upper;
+  trial.at_most("overshoot", "rad", trial.dt(), std::max(0.0, highest - stop), 0.1,
+                "10 N m into the stop, which it meets at 16 rad/s: three steps of travel at 2 ms");
+  trial.absolute("violation at rest", "rad", trial.dt(), world.state().q[0] - stop, 0.0, 0.01, "under 10 N m");
+  trial.absolute("velocity at rest", "rad/s", trial.dt(), world.state().v[0], 0.0, 1e-2, "2 s after the start");
+}
+
+}  // namespace duet::conformance

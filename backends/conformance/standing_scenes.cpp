@@ -1,0 +1,196 @@
+// The G1 on its feet: weight, fall, and a person who pushes and holds.
+#include <algorithm>
+#include <cmath>
+
+#include "backends/conformance/balance.h"
+#include "backends/conformance/reference.h"
+#include "backends/conformance/scenes.h"
+#include "backends/conformance/small_robots.h"
+#include "backends/conformance/trial.h"
+#include "core/skeleton.h"
+
+namespace duet::conformance {
+namespace {
+
+constexpr double kDrop = 1e-3;  // of the soles over the ground at the start [m]
+
+bool fallen(const RobotState& state) {
+  return state.X_WB.p.z() < 0.45 || (state.X_WB.R * Eigen::Vector3d::UnitZ()).z() < 0.7;
+}
+
+// A world with the G1 that stands under ankle feedback, refreshed at 100 Hz.
+class Standing {
+ public:
+  Standing(const Trial& trial, const Scene& scene)
+      : world_(trial, scene), balance_(world_.robot()), every_(std::max(1, steps_in(AnkleBalance::kPeriod, scene.dt))) {
+    RobotState start = world_.robot().standing_state();
+    start.X_WB.p.z() += kDrop;
+    world_.reset(start);
+  }
+
+  World& world() { return world_; }
+  void step() {
+    if (steps_++ % every_ == 0) command_ = balance_.command(world_.state(), world_.robot().neutral);
+    world_.step(command_);
+  }
+  void run(double seconds) {
+    for (int i = 0; i < steps_in(seconds, world_.dt()); ++i) step();
+  }
+  [[nodiscard]] Eigen::Vector3d feet() const {
+    Kinematics kinematics(world_.robot());
+    kinematics.update(world_.state().X_WB, world_.state().q);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const int foot : world_.robot().feet) sum += kinematics.shape_position(foot);
+    return sum / static_cast<double>(world_.robot().feet.size());
+  }
+
+ private:
+  World world_;
+  AnkleBalance balance_;
+  JointCommand command_;
+  int every_;
+  long steps_ = 0;
+};
+
+}  // namespace
+
+void measure_stand(Trial& trial) {
+  const double seconds = trial.full() ? 10.0 : 3.0, watch = trial.full() ? 2.0 : 0.5;
+  const std::vector<double> sizes = trial.full() ? trial.step_sizes() : std::vector{trial.dt()};
+  for (const double dt : sizes) {
+    Standing standing(trial, trial.scene(trial.g1(), dt));
+    World& world = standing.world();
+    const double weight = world.robot().total_mass() * kGravity;
+    const Eigen::Vector3d feet = standing.feet();
+    standing.run(seconds - watch);
+    double force = 0.0, depth = 0.0, speed = 0.0;
+    const int steps = steps_in(watch, dt);
+    for (int i = 0; i < steps; ++i) {
+      standing.step();
+      force += world.force_of(ContactSide::kGround).z() / steps;
+      speed += world.state().v.squaredNorm() / (world.robot().dof() * steps);
+      for (const Contact& contact : world.backend().contacts()) depth = std::max(depth, contact.depth);
+    }
+    trial.relative("ground force", "N", dt, force, weight, 1e-3, "m g, mean over the last part");
+    trial.at_most("deepest sole", "m", dt, depth, 1e-3, "over the last part");
+    trial.at_most("drift of the feet", "m", dt, (standing.feet() - feet).head<2>().norm(), 5e-3,
+                  "from the start, 1 mm drop included");
+    trial.at_most("joint speed, rms", "rad/s", dt, std::sqrt(speed), 1e-3, "over the last part: no buzz");
+    trial.at_most("fallen", "", dt, fallen(world.state()) ? 1.0 : 0.0, 0.0, "at the end");
+    trial.dot("error of the ground force, relative", "", dt, std::abs(force / weight - 1.0), world.cost());
+  }
+}
+
+void measure_fall(Trial& trial) {
+  // Of MuJoCo 2.2.2 at 2 ms; Bullet, DART and ODE fall at the same step. The median takes its place where engines run.
+  constexpr double kStored = 1.218;
+  const std::vector<double> sizes = trial.full() ? trial.step_sizes() : std::vector{trial.dt()};
+  for (const double dt : sizes) {
+    World world(trial, trial.scene(trial.g1(), dt));
+    RobotState start = world.robot().standing_state();
+    start.X_WB.p.z() += kDrop;
+    world.reset(start);
+    const JointCommand command = world.robot().default_command(world.robot().neutral);
+    while (world.time() < 5.0 && !fallen(world.state())) world.step(command);
+    trial
+        .absolute("time until fallen", "s", dt, world.time(), kStored, 0.03,
+                  "stored figure of MuJoCo at 2 ms: pelvis below 0.45 m or tilted beyond cos 0.7")
+        .across_engines = true;
+  }
+}
+
+namespace {
+
+constexpr double kPressSpeed = 0.2, kPressGap = 0.01, kPressDepth = 0.03;  // [m/s], [m]
+constexpr double kPressStart = 1.5, kPressEnd = 3.0;                       // [s]
+constexpr double kHandRadius = 0.05, kPressHeight = 0.17;                  // over the torso link's origin [m]
+
+HumanBody one_chest() {
+  HumanCapsule capsule;
+  capsule.name = "chest";
+  capsule.region = "chest";
+  capsule.joint_a = kLeftShoulder;
+  capsule.joint_b = kRightShoulder;
+  capsule.radius = kHandRadius;
+  capsule.skin = default_skin("chest");
+  return {{capsule}};
+}
+
+struct Press {
+  double peak = 0.0, held = 0.0, ground = 0.0;  // [N]
+  double impulse = 0.0, missing = 0.0;          // of the human, and what the momentum balance lacks [N s]
+  double cost = 0.0;
+};
+
+// A capsule across the chest comes from the front, goes 3 cm on after the first touch and stays there.
+Press press(const Trial& trial, double dt) {
+  Scene scene = trial.scene(trial.g1(), dt);
+  scene.partner = PartnerMode::kSolid;
+  scene.human = one_chest();
+  Standing standing(trial, scene);
+  World& world = standing.world();
+  standing.run(kPressStart);
+  Kinematics kinematics(world.robot());
+  kinematics.update(world.state().X_WB, world.state().q);
+  const int torso = world.robot().frames[world.robot().frame_index("torso_link")].link;
+  double front = 0.0;
+  const double height = kinematics.p_WL(torso).z() + kPressHeight;
+  for (const RobotShape& shape : world.robot().shapes)
+    if (shape.region == "torso")
+      front = std::max(front, (kinematics.X_WL(shape.link) * shape.X_LS.p).x() + shape.radius);
+  HumanJoints joints = HumanJoints::Zero(), moving = HumanJoints::Zero();
+  joints.colwise() = Eigen::Vector3d(front + kHandRadius + kPressGap, 0.0, height);
+  joints(1, kLeftShoulder) = 0.3;
+  joints(1, kRightShoulder) = -0.3;
+  moving.row(0).setConstant(-kPressSpeed);
+
+  Press found;
+  const Momentum before = momentum_of(world.robot(), world.state());
+  const double travel = (kPressGap + kPressDepth) / kPressSpeed;
+  const int steps = steps_in(kPressEnd - kPressStart, dt), stop = steps_in(travel, dt), watch = steps_in(0.3, dt);
+  double all = 0.0;
+  world.backend().set_partner(joints, moving);
+  for (int i = 0; i < steps; ++i) {
+    if (i == stop) {
+      joints.row(0).array() -= kPressSpeed * dt * stop;
+      world.backend().set_partner(joints, HumanJoints::Zero());
+    }
+    standing.step();
+    const Eigen::Vector3d human = world.force_of(ContactSide::kHuman), ground = world.force_of(ContactSide::kGround);
+    found.peak = std::max(found.peak, human.norm());
+    found.impulse += dt * human.x();
+    all += dt * (human.x() + ground.x());
+    if (i < steps - watch) continue;
+    found.held += human.x() / watch;
+    found.ground += ground.x() / watch;
+  }
+  found.missing = all - (momentum_of(world.robot(), world.state()).linear - before.linear).x();
+  found.cost = world.cost();
+  return found;
+}
+
+}  // namespace
+
+void measure_held_push(Trial& trial) {
+  // Of MuJoCo 2.2.2 at 2 ms, as in measure_fall.
+  constexpr double kStoredPeak = 96.0, kStoredHeld = -6.17;
+  std::vector<double> peaks;
+  for (const double dt : trial.step_sizes()) {
+    const Press found = press(trial, dt);
+    peaks.push_back(found.peak);
+    trial.relative("ground force while held", "N", dt, found.ground, -found.held, 0.03,
+                   "balances the person's force, mean over the last 0.3 s");
+    trial.absolute("momentum that the forces do not explain", "N s", dt, found.missing, 0.0,
+                   0.03 * std::abs(found.impulse), "impulse of person and ground less the robot's momentum; 3 %");
+    trial.relative("peak force", "N", dt, found.peak, kStoredPeak, 0.15, "stored figure of MuJoCo").across_engines =
+        true;
+    trial.relative("held force", "N", dt, found.held, kStoredHeld, 0.15, "stored figure of MuJoCo").across_engines =
+        true;
+    trial.dot("momentum that the forces do not explain", "N s", dt, std::abs(found.missing), found.cost);
+  }
+  for (std::size_t i = 1; i < peaks.size(); ++i)
+    trial.relative("peak force over that at twice the step", "", trial.step_sizes()[i], peaks[i] / peaks[i - 1], 1.0,
+                   0.15, "the skin makes the peak a property of the bodies");
+}
+
+}  // namespace duet::conformance

@@ -1,0 +1,181 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+#include "backends/conformance/conformance.h"
+#include "backends/conformance/deviations.h"
+#include "backends/conformance/scenes.h"
+#include "backends/conformance/trial.h"
+#include "backends/factory.h"
+#include "core/names.h"
+#include "core/require.h"
+
+namespace duet::conformance {
+namespace {
+
+constexpr std::array kScenes = {
+    ConformanceScene{"state", "a state set is the state that the engine steps from, link by link", measure_state},
+    ConformanceScene{"acceleration", "accelerations of the G1 in random states are those of our Newton-Euler",
+                     measure_acceleration},
+    ConformanceScene{"free-flight", "0.2 s of the G1 in the air against our Runge-Kutta integration",
+                     measure_free_flight},
+    ConformanceScene{"momentum", "inner forces of a thrashing G1 without gravity leave its momentum", measure_momentum},
+    ConformanceScene{"box-simple", "a box thrown with a slow spin about a principal axis", measure_box_simple},
+    ConformanceScene{"box-complex", "a box tumbling about its intermediate axis", measure_box_complex},
+    ConformanceScene{"pendulum", "period and energy of a pendulum at 90 degrees", measure_pendulum},
+    ConformanceScene{"chain", "a chain of two links against our Runge-Kutta integration", measure_chain},
+    ConformanceScene{"armature", "a wheel accelerates with torque over inertia plus armature", measure_armature},
+    ConformanceScene{"effort", "the effort limits PD and feed-forward together, armature apart", measure_effort},
+    ConformanceScene{"step-response", "a joint under PD is the damped oscillator of its gains", measure_step_response},
+    ConformanceScene{"saturation", "all joints of the G1 with a step beyond their effort, against our law at 0.1 ms",
+                     measure_saturation},
+    ConformanceScene{"joint-stop", "a driven joint stops at its limit", measure_joint_stop},
+    ConformanceScene{"incline", "slip angle and sliding on an incline along x, y and the diagonal", measure_incline},
+    ConformanceScene{"rolling-ball", "a sliding ball comes to roll", measure_rolling_ball},
+    ConformanceScene{"skin-bounce", "a ball on the skin of a held human capsule is a mass on a spring",
+                     measure_skin_bounce},
+    ConformanceScene{"ground-bounce", "the ground does not give energy back", measure_ground_bounce},
+    ConformanceScene{"stand", "the G1 stands under ankle feedback and its weight is carried", measure_stand},
+    ConformanceScene{"fall", "the G1 without feedback falls at the same time everywhere", measure_fall},
+    ConformanceScene{"held-push", "a person pushes the torso and holds: momentum, peak and held force",
+                     measure_held_push},
+    ConformanceScene{"self-collision", "a hand sent into the trunk is stopped, momentum stays", measure_self_collision},
+    ConformanceScene{"repeat", "snapshot in contact, rerun, second thread and reset continue bitwise", measure_repeat},
+};
+
+void run_measurements(const ConformanceScene& scene, const std::string& engine, const Settings& settings,
+                      SceneRun& run) {
+  Trial trial(engine, settings, std::string(scene.name), run);
+  try {
+    scene.measure(trial);
+  } catch (const std::exception& error) {
+    trial.absolute("ran to its end", "", settings.dt, 0.0, 1.0, 0.0, error.what());
+  }
+}
+
+double median_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t n = values.size();
+  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+}
+
+using QuantityKey = std::tuple<std::string, std::string, double>;
+
+QuantityKey key_of(const Measurement& measurement) { return {measurement.scene, measurement.quantity, measurement.dt}; }
+
+template <typename Report, typename Action>
+void for_each_measurement(Report& report, Action&& action) {
+  for (auto& scene : report.scenes)
+    for (auto& measurement : scene.run.measurements) action(measurement);
+}
+
+}  // namespace
+
+double error_of(const Measurement& measurement) {
+  const double error = std::abs(measurement.value - measurement.expected);
+  return measurement.relative ? error / std::abs(measurement.expected) : error;
+}
+
+std::span<const ConformanceScene> scenes() { return kScenes; }
+
+const ConformanceScene& find_scene(std::string_view name) {
+  const auto found =
+      std::find_if(kScenes.begin(), kScenes.end(), [&](const auto& scene) { return scene.name == name; });
+  if (found != kScenes.end()) return *found;
+  std::vector<std::string> names;
+  for (const ConformanceScene& scene : kScenes) names.emplace_back(scene.name);
+  throw std::invalid_argument(unknown_name_message("conformance scene", name, names));
+}
+
+SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings) {
+  static_cast<void>(engine_module(engine));
+  Settings with_robot = settings;
+  if (with_robot.g1 == nullptr) with_robot.g1 = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+  SceneRun run;
+  run_measurements(scene, engine, with_robot, run);
+  return run;
+}
+
+std::string_view to_string(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kPass:
+      return "pass";
+    case Verdict::kDeviation:
+      return "deviation";
+    case Verdict::kFail:
+      break;
+  }
+  return "FAIL";
+}
+
+Verdict verdict_on(const std::string& engine, const Measurement& measurement) {
+  const double error = error_of(measurement);
+  if (error <= measurement.tolerance) return Verdict::kPass;  // false for NaN
+  const Deviation* known = find_deviation(engine, measurement.scene, measurement.quantity);
+  return known != nullptr && error <= known->bound ? Verdict::kDeviation : Verdict::kFail;
+}
+
+EngineReport run_suite(const std::string& engine, const Settings& settings, std::span<const std::string> names) {
+  EngineReport report{.engine = engine, .version = engine_module(engine).version(), .settings = settings, .scenes = {}};
+  std::vector<const ConformanceScene*> chosen;
+  for (const std::string& name : names) chosen.push_back(&find_scene(name));
+  if (names.empty())
+    for (const ConformanceScene& scene : kScenes) chosen.push_back(&scene);
+  if (report.settings.g1 == nullptr)
+    report.settings.g1 = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+  for (const ConformanceScene* scene : chosen)
+    report.scenes.push_back({std::string(scene->name), run_scene(*scene, engine, report.settings)});
+  return report;
+}
+
+void agree(std::span<EngineReport> reports) {
+  std::map<QuantityKey, std::vector<double>> values;
+  for (const EngineReport& report : reports)
+    for_each_measurement(report, [&](const Measurement& measurement) {
+      if (measurement.across_engines && std::isfinite(measurement.value))
+        values[key_of(measurement)].push_back(measurement.value);
+    });
+  for (EngineReport& report : reports)
+    for_each_measurement(report, [&](Measurement& measurement) {
+      const auto found = values.find(key_of(measurement));
+      if (!measurement.across_engines || found == values.end() || found->second.size() < 2) return;
+      measurement.expected = median_of(found->second);
+      measurement.note = fmt::format("median of {} engines", found->second.size());
+    });
+}
+
+Tally tally(const EngineReport& report) {
+  Tally tally;
+  for_each_measurement(report, [&](const Measurement& measurement) {
+    const Verdict verdict = verdict_on(report.engine, measurement);
+    ++(verdict == Verdict::kPass ? tally.passed : verdict == Verdict::kFail ? tally.failed : tally.deviations);
+  });
+  return tally;
+}
+
+std::vector<std::string> stale_deviations(const EngineReport& report) {
+  if (!report.settings.options.empty() || report.settings.dt != Settings{}.dt) return {};
+  std::vector<std::string> stale;
+  for (const Deviation& entry : deviations()) {
+    if (entry.engine != report.engine) continue;
+    bool measured = false, deviates = false;
+    for_each_measurement(report, [&](const Measurement& measurement) {
+      if (measurement.scene != entry.scene || !measurement.quantity.starts_with(entry.quantity)) return;
+      measured = true;
+      deviates = deviates || verdict_on(report.engine, measurement) != Verdict::kPass;
+    });
+    const bool scene_ran = std::any_of(report.scenes.begin(), report.scenes.end(),
+                                       [&](const SceneReport& scene) { return scene.name == entry.scene; });
+    if (scene_ran && !(measured && deviates))
+      stale.push_back(fmt::format("deviation of {} in '{}', '{}': {}", entry.engine, entry.scene, entry.quantity,
+                                  measured ? "every measurement passes, remove the entry" : "no such quantity"));
+  }
+  return stale;
+}
+
+}  // namespace duet::conformance

@@ -1,0 +1,79 @@
+// What the scenes of the suite share: the settings they run under, a timed world, and how they note what they found.
+// Internal to backends/conformance.
+#pragma once
+
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "backends/backend.h"
+#include "backends/conformance/conformance.h"
+
+namespace duet::conformance {
+
+class Trial {
+ public:
+  Trial(std::string engine, const Settings& settings, std::string scene, SceneRun& run);
+
+  [[nodiscard]] const std::string& engine() const { return engine_; }
+  [[nodiscard]] double dt() const { return settings_.dt; }
+  [[nodiscard]] bool full() const { return settings_.effort == Effort::kFull; }
+  // Step sizes for what depends on them, each half of the one before; quick: dt and dt / 2.
+  [[nodiscard]] std::vector<double> step_sizes() const;
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& g1() const { return settings_.g1; }
+  // No partner, no self-collision, the engine's options.
+  [[nodiscard]] Scene scene(std::shared_ptr<const RobotModel> robot, double dt) const;
+
+  // Notes |value - expected| <= tolerance.
+  Measurement& absolute(std::string quantity, std::string unit, double dt, double value, double expected,
+                        double tolerance, std::string note);
+  // Notes |value - expected| <= tolerance |expected|.
+  Measurement& relative(std::string quantity, std::string unit, double dt, double value, double expected,
+                        double tolerance, std::string note);
+  // Notes 0 <= value <= bound.
+  Measurement& at_most(std::string quantity, std::string unit, double dt, double value, double bound, std::string note);
+  // Notes a dot of error against cost, where error > 0.
+  void dot(std::string error, std::string unit, double dt, double value, double cost);
+  // Notes the observed order of convergence between consecutive step sizes, log2 of the ratio of errors, as between 0.8
+  // and 1.3.
+  void first_order(const std::string& quantity, const std::vector<double>& step_sizes,
+                   const std::vector<double>& errors);
+
+ private:
+  Measurement& note(Measurement measurement);
+
+  std::string engine_;
+  const Settings& settings_;
+  std::string scene_;
+  SceneRun& run_;
+};
+
+// A backend whose steps are timed (CPU clock of the thread, about a microsecond a step for reading it).
+class World {
+ public:
+  World(const Trial& trial, const Scene& scene);
+
+  [[nodiscard]] Backend& backend() { return *backend_; }
+  [[nodiscard]] const RobotState& state() const { return backend_->state(); }
+  [[nodiscard]] const RobotModel& robot() const { return *backend_->scene().robot; }
+  [[nodiscard]] double dt() const { return backend_->scene().dt; }
+  [[nodiscard]] double time() const { return backend_->time(); }
+  void reset(const RobotState& state) { backend_->reset(state); }
+  // Throws std::runtime_error, with the time, where the engine diverges.
+  void step(const JointCommand& command);
+  void run(double seconds, const JointCommand& command);
+  // CPU seconds per simulated second, over all steps so far.
+  [[nodiscard]] double cost() const;
+  // Sum of the forces of this side on the robot in the last step. [N], W.
+  [[nodiscard]] Eigen::Vector3d force_of(ContactSide side) const;
+
+ private:
+  std::unique_ptr<Backend> backend_;
+  double cpu_ = 0.0;
+  long steps_ = 0;
+};
+
+int steps_in(double seconds, double dt);  // nearest
+
+}  // namespace duet::conformance

@@ -1,0 +1,193 @@
+// Every engine that is there runs every scene of the conformance suite at quick effort: ctest -R Conformance.
+#include "backends/conformance/conformance.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "backends/conformance/deviations.h"
+#include "backends/factory.h"
+#include "tests/support.h"
+
+namespace duet::conformance {
+namespace {
+
+using Case = std::tuple<std::string, std::string>;  // engine, scene
+
+std::vector<std::string> physics_engines() {
+  std::vector<std::string> names;
+  for (const EngineInfo& engine : engines())
+    if (engine.physics) names.push_back(engine.name);
+  return names;
+}
+
+std::vector<std::string> scene_names() {
+  std::vector<std::string> names;
+  for (const ConformanceScene& scene : scenes()) names.emplace_back(scene.name);
+  return names;
+}
+
+std::string absence(const std::string& engine) {
+  for (const EngineInfo& info : engines())
+    if (info.name == engine && !info.available) return fmt::format("engine {} absent: {}", engine, info.reason);
+  return "";
+}
+
+std::string sentence(const std::string& engine, const Measurement& found) {
+  return fmt::format("{}: {}: {} = {:.6g} {}, expected {:.6g}, {} error {:.3g} of {:.3g} allowed at dt {} ms ({})",
+                     engine, found.scene, found.quantity, found.value, found.unit, found.expected,
+                     found.relative ? "relative" : "absolute", error_of(found), found.tolerance, 1e3 * found.dt,
+                     found.note);
+}
+
+class Conformance : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Conformance, Holds) {
+  const auto& [engine, scene] = GetParam();
+  if (const std::string reason = absence(engine); !reason.empty()) GTEST_SKIP() << "not run: " << reason;
+  const EngineReport report = run_suite(engine, {}, std::vector{scene});
+  for (const Measurement& found : report.scenes[0].run.measurements)
+    EXPECT_NE(verdict_on(engine, found), Verdict::kFail) << sentence(engine, found);
+  EXPECT_FALSE(report.scenes[0].run.measurements.empty());
+  for (const std::string& stale : stale_deviations(report)) ADD_FAILURE() << stale;
+}
+
+std::string case_name(const ::testing::TestParamInfo<Case>& info) {
+  std::string name = std::get<0>(info.param) + "_" + std::get<1>(info.param);
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Engines, Conformance,
+                         ::testing::Combine(::testing::ValuesIn(physics_engines()), ::testing::ValuesIn(scene_names())),
+                         case_name);
+
+Measurement measured(double value, double expected, double tolerance) {
+  return {.scene = "stand",
+          .quantity = "ground force",
+          .unit = "N",
+          .dt = 0.002,
+          .value = value,
+          .expected = expected,
+          .tolerance = tolerance,
+          .relative = false,
+          .across_engines = false,
+          .note = ""};
+}
+
+EngineReport report_of(const std::string& engine, std::vector<Measurement> measurements) {
+  EngineReport report;
+  report.engine = engine;
+  report.scenes.push_back({measurements[0].scene,
+                           {.measurements = std::move(measurements), .error = "", .error_unit = "", .accuracy = {}}});
+  return report;
+}
+
+TEST(ConformanceVerdict, IsByAbsoluteOrRelativeErrorAndFailsForNaN) {
+  Measurement found = measured(101.0, 100.0, 1.0);
+  EXPECT_EQ(verdict_on("ode", found), Verdict::kPass);
+  found.value = 101.1;
+  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  found.relative = true;
+  found.tolerance = 0.02;
+  EXPECT_EQ(verdict_on("ode", found), Verdict::kPass);
+  found.expected = -100.0;
+  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+  found.value = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(verdict_on("ode", found), Verdict::kFail);
+}
+
+TEST(ConformanceVerdict, KnownDeviationHoldsUpToItsBoundForItsEngineOnly) {
+  const Deviation& known = deviations()[0];
+  Measurement found = measured(0.99 * known.bound, 0.0, 0.0);
+  found.scene = known.scene;
+  found.quantity = known.quantity;
+  EXPECT_EQ(verdict_on(std::string(known.engine), found), Verdict::kDeviation);
+  EXPECT_EQ(verdict_on("another", found), Verdict::kFail);
+  found.value = 1.01 * known.bound;
+  EXPECT_EQ(verdict_on(std::string(known.engine), found), Verdict::kFail);
+}
+
+TEST(ConformanceVerdict, DeviationThatIsGoneIsStale) {
+  const Deviation& known = deviations()[0];
+  Measurement found = measured(0.99 * known.bound, 0.0, 0.0);
+  found.scene = known.scene;
+  found.quantity = known.quantity;
+  EXPECT_TRUE(stale_deviations(report_of(std::string(known.engine), {found})).empty());
+  found.value = 0.0;
+  const std::vector<std::string> stale = stale_deviations(report_of(std::string(known.engine), {found}));
+  ASSERT_EQ(stale.size(), 1U);
+  EXPECT_NE(stale[0].find("remove the entry"), std::string::npos);
+  found.quantity = "something else";
+  ASSERT_EQ(stale_deviations(report_of(std::string(known.engine), {found})).size(), 1U);
+  EngineReport other_step = report_of(std::string(known.engine), {found});
+  other_step.settings.dt = 0.001;
+  EXPECT_TRUE(stale_deviations(other_step).empty());
+}
+
+TEST(ConformanceVerdict, AcrossEnginesTheMedianIsExpectedWhereTwoOrMoreRan) {
+  const auto across = [](double value) {
+    Measurement found = measured(value, 7.0, 0.1);
+    found.across_engines = true;
+    return found;
+  };
+  std::vector<EngineReport> alone = {report_of("a", {across(1.0)})};
+  agree(alone);
+  EXPECT_EQ(alone[0].scenes[0].run.measurements[0].expected, 7.0);
+  std::vector<EngineReport> three = {report_of("a", {across(1.0)}),
+                                     report_of("b", {across(1.05), measured(3.0, 4.0, 0.1)}),
+                                     report_of("c", {across(1.2)})};
+  agree(three);
+  EXPECT_EQ(three[2].scenes[0].run.measurements[0].expected, 1.05);
+  EXPECT_EQ(three[1].scenes[0].run.measurements[1].expected, 4.0);
+  EXPECT_EQ(tally(three[0]).passed, 1);
+  EXPECT_EQ(tally(three[2]).failed, 1);
+}
+
+TEST(ConformanceSuite, RefusesUnknownScenesAndAbsentEngines) {
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([] { find_scene("pendulun"); }).find("did you mean 'pendulum'"),
+            std::string::npos);
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([] { run_suite("mujocco", {}); }).find("unknown engine"),
+            std::string::npos);
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([] { run_suite("playback", {}); }).find("no physics engine"),
+            std::string::npos);
+}
+
+TEST(ConformanceSuite, FaultOfAnEngineIsAFailedMeasurementWithItsMessage) {
+  for (const EngineInfo& info : engines()) {
+    if (!info.physics || !info.available) continue;
+    const SceneRun run = run_scene(find_scene("armature"), info.name,
+                                   {.dt = 0.5, .options = {}, .effort = Effort::kQuick, .g1 = nullptr});
+    ASSERT_EQ(run.measurements.size(), 1U);
+    EXPECT_EQ(run.measurements[0].quantity, "ran to its end");
+    EXPECT_EQ(verdict_on(info.name, run.measurements[0]), Verdict::kFail);
+    EXPECT_NE(run.measurements[0].note.find("dt is 0.5 s"), std::string::npos);
+  }
+}
+
+TEST(ConformanceSuite, DeviationsNameScenesOfTheSuiteAndGiveAReason) {
+  for (const Deviation& entry : deviations()) {
+    EXPECT_NO_THROW(find_scene(entry.scene));
+    EXPECT_GT(entry.reason.size(), 40U) << entry.engine << " " << entry.scene;
+    EXPECT_GT(entry.bound, 0.0);
+  }
+}
+
+// What the engines are compared with among one another, each against the median of those that are here.
+TEST(ConformanceSuite, EnginesAgreeOnFallAndHeldPush) {
+  std::vector<EngineReport> reports;
+  for (const EngineInfo& info : engines())
+    if (info.physics && info.available)
+      reports.push_back(run_suite(info.name, {}, std::vector<std::string>{"fall", "held-push"}));
+  if (reports.size() < 2) GTEST_SKIP() << "not run: fewer than two physics engines";
+  agree(reports);
+  for (const EngineReport& report : reports)
+    for (const SceneReport& scene : report.scenes)
+      for (const Measurement& found : scene.run.measurements)
+        EXPECT_NE(verdict_on(report.engine, found), Verdict::kFail) << sentence(report.engine, found);
+}
+
+}  // namespace
+}  // namespace duet::conformance
