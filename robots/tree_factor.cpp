@@ -68,6 +68,15 @@ void TreeFactor::half_solve(std::span<const int> rows, Triple& x) const {
   }
 }
 
+void TreeFactor::solve(std::span<const int> rows, Triple& x) const {
+  half_solve(rows, x);
+  for (int i = 0; i < static_cast<int>(parent_.size()); ++i) {
+    Eigen::RowVector3d value = x.row(i);
+    for (const int j : ancestors_[i]) value -= L_(i, j) * x.row(j);
+    x.row(i) = inverse_[i] * value;
+  }
+}
+
 void TreeFactor::solve(Columns& x) const {
   half_solve(x);
   for (int i = 0; i < static_cast<int>(parent_.size()); ++i) {

@@ -28,6 +28,7 @@ class TreeFactor {
   void half_solve(Columns& x) const;
   // The same for three columns that are zero outside `rows`, which fall and hold the ancestors of all they hold.
   void half_solve(std::span<const int> rows, Triple& x) const;
+  void solve(std::span<const int> rows, Triple& x) const;
 
  private:
   std::vector<int> parent_;                  // of each row: the next row that its joint's motion reaches; -1: none
