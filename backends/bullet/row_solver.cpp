@@ -1,6 +1,7 @@
 #include "backends/bullet/row_solver.h"
 
 #include <algorithm>
+#include <functional>
 
 namespace duet {
 namespace {
@@ -9,6 +10,13 @@ constexpr double kNear = 0.01;      // stops that the step without contacts leav
 constexpr double kSoftest = 1e-12;  // of the sum h K + D of a skin [N s/m]
 constexpr double kNoLimit = 1e10;   // impulse [N s]
 
+// Joints of one or two chains towards the base: falling, each once, then the base.
+void close_support(std::vector<int>& support) {
+  std::sort(support.begin(), support.end(), std::greater<>());
+  support.erase(std::unique(support.begin(), support.end()), support.end());
+  for (int i = 5; i >= 0; --i) support.push_back(i);
+}
+
 }  // namespace
 
 RowSolver::RowSolver(const Scene& scene, const RowSettings& settings, std::size_t contacts)
@@ -16,7 +24,11 @@ RowSolver::RowSolver(const Scene& scene, const RowSettings& settings, std::size_
   const int n = 6 + robot_->dof(), stops = robot_->dof(), rows = 3 * static_cast<int>(contacts) + stops;
   row_ = Eigen::VectorXd::Zero(n);
   response_ = Eigen::VectorXd::Zero(n);
-  for (ContactRows& contact : contacts_) contact.J = Columns::Zero(n, 3);
+  responses_ = Triple::Zero(n, 3);
+  for (ContactRows& contact : contacts_) {
+    contact.support.reserve(n);
+    contact.J = Triple::Zero(n, 3);
+  }
   m_multiBodyNonContactConstraints.reserve(stops);
   m_multiBodyNormalContactConstraints.reserve(static_cast<int>(contacts));
   m_multiBodyFrictionContactConstraints.reserve(2 * static_cast<int>(contacts));
@@ -36,8 +48,10 @@ void RowSolver::set_contacts(std::span<const ContactPoint> points, const Kinemat
     const Eigen::Vector3d tangent = point.n_W.unitOrthogonal();
     rows.axes_W << point.n_W, tangent, point.n_W.cross(tangent);
     rows.J.setZero();
-    add_link(rows.J, rows.axes_W, point.link, 1.0, point.p_W, kinematics);
-    if (point.side == ContactSide::kRobot) add_link(rows.J, rows.axes_W, point.other, -1.0, point.p_W, kinematics);
+    rows.support.clear();
+    add_link(rows, point.link, 1.0, point.p_W, kinematics);
+    if (point.side == ContactSide::kRobot) add_link(rows, point.other, -1.0, point.p_W, kinematics);
+    close_support(rows.support);
     rows.friction = point.friction;
     rows.v_target = rows.axes_W.transpose() * point.v_other_W;
     if (point.side == ContactSide::kHuman) {
@@ -52,16 +66,17 @@ void RowSolver::set_contacts(std::span<const ContactPoint> points, const Kinemat
   }
 }
 
-void RowSolver::add_link(Columns& J, const Eigen::Matrix3d& axes_W, int link, double sign, const Eigen::Vector3d& p_W,
+void RowSolver::add_link(ContactRows& rows, int link, double sign, const Eigen::Vector3d& p_W,
                          const Kinematics& kinematics) const {
-  const Eigen::Matrix3d axes = sign * axes_W;
-  J.topRows<3>() += axes;
+  const Eigen::Matrix3d axes = sign * rows.axes_W;
   const Eigen::Vector3d arm = p_W - kinematics.p_WL(0);
+  rows.J.topRows<3>() += axes;
   for (int i = 0; i < 3; ++i)
-    J.block<3, 1>(3, i) += kinematics.R_WL(0).transpose() * arm.cross(Eigen::Vector3d(axes.col(i)));
+    rows.J.block<3, 1>(3, i) += kinematics.R_WL(0).transpose() * arm.cross(Eigen::Vector3d(axes.col(i)));
   for (int k = link; k > 0; k = robot_->links[k].parent) {
     const Eigen::Vector3d hinge = kinematics.R_WL(k) * robot_->links[k].axis;
-    J.row(5 + k) += hinge.cross(p_W - kinematics.p_WL(k)).transpose() * axes;
+    rows.J.row(5 + k) += hinge.cross(p_W - kinematics.p_WL(k)).transpose() * axes;
+    rows.support.push_back(5 + k);
   }
 }
 
@@ -97,28 +112,32 @@ void RowSolver::add_stops() {
     if (gap + dt_ * side * v[6 + i] > kNear) continue;
     row_.setZero();
     row_[6 + i] = side;
+    response_ = row_;
+    factor_->solve(response_);
     btMultiBodySolverConstraint& row =
-        add_row(m_multiBodyNonContactConstraints, row_, 0.0, -(gap < 0.0 ? settings_.stop_erp : 1.0) * gap / dt_);
+        add_row(m_multiBodyNonContactConstraints, 0.0, -(gap < 0.0 ? settings_.stop_erp : 1.0) * gap / dt_);
     row.m_upperLimit = kNoLimit;
   }
 }
 
 void RowSolver::add_contact(const ContactRows& contact) {
-  const int normal_index = m_multiBodyNormalContactConstraints.size();
-  btMultiBodySolverConstraint& normal =
-      add_row(m_multiBodyNormalContactConstraints, contact.J.col(0), contact.cfm, contact.v_target[0]);
-  normal.m_upperLimit = kNoLimit;
-  normal.m_frictionIndex = m_multiBodyFrictionContactConstraints.size();
-  const int first = normal.m_frictionIndex;
-  for (int i = 1; i < 3; ++i) {
+  responses_ = contact.J;
+  factor_->solve(contact.support, responses_);
+  const int normal_at = m_multiBodyNormalContactConstraints.size(),
+            friction_at = m_multiBodyFrictionContactConstraints.size();
+  for (int i = 0; i < 3; ++i) {
+    row_ = contact.J.col(i);
+    response_ = responses_.col(i);
     btMultiBodySolverConstraint& row =
-        add_row(m_multiBodyFrictionContactConstraints, contact.J.col(i), 0.0, contact.v_target[i]);
+        add_row(i == 0 ? m_multiBodyNormalContactConstraints : m_multiBodyFrictionContactConstraints,
+                i == 0 ? contact.cfm : 0.0, contact.v_target[i]);
+    row.m_frictionIndex = i == 0 ? friction_at : normal_at;
     row.m_friction = contact.friction;
-    row.m_frictionIndex = normal_index;
+    if (i == 0) row.m_upperLimit = kNoLimit;
   }
   // One step size for both, or friction would not oppose the slip.
-  btMultiBodySolverConstraint &a = m_multiBodyFrictionContactConstraints[first],
-                              &b = m_multiBodyFrictionContactConstraints[first + 1];
+  btMultiBodySolverConstraint &a = m_multiBodyFrictionContactConstraints[friction_at],
+                              &b = m_multiBodyFrictionContactConstraints[friction_at + 1];
   const double step = std::min(a.m_jacDiagABInv, b.m_jacDiagABInv);
   for (btMultiBodySolverConstraint* row : {&a, &b}) {
     row->m_rhs *= step / row->m_jacDiagABInv;
@@ -126,18 +145,15 @@ void RowSolver::add_contact(const ContactRows& contact) {
   }
 }
 
-btMultiBodySolverConstraint& RowSolver::add_row(btMultiBodyConstraintArray& rows, const Eigen::VectorXd& J, double cfm,
-                                                double v_target) {
-  const int n = static_cast<int>(J.size()), at = m_data.m_jacobians.size();
-  response_ = J;
-  factor_->solve(response_);
-  const double inverse = 1.0 / (J.dot(response_) + cfm);
+btMultiBodySolverConstraint& RowSolver::add_row(btMultiBodyConstraintArray& rows, double cfm, double v_target) {
+  const int n = static_cast<int>(row_.size()), at = m_data.m_jacobians.size();
+  const double inverse = 1.0 / (row_.dot(response_) + cfm);
 
   m_data.m_jacobians.resize(at + n);
   m_data.m_deltaVelocitiesUnitImpulse.resize(at + n);
   Eigen::Map<Eigen::VectorXd> jacobian(&m_data.m_jacobians[at], n), unit(&m_data.m_deltaVelocitiesUnitImpulse[at], n);
-  const Eigen::Vector3d force = J.head<3>(), spin = R_WB_ * response_.segment<3>(3);
-  jacobian << R_WB_ * J.segment<3>(3) - r_W_.cross(force), force, J.tail(n - 6);
+  const Eigen::Vector3d force = row_.head<3>(), spin = R_WB_ * response_.segment<3>(3);
+  jacobian << R_WB_ * row_.segment<3>(3) - r_W_.cross(force), force, row_.tail(n - 6);
   unit << spin, response_.head<3>() + spin.cross(r_W_), response_.tail(n - 6);
 
   btMultiBodySolverConstraint& row = rows.expand(btMultiBodySolverConstraint());

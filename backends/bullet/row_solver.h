@@ -37,9 +37,10 @@ class RowSolver final : public btMultiBodyConstraintSolver {
   [[nodiscard]] Eigen::Vector3d contact_force(std::size_t i) const;
 
  private:
-  using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
+  using Triple = TreeFactor::Triple;
   struct ContactRows {
-    Columns J;                                             // normal, two tangents; in duet's generalised velocity
+    std::vector<int> support;  // entries of the generalised velocity that J depends on, falling
+    Triple J;                  // normal, two tangents; in duet's generalised velocity
     Eigen::Matrix3d axes_W = Eigen::Matrix3d::Identity();  // columns: normal, tangents
     Eigen::Vector3d v_target = Eigen::Vector3d::Zero();    // along them [m/s]
     double cfm = 0.0, friction = 0.0;
@@ -51,13 +52,12 @@ class RowSolver final : public btMultiBodyConstraintSolver {
   // Nothing is written back: impulses are read from the rows.
   btScalar solveGroupCacheFriendlyFinish(btCollisionObject**, int, const btContactSolverInfo&) override { return 0.0; }
 
-  void add_link(Columns& J, const Eigen::Matrix3d& axes_W, int link, double sign, const Eigen::Vector3d& p_W,
+  void add_link(ContactRows& rows, int link, double sign, const Eigen::Vector3d& p_W,
                 const Kinematics& kinematics) const;
   void add_stops();
   void add_contact(const ContactRows& contact);
-  // A row with response to unit impulse; `J` in duet's generalised velocity.
-  btMultiBodySolverConstraint& add_row(btMultiBodyConstraintArray& rows, const Eigen::VectorXd& J, double cfm,
-                                       double v_target);
+  // A row of the Jacobian row_ and the response_ to its unit impulse, both in duet's generalised velocity.
+  btMultiBodySolverConstraint& add_row(btMultiBodyConstraintArray& rows, double cfm, double v_target);
 
   std::shared_ptr<const RobotModel> robot_;
   RowSettings settings_;
@@ -72,6 +72,7 @@ class RowSolver final : public btMultiBodyConstraintSolver {
   const Eigen::VectorXd* q_ = nullptr;
   Eigen::Matrix3d R_WB_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d r_W_ = Eigen::Vector3d::Zero();  // from the base's origin to its centre of mass
+  Triple responses_;
   Eigen::VectorXd row_, response_;
 };
 
