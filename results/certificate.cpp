@@ -1,6 +1,7 @@
 #include "results/certificate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -35,18 +36,28 @@ std::vector<nlohmann::json> engines_in(const nlohmann::json& certificate) {
   return engines;
 }
 
-// "" where the certificate covers the engine as it was run.
-std::string coverage_note(const std::vector<nlohmann::json>& certified, const EngineInfo& engine) {
-  const auto found = std::find_if(certified.begin(), certified.end(),
-                                  [&](const nlohmann::json& entry) { return text_of(entry, "name") == engine.name; });
-  if (found == certified.end()) return fmt::format("The certificate does not cover {}.", engine.name);
-  const std::string version = text_of(*found, "version");
-  const std::string profile = text_of(*found, "profile");
-  const bool same_version = engine.version.empty() || engine.version == version;
-  const bool same_profile = engine.profile.empty() || engine.profile == profile;
-  if (same_version && same_profile) return "";
-  return fmt::format("These results are of {} {} with profile {}, the certificate of {} with profile {}.", engine.name,
-                     engine.version, engine.profile, version, profile);
+// Which engines of the results the certificate does not cover as they were run.
+std::vector<std::string> coverage_notes(const std::vector<nlohmann::json>& certified,
+                                        const std::vector<EngineInfo>& engines) {
+  std::vector<std::string> missing;
+  std::vector<std::string> notes;
+  for (const EngineInfo& engine : engines) {
+    const auto found = std::find_if(certified.begin(), certified.end(),
+                                    [&](const nlohmann::json& entry) { return text_of(entry, "name") == engine.name; });
+    if (found == certified.end()) {
+      missing.push_back(engine.name);
+      continue;
+    }
+    const std::string version = text_of(*found, "version");
+    const std::string profile = text_of(*found, "profile");
+    const bool same_version = engine.version.empty() || engine.version == version;
+    const bool same_profile = engine.profile.empty() || engine.profile == profile;
+    if (same_version && same_profile) continue;
+    notes.push_back(fmt::format("These results are of {} {} with profile {}, the certificate of {} with profile {}.",
+                                engine.name, engine.version, engine.profile, version, profile));
+  }
+  if (!missing.empty()) notes.push_back(fmt::format("The certificate does not cover {}.", fmt::join(missing, ", ")));
+  return notes;
 }
 
 }  // namespace
@@ -80,9 +91,7 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
     titled.notes.push_back(
         fmt::format("Its schema is {}, expected {}: it may say more than is shown.", schema, kSchema));
   }
-  for (const EngineInfo& engine : engines) {
-    if (std::string note = coverage_note(certified, engine); !note.empty()) titled.notes.push_back(std::move(note));
-  }
+  for (std::string& note : coverage_notes(certified, engines)) titled.notes.push_back(std::move(note));
   return titled;
 }
 

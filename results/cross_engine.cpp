@@ -82,7 +82,7 @@ void add_spread(EngineSuccess& success) {
 }
 
 EngineSuccess success_of(const Combination& combination, const EpisodesOfEngines& episodes, const EngineRows& rows,
-                         const CrossEngineOptions& options) {
+                         ClusterBootstrap& bootstrap, double level) {
   EngineSuccess success;
   success.controller = combination.controller;
   success.policy = combination.policy;
@@ -100,19 +100,18 @@ EngineSuccess success_of(const Combination& combination, const EpisodesOfEngines
     ++success.n;
   }
   for (auto& [engine, rate] : gathered.engines) {
-    finish(rate, options.level);
+    finish(rate, level);
     success.engines.push_back(rate);
   }
   if (gathered.playback.n > 0) {
     gathered.playback.engine = kPlaybackEngine;
-    finish(gathered.playback, options.level);
+    finish(gathered.playback, level);
     success.playback = gathered.playback;
   }
   add_spread(success);
   success.mean_interval = {.low = kUndefined, .high = kUndefined};
   if (success.n > 0) {
-    success.mean_interval =
-        cluster_bootstrap(gathered.means, gathered.clips, options.resamples, options.seed, options.level);
+    success.mean_interval = bootstrap.mean(gathered.means, gathered.clips, level);
   }
   return success;
 }
@@ -246,9 +245,10 @@ const EpisodeRow* EngineRows::playback(const Combination& combination, const Epi
 }
 
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options) {
+  ClusterBootstrap bootstrap(options.resamples, options.seed);
   std::vector<EngineSuccess> success;
   for (const auto& [combination, episodes] : rows.physics()) {
-    success.push_back(success_of(combination, episodes, rows, options));
+    success.push_back(success_of(combination, episodes, rows, bootstrap, options.level));
   }
   return success;
 }

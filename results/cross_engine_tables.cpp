@@ -171,7 +171,7 @@ TitledTable drift_table(const CrossEngine& result, const std::string& controller
   return titled;
 }
 
-std::string reached(double time) { return std::isfinite(time) ? significant(time) : "not reached"; }
+std::string reached(double time) { return std::isfinite(time) ? fmt::format("{:.2f}", time) : "not reached"; }
 
 TitledTable parting_table(const CrossEngine& result, bool with_controller) {
   TitledTable titled{.title = "Time until engines part", .caption = "", .table = {}, .notes = {}};

@@ -120,6 +120,7 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
       for (const auto& [engine, row] : row_of) gather_drift(*row, *playback, metrics, clips.of(id), gathered);
     }
   }
+  ClusterBootstrap bootstrap(options.resamples, options.seed);
   std::vector<MetricDrift> drift;
   for (const auto& [key, differences] : gathered) {
     const auto& [controller, metric, engine] = key;
@@ -129,8 +130,7 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
                      .pairs = static_cast<long>(differences.values.size()),
                      .playback = mean_of(differences.playback),
                      .mean = mean_of(differences.values),
-                     .interval = cluster_bootstrap(differences.values, differences.clips, options.resamples,
-                                                   options.seed, options.level)});
+                     .interval = bootstrap.mean(differences.values, differences.clips, options.level)});
   }
   return drift;
 }
@@ -195,7 +195,8 @@ std::vector<ForceAgreement> force_agreement(const EngineRows& rows) {
                          .unit = force_unit(name),
                          .episodes = static_cast<long>(samples.typical.size()),
                          .typical = quantile(samples.typical, 0.5),
-                         .spread = quantile(samples.spread, 0.5)};
+                         .spread = quantile(samples.spread, 0.5),
+                         .ratio = {}};
     for (const auto& [engine, ratios] : samples.ratio) force.ratio[engine] = quantile(ratios, 0.5);
     agreement.push_back(std::move(force));
   }

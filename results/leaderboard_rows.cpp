@@ -100,6 +100,15 @@ std::vector<LeaderboardRow> leaderboard_rows(const std::vector<LeaderboardEntry>
   return rows;
 }
 
+std::vector<std::vector<LeaderboardRow>> rows_by_engine(const std::vector<LeaderboardRow>& rows) {
+  std::vector<std::vector<LeaderboardRow>> engines;
+  for (const LeaderboardRow& row : rows) {
+    if (engines.empty() || engines.back().front().engine != row.engine) engines.emplace_back();
+    engines.back().push_back(row);
+  }
+  return engines;
+}
+
 int task_rank(std::string_view task) {
   for (std::size_t i = 0; i < kTasks.size(); ++i) {
     if (to_string(kTasks[i]) == task) return static_cast<int>(i);

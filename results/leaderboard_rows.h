@@ -21,6 +21,10 @@ struct LeaderboardRow {
 // By engine, controller, perturbation; then the main arm by policy, the oracle, and the null arm last.
 std::vector<LeaderboardRow> leaderboard_rows(const std::vector<LeaderboardEntry>& entries);
 
+// Rows of one engine after those of another, each engine's apart: for tables with a column per row, which would be too
+// wide with many engines.
+std::vector<std::vector<LeaderboardRow>> rows_by_engine(const std::vector<LeaderboardRow>& rows);
+
 // Tasks that occur, in the order of kTasks, others after them by name; without "all".
 std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& entries);
 // The place of a task in that order.

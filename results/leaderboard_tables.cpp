@@ -79,7 +79,8 @@ TextTable verdict_table(const Entries& entries, const std::vector<LeaderboardRow
 }
 
 // Metrics are rows here: there are many of them and few policies.
-TextTable metric_table(const Entries& entries, const std::vector<LeaderboardRow>& rows, const RowLabels& labels) {
+TextTable metric_table(const Entries& entries, const std::vector<LeaderboardRow>& rows) {
+  const RowLabels labels = row_labels(rows);
   TextTable table{.header = {"Metric"}, .rows = {}, .label_columns = 1};
   for (const std::vector<std::string>& cells : labels.cells) {
     std::string title;
@@ -176,7 +177,12 @@ std::string leaderboard_markdown(const Entries& entries) {
   }
   if (!metric_names(entries).empty()) {
     text += "\nMean over the episodes that have the metric, all tasks:\n\n";
-    text += markdown_table(metric_table(entries, rows, labels));
+    const std::vector<std::vector<LeaderboardRow>> engines = rows_by_engine(rows);
+    for (const std::vector<LeaderboardRow>& of_engine : engines) {
+      if (engines.size() > 1)
+        text += fmt::format("{}Engine {}:\n\n", &of_engine == &engines.front() ? "" : "\n", of_engine.front().engine);
+      text += markdown_table(metric_table(entries, of_engine));
+    }
   }
   return text;
 }

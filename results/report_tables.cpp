@@ -194,17 +194,26 @@ std::string detector_table_html(const std::vector<LeaderboardEntry>& entries) {
 }
 
 std::string episode_metrics_html(const ReportContent& content) {
-  const std::vector<LeaderboardRow> rows = leaderboard_rows(content.entries);
-  const RowLabels labels = row_labels(rows);
-  std::vector<std::string> heads;
-  std::vector<const Values*> sets;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const LeaderboardEntry* overall = rows[i].find("all");
-    if (overall == nullptr) continue;
-    heads.push_back(joined(labels.cells[i]));
-    sets.push_back(&overall->metrics);
+  const std::vector<std::vector<LeaderboardRow>> engines = rows_by_engine(leaderboard_rows(content.entries));
+  std::string html;
+  for (const std::vector<LeaderboardRow>& rows : engines) {
+    const RowLabels labels = row_labels(rows);
+    std::vector<std::string> heads;
+    std::vector<const Values*> sets;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const LeaderboardEntry* overall = rows[i].find("all");
+      if (overall == nullptr) continue;
+      heads.push_back(joined(labels.cells[i]));
+      sets.push_back(&overall->metrics);
+    }
+    const std::string table =
+        metric_table("Mean over the episodes that have the metric, all tasks", heads, sets, content.columns);
+    if (table.empty()) continue;
+    html += engines.size() == 1 ? table
+                                : fmt::format("<details><summary>Engine {}</summary>{}</details>\n",
+                                              escape_html(rows.front().engine), table);
   }
-  return metric_table("Mean over the episodes that have the metric, all tasks", heads, sets, content.columns);
+  return html;
 }
 
 std::string retargeting_html(const ReportContent& content) {

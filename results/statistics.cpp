@@ -135,20 +135,37 @@ double mcnemar_exact(long only_a, long only_b) {
 
 Interval cluster_bootstrap(std::span<const double> values, std::span<const int> cluster, int resamples,
                            std::uint64_t seed, double level) {
+  return ClusterBootstrap(resamples, seed).mean(values, cluster, level);
+}
+
+ClusterBootstrap::ClusterBootstrap(int resamples, std::uint64_t seed) : resamples_(resamples), seed_(seed) {
+  require(resamples > 0, fmt::format("bootstrap: expected at least 1 resample, found {}", resamples));
+}
+
+const std::vector<int>& ClusterBootstrap::draws(int clusters) {
+  const auto [found, is_new] = draws_.try_emplace(clusters);
+  if (is_new) {
+    Random random(seed_, stream_key({"cluster_bootstrap"}));
+    found->second.resize(static_cast<std::size_t>(resamples_) * static_cast<std::size_t>(clusters));
+    for (int& draw : found->second) draw = random.below(clusters);
+  }
+  return found->second;
+}
+
+Interval ClusterBootstrap::mean(std::span<const double> values, std::span<const int> cluster, double level) {
   require(!values.empty(), "bootstrap: expected at least one value, found none");
   require(values.size() == cluster.size(),
           fmt::format("bootstrap: expected one cluster per value, found {} for {}", cluster.size(), values.size()));
-  require(resamples > 0, fmt::format("bootstrap: expected at least 1 resample, found {}", resamples));
   require_level(level);
   const std::vector<Cluster> clusters = clusters_of(values, cluster);
-  Random random(seed, stream_key({"cluster_bootstrap"}));
-  std::vector<double> means(resamples);
+  const std::vector<int>& drawn = draws(static_cast<int>(clusters.size()));
+  auto draw = drawn.begin();
+  std::vector<double> means(resamples_);
   for (double& mean : means) {
     Cluster total;
-    for (std::size_t draw = 0; draw < clusters.size(); ++draw) {
-      const Cluster& drawn = clusters[random.below(static_cast<int>(clusters.size()))];
-      total.sum += drawn.sum;
-      total.count += drawn.count;
+    for (std::size_t i = 0; i < clusters.size(); ++i, ++draw) {
+      total.sum += clusters[*draw].sum;
+      total.count += clusters[*draw].count;
     }
     mean = total.sum / static_cast<double>(total.count);
   }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,6 +26,21 @@ double mcnemar_exact(long only_a, long only_b);
 // Percentile interval of the mean by resampling clusters with replacement. `cluster` has one id per value.
 Interval cluster_bootstrap(std::span<const double> values, std::span<const int> cluster, int resamples,
                            std::uint64_t seed, double level = 0.95);
+
+// The same for many sets of values: clusters are drawn once for each number of clusters, so that sets with the same
+// clusters share their draws. Equal to cluster_bootstrap with the same seed.
+class ClusterBootstrap {
+ public:
+  ClusterBootstrap(int resamples, std::uint64_t seed);  // throws std::invalid_argument for no resamples
+  Interval mean(std::span<const double> values, std::span<const int> cluster, double level = 0.95);
+
+ private:
+  const std::vector<int>& draws(int clusters);
+
+  int resamples_;
+  std::uint64_t seed_;
+  std::map<int, std::vector<int>> draws_;  // number of clusters -> (resamples, clusters)
+};
 
 // Holm's step-down adjustment, in the order given.
 std::vector<double> holm(std::span<const double> p_values);

@@ -95,9 +95,9 @@ Mean of engine minus playback over the same episodes, with a 95 % interval that 
 
 | Engines        | Episodes | First quartile [s] | Median [s] | Third quartile [s] | Never part [%] |
 | :------------- | -------: | -----------------: | ---------: | -----------------: | -------------: |
-| bullet, mujoco |       12 |                0.5 |        0.5 |                0.5 |            0.0 |
-| bullet, ode    |       12 |                0.2 |        0.2 |                0.2 |            0.0 |
-| mujoco, ode    |       12 |                0.2 |        0.2 |                0.2 |            0.0 |
+| bullet, mujoco |       12 |               0.50 |       0.50 |               0.50 |            0.0 |
+| bullet, ode    |       12 |               0.20 |       0.20 |               0.20 |            0.0 |
+| mujoco, ode    |       12 |               0.20 |       0.20 |               0.20 |            0.0 |
 
 First time at which a traced point (root, hands) is more than 5 cm away from where it is in the other engine in the same episode, or at which the robot falls or diverges in one engine alone. Quartiles by Kaplan and Meier: an episode that ends before that counts for as long as it lasted.
 

@@ -183,6 +183,20 @@ TEST(LeaderboardMarkdown, AlignsAndPrintsTheNullArmAsARow) {
   }
 }
 
+TEST(LeaderboardMarkdown, MetricsOfSeveralEnginesAreATableEach) {
+  std::vector<EpisodeRow> rows;
+  for (const char* engine : {"ode", "mujoco"}) {
+    rows.push_back(episode("replay", "hug", 0, true));
+    rows.back().engine = engine;
+    rows.back().metrics = {{"jpe", 0.125}};
+  }
+  const std::string text = leaderboard_markdown(leaderboard(rows));
+  EXPECT_THAT(text, HasSubstr("all tasks:\n\nEngine mujoco:\n\n| Metric | replay |\n"));
+  EXPECT_THAT(text, HasSubstr("|  0.125 |\n\nEngine ode:\n\n| Metric | replay |\n"));
+  rows.pop_back();
+  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("all tasks:\n\n| Metric | replay |\n"));
+}
+
 TEST(LeaderboardMarkdown, EscapesNames) {
   std::vector<EpisodeRow> rows = {episode("a|b\n<c> <5", "hug", 0, true)};
   EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("a\\|b &lt;c> <5"));

@@ -167,6 +167,19 @@ TEST(McNemar, MatchesPublishedValuesAndLaws) {
               testing::HasSubstr("found -1 and 0"));
 }
 
+TEST(ClusterBootstrap, SharedDrawsChangeNothing) {
+  const std::vector<double> values = {0.1, 0.7, 0.2, 0.9, 0.4, 0.3};
+  const std::vector<int> three = {0, 0, 1, 1, 2, 2};
+  const std::vector<int> two = {0, 1, 0, 1, 0, 1};
+  ClusterBootstrap shared(500, 3);
+  for (const std::vector<int>& cluster : {three, two, three}) {
+    const Interval expected = cluster_bootstrap(values, cluster, 500, 3);
+    const Interval found = shared.mean(values, cluster);
+    EXPECT_EQ(found.low, expected.low);
+    EXPECT_EQ(found.high, expected.high);
+  }
+}
+
 TEST(ClusterBootstrap, DependsOnTheSeedOnlyAndNotOnClusterNames) {
   const std::vector<double> values = {0, 1, 1, 0, 1, 1, 0, 1, 0.5, 2};
   const std::vector<int> cluster = {0, 0, 1, 1, 2, 2, 3, 3, 4, 4};
