@@ -1,0 +1,402 @@
+// Simbody against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "backends/factory.h"
+#include "core/random.h"
+#include "robots/dynamics.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/backends/small_robots.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+struct Simbody : ::testing::Test {
+  void SetUp() override {
+    for (const EngineInfo& engine : engines())
+      if (engine.name == "simbody" && !engine.available)
+        GTEST_SKIP() << "not run: engine simbody absent: " << engine.reason;
+  }
+  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
+    Scene scene;
+    scene.robot = std::move(robot);
+    scene.partner = PartnerMode::kNone;
+    scene.dt = dt;
+    scene.self_collision = false;
+    return make_backend("simbody", scene);
+  }
+};
+
+constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
+
+TEST_F(Simbody, FallsAsSemiImplicitEulerDoes) {
+  const auto backend = make(test::sledge());
+  RobotState state = test::state_of(*backend->scene().robot, {0.3, -0.2, 50.0});
+  state.v_WB = {1.0, 2.0, 3.0};
+  backend->reset(state);
+  const int steps = 250;
+  for (int i = 0; i < steps; ++i) ASSERT_EQ(backend->step(test::no_torque(*backend->scene().robot)), Outcome::kOk);
+  const double t = backend->time(), dt = backend->scene().dt;
+  EXPECT_NEAR(backend->state().X_WB.p.x(), 0.3 + t, kAlgebra);
+  EXPECT_NEAR(backend->state().X_WB.p.y(), -0.2 + 2.0 * t, kAlgebra);
+  EXPECT_NEAR(backend->state().X_WB.p.z(), 50.0 + 3.0 * t - 0.5 * kGravity * t * (t + dt), kAlgebra);
+  EXPECT_NEAR(backend->state().v_WB.z(), 3.0 - kGravity * t, kAlgebra);
+}
+
+TEST_F(Simbody, ReportsVelocitiesInOurFrames) {
+  const auto backend = make(test::sledge());
+  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 50.0});
+  state.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -1.0).normalized());
+  state.w_WB_B = {0.0, 0.0, 2.0};  // about a principal axis: constant in B
+  backend->reset(state);
+  for (int i = 0; i < 100; ++i) backend->step(test::no_torque(*backend->scene().robot));
+  const Eigen::Quaterniond turned = state.X_WB.R * yaw_rotation(2.0 * backend->time());
+  EXPECT_NEAR(backend->state().X_WB.R.angularDistance(turned), 0.0, 1e-7);
+  EXPECT_NEAR((backend->state().w_WB_B - state.w_WB_B).norm(), 0.0, kAlgebra);
+}
+
+struct SimbodyWheel : Simbody {
+  void SetUp() override {
+    Simbody::SetUp();
+    if (IsSkipped()) return;
+    backend = make(test::wheel());
+    backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
+    command = test::no_torque(*backend->scene().robot);
+  }
+  static constexpr double kInertia = test::kWheelInertia + test::kWheelArmature;
+  std::unique_ptr<Backend> backend;
+  JointCommand command;
+};
+
+TEST_F(SimbodyWheel, TurnsWithItsArmature) {
+  command.tau_ff[0] = 0.5;
+  for (int i = 0; i < 100; ++i) backend->step(command);
+  EXPECT_NEAR(backend->state().v[0], 0.5 / kInertia * backend->time(), 1e-6);  // the base gives way by 1e-6
+  EXPECT_EQ(backend->torques()[0], 0.5);
+}
+
+TEST_F(SimbodyWheel, FollowsTheTorqueLawTakenImplicitly) {
+  command.q_target[0] = 0.2;
+  command.kp[0] = 8.0;
+  command.kd[0] = 0.9;
+  command.tau_ff[0] = 0.3;
+  double q = 0.0, v = 0.0;
+  const double dt = backend->scene().dt;
+  for (int i = 0; i < 200; ++i) {
+    backend->step(command);
+    v = (kInertia * v + dt * (8.0 * (0.2 - q) + 0.3)) / (kInertia + dt * 0.9 + dt * dt * 8.0);
+    q += dt * v;
+    ASSERT_NEAR(backend->state().q[0], q, 1e-6);
+    ASSERT_NEAR(backend->state().v[0], v, 1e-6);
+    ASSERT_NEAR(backend->torques()[0], 8.0 * (0.2 - q) + 0.3 - 0.9 * v, 1e-4);  // of the end of the step
+  }
+}
+
+TEST_F(SimbodyWheel, GainsMayChangeAtEveryStep) {
+  double q = 0.0, v = 0.0;
+  const double dt = backend->scene().dt;
+  for (int i = 0; i < 100; ++i) {
+    const double kp = 1.0 + i % 7, kd = 0.1 * (i % 3);
+    command.kp[0] = kp;
+    command.kd[0] = kd;
+    command.q_target[0] = 0.1;
+    backend->step(command);
+    v = (kInertia * v + dt * kp * (0.1 - q)) / (kInertia + dt * kd + dt * dt * kp);
+    q += dt * v;
+    ASSERT_NEAR(backend->state().q[0], q, 1e-6);
+  }
+}
+
+TEST_F(Simbody, AStiffServoIsStable) {
+  const auto robot = test::wheel();
+  robot->joints[0].effort = 1e9;
+  const auto backend = make(robot);
+  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
+  JointCommand command = test::no_torque(*robot);
+  command.q_target[0] = 0.5;
+  command.kp[0] = 1e6;
+  command.kd[0] = 1e3;
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk);
+  EXPECT_NEAR(backend->state().q[0], 0.5, 1e-4);
+  EXPECT_NEAR(backend->state().v[0], 0.0, 1e-4);
+}
+
+TEST_F(SimbodyWheel, ClampsTheWholeLawNotItsSpring) {
+  command.tau_ff[0] = 100.0;  // effort is 10
+  backend->step(command);
+  EXPECT_EQ(backend->torques()[0], 10.0);
+  EXPECT_NEAR(backend->state().v[0], 10.0 / kInertia * backend->scene().dt, 1e-6);
+  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0});
+  state.v[0] = 20.0;
+  backend->reset(state);
+  command.tau_ff[0] = 0.0;
+  command.kd[0] = 5.0;  // asks for -100
+  backend->step(command);
+  EXPECT_EQ(backend->torques()[0], -10.0);
+  EXPECT_NEAR(backend->state().v[0], 20.0 - 10.0 / kInertia * backend->scene().dt, 1e-5);
+}
+
+TEST_F(SimbodyWheel, StopsAtBothLimitsWithoutPassingThem) {
+  for (const double side : {1.0, -1.0}) {
+    backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
+    command.tau_ff[0] = side * 10.0;
+    double farthest = 0.0;
+    for (int i = 0; i < 1000; ++i) {
+      backend->step(command);
+      farthest = std::max(farthest, side * backend->state().q[0]);
+    }
+    EXPECT_LT(farthest, 1.0 + 1e-6);  // arrives at 16 rad/s
+    EXPECT_NEAR(side * backend->state().q[0], 1.0, 1e-6);
+    EXPECT_NEAR(backend->state().v[0], 0.0, 1e-6);
+    EXPECT_EQ(backend->torques()[0], side * 10.0);
+  }
+}
+
+TEST_F(SimbodyWheel, ComesBackFromBeyondAStop) {
+  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0});
+  state.q[0] = 1.1;
+  backend->reset(state);
+  for (int i = 0; i < 100; ++i) backend->step(command);
+  EXPECT_LT(backend->state().q[0], 1.0 + 1e-6);
+}
+
+TEST_F(Simbody, DivergenceIsAValueAndFinalUntilReset) {
+  const auto robot = test::wheel();
+  robot->joints[0].effort = 1e300;
+  robot->joints[0].lower = -1e9;
+  robot->joints[0].upper = 1e9;
+  const auto backend = make(robot);
+  const RobotState state = test::state_of(*robot, {0.0, 0.0, 1000.0});
+  for (const double torque : {1e6, 1e200, 1e300}) {
+    backend->reset(state);
+    JointCommand command = test::no_torque(*robot);
+    command.tau_ff[0] = torque;
+    Outcome outcome = Outcome::kOk;
+    for (int i = 0; i < 2000 && outcome == Outcome::kOk; ++i) outcome = backend->step(command);
+    EXPECT_EQ(outcome, Outcome::kDiverged);
+    EXPECT_TRUE(backend->state().q.allFinite());
+    command = test::no_torque(*robot);
+    EXPECT_EQ(backend->step(command), Outcome::kDiverged);
+  }
+  backend->reset(state);
+  EXPECT_EQ(backend->step(test::no_torque(*robot)), Outcome::kOk);
+}
+
+TEST_F(Simbody, OptionsAreCheckedByNameAndRange) {
+  Scene scene;
+  scene.robot = test::sledge();
+  scene.options = {{"sweps", "10"}};
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([&] { make_backend("simbody", scene); }).find("sweeps"),
+            std::string::npos);
+  scene.options = {{"sweeps", "0"}};
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([&] {
+              make_backend("simbody", scene);
+            }).find("simbody: sweeps is '0', expected a whole number from 1 to 10000"),
+            std::string::npos);
+  scene.options = {{"contact_stiffness", "soft"}};
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([&] { make_backend("simbody", scene); }).find("'soft'"),
+            std::string::npos);
+  scene.options = {{"contact_stiffness", "5e5"}, {"contact_damping", "0"}, {"stop_erp", "0.5"}, {"sweeps", "5"}};
+  EXPECT_EQ(make_backend("simbody", scene)->name(), "simbody");
+}
+
+TEST_F(Simbody, SaysItsVersion) { EXPECT_EQ(make(test::sledge())->version().substr(0, 2), "3."); }
+
+TEST_F(Simbody, PrintsNothing) {
+  ::testing::internal::CaptureStdout();
+  ::testing::internal::CaptureStderr();
+  {
+    const auto backend = make(test::wheel());
+    backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
+    backend->step(test::no_torque(*backend->scene().robot));
+  }
+  EXPECT_EQ(::testing::internal::GetCapturedStdout(), "");
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+TEST_F(Simbody, BareLoopTakesTimeAndRefusesNoSteps) {
+  Scene scene;
+  scene.robot = test::sledge();
+  const RobotState state = test::state_of(*scene.robot, {0.0, 0.0, 0.1});
+  const auto& bare = engine_module("simbody").bare_step_seconds;
+  EXPECT_GT(bare(scene, state, test::no_torque(*scene.robot), 10), 0.0);
+  EXPECT_NE(test::thrown_message<std::invalid_argument>([&] {
+              bare(scene, state, test::no_torque(*scene.robot), 0);
+            }).find("steps is 0"),
+            std::string::npos);
+}
+
+TEST_F(Simbody, BranchedTreesKeepTheCardsJointOrder) {
+  // A second wheel on the base listed between a wheel and its child: Simbody orders speeds as it likes.
+  auto robot = test::wheel();
+  RobotLink second = robot->links[1], child = robot->links[1];
+  second.name = "second";
+  child.name = "child";
+  child.parent = 1;
+  robot->links.insert(robot->links.end(), {second, child});
+  robot->joints.resize(3, robot->joints[0]);
+  robot->neutral = Eigen::VectorXd::Zero(3);
+  const auto backend = make(robot);
+  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
+  JointCommand command = test::no_torque(*robot);
+  command.tau_ff[1] = 0.5;
+  for (int i = 0; i < 10; ++i) backend->step(command);
+  EXPECT_GT(backend->state().q[1], 1e-4);
+  EXPECT_NEAR(backend->state().q[0], 0.0, 1e-9);
+  EXPECT_NEAR(backend->state().q[2], 0.0, 1e-9);
+}
+
+TEST_F(Simbody, AccelerationsAgreeWithOurDynamics) {
+  const auto backend = make(test::g1(), 1e-6);
+  const RobotModel& robot = *backend->scene().robot;
+  Random random(1, 2);
+  for (int trial = 0; trial < 3; ++trial) {
+    RobotState state = test::state_of(robot, {0.0, 0.0, 50.0});
+    state.X_WB.R = Eigen::AngleAxisd(1.0, Eigen::Vector3d(0.1, 0.7, -0.3).normalized());
+    state.w_WB_B = {random.normal(), random.normal(), random.normal()};
+    state.v_WB = {random.normal(), random.normal(), random.normal()};
+    for (int i = 0; i < robot.dof(); ++i) {
+      state.q[i] = std::clamp(0.3 * random.normal(), robot.joints[i].lower + 0.05, robot.joints[i].upper - 0.05);
+      state.v[i] = random.normal();
+    }
+    JointCommand command = test::no_torque(robot);
+    for (int i = 0; i < robot.dof(); ++i) command.tau_ff[i] = random.normal();
+    const int n = 6 + robot.dof();
+    Eigen::VectorXd bias(n), force = Eigen::VectorXd::Zero(n);
+    Eigen::MatrixXd mass(n, n);
+    bias_forces(robot, state, bias);
+    mass_matrix(robot, state, mass);
+    force.tail(robot.dof()) = command.tau_ff;
+    const Eigen::VectorXd expected = mass.llt().solve(force - bias);
+    backend->reset(state);
+    backend->step(command);
+    Eigen::VectorXd found(n);
+    found << backend->state().v_WB - state.v_WB, backend->state().w_WB_B - state.w_WB_B, backend->state().v - state.v;
+    found /= backend->scene().dt;
+    EXPECT_LT((found - expected).norm() / expected.norm(), 1e-6);
+  }
+}
+
+// A run that falls over: contacts come and go, everything is excited.
+struct Trace {
+  std::vector<RobotState> states;
+  std::vector<size_t> contacts;
+};
+
+Trace fall(Backend& backend, int begin, int end) {
+  const RobotModel& robot = *backend.scene().robot;
+  Trace run;
+  JointCommand command = robot.default_command(robot.neutral);
+  for (int i = begin; i < end; ++i) {
+    command.q_target[3] = robot.neutral[3] + 0.3 * std::sin(0.02 * i);
+    EXPECT_EQ(backend.step(command), Outcome::kOk);
+    run.states.push_back(backend.state());
+    run.contacts.push_back(backend.contacts().size());
+  }
+  return run;
+}
+
+bool same(const Trace& a, const Trace& b) {
+  return a.contacts == b.contacts && std::ranges::equal(a.states, b.states, test::same);
+}
+
+TEST_F(Simbody, RunsAgainBitwiseAfterResetInAFreshWorldAndInAnotherThread) {
+  const Scene scene = test::g1_scene();
+  const auto backend = make_backend("simbody", scene);
+  backend->reset(scene.robot->standing_state());
+  const Trace first = fall(*backend, 0, 1000);
+  backend->reset(scene.robot->standing_state());
+  EXPECT_TRUE(same(fall(*backend, 0, 1000), first));
+  Trace other;
+  std::thread thread([&] {
+    const auto fresh = make_backend("simbody", scene);
+    fresh->reset(scene.robot->standing_state());
+    other = fall(*fresh, 0, 1000);
+  });
+  thread.join();
+  EXPECT_TRUE(same(other, first));
+}
+
+TEST_F(Simbody, ContinuesBitwiseFromASnapshotInTheMiddleOfAFall) {
+  const Scene scene = test::g1_scene();
+  const auto backend = make_backend("simbody", scene);
+  backend->reset(scene.robot->standing_state());
+  backend->push(9, {3.0, 1.0, 0.0}, scene.robot->standing_state().X_WB.p);
+  fall(*backend, 0, 300);
+  ASSERT_FALSE(backend->contacts().empty());
+  const Snapshot snapshot = backend->snapshot();
+  const Trace first = fall(*backend, 300, 900);
+  backend->restore(snapshot);
+  EXPECT_TRUE(same(fall(*backend, 300, 900), first));
+  const auto fresh = make_backend("simbody", scene);
+  fresh->restore(snapshot);
+  EXPECT_TRUE(same(fall(*fresh, 300, 900), first));
+  EXPECT_EQ(fresh->time(), 900 * scene.dt);
+}
+
+TEST_F(Simbody, TheLimitHoldsForTheG1UnderATargetFarAway) {
+  const auto backend = make(test::g1());
+  const RobotModel& robot = *backend->scene().robot;
+  backend->reset(test::state_of(robot, {0.0, 0.0, 50.0}));
+  JointCommand command = robot.default_command(robot.neutral.array() + 0.6);
+  bool limited = false;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(backend->step(command), Outcome::kOk);
+    for (int k = 0; k < robot.dof(); ++k) {
+      ASSERT_LE(std::abs(backend->torques()[k]), 1.001 * robot.joints[k].effort) << robot.joints[k].name;
+      limited = limited || std::abs(backend->torques()[k]) == robot.joints[k].effort;
+    }
+  }
+  EXPECT_TRUE(limited);
+}
+
+// The centre of mass kept over the feet through the ankles, at 100 Hz: reference/engines.md section 1.
+void balance(const Backend& backend, Kinematics& kinematics, Eigen::Vector2d& before, JointCommand& command) {
+  const RobotModel& robot = *backend.scene().robot;
+  kinematics.update(backend.state().X_WB, backend.state().q);
+  Eigen::Vector3d feet = Eigen::Vector3d::Zero();
+  for (const int shape : robot.feet) feet += kinematics.shape_position(shape) / static_cast<double>(robot.feet.size());
+  const Eigen::Vector2d lean = (kinematics.center_of_mass() - feet).head<2>() / 0.65;
+  const Eigen::Vector2d by = (1.5 * lean + 0.35 * (lean - before) / 0.01).cwiseMax(-0.3).cwiseMin(0.3);
+  before = lean;
+  for (const int ankle : {4, 10}) {
+    command.q_target[ankle] = robot.neutral[ankle] + by.x();
+    command.q_target[ankle + 1] = robot.neutral[ankle + 1] - 0.5 * by.y();
+  }
+}
+
+TEST_F(Simbody, TheG1StandsForTwoSecondsAndCarriesItsWeight) {
+  for (const double dt : {0.0005, 0.002, 0.004}) {
+    const auto backend = make(test::g1(), dt);
+    const RobotModel& robot = *backend->scene().robot;
+    backend->reset(robot.standing_state());
+    JointCommand command = robot.default_command(robot.neutral);
+    for (const int leg : {0, 6})
+      for (int k = 0; k < 6; ++k) {
+        command.kp[leg + k] = k < 4 ? 200.0 : 150.0;
+        command.kd[leg + k] = 5.0;
+      }
+    Kinematics kinematics(robot);
+    Eigen::Vector2d before = Eigen::Vector2d::Zero();
+    const int steps = static_cast<int>(std::lround(3.0 / dt)), control = static_cast<int>(std::lround(0.01 / dt));
+    double carried = 0.0, deepest = 0.0;
+    for (int i = 0; i < steps; ++i) {
+      if (i % std::max(1, control) == 0) balance(*backend, kinematics, before, command);
+      ASSERT_EQ(backend->step(command), Outcome::kOk);
+      if (i < steps * 2 / 3) continue;
+      for (const Contact& contact : backend->contacts()) {
+        carried += contact.f_W.z() / (steps / 3.0);
+        deepest = std::max(deepest, contact.depth);
+      }
+    }
+    const double weight = robot.total_mass() * kGravity;
+    EXPECT_NEAR(backend->state().X_WB.p.z(), robot.standing_height, 0.03) << dt;
+    EXPECT_NEAR(carried, weight, 1e-3 * weight) << dt;
+    EXPECT_LT(deepest, 1e-3) << dt;
+  }
+}
+
+}  // namespace
+}  // namespace duet
