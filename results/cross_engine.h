@@ -91,7 +91,7 @@ struct EngineParting {
 };
 
 // One contact force over the engines, per episode of two or more engines that have it; episodes in which no engine has
-// any force are left out.
+// any force are left out, and so are names that end with no unit.
 struct ForceAgreement {
   std::string name, unit;
   long episodes = 0;

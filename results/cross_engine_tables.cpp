@@ -216,8 +216,8 @@ TitledTable force_table(const CrossEngine& result) {
       .notes = {}};
   for (const EngineInfo& engine : result.engines) titled.table.header.push_back(engine.name);
   for (const ForceAgreement& force : result.forces) {
-    std::vector<std::string> cells = {force.name, force.unit.empty() ? "-" : force.unit, count(force.episodes),
-                                      significant(force.typical), percent(force.spread)};
+    std::vector<std::string> cells = {force.name, force.unit, count(force.episodes), significant(force.typical),
+                                      percent(force.spread)};
     for (const EngineInfo& engine : result.engines) {
       const auto found = force.ratio.find(engine.name);
       cells.push_back(found != force.ratio.end() ? fmt::format("{:.3f}", found->second) : "-");

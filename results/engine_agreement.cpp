@@ -95,12 +95,15 @@ void gather_force(const std::map<std::string, double>& in_engine, ForceSamples& 
   }
 }
 
+// Without flags and ratios, whose names end with no unit.
 std::set<std::string> force_names(const EngineRows& rows) {
   std::set<std::string> names;
   for (const auto& [combination, episodes] : rows.physics()) {
     for (const auto& [id, row_of] : episodes) {
       for (const auto& [engine, row] : row_of) {
-        for (const auto& [name, value] : row->forces) names.insert(name);
+        for (const auto& [name, value] : row->forces) {
+          if (!force_unit(name).empty()) names.insert(name);
+        }
       }
     }
   }

@@ -52,7 +52,7 @@ struct EpisodeRow {
   double sim_s = 0.0, wall_s = 0.0;
   double contact_peak_n = 0.0, contact_impulse_ns = 0.0;  // of the human on the robot
   // Finite values only, by dotted name ("human.chest.peak_n"); the ending is the unit: _n [N], _ns [N s], _s [s],
-  // _n_cm2 [N/cm^2].
+  // _n_cm2 [N/cm^2]; any other: a ratio or a flag (1 or 0).
   std::map<std::string, double> forces;
   StateTrace trace;
   int late_plans = 0;

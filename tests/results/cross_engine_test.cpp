@@ -368,7 +368,7 @@ TEST(ForceAgreement, IsPerEpisodeAndThenTheMedian) {
   const auto add = [&](int number, std::initializer_list<std::pair<const char*, double>> in_engine) {
     for (const auto& [engine, value] : in_engine) {
       rows.push_back(engine_episode(engine, "replay", number, true));
-      rows.back().forces = {{"human.peak_n", value}};
+      rows.back().forces = {{"human.peak_n", value}, {"human.limits_verified", 1.0}};
     }
   };
   add(0, {{"mujoco", 100.0}, {"ode", 110.0}, {"bullet", 90.0}});   // spread 0.2, median 100
