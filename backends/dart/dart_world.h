@@ -3,9 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <dart/constraint/ConstraintSolver.hpp>
-#include <dart/dynamics/FreeJoint.hpp>
-#include <dart/dynamics/Skeleton.hpp>
 #include <memory>
 #include <span>
 #include <vector>

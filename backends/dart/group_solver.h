@@ -5,7 +5,7 @@
 
 #include <dart/constraint/BoxedLcpConstraintSolver.hpp>
 
-#include "backends/dart/implicit_hinge.h"
+#include "backends/dart/alignment.h"
 
 namespace duet {
 

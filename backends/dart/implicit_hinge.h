@@ -3,12 +3,9 @@
 // responses to contact impulses; here accelerations and responses see the same inertia.
 #pragma once
 
-#include <Eigen/Core>
-
-// libdart is built for 16-byte alignment: a unit with wider vectors would lay out the same types differently.
-static_assert(EIGEN_MAX_ALIGN_BYTES == 16, "DART and AVX do not go together: compile for x86-64-v2 at most");
-
 #include <dart/dynamics/RevoluteJoint.hpp>
+
+#include "backends/dart/alignment.h"
 
 namespace duet {
 
