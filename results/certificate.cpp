@@ -38,10 +38,10 @@ std::vector<nlohmann::json> engines_in(const nlohmann::json& certificate) {
 
 // Which engines of the results the certificate does not cover as they were run.
 std::vector<std::string> coverage_notes(const std::vector<nlohmann::json>& certified,
-                                        const std::vector<EngineInfo>& engines) {
+                                        const std::vector<RunEngine>& engines) {
   std::vector<std::string> missing;
   std::vector<std::string> notes;
-  for (const EngineInfo& engine : engines) {
+  for (const RunEngine& engine : engines) {
     const auto found = std::find_if(certified.begin(), certified.end(),
                                     [&](const nlohmann::json& entry) { return text_of(entry, "name") == engine.name; });
     if (found == certified.end()) {
@@ -66,7 +66,7 @@ std::string certificate_digest(const nlohmann::json& certificate) {
   return sha256_hex(certificate.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
-TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<EngineInfo>& engines) {
+TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<RunEngine>& engines) {
   TitledTable titled{.title = kTitle, .caption = "", .table = {}, .notes = {}};
   if (!certificate.is_object()) {
     titled.notes = {certificate.is_null() ? "No parity certificate is attached (duet validate makes one)."
@@ -95,7 +95,7 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
   return titled;
 }
 
-std::string certificate_markdown(const nlohmann::json& certificate, const std::vector<EngineInfo>& engines) {
+std::string certificate_markdown(const nlohmann::json& certificate, const std::vector<RunEngine>& engines) {
   return markdown_of(certificate_table(certificate, engines));
 }
 

@@ -210,14 +210,14 @@ std::string listed(const std::set<std::string>& words) {
   return text;
 }
 
-std::vector<EngineInfo> engine_infos(const std::vector<EpisodeRow>& rows, const std::string& arm) {
+std::vector<RunEngine> engine_infos(const std::vector<EpisodeRow>& rows, const std::string& arm) {
   std::map<std::string, std::pair<std::set<std::string>, std::set<std::string>>> engines;
   for (const EpisodeRow& row : rows) {
     if (row.arm != arm || row.engine == kPlaybackEngine) continue;
     engines[row.engine].first.insert(row.engine_version);
     engines[row.engine].second.insert(row.engine_profile);
   }
-  std::vector<EngineInfo> infos;
+  std::vector<RunEngine> infos;
   infos.reserve(engines.size());
   for (const auto& [name, found] : engines) infos.push_back({name, listed(found.first), listed(found.second)});
   return infos;

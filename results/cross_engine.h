@@ -25,7 +25,7 @@ struct CrossEngineOptions {
   std::string arm = "main";
 };
 
-struct EngineInfo {
+struct RunEngine {
   std::string name, version, profile;  // of several versions or profiles all, "2.2.2, 2.3.0"
 };
 
@@ -101,7 +101,7 @@ struct ForceAgreement {
 };
 
 struct CrossEngine {
-  std::vector<EngineInfo> engines;  // physics engines by name; fewer than two: nothing below is filled
+  std::vector<RunEngine> engines;  // physics engines by name; fewer than two: nothing below is filled
   bool has_playback = false;
   double level = 0.95;
   double parting_distance = 0.05;

@@ -151,7 +151,7 @@ Json json_of(const Interval& interval) {
   return Json::array({number_or_null(interval.low), number_or_null(interval.high)});
 }
 
-Json json_of(const EngineInfo& engine) {
+Json json_of(const RunEngine& engine) {
   return {{"name", engine.name}, {"version", engine.version}, {"profile", engine.profile}};
 }
 

@@ -35,13 +35,13 @@ TitledTable success_table(const CrossEngine& result, const CombinationLabels& la
                      .table = {.header = labels.columns, .rows = {}, .label_columns = labels.columns.size()},
                      .notes = {}};
   titled.table.header.emplace_back("n");
-  for (const EngineInfo& engine : result.engines) titled.table.header.push_back(engine.name);
+  for (const RunEngine& engine : result.engines) titled.table.header.push_back(engine.name);
   if (result.has_playback) titled.table.header.emplace_back(kPlaybackEngine);
   for (std::size_t i = 0; i < result.success.size(); ++i) {
     const EngineSuccess& entry = result.success[i];
     std::vector<std::string> cells = labels.cells[i];
     cells.push_back(count(entry.n));
-    for (const EngineInfo& engine : result.engines) cells.push_back(rate_cell(find(entry.engines, engine.name)));
+    for (const RunEngine& engine : result.engines) cells.push_back(rate_cell(find(entry.engines, engine.name)));
     if (result.has_playback) cells.push_back(rate_cell(entry.playback.has_value() ? &*entry.playback : nullptr));
     titled.table.rows.push_back(std::move(cells));
   }
@@ -145,7 +145,7 @@ std::vector<std::string> drift_cells(const MetricColumn& metric, const DriftRow&
   std::vector<std::string> cells = {
       metric.title.empty() ? metric.name : metric.title, metric.unit.empty() ? "1" : metric.unit,
       fewest == most ? count(most) : fmt::format("{}-{}", fewest, most), significant(playback)};
-  for (const EngineInfo& engine : result.engines) {
+  for (const RunEngine& engine : result.engines) {
     const auto found = row.find(engine.name);
     cells.push_back(drift_cell(found != row.end() ? found->second : nullptr));
   }
@@ -160,7 +160,7 @@ TitledTable drift_table(const CrossEngine& result, const std::string& controller
       .notes = {fmt::format("Mean of engine minus playback over the same episodes, with a {:g} % interval that draws "
                             "clips again. Playback: its own mean.",
                             100.0 * result.level)}};
-  for (const EngineInfo& engine : result.engines) titled.table.header.push_back(engine.name);
+  for (const RunEngine& engine : result.engines) titled.table.header.push_back(engine.name);
   for (const MetricColumn& metric : result.metrics) {
     DriftRow row;
     for (const MetricDrift& drift : result.drift) {
@@ -214,11 +214,11 @@ TitledTable force_table(const CrossEngine& result) {
       .caption = "",
       .table = {.header = {"Force", "Unit", "Episodes", "Typical", "Spread [%]"}, .rows = {}, .label_columns = 2},
       .notes = {}};
-  for (const EngineInfo& engine : result.engines) titled.table.header.push_back(engine.name);
+  for (const RunEngine& engine : result.engines) titled.table.header.push_back(engine.name);
   for (const ForceAgreement& force : result.forces) {
     std::vector<std::string> cells = {force.name, force.unit, count(force.episodes), significant(force.typical),
                                       percent(force.spread)};
-    for (const EngineInfo& engine : result.engines) {
+    for (const RunEngine& engine : result.engines) {
       const auto found = force.ratio.find(engine.name);
       cells.push_back(found != force.ratio.end() ? fmt::format("{:.3f}", found->second) : "-");
     }

@@ -23,7 +23,7 @@ std::string too_few_engines(const CrossEngine& result);
 
 // The parity certificate as a table, with a note for each engine of these results that it does not cover as it was run.
 // Read tolerantly: what is missing is "-". null: a table without rows that says that none is attached.
-TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<EngineInfo>& engines);
+TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<RunEngine>& engines);
 
 // "### title", caption, table, notes.
 std::string markdown_of(const TitledTable& titled);

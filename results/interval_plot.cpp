@@ -134,7 +134,7 @@ Drawing engine_drawing(const CrossEngine& result) {
     names.push_back(fmt::format("{}", fmt::join(cells, " / ")));
     longest = std::max(longest, names.back().size());
   }
-  for (const EngineInfo& engine : result.engines) longest = std::max(longest, engine.name.size());
+  for (const RunEngine& engine : result.engines) longest = std::max(longest, engine.name.size());
   longest += longest / 6;  // combinations are set bold
   const int left = label_width(std::max(longest, kPlaybackEngine.size()));
   Drawing drawing{.width = left + kPlotWidth + 170, .height = kTop + 8, .body = ""};
