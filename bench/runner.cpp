@@ -180,7 +180,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   const std::string hash = suite_hash(suite);
   const auto robot = load_shared_robot(suite.robot);
   RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
-                                                    utc_now(), capture_environment()});
+                                                    utc_now(), capture_environment(), options.certificate});
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
 
   RunSummary summary;

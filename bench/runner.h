@@ -20,6 +20,7 @@ struct RunOptions {
   std::vector<std::string> engines, controllers, policies;  // where not empty: only these
   std::vector<std::string> tasks;
   std::vector<std::string> argv;
+  nlohmann::json certificate;  // parity certificate that the run keeps; null: none
 };
 
 enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };

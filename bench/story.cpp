@@ -43,14 +43,16 @@ KeyFrame key_frame(const std::string& label, const PairedMotion& motion, const R
            robot_figure(robot, motion.robot, frame)}};
 }
 
+MetricColumn column_of(const MetricInfo& metric) {
+  const char* direction = metric.direction == Direction::kLower    ? "lower"
+                          : metric.direction == Direction::kHigher ? "higher"
+                                                                   : "";
+  return {std::string(metric.name), std::string(metric.title), std::string(metric.unit), direction};
+}
+
 std::vector<MetricColumn> metric_columns() {
   std::vector<MetricColumn> columns;
-  for (const MetricInfo& metric : metric_catalogue()) {
-    const char* direction = metric.direction == Direction::kLower    ? "lower"
-                            : metric.direction == Direction::kHigher ? "higher"
-                                                                     : "";
-    columns.push_back({std::string(metric.name), std::string(metric.title), std::string(metric.unit), direction});
-  }
+  for (const MetricInfo& metric : metric_catalogue()) columns.push_back(column_of(metric));
   columns.insert(columns.end(), {{"jpe.pelvis", "Joint position error, pelvis-aligned", "m", "lower"},
                                  {"large_angle_ratio.entry", "Large-angle ratio, per joint", "1", "lower"},
                                  {"source_detected", "Task detected, people", "1", "higher"},
@@ -88,6 +90,13 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
   return story;
 }
 
+CrossEngine across_engines(const std::vector<EpisodeRow>& rows) {
+  std::vector<MetricColumn> columns;
+  for (const MetricInfo& metric : metric_catalogue())
+    if (metric.group == MetricGroup::kRetargeting) columns.push_back(column_of(metric));
+  return cross_engine(rows, columns);
+}
+
 ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int threads, Progress& progress) {
   ReportContent content;
   std::vector<EpisodeRow> rows;
@@ -98,6 +107,8 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int 
   content.notes = notes_of(suite);
   content.entries = leaderboard(rows);
   content.columns = metric_columns();
+  content.cross_engine = across_engines(rows);
+  content.certificate = runs.front().info.certificate;
   if (!with_clips) return content;
 
   const auto robot = load_shared_robot(suite.robot);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bench/score.h"
+#include "results/cross_engine.h"
 #include "results/html_report.h"
 #include "results/run_directory.h"
 
@@ -15,6 +16,9 @@ class Progress;
 
 // People as in the clip, the adapted partner and the robot at the start, in mid-act and at the end.
 ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot);
+
+// The cross-engine tables of rows, with the 18 retargeting metrics.
+CrossEngine across_engines(const std::vector<EpisodeRow>& rows);
 
 // Everything that the report says of runs: leaderboard, notes, retargeting figures and stories of their clips, which
 // are made again from the first run's suite (`with_clips`), on `threads` threads.

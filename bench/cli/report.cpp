@@ -9,8 +9,10 @@
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "results/certificate.h"
 #include "results/database.h"
 #include "results/html_report.h"
+#include "results/interval_plot.h"
 #include "results/leaderboard.h"
 
 namespace duet::cli {
@@ -63,6 +65,24 @@ void write_format(const std::string& format, const std::string& path, const std:
   if (format == "sqlite") write_database(all_rows(runs), path);
 }
 
+// engines.md and the like, and engines.svg: what changes when only the engine does.
+void write_engines(const CrossEngine& engines, const nlohmann::json& certificate, const std::string& folder,
+                   const std::vector<std::string>& formats, nlohmann::json& written) {
+  const auto write = [&](const std::string& name, const std::string& text) {
+    const std::string path = (std::filesystem::path(folder) / name).string();
+    write_file(path, text);
+    written.push_back(path);
+  };
+  for (const std::string& format : formats) {
+    if (format == "md")
+      write("engines.md", cross_engine_markdown(engines) + "\n" + certificate_markdown(certificate, engines.engines));
+    if (format == "csv") write("engines.csv", cross_engine_csv(engines));
+    if (format == "json") write("engines.json", cross_engine_json(engines).dump(2) + "\n");
+    if (format == "tex") write("engines.tex", cross_engine_latex(engines));
+  }
+  write("engines.svg", engine_plot_svg(engines));
+}
+
 void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
   const std::vector<Run> runs = load_runs(arguments.runs);
@@ -79,7 +99,13 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     written.push_back(path);
     note(session, "wrote " + path);
   }
-  print(session, leaderboard_markdown(entries), {{"files", written}, {"leaderboard", leaderboard_json(entries)}});
+  const CrossEngine engines = across_engines(all_rows(runs));
+  const nlohmann::json& certificate = runs.front().info.certificate;
+  if (engines.engines.size() > 1) write_engines(engines, certificate, folder.string(), arguments.formats, written);
+  print(session,
+        leaderboard_markdown(entries) + "\n" + cross_engine_markdown(engines) + "\n" +
+            certificate_markdown(certificate, engines.engines),
+        {{"files", written}, {"leaderboard", leaderboard_json(entries)}, {"engines", cross_engine_json(engines)}});
 }
 
 }  // namespace

@@ -4,11 +4,13 @@
 
 #include <filesystem>
 
+#include "bench/certificate.h"
 #include "bench/cli/command.h"
 #include "bench/clips.h"
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
 #include "bench/runner.h"
+#include "bench/story.h"
 #include "core/require.h"
 #include "results/leaderboard.h"
 
@@ -79,19 +81,27 @@ void run_run(Session& session, RunArguments arguments) {
   require(!arguments.output.empty(), "--output is needed: the run directory");
   catch_interrupts();
   arguments.options.argv = session.argv;
+  if (!arguments.certificate.empty())
+    arguments.options.certificate = certificate_json(load_certificate(arguments.certificate));
   Progress progress(session.progress());
   const RunSummary summary = run_suite(suite, arguments.output, arguments.options, progress);
   session.exit_code = exit_code(summary);
   note(session, describe(summary, suite, arguments.output));
-  const std::vector<LeaderboardEntry> entries = leaderboard(load_run(arguments.output).rows);
-  print(session, leaderboard_markdown(entries),
+  const std::vector<EpisodeRow> rows = load_run(arguments.output).rows;
+  const std::vector<LeaderboardEntry> entries = leaderboard(rows);
+  const CrossEngine engines = across_engines(rows);
+  std::string text = leaderboard_markdown(entries);
+  if (engines.engines.size() > 1) text += "\n" + cross_engine_markdown(engines);
+  print(session, text,
         {{"run", arguments.output},
          {"planned", summary.planned},
          {"already_there", summary.already_there},
          {"run_now", summary.run},
          {"outcomes", summary.outcomes},
          {"complete", summary.end == RunEnd::kComplete},
-         {"leaderboard", leaderboard_json(entries)}});
+         {"absent_engines", summary.absent_engines},
+         {"leaderboard", leaderboard_json(entries)},
+         {"engines", cross_engine_json(engines)}});
 }
 
 }  // namespace
@@ -113,6 +123,8 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
   command->add_option("--partner", arguments->partner, "none, ghost or solid");
   command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");
+  command->add_option("--certificate", arguments->certificate,
+                      "parity certificate of `duet validate`, kept with the results");
   command->add_option("--engines", options.engines, "only these")->delimiter(',');
   command->add_option("--controllers", options.controllers, "only these")->delimiter(',');
   command->add_option("--policies", options.policies, "only these (the null arm always runs)")->delimiter(',');
