@@ -9,6 +9,7 @@ RowSettings row_settings(const EngineOptions& options) {
   const std::span<const EngineOption> known = bullet_options();
   return {.iterations = option_integer(options, known, "iterations"),
           .erp = option_number(options, known, "erp"),
+          .push_out = option_number(options, known, "push_out"),
           .slop = option_number(options, known, "slop"),
           .stop_erp = option_number(options, known, "stop_erp")};
 }
@@ -20,6 +21,7 @@ std::span<const EngineOption> bullet_options() {
   static const std::vector<EngineOption> options = {
       integer_option("iterations", kDefault.iterations, 1, 1000, "sweeps of sequential impulses"),
       number_option("erp", kDefault.erp, 0.0, 1.0, "share of a rigid contact's depth that a step removes"),
+      number_option("push_out", kDefault.push_out, 0.0, 100.0, "the most speed at which a step removes depth [m/s]"),
       number_option("slop", kDefault.slop, 0.0, 0.01, "depth at which a rigid contact rests [m]"),
       number_option("stop_erp", kDefault.stop_erp, 0.0, 1.0, "share of a joint stop's violation that a step removes")};
   return options;

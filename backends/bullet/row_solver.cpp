@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kNear = 0.01;      // stops that the step without contacts leaves nearer than this get a row [rad]
 constexpr double kSoftest = 1e-12;  // of the sum h K + D of a skin [N s/m]
+constexpr double kRigid = 1e-12;    // no impulse moves a row less compliant than this; Bullet leaves it out [1/kg]
 constexpr double kNoLimit = 1e10;   // impulse [N s]
 
 // Joints of one or two chains towards the base: falling, each once, then the base.
@@ -15,6 +16,16 @@ void close_support(std::vector<int>& support) {
   std::sort(support.begin(), support.end(), std::greater<>());
   support.erase(std::unique(support.begin(), support.end()), support.end());
   for (int i = 5; i >= 0; --i) support.push_back(i);
+}
+
+// One step size for the two friction rows of a contact, or friction would not oppose the slip.
+void share_step(btMultiBodySolverConstraint& a, btMultiBodySolverConstraint& b) {
+  const double step = std::min(a.m_jacDiagABInv, b.m_jacDiagABInv);
+  if (step == 0.0) return;
+  for (btMultiBodySolverConstraint* row : {&a, &b}) {
+    row->m_rhs *= step / row->m_jacDiagABInv;
+    row->m_jacDiagABInv = step;
+  }
 }
 
 }  // namespace
@@ -61,7 +72,7 @@ void RowSolver::set_contacts(std::span<const ContactPoint> points, const Kinemat
     } else {
       const double depth = point.depth - settings_.slop;
       rows.cfm = 0.0;
-      rows.v_target[0] += (depth > 0.0 ? settings_.erp : 1.0) * depth / dt_;
+      rows.v_target[0] += depth > 0.0 ? std::min(settings_.erp * depth / dt_, settings_.push_out) : depth / dt_;
     }
   }
 }
@@ -135,19 +146,14 @@ void RowSolver::add_contact(const ContactRows& contact) {
     row.m_friction = contact.friction;
     if (i == 0) row.m_upperLimit = kNoLimit;
   }
-  // One step size for both, or friction would not oppose the slip.
-  btMultiBodySolverConstraint &a = m_multiBodyFrictionContactConstraints[friction_at],
-                              &b = m_multiBodyFrictionContactConstraints[friction_at + 1];
-  const double step = std::min(a.m_jacDiagABInv, b.m_jacDiagABInv);
-  for (btMultiBodySolverConstraint* row : {&a, &b}) {
-    row->m_rhs *= step / row->m_jacDiagABInv;
-    row->m_jacDiagABInv = step;
-  }
+  share_step(m_multiBodyFrictionContactConstraints[friction_at],
+             m_multiBodyFrictionContactConstraints[friction_at + 1]);
 }
 
 btMultiBodySolverConstraint& RowSolver::add_row(btMultiBodyConstraintArray& rows, double cfm, double v_target) {
   const int n = static_cast<int>(row_.size()), at = m_data.m_jacobians.size();
-  const double inverse = 1.0 / (row_.dot(response_) + cfm);
+  const double compliance = row_.dot(response_) + cfm;
+  const double inverse = compliance > kRigid ? 1.0 / compliance : 0.0;
 
   m_data.m_jacobians.resize(at + n);
   m_data.m_deltaVelocitiesUnitImpulse.resize(at + n);

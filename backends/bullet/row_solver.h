@@ -19,6 +19,7 @@ namespace duet {
 struct RowSettings {
   int iterations = 20;
   double erp = 0.2;       // share of a rigid contact's depth beyond `slop` that one step removes
+  double push_out = 0.1;  // the most speed at which it does so [m/s]
   double slop = 1e-5;     // depth at which a rigid contact rests [m]
   double stop_erp = 0.2;  // share of a stop's violation that one step removes
 };
