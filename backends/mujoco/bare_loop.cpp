@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
-#include <algorithm>
 #include <ctime>
 
+#include "backends/mujoco/mujoco_law.h"
 #include "backends/mujoco/mujoco_model.h"
 #include "core/require.h"
 
@@ -26,17 +26,14 @@ double mujoco_bare_step_seconds(const Scene& scene, const RobotState& state, con
   mjModel& m = *compiled.model;
   mjData& d = *compiled.data;
   write_state(state, compiled, d);
-  const int joints = scene.robot->dof();
-  for (int i = 0; i < joints; ++i) m.dof_damping[compiled.v_address[i]] = command.kd[i];
+  MujocoLaw law(scene, compiled);
   RobotState read = state;
   const double begin = cpu_seconds();
   for (int step = 0; step < steps; ++step) {
-    for (int i = 0; i < joints; ++i) {
-      const double effort = scene.robot->joints[i].effort;
-      const double torque = command.kp[i] * (command.q_target[i] - read.q[i]) + command.tau_ff[i];
-      d.qfrc_applied[compiled.v_address[i]] = std::clamp(torque, -effort, effort);
-    }
-    mj_step(&m, &d);
+    law.begin(read, command);
+    mj_step1(&m, &d);
+    law.accelerate();
+    law.integrate();
     read_state(compiled, read);
   }
   return cpu_seconds() - begin;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "backends/mujoco/mujoco_options.h"
 #include "robots/dynamics.h"
 
 namespace duet {
@@ -15,25 +16,49 @@ using Out = std::back_insert_iterator<std::string>;
 // Contact and stop parameters of MuJoCo (its `solref` time constant is at least twice the step): chosen stiff, see the
 // README. With a higher priority a geom decides the parameters of a contact alone: the ground over the robot, the robot
 // over the human.
-constexpr double kGroundTimeConstant = 0.01;  // [s]
 constexpr int kGroundPriority = 2;
 constexpr int kRobotPriority = 1;
-// More contacts with the human than a body's surface takes at once.
-constexpr int kHumanContacts = 64;
+constexpr const char* kImpedance = "0.95 0.99 0.001";  // of the ground and of the robot itself
+// More points, and rows of theirs and of joint stops, than a robot touches with at once; a world stays below a
+// mebibyte, of which the rows take most.
+constexpr int kContacts = 64;
+constexpr int kRows = 205;
+// What the solver and the collision take from MuJoCo's stack at most with so many rows, with a margin (tests look).
+constexpr int kStackPerRow = 60, kStack = 8000;  // [doubles]
 // Capsules wait here until the partner is set.
 constexpr double kFarAway = 1000.0;  // [m]
 
 std::string numbers(const Eigen::Vector3d& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); }
 std::string numbers(const Eigen::Quaterniond& R) { return fmt::format("{} {} {} {}", R.w(), R.x(), R.y(), R.z()); }
 
+// MuJoCo wants at least two steps.
+double ground_time_constant(const Scene& scene) {
+  return std::max(mujoco_settings(scene.options).ground_time_constant, 2.0 * scene.dt);
+}
+
+// [doubles]. The implicit integrator's derivatives take one velocity, acceleration and force per body and coordinate.
+int stack_size(const Scene& scene, const MujocoSettings& settings, int rows) {
+  const int stack = kStack + kStackPerRow * rows;
+  if (settings.integrator == "euler") return stack;
+  const int bodies = static_cast<int>(1 + scene.robot->links.size() + scene.human.capsules.size());
+  const int coordinates = 6 + scene.robot->dof();
+  return stack + 6 * coordinates * (3 * bodies + coordinates);
+}
+
 void write_options(Out out, const Scene& scene) {
   const MujocoSizes sizes = mujoco_sizes(scene);
+  const MujocoSettings settings = mujoco_settings(scene.options);
+  const std::string solver = settings.solver == "newton" ? "Newton" : settings.solver == "cg" ? "CG" : "PGS";
   fmt::format_to(out,
                  "<mujoco><compiler angle='radian' inertiafromgeom='false' boundmass='0' boundinertia='0' "
-                 "balanceinertia='false'/><size njmax='{}' nconmax='{}'/>"
-                 "<option timestep='{}' gravity='{}' integrator='Euler' solver='Newton' cone='elliptic' "
-                 "iterations='20' tolerance='1e-8' impratio='10' jacobian='dense'/>",
-                 sizes.rows, sizes.contacts, scene.dt, numbers(scene.gravity));
+                 "balanceinertia='false'/><size njmax='{}' nconmax='{}' nstack='{}'/>"
+                 "<option timestep='{}' gravity='{}' integrator='{}' solver='{}' cone='{}' "
+                 "iterations='{}' tolerance='{}' impratio='{}' jacobian='{}'>"
+                 "<flag frictionloss='disable' equality='disable' passive='disable' sensor='disable' "
+                 "actuation='disable'/></option>",
+                 sizes.rows, sizes.contacts, stack_size(scene, settings, sizes.rows), scene.dt, numbers(scene.gravity),
+                 settings.integrator == "euler" ? "Euler" : settings.integrator, solver, settings.cone,
+                 settings.iterations, settings.tolerance, settings.impratio, settings.jacobian);
 }
 
 void write_shape(Out out, const Scene& scene, int index) {
@@ -81,16 +106,27 @@ void write_capsules(Out out, const Scene& scene) {
                    i, static_cast<double>(i), kFarAway, capsules[i].radius);
 }
 
+void write_pairs(Out out, const Scene& scene) {
+  if (scene.robot->self_collision.empty()) return;
+  fmt::format_to(out, "<contact>");
+  for (const auto& [first, second] : scene.robot->self_collision)
+    fmt::format_to(out,
+                   "<pair geom1='s{0}' geom2='s{1}' condim='3' friction='{2} {2} 0 0 0' solref='{3} 1' solimp='{4}'/>",
+                   first, second, scene.friction.robot_robot, ground_time_constant(scene), kImpedance);
+  fmt::format_to(out, "</contact>");
+}
+
 }  // namespace
 
 MujocoSizes mujoco_sizes(const Scene& scene) {
-  int shape_ends = 0;  // a capsule touches the ground at two points
-  for (const RobotShape& shape : scene.robot->shapes) shape_ends += shape.kind == ShapeKind::kSphere ? 1 : 2;
-  const int human = scene.partner == PartnerMode::kSolid
-                        ? std::min(kHumanContacts, 2 * shape_ends * static_cast<int>(scene.human.capsules.size()))
-                        : 0;
-  const int contacts = std::max(1, shape_ends + human);
-  return {.contacts = contacts, .rows = 3 * contacts + scene.robot->dof()};
+  const RobotModel& robot = *scene.robot;
+  int contacts = 0;
+  for (const RobotShape& shape : robot.shapes) contacts += shape.kind == ShapeKind::kSphere ? 1 : 2;  // ends
+  const bool solid = scene.partner == PartnerMode::kSolid;
+  if (solid) contacts += 2 * static_cast<int>(robot.shapes.size() * scene.human.capsules.size());
+  if (scene.self_collision) contacts += 2 * static_cast<int>(robot.self_collision.size());
+  contacts = std::clamp(contacts, 1, kContacts);
+  return {.contacts = contacts, .rows = std::min(4 * contacts + robot.dof(), kRows)};
 }
 
 std::string make_mjcf(const Scene& scene) {
@@ -99,11 +135,13 @@ std::string make_mjcf(const Scene& scene) {
   write_options(out, scene);
   fmt::format_to(out,
                  "<worldbody><geom name='ground' type='plane' size='0 0 1' contype='1' conaffinity='0' condim='3' "
-                 "priority='{}' friction='{} 0 0' solref='{} 1' solimp='0.95 0.99 0.001'/>",
-                 kGroundPriority, scene.friction.robot_ground, std::max(kGroundTimeConstant, 2.0 * scene.dt));
+                 "priority='{}' friction='{} 0 0' solref='{} 1' solimp='{}'/>",
+                 kGroundPriority, scene.friction.robot_ground, ground_time_constant(scene), kImpedance);
   write_link(out, scene, 0);
   if (scene.partner == PartnerMode::kSolid) write_capsules(out, scene);
-  fmt::format_to(out, "</worldbody></mujoco>");
+  fmt::format_to(out, "</worldbody>");
+  if (scene.self_collision) write_pairs(out, scene);
+  fmt::format_to(out, "</mujoco>");
   return text;
 }
 

@@ -11,12 +11,17 @@
 #include "backends/link_pushes.h"
 #include "backends/mujoco/bare_loop.h"
 #include "backends/mujoco/mjcf.h"
+#include "backends/mujoco/mujoco_law.h"
 #include "backends/mujoco/mujoco_model.h"
+#include "backends/mujoco/mujoco_options.h"
+#include "backends/mujoco/mujoco_skin.h"
 #include "backends/partner.h"
 #include "backends/start_overlap.h"
 
 namespace duet {
 namespace {
+
+constexpr double kAbsurdSpeed = 1e4;  // [m/s, rad/s]
 
 class MujocoBackend final : public Backend {
  public:
@@ -25,7 +30,8 @@ class MujocoBackend final : public Backend {
         compiled_(compile_mujoco(scene)),
         m_(*compiled_.model),
         d_(*compiled_.data),
-        applied_(Eigen::VectorXd::Zero(scene.robot->dof())),
+        law_(this->scene(), compiled_),
+        v_before_(Eigen::VectorXd::Zero(scene.robot->dof())),
         pushes_(scene.robot->links.size()) {
     contacts_.reserve(mujoco_sizes(scene).contacts);
     order_.reserve(mujoco_sizes(scene).contacts);
@@ -50,39 +56,20 @@ class MujocoBackend final : public Backend {
 
   Outcome do_step(const JointCommand& command) override {
     place_partner();
-    apply_torques(command);
+    law_.begin(state_, command);
     mj_step1(&m_, &d_);
     if (pushes_.any()) apply_pushes();
-    move_partner_contacts();
-    mj_step2(&m_, &d_);
+    set_skin_rows(scene(), partner_, compiled_);
+    law_.accelerate();
+    read_contacts();
+    law_.integrate();
     partner_.advance(scene().dt);
     if (diverged()) return Outcome::kDiverged;
     check_buffers();
+    v_before_ = state_.v;
     read_state(compiled_, state_);
-    read_torques();
-    read_contacts();
+    law_.torques(v_before_, state_.v, torques_);
     return Outcome::kOk;
-  }
-
-  // The gain on velocity is MuJoCo's joint damping, which its Euler integrator takes at the end of the step: stable
-  // where an explicit one is not. It cannot be limited there, so a joint whose whole torque is at the limit gets the
-  // limit itself and no damping.
-  void apply_torques(const JointCommand& command) {
-    const std::vector<RobotJoint>& joints = scene().robot->joints;
-    for (int i = 0; i < applied_.size(); ++i) {
-      const int v = compiled_.v_address[i];
-      const double spring = command.kp[i] * (command.q_target[i] - state_.q[i]) + command.tau_ff[i];
-      const double torque = spring - command.kd[i] * state_.v[i];
-      const bool saturated = std::abs(torque) >= joints[i].effort;
-      m_.dof_damping[v] = saturated ? 0.0 : command.kd[i];
-      applied_[i] = saturated ? std::copysign(joints[i].effort, torque) : spring;
-      d_.qfrc_applied[v] = applied_[i];
-    }
-  }
-
-  void read_torques() {
-    for (int i = 0; i < applied_.size(); ++i)
-      torques_[i] = applied_[i] - m_.dof_damping[compiled_.v_address[i]] * state_.v[i];
   }
 
   void place_partner() {
@@ -95,25 +82,6 @@ class MujocoBackend final : public Backend {
       Eigen::Map<Eigen::Vector4d>(d_.mocap_quat + 4 * mocap) << R.w(), R.x(), R.y(), R.z();
       m_.geom_size[3 * geom + 1] = pose.half_length;
       m_.geom_rbound[geom] = pose.half_length + m_.geom_size[3 * geom];
-    }
-  }
-
-  // MuJoCo takes mocap bodies as resting. What their velocity changes is the reference acceleration of the rows of the
-  // contacts with them: -b times the relative velocity.
-  void move_partner_contacts() {
-    if (!partner_.present || compiled_.human_geom.empty()) return;
-    for (int i = 0; i < d_.ncon; ++i) {
-      const mjContact& contact = d_.contact[i];
-      const bool first_is_human = compiled_.geoms[contact.geom1].side == ContactSide::kHuman;
-      const MujocoGeom& human = compiled_.geoms[first_is_human ? contact.geom1 : contact.geom2];
-      if (human.side != ContactSide::kHuman || contact.efc_address < 0) continue;
-      const Eigen::Vector3d v_W =
-          capsule_velocity(scene().human.capsules[human.index], partner_, Eigen::Vector3d(contact.pos));
-      for (int k = 0; k < contact.dim; ++k) {
-        const int row = contact.efc_address + k;
-        const double along = Eigen::Map<const Eigen::Vector3d>(contact.frame + 3 * k).dot(v_W);
-        d_.efc_aref[row] -= d_.efc_KBIP[4 * row + 1] * (first_is_human ? -along : along);
-      }
     }
   }
 
@@ -141,8 +109,9 @@ class MujocoBackend final : public Backend {
 
   // On a bad number MuJoCo silently starts again from its own initial state; its counters tell.
   [[nodiscard]] bool diverged() const {
-    return d_.warning[mjWARN_BADQPOS].number + d_.warning[mjWARN_BADQVEL].number + d_.warning[mjWARN_BADQACC].number >
-           0;
+    if (d_.warning[mjWARN_BADQPOS].number + d_.warning[mjWARN_BADQVEL].number + d_.warning[mjWARN_BADQACC].number > 0)
+      return true;
+    return Eigen::Map<const Eigen::VectorXd>(d_.qvel, m_.nv).cwiseAbs().maxCoeff() > kAbsurdSpeed;
   }
 
   void check_buffers() const {
@@ -166,9 +135,9 @@ class MujocoBackend final : public Backend {
   // MuJoCo's force acts on the second geom's body, in a frame whose rows are the normal and two tangents.
   [[nodiscard]] Contact contact_of(int index) const {
     const mjContact& contact = d_.contact[index];
-    const bool second_is_robot = compiled_.geoms[contact.geom2].side == ContactSide::kRobot;
-    const MujocoGeom& robot = compiled_.geoms[second_is_robot ? contact.geom2 : contact.geom1];
-    const MujocoGeom& other = compiled_.geoms[second_is_robot ? contact.geom1 : contact.geom2];
+    const bool link_is_second = second_is_the_link(compiled_.geoms[contact.geom1], compiled_.geoms[contact.geom2]);
+    const MujocoGeom& robot = compiled_.geoms[link_is_second ? contact.geom2 : contact.geom1];
+    const MujocoGeom& other = compiled_.geoms[link_is_second ? contact.geom1 : contact.geom2];
     std::array<mjtNum, 6> wrench{};
     mj_contactForce(&m_, &d_, index, wrench.data());
     const Eigen::Vector3d f_W =
@@ -177,8 +146,15 @@ class MujocoBackend final : public Backend {
             .side = other.side,
             .other = other.index,
             .p_WC = Eigen::Vector3d(contact.pos),
-            .f_W = second_is_robot ? f_W : Eigen::Vector3d(-f_W),
+            .f_W = link_is_second ? f_W : Eigen::Vector3d(-f_W),
             .depth = std::max(0.0, -contact.dist)};
+  }
+
+  // Of two links the one whose shape the declared pair names first.
+  [[nodiscard]] bool second_is_the_link(const MujocoGeom& first, const MujocoGeom& second) const {
+    if (first.side != second.side) return second.side == ContactSide::kRobot;
+    const std::vector<std::pair<int, int>>& pairs = scene().robot->self_collision;
+    return std::find(pairs.begin(), pairs.end(), std::pair(first.shape, second.shape)) == pairs.end();
   }
 
   void do_snapshot(Snapshot& snapshot) const override {
@@ -211,14 +187,11 @@ class MujocoBackend final : public Backend {
   mjModel& m_;
   mjData& d_;
   MovingPartner partner_;
-  Eigen::VectorXd applied_;  // torques without the damping that the integrator adds
+  MujocoLaw law_;
+  Eigen::VectorXd v_before_;
   LinkPushes pushes_;
   std::vector<int> order_;
 };
-
-}  // namespace
-
-namespace {
 
 std::string engine_version() { return mj_versionString(); }
 std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
@@ -226,7 +199,7 @@ std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<Mujo
 const EngineModule kModule = {.name = "mujoco",
                               .version = engine_version,
                               .make = make,
-                              .options = {},
+                              .options = mujoco_options(),
                               .bare_step_seconds = mujoco_bare_step_seconds};
 
 }  // namespace

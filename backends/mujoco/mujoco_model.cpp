@@ -22,7 +22,7 @@ void install_handlers() {
   std::call_once(once, [] {
     if (mju_user_warning == nullptr) mju_user_warning = [](const char*) {};
     if (mju_user_error == nullptr)
-      mju_user_error = [](const char* message) { throw std::runtime_error(fmt::format("MuJoCo: {}", message)); };
+      mju_user_error = [](const char* message) { throw std::runtime_error(fmt::format("mujoco: {}", message)); };
   });
 }
 
@@ -38,29 +38,12 @@ mjModel* load(const std::string& document) {
   std::array<char, 1000> error{};
   mjModel* model = mj_loadXML(kName, files.get(), error.data(), static_cast<int>(error.size()));
   mj_deleteVFS(files.get());
-  if (model == nullptr) throw std::runtime_error(fmt::format("MuJoCo refuses the scene: {}", error.data()));
+  if (model == nullptr) throw std::runtime_error(fmt::format("mujoco: refuses the scene: {}", error.data()));
   return model;
 }
 
 int id_of(const mjModel& model, int type, char letter, int index) {
   return mj_name2id(&model, type, fmt::format("{}{}", letter, index).c_str());
-}
-
-// The skin of the human is a spring K and a damper D, taken linearly implicitly: with relative normal acceleration a,
-//   f = -K r - (D + dt K) v - (dt D + dt^2 K) a.
-// MuJoCo's contact law is f = (-b v - k r - a) / R with R = (1 - d) / d A, A the inverse weight of the body. Equal
-// coefficients give R = 1 / (dt D + dt^2 K), k = K R, b = (D + dt K) R, d = A / (A + R); the direct form of solref
-// holds k d and b d.
-void set_skin(const Scene& scene, int geom, mjModel& model) {
-  const double dt = scene.dt, K = Skin().stiffness, D = Skin().damping;
-  const double virtual_mass = dt * D + dt * dt * K;  // 1 / R
-  const double A = model.body_invweight0[2 * model.geom_bodyid[geom]];
-  const double d = std::clamp(A * virtual_mass / (A * virtual_mass + 1.0), mjMINIMP, mjMAXIMP);
-  const double R = (1.0 - d) / d * A;
-  model.geom_solref[mjNREF * geom] = -K * R * d;
-  model.geom_solref[mjNREF * geom + 1] = -(D + dt * K) * R * d;
-  model.geom_solimp[mjNIMP * geom] = d;
-  model.geom_solimp[mjNIMP * geom + 1] = d;
 }
 
 void find_robot(const Scene& scene, MujocoModel& compiled) {
@@ -75,8 +58,7 @@ void find_robot(const Scene& scene, MujocoModel& compiled) {
     compiled.link_body.push_back(id_of(m, mjOBJ_BODY, 'l', i));
   for (int i = 0; i < static_cast<int>(robot.shapes.size()); ++i) {
     const int geom = id_of(m, mjOBJ_GEOM, 's', i);
-    compiled.geoms[geom] = {ContactSide::kRobot, robot.shapes[i].link};
-    if (scene.partner == PartnerMode::kSolid) set_skin(scene, geom, m);
+    compiled.geoms[geom] = {ContactSide::kRobot, robot.shapes[i].link, i};
   }
 }
 
@@ -84,7 +66,7 @@ void find_human(const Scene& scene, MujocoModel& compiled) {
   if (scene.partner != PartnerMode::kSolid) return;
   for (int i = 0; i < static_cast<int>(scene.human.capsules.size()); ++i) {
     const int geom = id_of(*compiled.model, mjOBJ_GEOM, 'h', i);
-    compiled.geoms[geom] = {ContactSide::kHuman, i};
+    compiled.geoms[geom] = {ContactSide::kHuman, i, -1};
     compiled.human_geom.push_back(geom);
     compiled.human_mocap.push_back(compiled.model->body_mocapid[compiled.model->geom_bodyid[geom]]);
   }

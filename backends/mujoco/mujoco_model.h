@@ -18,6 +18,7 @@ namespace duet {
 struct MujocoGeom {
   ContactSide side = ContactSide::kGround;
   int index = -1;  // link of the robot or capsule of the human; -1 for the ground
+  int shape = -1;  // of the robot
 };
 
 struct MujocoDelete {

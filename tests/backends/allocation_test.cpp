@@ -27,7 +27,9 @@ TEST(Allocation, StepMakesNoneInAnyEngine) {
     backend->reset(state);
     const JointCommand command = scene.robot->default_command(scene.robot->neutral);
     const Reference reference{state.X_WB, state.q};
-    const HumanJoints joints = HumanJoints::Constant(0.3), velocities = HumanJoints::Constant(0.01);
+    HumanJoints joints = HumanJoints::Constant(0.3);  // a pole before the robot
+    joints.row(2).setLinSpaced(0.1, 1.3);
+    const HumanJoints velocities = HumanJoints::Constant(0.01);
     backend->set_partner(joints, velocities);  // the first call after a reset checks the start
     const long before = test::allocation_count();
     for (int i = 0; i < 500; ++i) {  // through the fall: contacts of every kind

@@ -159,6 +159,137 @@ TEST_F(MujocoContact, SkinIsTheSpringOfTheSceneAtRest) {
   EXPECT_NEAR(force_of(*backend, ContactSide::kGround).x(), -force.x(), 0.03 * -force.x());  // balance of momentum
 }
 
+TEST_F(MujocoContact, SkinIsThatOfTheCapsuleInEverySolverAndCone) {
+  scene.partner = PartnerMode::kSolid;
+  scene.friction.robot_ground = 10.0;
+  for (const double stiffness : {1e4, 7.5e4})
+    for (const char* solver : {"newton", "cg", "pgs"})
+      for (const char* cone : {"elliptic", "pyramidal"}) {
+        scene.options = {{"solver", solver}, {"cone", cone}, {"iterations", "500"}, {"tolerance", "1e-12"}};
+        scene.human.capsules[0].skin.stiffness = stiffness;
+        start(rest);
+        run(0.2);
+        backend->set_partner(hand_before_sledge(backend->state(), -0.001), HumanJoints::Zero());
+        run(0.5);
+        int touching = 0;
+        for (const Contact& contact : backend->contacts()) {
+          if (contact.side != ContactSide::kHuman) continue;
+          ++touching;
+          EXPECT_NEAR(-contact.f_W.x(), stiffness * contact.depth, 0.01 * stiffness * contact.depth)
+              << solver << " " << cone;
+        }
+        EXPECT_EQ(touching, 2);
+      }
+}
+
+TEST_F(MujocoContact, SkinOfTwoPointsOfOneCapsuleIsOneSkin) {
+  scene.partner = PartnerMode::kSolid;
+  scene.friction.robot_ground = 10.0;
+  auto robot = test::sledge();
+  RobotShape bar;
+  bar.kind = ShapeKind::kCapsule;
+  bar.radius = 0.02;
+  bar.half_length = 0.2;
+  bar.X_LS = {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitY()), {0.25, 0, 0}};
+  robot->shapes.push_back(bar);
+  scene.robot = robot;
+  start(rest);
+  run(0.2);
+  HumanJoints joints = HumanJoints::Zero();
+  const Eigen::Vector3d middle = backend->state().X_WB * Eigen::Vector3d(0.25 + 0.07 - 0.001, 0.0, 0.0);
+  joints.col(20) = middle + backend->state().X_WB.R * Eigen::Vector3d(0.0, 0.4, 0.0);
+  joints.col(22) = middle - backend->state().X_WB.R * Eigen::Vector3d(0.0, 0.4, 0.0);
+  backend->set_partner(joints, HumanJoints::Zero());
+  run(0.3);
+  double depth = 0.0;
+  int points = 0;
+  for (const Contact& contact : backend->contacts()) {
+    if (contact.side != ContactSide::kHuman) continue;
+    depth += contact.depth;
+    ++points;
+  }
+  ASSERT_GE(points, 1);
+  const double expected = scene.human.capsules[0].skin.stiffness * depth / points;
+  EXPECT_NEAR(-force_of(*backend, ContactSide::kHuman).x(), expected, 0.02 * expected);
+}
+
+// A sphere on the rim of the wheel, 0.3 m from the axle, is met at 0.3 m/s: one mass of I / r^2 on K and D.
+TEST_F(MujocoContact, PeakOfABlowOnAMovingLinkDoesNotDependOnTheStep) {
+  constexpr double kArm = 0.3, kSpeed = 0.3;
+  const double mass = (test::kWheelInertia + test::kWheelArmature) / (kArm * kArm);
+  const Skin skin = scene.human.capsules[0].skin;
+  double expected = 0.0, gap = 0.0, v = -kSpeed, h = 1e-6;
+  for (int i = 0; i < 100000; ++i) {
+    const double f = std::max(0.0, -skin.stiffness * gap - skin.damping * v);
+    expected = std::max(expected, f);
+    v += h * f / mass;
+    gap += h * v;
+  }
+  auto robot = test::wheel();
+  RobotShape ball;
+  ball.link = 1;
+  ball.X_LS.p.x() = kArm;
+  ball.radius = 0.02;
+  robot->shapes = {ball};
+  scene.robot = robot;
+  scene.partner = PartnerMode::kSolid;
+  scene.gravity.setZero();
+  for (const double dt : {0.0005, 0.001, 0.002}) {
+    scene.dt = dt;
+    start(test::state_of(*robot, {0.0, 0.0, 10.0}));
+    HumanJoints joints = HumanJoints::Zero(), velocities = HumanJoints::Zero();
+    joints.col(20) = Eigen::Vector3d(kArm - 0.2, -0.0701, 10.0);
+    joints.col(22) = Eigen::Vector3d(kArm + 0.2, -0.0701, 10.0);
+    velocities.row(1).setConstant(kSpeed);
+    backend->set_partner(joints, velocities);
+    double peak = 0.0;
+    for (int i = 0; i < std::lround(0.05 / dt); ++i) {
+      run(dt);
+      peak = std::max(peak, force_of(*backend, ContactSide::kHuman).norm());
+    }
+    RecordProperty("peak_over_expected_at_" + std::to_string(std::lround(1e6 * dt)) + "_us",
+                   std::to_string(peak / expected));
+    EXPECT_NEAR(peak, expected, 0.1 * expected) << dt;
+  }
+}
+
+// The rim's ball is driven against a ball of the base, declared as touching.
+TEST_F(MujocoContact, DeclaredPairHoldsAndIsReportedFromItsFirstShape) {
+  auto robot = test::wheel();
+  RobotShape ball;
+  ball.radius = 0.05;
+  ball.X_LS.p = {0.3, 0.15, 0.0};
+  robot->shapes.push_back(ball);
+  ball.link = 1;
+  ball.X_LS.p = {0.3, 0.0, 0.0};
+  robot->shapes.push_back(ball);
+  scene.robot = robot;
+  scene.gravity.setZero();
+  const RobotState state = test::state_of(*robot, {0.0, 0.0, 10.0});
+  JointCommand command = test::no_torque(*robot);
+  command.tau_ff[0] = 2.0;
+  command.kd[0] = 0.5;
+  for (const bool reversed : {false, true}) {
+    robot->self_collision = {reversed ? std::pair(1, 0) : std::pair(0, 1)};
+    start(state);
+    for (int i = 0; i < 1000; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk);
+    ASSERT_EQ(backend->contacts().size(), 1U);
+    const Contact& contact = backend->contacts()[0];
+    EXPECT_EQ(contact.side, ContactSide::kRobot);
+    EXPECT_EQ(contact.link, reversed ? 1 : 0);
+    EXPECT_EQ(contact.other, reversed ? 0 : 1);
+    EXPECT_LT(contact.depth, 0.002);
+    const Eigen::Vector3d f_W = reversed ? contact.f_W : Eigen::Vector3d(-contact.f_W);  // on the rim
+    EXPECT_NEAR((contact.p_WC - backend->state().X_WB.p).cross(f_W).z(), -2.0, 0.02);
+    EXPECT_LT(backend->state().q[0], 0.25);
+  }
+  scene.self_collision = false;
+  start(state);
+  for (int i = 0; i < 1000; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk);
+  EXPECT_TRUE(backend->contacts().empty());
+  EXPECT_GT(backend->state().q[0], 0.9);
+}
+
 TEST_F(MujocoContact, SkinIsTheDamperOfTheSceneInMotion) {
   // A free sledge, hit by the hand at 0.5 m/s: two contacts of K, D in parallel, taken linearly implicitly, move it as
   // m a = f, f = -2 (K r + (D + dt K) v_rel + (dt D + dt^2 K) a).

@@ -1,9 +1,13 @@
 // MuJoCo against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
 #include <cmath>
 #include <limits>
 #include <thread>
 
 #include "backends/factory.h"
+#include "backends/implicit_law.h"
 #include "core/random.h"
 #include "robots/dynamics.h"
 #include "tests/backends/g1_scene.h"
@@ -75,7 +79,7 @@ TEST_F(Wheel, TurnsWithItsArmature) {
   EXPECT_EQ(backend->torques()[0], 0.5);
 }
 
-TEST_F(Wheel, FollowsTheTorqueLawWithDampingAtTheEndOfTheStep) {
+TEST_F(Wheel, FollowsTheTorqueLawImplicitly) {
   command.q_target[0] = 0.2;
   command.kp[0] = 8.0;
   command.kd[0] = 0.9;
@@ -84,11 +88,12 @@ TEST_F(Wheel, FollowsTheTorqueLawWithDampingAtTheEndOfTheStep) {
   const double dt = backend->scene().dt;
   for (int i = 0; i < 200; ++i) {
     backend->step(command);
-    v = (v + dt / kInertia * (8.0 * (0.2 - q) + 0.3)) / (1.0 + dt / kInertia * 0.9);
+    const double a = (8.0 * (0.2 - q - dt * v) - 0.9 * v + 0.3) / (kInertia + dt * 0.9 + dt * dt * 8.0);
+    v += dt * a;
     q += dt * v;
     ASSERT_NEAR(backend->state().q[0], q, 1e-6);
     ASSERT_NEAR(backend->state().v[0], v, 1e-6);
-    ASSERT_NEAR(backend->torques()[0], 8.0 * (0.2 - (q - dt * v)) + 0.3 - 0.9 * v, 1e-4);
+    ASSERT_NEAR(backend->torques()[0], 8.0 * (0.2 - q) + 0.3 - 0.9 * v, 1e-4);  // of the end of the step
   }
 }
 
@@ -126,8 +131,7 @@ TEST_F(Mujoco, DivergenceIsAValueAndFinalUntilReset) {
   const RobotState state = test::state_of(*robot, {0.0, 0.0, 1000.0});
   backend->reset(state);
   JointCommand command = test::no_torque(*robot);
-  command.q_target[0] = 0.5;
-  command.kp[0] = 1e9;  // an explicit spring far beyond what the step bears
+  command.tau_ff[0] = 1e6;
   Outcome outcome = Outcome::kOk;
   for (int i = 0; i < 2000 && outcome == Outcome::kOk; ++i) outcome = backend->step(command);
   EXPECT_EQ(outcome, Outcome::kDiverged);
@@ -142,7 +146,7 @@ TEST_F(Mujoco, DivergenceIsAValueAndFinalUntilReset) {
 TEST_F(Mujoco, RefusesAModelThatItCannotCompileWithItsMessage) {
   auto robot = test::wheel();
   robot->links[1].inertia = Eigen::Vector3d(1.0, 1.0, 5.0).asDiagonal();  // no body has this
-  EXPECT_NE(test::thrown_message<std::runtime_error>([&] { make(robot); }).find("MuJoCo refuses the scene"),
+  EXPECT_NE(test::thrown_message<std::runtime_error>([&] { make(robot); }).find("mujoco: refuses the scene"),
             std::string::npos);
 }
 
@@ -195,6 +199,147 @@ TEST_F(Mujoco, AccelerationsAgreeWithOurDynamics) {
     found /= backend->scene().dt;
     EXPECT_LT((found - expected).norm() / expected.norm(), 1e-6);
   }
+}
+
+// The G1 far from stops, thrown and turning, all its targets 0.6 rad away: most joints are at their effort.
+struct FarTargets {
+  FarTargets() {
+    RobotModel free = *test::g1();
+    for (RobotJoint& joint : free.joints) {
+      joint.lower = -6.0;
+      joint.upper = 6.0;
+    }
+    robot = std::make_shared<const RobotModel>(std::move(free));
+    state = test::state_of(*robot, {0.0, 0.0, 50.0});
+    state.w_WB_B = {0.5, -1.0, 0.3};
+    command = robot->default_command(robot->neutral.array() + 0.6);
+  }
+  std::shared_ptr<const RobotModel> robot;
+  RobotState state;
+  JointCommand command;
+};
+
+void take_step(const ImplicitLaw& law, double dt, RobotState& state) {
+  const Eigen::VectorXd& a = law.acceleration();
+  state.v_WB += dt * a.head<3>();
+  state.w_WB_B += dt * a.segment<3>(3);
+  state.v += dt * a.tail(state.v.size());
+  state.X_WB.p += dt * state.v_WB;
+  const Eigen::Vector3d turn = dt * state.w_WB_B;
+  state.X_WB.R = state.X_WB.R * Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized()));
+  state.q += dt * state.v;
+}
+
+TEST_F(Mujoco, LawAndLimitAreImplicitLawsInFreeFlight) {
+  const FarTargets far;
+  Scene scene;
+  scene.robot = far.robot;
+  scene.self_collision = false;
+  const auto backend = make_backend("mujoco", scene);
+  backend->reset(far.state);
+  ImplicitLaw law(scene);
+  RobotState state = far.state;
+  Eigen::VectorXd torques(29);
+  int saturated = 0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(backend->step(far.command), Outcome::kOk);
+    law.begin(state, far.command);
+    law.solve(Eigen::VectorXd::Zero(35));
+    law.torques(law.acceleration(), torques);
+    take_step(law, scene.dt, state);
+    for (int k = 0; k < 29; ++k) {
+      saturated += std::abs(torques[k]) == scene.robot->joints[k].effort;
+      ASSERT_LE(std::abs(backend->torques()[k]), scene.robot->joints[k].effort * (1.0 + 1e-9));
+    }
+    ASSERT_LT((backend->torques() - torques).cwiseAbs().maxCoeff(), 1e-5) << i;
+    ASSERT_LT((backend->state().q - state.q).cwiseAbs().maxCoeff(), 1e-7) << i;
+  }
+  EXPECT_GT(saturated, 50);
+}
+
+TEST_F(Mujoco, SaturatedStepConvergesToTheLawWithFineSteps) {
+  const FarTargets far;
+  Scene scene;
+  scene.robot = far.robot;
+  scene.self_collision = false;
+  Scene fine = scene;
+  fine.dt = 1e-4;
+  ImplicitLaw law(fine);
+  RobotState state = far.state;
+  for (int i = 0; i < 2000; ++i) {
+    law.begin(state, far.command);
+    law.solve(Eigen::VectorXd::Zero(35));
+    take_step(law, fine.dt, state);
+  }
+  for (const double dt : {0.0005, 0.001, 0.002}) {
+    scene.dt = dt;
+    const auto backend = make_backend("mujoco", scene);
+    backend->reset(far.state);
+    for (int i = 0; i < std::lround(0.2 / dt); ++i) backend->step(far.command);
+    const double error = (backend->state().q - state.q).cwiseAbs().maxCoeff();
+    RecordProperty(fmt::format("error_at_{}_us", std::lround(1e6 * dt)), fmt::format("{:.5f}", error));
+    EXPECT_LT(error, 15.0 * dt);
+  }
+}
+
+TEST_F(Mujoco, NamesItsOptionsAndTheirValues) {
+  const auto message = [](const EngineOptions& options) {
+    Scene scene;
+    scene.robot = test::sledge();
+    scene.options = options;
+    return test::thrown_message<std::invalid_argument>([&] { make_backend("mujoco", scene); });
+  };
+  EXPECT_THAT(message({{"solvr", "cg"}}), ::testing::HasSubstr("did you mean 'solver'"));
+  EXPECT_THAT(message({{"solver", "lemke"}}), ::testing::HasSubstr("expected one of newton, cg, pgs"));
+  EXPECT_THAT(message({{"iterations", "1.5"}}), ::testing::HasSubstr("expected a whole number from 1 to 1000"));
+}
+
+// Where a standing G1 is after 0.1 s under these settings.
+RobotState stood(const EngineOptions& options) {
+  Scene scene = test::g1_scene();
+  scene.options = options;
+  const auto backend = make_backend("mujoco", scene);
+  RobotState state = scene.robot->standing_state();
+  state.v_WB = {0.3, 0.2, -0.3};
+  backend->reset(state);
+  const JointCommand command = scene.robot->default_command(scene.robot->neutral);
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(backend->step(command), Outcome::kOk);
+  return backend->state();
+}
+
+TEST_F(Mujoco, EachOptionChangesTheRunAndOnlySlightly) {
+  const RobotState usual = stood({});
+  EXPECT_TRUE(test::same(stood({{"solver", "newton"}, {"iterations", "20"}}), usual));
+  const EngineOptions changed[] = {{{"solver", "cg"}},
+                                   {{"solver", "pgs"}, {"iterations", "200"}},
+                                   {{"iterations", "1"}},
+                                   {{"tolerance", "0.1"}},
+                                   {{"impratio", "1"}},
+                                   {{"cone", "pyramidal"}},
+                                   {{"jacobian", "sparse"}},
+                                   {{"integrator", "implicit"}},
+                                   {{"ground_time_constant", "0.02"}}};
+  for (const EngineOptions& options : changed) {
+    const RobotState state = stood(options);
+    const std::string& name = options.begin()->second;
+    EXPECT_FALSE(test::same(state, usual)) << name;
+    EXPECT_LT((state.X_WB.p - usual.X_WB.p).norm(), 0.01) << name;
+  }
+}
+
+TEST_F(Mujoco, SofterGroundSinksDeeper) {
+  double depth[2];
+  for (const int i : {0, 1}) {
+    Scene scene;
+    scene.robot = test::sledge();
+    scene.options = {{"ground_time_constant", i == 0 ? "0.005" : "0.04"}};
+    const auto backend = make_backend("mujoco", scene);
+    backend->reset(test::state_of(*scene.robot, {0.0, 0.0, 0.1}));
+    for (int k = 0; k < 500; ++k) backend->step(test::no_torque(*scene.robot));
+    ASSERT_EQ(backend->contacts().size(), 4U);
+    depth[i] = backend->contacts()[0].depth;
+  }
+  EXPECT_GT(depth[1], 10.0 * depth[0]);
 }
 
 // A run that falls over: contacts come and go, everything is excited.

@@ -1,0 +1,36 @@
+// The torque law of JointCommand in MuJoCo, as ImplicitLaw has it: (M + S) a = t0 - b + J^T f. What the law adds to the
+// inertia of a joint, dt kd + dt^2 kp, stands beside the armature in MuJoCo's mass matrix; so the constraint solver
+// sees M + S and the integrator has nothing left to do. No allocation after construction.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "backends/mujoco/mujoco_model.h"
+#include "backends/scene.h"
+#include "core/robot_state.h"
+
+namespace duet {
+
+class MujocoLaw {
+ public:
+  MujocoLaw(const Scene& scene, const MujocoModel& compiled);  // keeps references to both
+
+  // Inertia and torque of the step, without the limit. Before mj_step1.
+  void begin(const RobotState& state, const JointCommand& command);
+  // Accelerations and constraint forces (mj_fwdAcceleration, mj_fwdConstraint), repeated once where a joint passes its
+  // limit: that joint then gets its effort and its armature alone. Between mj_step1 and integrate().
+  void accelerate();
+  // The state after the step.
+  void integrate();
+  // The law's torque, armature apart, for the velocities before and after the step. [N m]
+  void torques(const Eigen::VectorXd& v_before, const Eigen::VectorXd& v_after, Eigen::VectorXd& out) const;
+
+ private:
+  bool saturate();
+
+  const Scene& scene_;
+  const MujocoModel& compiled_;
+  Eigen::VectorXd drive_, added_;  // t0; dt kd + dt^2 kp
+};
+
+}  // namespace duet
