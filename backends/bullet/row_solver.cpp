@@ -50,6 +50,10 @@ RowSolver::RowSolver(const Scene& scene, const RowSettings& settings, std::size_
   info_.m_numIterations = settings_.iterations;
   info_.m_splitImpulse = 0;
   info_.m_solverMode = SOLVER_USE_2_FRICTION_DIRECTIONS;  // the two rows of a contact are limited by a cone
+  // Once, so that Bullet's own buffers have their size.
+  m_tmpMultiBodyConstraints = nullptr;
+  m_tmpNumMultiBodyConstraints = 0;
+  btMultiBodyConstraintSolver::solveGroupCacheFriendlySetup(nullptr, 0, nullptr, 0, nullptr, 0, info_, nullptr);
 }
 
 void RowSolver::set_contacts(std::span<const ContactPoint> points, const Kinematics& kinematics) {
