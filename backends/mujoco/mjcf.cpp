@@ -13,10 +13,7 @@ namespace {
 
 using Out = std::back_insert_iterator<std::string>;
 
-// Contact and stop parameters of MuJoCo (its `solref` time constant is at least twice the step): chosen stiff, see the
-// README. With a higher priority a geom decides the parameters of a contact alone: the ground over the robot, the robot
-// over the human.
-constexpr int kGroundPriority = 2;
+// With a higher priority a geom decides the parameters of a contact alone: the robot over the human.
 constexpr int kRobotPriority = 1;
 constexpr const char* kImpedance = "0.95 0.99 0.001";  // of the ground and of the robot itself
 // More points, and rows of theirs and of joint stops, than a robot touches with at once; a world stays below a
@@ -53,12 +50,13 @@ void write_options(Out out, const Scene& scene) {
                  "<mujoco><compiler angle='radian' inertiafromgeom='false' boundmass='0' boundinertia='0' "
                  "balanceinertia='false'/><size njmax='{}' nconmax='{}' nstack='{}'/>"
                  "<option timestep='{}' gravity='{}' integrator='{}' solver='{}' cone='{}' "
-                 "iterations='{}' tolerance='{}' impratio='{}' jacobian='{}'>"
+                 "iterations='{}' tolerance='{}' impratio='{}' jacobian='{}' collision='{}'>"
                  "<flag frictionloss='disable' equality='disable' passive='disable' sensor='disable' "
                  "actuation='disable'/></option>",
                  sizes.rows, sizes.contacts, stack_size(scene, settings, sizes.rows), scene.dt, numbers(scene.gravity),
                  settings.integrator == "euler" ? "Euler" : settings.integrator, solver, settings.cone,
-                 settings.iterations, settings.tolerance, settings.impratio, settings.jacobian);
+                 settings.iterations, settings.tolerance, settings.impratio, settings.jacobian,
+                 scene.partner == PartnerMode::kSolid ? "all" : "predefined");
 }
 
 void write_shape(Out out, const Scene& scene, int index) {
@@ -106,13 +104,21 @@ void write_capsules(Out out, const Scene& scene) {
                    i, static_cast<double>(i), kFarAway, capsules[i].radius);
 }
 
+// Contacts with the ground and of the robot with itself are pairs of their own: no search for them, and friction is
+// the pair's.
 void write_pairs(Out out, const Scene& scene) {
-  if (scene.robot->self_collision.empty()) return;
-  fmt::format_to(out, "<contact>");
-  for (const auto& [first, second] : scene.robot->self_collision)
+  const RobotModel& robot = *scene.robot;
+  const double time_constant = ground_time_constant(scene);
+  const auto write = [&](const std::string& first, const std::string& second, double friction) {
     fmt::format_to(out,
-                   "<pair geom1='s{0}' geom2='s{1}' condim='3' friction='{2} {2} 0 0 0' solref='{3} 1' solimp='{4}'/>",
-                   first, second, scene.friction.robot_robot, ground_time_constant(scene), kImpedance);
+                   "<pair geom1='{0}' geom2='{1}' condim='3' friction='{2} {2} 0 0 0' solref='{3} 1' solimp='{4}'/>",
+                   first, second, friction, time_constant, kImpedance);
+  };
+  fmt::format_to(out, "<contact>");
+  for (size_t s = 0; s < robot.shapes.size(); ++s) write("ground", fmt::format("s{}", s), scene.friction.robot_ground);
+  if (scene.self_collision)
+    for (const auto& [first, second] : robot.self_collision)
+      write(fmt::format("s{}", first), fmt::format("s{}", second), scene.friction.robot_robot);
   fmt::format_to(out, "</contact>");
 }
 
@@ -133,14 +139,11 @@ std::string make_mjcf(const Scene& scene) {
   std::string text;
   const Out out(text);
   write_options(out, scene);
-  fmt::format_to(out,
-                 "<worldbody><geom name='ground' type='plane' size='0 0 1' contype='1' conaffinity='0' condim='3' "
-                 "priority='{}' friction='{} 0 0' solref='{} 1' solimp='{}'/>",
-                 kGroundPriority, scene.friction.robot_ground, ground_time_constant(scene), kImpedance);
+  fmt::format_to(out, "<worldbody><geom name='ground' type='plane' size='0 0 1' contype='0' conaffinity='0'/>");
   write_link(out, scene, 0);
   if (scene.partner == PartnerMode::kSolid) write_capsules(out, scene);
   fmt::format_to(out, "</worldbody>");
-  if (scene.self_collision) write_pairs(out, scene);
+  write_pairs(out, scene);
   fmt::format_to(out, "</mujoco>");
   return text;
 }
