@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "backends/bullet/bare_loop.h"
 #include "backends/bullet/bullet_world.h"
 #include "backends/engine_module.h"
@@ -26,7 +28,7 @@ class BulletBackend final : public PhysicsBackend {
 
   Outcome advance(const JointCommand& command) override {
     if (!world_.begin(state_, command)) return Outcome::kDiverged;
-    const std::span<const ContactPoint> points = narrow_phase_.collide(world_.kinematics(), partner_);
+    const std::span<const ContactPoint> points = collide();
     world_.step(points, &pushes_, state_, torques_);
     const Eigen::Map<const Eigen::VectorXd> velocity = std::as_const(world_).articulation().velocity();
     if (!(velocity.cwiseAbs().maxCoeff() < kAbsurd)) return Outcome::kDiverged;
@@ -34,6 +36,14 @@ class BulletBackend final : public PhysicsBackend {
     for (std::size_t i = 0; i < points.size(); ++i)
       contacts_.push_back(reported(points[i], world_.rows().contact_force(i)));
     return Outcome::kOk;
+  }
+
+  std::span<const ContactPoint> collide() {
+    try {
+      return narrow_phase_.collide(world_.kinematics(), partner_);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("bullet: {}", error.what()));
+    }
   }
 
   void append_to(std::vector<double>& values) const override { world_.articulation().append_to(values); }

@@ -324,6 +324,20 @@ TEST_F(BulletContact, SkinIsTheSameAtEveryStep) {
   for (const double peak : peaks) EXPECT_NEAR(peak, peaks[0], 0.15 * peaks[0]);
 }
 
+TEST_F(BulletContact, TooManyContactsWithTheHumanAreAnErrorThatSaysSo) {
+  auto robot = test::sledge();
+  robot->shapes.resize(100, robot->shapes[3]);  // in one place
+  scene.robot = robot;
+  scene.human.capsules.resize(2, scene.human.capsules[0]);
+  scene.partner = PartnerMode::kSolid;
+  RobotState flying = rest;
+  flying.X_WB.p.z() = 100.0;
+  start(flying);
+  backend->set_partner(hand_before_sledge(flying, -0.001), HumanJoints::Zero());
+  const std::string message = test::thrown_message<std::runtime_error>([&] { backend->step(test::no_torque(*robot)); });
+  EXPECT_EQ(message.rfind("bullet: more than", 0), 0U) << message;
+}
+
 // Two arms of one robot, in flight, are driven together.
 TEST_F(BulletContact, LinksThatTouchHoldOneAnotherAndKeepMomentum) {
   auto robot = std::make_shared<RobotModel>();
