@@ -9,7 +9,9 @@ namespace {
 using dart::dynamics::BodyNode;
 
 constexpr double kNoSlip = 1e-12;  // [m/s], below which a direction of sliding has no meaning
-constexpr double kNoSkin = 1e-9;   // [N s/m], the least h K + D of a skin
+// Of friction rows, as a share of their inverse inertia: the rows of one link depend on one another.
+constexpr double kFrictionCfm = 1e-5;
+constexpr double kNoSkin = 1e-9;  // [N s/m], the least h K + D of a skin
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 Eigen::Vector3d velocity_at(const BodyNode& body, const Eigen::Vector3d& p_W) {
@@ -86,6 +88,7 @@ void ContactRows::fill_rows(const ContactPoint& contact, const Point& point, Row
     row.J = wrench_on(*point.body, contact.p_W, axis_W);
     row.velocity = contact.v_other_W.dot(axis_W) - row.J.dot(point.body->getSpatialVelocity());
     row.softness = 0.0;
+    row.cfm = kFrictionCfm;
     row.impulse = 0.0;
     if (point.other == nullptr) continue;
     row.J_other = -wrench_on(*point.other, contact.p_W, axis_W);
@@ -95,8 +98,10 @@ void ContactRows::fill_rows(const ContactPoint& contact, const Point& point, Row
     const double spring = dt_ * contact.skin.stiffness, both = std::max(spring + contact.skin.damping, kNoSkin);
     rows[0].velocity += spring / both * contact.depth / dt_;
     rows[0].softness = 1.0 / (dt_ * both);
+    rows[0].cfm = 0.0;
   } else {
     rows[0].velocity += std::min(rigid_.erp * contact.depth / dt_, rigid_.recovery_speed);
+    rows[0].cfm = rigid_.cfm;
   }
 }
 
@@ -136,7 +141,9 @@ void ContactRows::getVelocityChange(double* change, bool with_cfm) {
     change[i] = rows_[i].J.dot(answer_of(contact.link));
     if (contact.side == ContactSide::kRobot) change[i] += rows_[i].J_other.dot(answer_of(contact.other));
   }
-  if (with_cfm) change[applied_] += rigid_.cfm * change[applied_] + rows_[applied_].softness;
+  if (!with_cfm) return;
+  const Row& row = rows_[applied_];
+  change[applied_] += row.cfm * change[applied_] + row.softness;
 }
 
 void ContactRows::answer(std::size_t row) {

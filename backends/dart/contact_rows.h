@@ -17,7 +17,7 @@ namespace duet {
 struct RigidContact {
   double erp = 0.0;             // share of the depth that is recovered in a step
   double recovery_speed = 0.0;  // at most [m/s]
-  double cfm = 0.0;             // added to the diagonal, as a share of it
+  double cfm = 0.0;             // softness of the normal row, as a share of its inverse inertia
 };
 
 class ContactRows final : public dart::constraint::ConstraintBase {
@@ -39,6 +39,7 @@ class ContactRows final : public dart::constraint::ConstraintBase {
     Eigen::Vector6d J_other = Eigen::Vector6d::Zero();  // of the other link, where there is one
     double velocity = 0.0;                              // change that is asked for [m/s]
     double softness = 0.0;                              // added to the diagonal [1/kg]
+    double cfm = 0.0;                                   // the same, as a share of it
     double impulse = 0.0;                               // [N s]
   };
   struct Point {

@@ -40,8 +40,10 @@ std::unique_ptr<GroupSolver> make_solver(const Scene& scene) {
   const auto pgs = std::make_shared<dc::PgsBoxedLcpSolver>();
   pgs->setOption(dc::PgsBoxedLcpSolver::Option(option_integer(scene.options, dart_options(), "pgs_iterations")));
   const bool dantzig = option_choice(scene.options, dart_options(), "solver") == "dantzig";
-  auto solver = dantzig ? std::make_unique<GroupSolver>(std::make_shared<dc::DantzigBoxedLcpSolver>(), pgs, scene.dt)
-                        : std::make_unique<GroupSolver>(pgs, nullptr, scene.dt);
+  const int passes = option_integer(scene.options, dart_options(), "friction_passes");
+  auto solver =
+      dantzig ? std::make_unique<GroupSolver>(std::make_shared<dc::DantzigBoxedLcpSolver>(), pgs, scene.dt, passes)
+              : std::make_unique<GroupSolver>(pgs, nullptr, scene.dt, passes);
   solver->setCollisionDetector(dart::collision::DARTCollisionDetector::create());  // without shapes the cheapest
   return solver;
 }
@@ -62,9 +64,12 @@ std::span<const EngineOption> dart_options() {
   static const std::vector<EngineOption> options = {
       choice_option("solver", {"dantzig", "pgs"}, "of the contact problem; dantzig falls back on pgs"),
       integer_option("pgs_iterations", 50, 1, 10000, "sweeps of pgs"),
-      number_option("erp", 0.1, 0.0, 1.0, "share of a rigid contact's depth that is recovered in a step"),
-      number_option("recovery_speed", 0.02, 0.0, 10.0, "at most, of a rigid contact [m/s]"),
-      number_option("cfm", 1e-5, 0.0, 1.0, "softness of a rigid contact, as a share of its inverse inertia")};
+      integer_option("friction_passes", 5, 0, 100,
+                     "solutions that refine the bounds of friction; 0: DART's own bounds"),
+      number_option("erp", 0.2, 0.0, 1.0, "share of a rigid contact's depth that is recovered in a step"),
+      number_option("recovery_speed", 0.05, 0.0, 10.0, "at most, of a rigid contact [m/s]"),
+      number_option("cfm", 0.03, 0.0, 1.0,
+                    "softness of a rigid contact along its normal, as a share of its inertia^-1")};
   return options;
 }
 

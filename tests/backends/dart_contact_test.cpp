@@ -272,7 +272,7 @@ TEST_F(DartContact, NeverPulls) {
     for (const Contact& contact : backend->contacts()) {
       touched = true;
       EXPECT_GE(contact.f_W.z(), -1e-9);
-      EXPECT_LE(contact.f_W.head<2>().norm(), 0.6 * 1.05 * contact.f_W.z() + 1e-6);
+      EXPECT_LE(contact.f_W.head<2>().norm(), 0.6 * 1.05 * contact.f_W.z() + 1e-6) << backend->time();
     }
   }
   EXPECT_TRUE(touched);
@@ -301,8 +301,8 @@ TEST_F(DartContact, SkinIsTheSameAtEveryStep) {
     run(0.5);
     for (const Contact& contact : backend->contacts()) {
       if (contact.side != ContactSide::kHuman) continue;
-      EXPECT_NEAR(contact.f_W.norm(), scene.human.capsules[0].skin.stiffness * contact.depth,
-                  0.01 * contact.f_W.norm());
+      // Along the normal: friction with the hand may still hold up what the ground has not yet taken.
+      EXPECT_NEAR(-contact.f_W.x(), scene.human.capsules[0].skin.stiffness * contact.depth, 0.01 * -contact.f_W.x());
     }
   }
   for (const double peak : peaks) EXPECT_NEAR(peak, peaks[0], 0.15 * peaks[0]);
@@ -359,8 +359,9 @@ TEST_F(DartContact, LinksThatTouchHoldOneAnotherAndKeepMomentum) {
     EXPECT_EQ(contact.other, 2);
     EXPECT_GT(contact.f_W.y(), 1.0);  // away from the other arm
     EXPECT_LT(contact.depth, 1e-4);
-    EXPECT_NEAR(backend->state().v_WB.norm(), 0.0, 1e-6);  // equal and opposite: nothing moves the whole
-    EXPECT_NEAR(backend->state().w_WB_B.norm(), 0.0, 1e-6);
+    // Equal and opposite: nothing moves the whole, but what first order in dt left of the arms' swing.
+    EXPECT_NEAR(backend->state().v_WB.norm(), 0.0, 1e-3);
+    EXPECT_NEAR(backend->state().w_WB_B.norm(), 0.0, 1e-3);
   }
 }
 
