@@ -9,9 +9,14 @@
 namespace duet {
 namespace {
 
-constexpr std::size_t kDirect = 16;       // contacts that are first tried as all sticking
+constexpr std::size_t kDirect = 16;       // contacts whose linear system is formed
 constexpr double kRegularisation = 1e-7;  // of the inverse inertia: coplanar contacts share the load
 constexpr double kSettled = 1e-9;         // change of velocity in a sweep [m/s]
+constexpr int kFirstGuess = 4;            // sweeps before the first, each next one after twice as many
+constexpr int kTurns = 4;                 // of corrections, per guess
+constexpr double kOpening = 1e-9;         // approach of an open contact [m/s]
+constexpr double kSlip = 1e-5;            // that has a direction [m/s]
+constexpr double kDirection = 3e-3;       // of slip [rad], and of a share of the cone
 
 // Nearest point of the disc with this radius.
 Eigen::Vector2d clipped(const Eigen::Vector2d& p, double radius) {
@@ -21,6 +26,23 @@ Eigen::Vector2d clipped(const Eigen::Vector2d& p, double radius) {
 
 bool in_cone(const Eigen::Vector3d& p, double friction) {
   return p.x() >= 0.0 && p.tail<2>().squaredNorm() <= friction * friction * p.x() * p.x();
+}
+
+// In place, without pivots: the systems here are close to positive definite. False where one is not.
+bool solve_in_place(Eigen::Ref<Eigen::MatrixXd> A, Eigen::Ref<Eigen::VectorXd> x) {
+  const Eigen::Index n = x.size();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    if (!(A(k, k) > 0.0)) return false;
+    const Eigen::Index below = n - k - 1;
+    A.col(k).tail(below) /= A(k, k);
+    x.tail(below) -= x[k] * A.col(k).tail(below);
+    for (Eigen::Index j = k + 1; j < n; ++j) A.col(j).tail(below) -= A(k, j) * A.col(k).tail(below);
+  }
+  for (Eigen::Index k = n - 1; k >= 0; --k) {
+    x[k] /= A(k, k);
+    x.head(k) -= x[k] * A.col(k).head(k);
+  }
+  return true;
 }
 
 double largest_eigenvalue(const Eigen::Matrix2d& m) {
@@ -44,8 +66,8 @@ ContactSolver::ContactSolver(const RobotModel& robot, std::size_t contacts, doub
     row.Y = TreeFactor::Triple::Zero(n, 3);
   }
   const int direct = static_cast<int>(3 * std::min(rows_.size(), kDirect));
-  G_ = Eigen::MatrixXd::Zero(direct, direct);  // the lower triangle is used
-  sticking_ = Eigen::VectorXd::Zero(direct);
+  G_ = system_ = Eigen::MatrixXd::Zero(direct, direct);
+  unknowns_ = p_ = missing_ = change_of_rows_ = Eigen::VectorXd::Zero(direct);
   half_ = generalized_ = change_ = Eigen::VectorXd::Zero(n);
 }
 
@@ -129,28 +151,35 @@ void ContactSolver::project(const TreeFactor& factor, const Eigen::VectorXd& v) 
   }
 }
 
-// False where a contact then pulls or leaves its cone; the rows hold the impulses of that all the same.
-bool ContactSolver::stick() {
-  for (std::size_t i = 0; i < used_; ++i) rows_[i].p.setZero();
-  if (used_ > kDirect) return false;
-  const int size = static_cast<int>(3 * used_);
+void ContactSolver::assemble() {
   for (std::size_t i = 0; i < used_; ++i) {
     const Row& a = rows_[i];
     const int ia = static_cast<int>(3 * i);
     for (std::size_t j = 0; j < i; ++j) {
-      const Row& b = rows_[j];
+      const int jb = static_cast<int>(3 * j);
       Eigen::Matrix3d block = Eigen::Matrix3d::Zero();
-      for (const int k : a.support) block.noalias() += a.Y.row(k).transpose() * b.Y.row(k);
-      G_.block<3, 3>(ia, static_cast<int>(3 * j)) = block;
+      for (const int k : a.support) block.noalias() += a.Y.row(k).transpose() * rows_[j].Y.row(k);
+      G_.block<3, 3>(ia, jb) = block;
+      G_.block<3, 3>(jb, ia) = block.transpose();
     }
     G_.block<3, 3>(ia, ia) = a.inverse;
     G_.diagonal().segment<3>(ia).array() += kRegularisation * a.inverse(0, 0);
     G_(ia, ia) += a.compliance;
-    sticking_.segment<3>(ia) = a.missing;
+    missing_.segment<3>(ia) = a.missing;
   }
-  Eigen::Ref<Eigen::MatrixXd> G = G_.topLeftCorner(size, size);
-  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(G);
-  Eigen::Ref<Eigen::VectorXd> p = sticking_.head(size);
+}
+
+// False where a contact then pulls or leaves its cone; the rows hold the impulses of that all the same.
+bool ContactSolver::stick() {
+  for (std::size_t i = 0; i < used_; ++i) rows_[i].p.setZero();
+  if (used_ > kDirect) return false;
+  assemble();
+  const int size = static_cast<int>(3 * used_);
+  system_.topLeftCorner(size, size) = G_.topLeftCorner(size, size);
+  Eigen::Ref<Eigen::MatrixXd> system = system_.topLeftCorner(size, size);
+  const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> factor(system);
+  p_.head(size) = missing_.head(size);
+  Eigen::Ref<Eigen::VectorXd> p = p_.head(size);
   factor.solveInPlace(p);
   bool holds = true;
   for (std::size_t i = 0; i < used_; ++i) {
@@ -161,15 +190,107 @@ bool ContactSolver::stick() {
 }
 
 void ContactSolver::slide() {
-  half_.setZero();
   for (std::size_t i = 0; i < used_; ++i) {
     Row& row = rows_[i];
     row.p.x() = std::max(0.0, row.p.x());
     row.p.tail<2>() = clipped(row.p.tail<2>(), row.friction * row.p.x());
-    for (const int k : row.support) half_[k] += row.Y.row(k).dot(row.p);
   }
-  for (int i = 0; i < sweeps_; ++i)
+  write_half();
+  int guess = kFirstGuess;
+  for (int i = 1; i <= sweeps_; ++i) {
     if (sweep() < kSettled) return;
+    if (i < guess || used_ > kDirect) continue;
+    guess *= 2;
+    if (settle()) return;
+  }
+}
+
+void ContactSolver::write_half() {
+  half_.setZero();
+  for (std::size_t i = 0; i < used_; ++i)
+    for (const int k : rows_[i].support) half_[k] += rows_[i].Y.row(k).dot(rows_[i].p);
+}
+
+// True where the impulses that follow from what each contact does agree with it; else nothing changes.
+bool ContactSolver::settle() {
+  guess_modes();
+  for (int turn = 0; turn < kTurns; ++turn) {
+    if (!solve_modes()) return false;
+    if (!correct_modes()) continue;
+    for (std::size_t i = 0; i < used_; ++i) rows_[i].p = p_.segment<3>(static_cast<int>(3 * i));
+    return true;
+  }
+  return false;
+}
+
+void ContactSolver::guess_modes() {
+  for (std::size_t i = 0; i < used_; ++i) {
+    Row& row = rows_[i];
+    const double drag = row.p.tail<2>().norm(), most = row.friction * row.p.x();
+    row.mode = row.p.x() <= 0.0 ? Mode::kOpen : drag < (1.0 - kDirection) * most ? Mode::kStick : Mode::kSlide;
+    row.drag = drag > 0.0 ? Eigen::Vector2d(row.p.tail<2>() / drag) : Eigen::Vector2d::Zero();
+  }
+}
+
+// A sliding contact's friction is its normal impulse times friction along `drag`: one column.
+bool ContactSolver::solve_modes() {
+  const int size = static_cast<int>(3 * used_);
+  int unknowns = 0;
+  for (std::size_t i = 0; i < used_; ++i) {
+    rows_[i].at = unknowns;
+    unknowns += rows_[i].mode == Mode::kOpen ? 0 : rows_[i].mode == Mode::kStick ? 3 : 1;
+  }
+  for (std::size_t j = 0; j < used_; ++j) {
+    const Row& b = rows_[j];
+    if (b.mode == Mode::kOpen) continue;
+    const int jb = static_cast<int>(3 * j), columns = b.mode == Mode::kStick ? 3 : 1;
+    for (std::size_t i = 0; i < used_; ++i) {
+      const Row& a = rows_[i];
+      if (a.mode == Mode::kOpen) continue;
+      const int ia = static_cast<int>(3 * i), lines = a.mode == Mode::kStick ? 3 : 1;
+      system_.block(a.at, b.at, lines, columns) = G_.block(ia, jb, lines, columns);
+      if (columns == 1) system_.block(a.at, b.at, lines, 1) += b.friction * (G_.block(ia, jb + 1, lines, 2) * b.drag);
+    }
+    unknowns_.segment(b.at, columns) = missing_.segment(jb, columns);
+  }
+  if (!solve_in_place(system_.topLeftCorner(unknowns, unknowns), unknowns_.head(unknowns))) return false;
+  for (std::size_t i = 0; i < used_; ++i) {
+    const Row& row = rows_[i];
+    Eigen::Vector3d p = Eigen::Vector3d::Zero();
+    if (row.mode == Mode::kStick) p = unknowns_.segment<3>(row.at);
+    if (row.mode == Mode::kSlide) p << unknowns_[row.at], row.friction * unknowns_[row.at] * row.drag;
+    p_.segment<3>(static_cast<int>(3 * i)) = p;
+  }
+  change_of_rows_.head(size).noalias() = G_.topLeftCorner(size, size) * p_.head(size);
+  return true;
+}
+
+// True where nothing was to be corrected.
+bool ContactSolver::correct_modes() {
+  bool held = true;
+  for (std::size_t i = 0; i < used_; ++i) {
+    Row& row = rows_[i];
+    const int ia = static_cast<int>(3 * i);
+    const Eigen::Vector3d p = p_.segment<3>(ia), missing = row.missing - change_of_rows_.segment<3>(ia);
+    const Mode mode = row.mode;
+    if (mode == Mode::kOpen) {
+      if (missing.x() > kOpening) row.mode = row.friction > 0.0 ? Mode::kStick : Mode::kSlide;
+    } else if (p.x() < 0.0) {
+      row.mode = Mode::kOpen;
+    } else if (mode == Mode::kStick) {
+      if (!in_cone(p, row.friction)) {
+        row.mode = Mode::kSlide;
+        row.drag = p.tail<2>().normalized();
+      }
+    } else if (row.friction > 0.0 && missing.tail<2>().norm() > kSlip) {
+      const Eigen::Vector2d drag = missing.tail<2>().normalized();
+      if (drag.dot(row.drag) < 0.0) row.mode = Mode::kStick;
+      held = held && (drag - row.drag).norm() < kDirection;
+      row.drag = drag;
+    }
+    held = held && row.mode == mode;
+  }
+  return held;
 }
 
 // Each contact in turn finds its own impulse, the others' given. The largest change of velocity along a row [m/s].

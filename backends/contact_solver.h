@@ -3,8 +3,9 @@
 // With the velocity v0 that the step would end with, the impulses p [N s] and the velocity u of the other side,
 //   v = v0 + A^-1 J^T p,   0 <= p_n  complementary to  n (J v - u) + cfm p_n / dt - erp depth / dt >= 0,
 //   |p_t| <= friction p_n, against the slip where equal.
-// Where all contacts stick, one factorisation gives the answer; else block Gauss-Seidel goes on from there. No history:
-// equal input gives bitwise equal output. No allocation after construction.
+// Where all contacts stick, one factorisation gives the answer. Else block Gauss-Seidel finds which ones open or slide,
+// and a linear system the impulses of that, until both agree. No history: equal input gives bitwise equal output. No
+// allocation after construction.
 #pragma once
 
 #include <Eigen/Core>
@@ -47,6 +48,7 @@ class ContactSolver {
   [[nodiscard]] const Eigen::VectorXd& generalized_impulse() const { return generalized_; }  // J^T p
 
  private:
+  enum class Mode { kOpen, kStick, kSlide };
   struct Row {                        // a contact: its normal and two tangents; a stop has the first only
     std::vector<int> support;         // entries of the generalised velocity that matter to it, falling
     TreeFactor::Triple J, Y;          // Jacobian transposed and L^-T times that, A = L^T L; zero outside the support
@@ -54,22 +56,33 @@ class ContactSolver {
     Eigen::Vector3d target, missing;  // velocities wanted, and less those of v0 [m/s]
     double friction = 0.0, compliance = 0.0;
     Eigen::Vector3d p;
+    Mode mode = Mode::kOpen;
+    Eigen::Vector2d drag;  // of a sliding contact: direction of its friction
+    int at = 0;            // of its first unknown in the linear system
   };
   Row& next_row(const Softness& softness);
   void add_link(Row& row, int link, double sign, const Eigen::Vector3d& p_W, std::span<const Eigen::Matrix3d> R_WL,
                 std::span<const Eigen::Vector3d> p_WL) const;
   void project(const TreeFactor& factor, const Eigen::VectorXd& v);
+  void assemble();
   bool stick();
   void slide();
   double sweep();
+  bool settle();
+  void guess_modes();
+  bool solve_modes();
+  bool correct_modes();
+  void write_half();
 
   const RobotModel* robot_;
   double dt_;
   int sweeps_;
   std::size_t used_ = 0;
   std::vector<Row> rows_;
-  Eigen::MatrixXd G_;  // of all rows, where they are few
-  Eigen::VectorXd sticking_, half_, generalized_, change_;
+  // Of all rows, where they are few: the inverse inertia, a system in some of them, its solution, all impulses.
+  Eigen::MatrixXd G_, system_;
+  Eigen::VectorXd unknowns_, p_, missing_, change_of_rows_;
+  Eigen::VectorXd half_, generalized_, change_;  // L^-T J^T p, J^T p, A^-1 J^T p
 };
 
 }  // namespace duet

@@ -14,6 +14,7 @@ namespace {
 constexpr double kDt = 0.002;
 constexpr int kSweeps = 200;
 constexpr double kSettled = 2e-4;  // what that many sweeps leave where contacts slide [m/s]
+constexpr double kBlow = 1e-3;     // and where eight contacts of two stiff legs open and slide in one blow [m/s]
 constexpr Softness kRigid = {.erp = 0.5, .cfm = 1e-6};
 
 // A robot over the ground, its mass matrix factored, its contacts added.
@@ -157,7 +158,7 @@ TEST(ContactSolver, AStopTakesTheVelocityAndReturnsTheRest) {
 TEST(ContactSolver, TheLawsHoldForTheG1InEveryMixOfSlipAndLift) {
   const auto robot = test::g1();
   RobotState state = robot->standing_state();
-  state.X_WB.p.z() -= 1e-4;
+  state.X_WB.p.z() -= 1.5e-3;  // toes and heels
   for (int trial = 0; trial < 8; ++trial) {
     Step step(robot, state, 0.6);
     ASSERT_EQ(step.points.size(), 8U);
@@ -166,7 +167,7 @@ TEST(ContactSolver, TheLawsHoldForTheG1InEveryMixOfSlipAndLift) {
     v[trial % 6] += 0.2 * (trial < 6 ? 1.0 : -1.0);
     v[6 + trial] = 1.0;
     step.solver.solve(step.factor, v);
-    step.expect_laws(v, kSettled);
+    step.expect_laws(v, kBlow);
   }
 }
 
