@@ -5,6 +5,8 @@
 namespace duet {
 namespace {
 
+constexpr int kRepeats = 4;  // each may bring further joints to their limit; seldom more than one
+
 RowSettings row_settings(const EngineOptions& options) {
   const std::span<const EngineOption> known = bullet_options();
   return {.iterations = option_integer(options, known, "iterations"),
@@ -48,7 +50,7 @@ bool BulletWorld::begin(const RobotState& state, const JointCommand& command) {
   return true;
 }
 
-// The law's limit is taken with the contact forces of the step: where the torque passes it, the step is made again.
+// The law's limit is taken with the contact forces of the step: where a torque passes it, the step is made again.
 void BulletWorld::step(std::span<const ContactPoint> points, const LinkPushes* pushes, RobotState& state,
                        Eigen::VectorXd& torques) {
   Q_.setZero();
@@ -56,7 +58,7 @@ void BulletWorld::step(std::span<const ContactPoint> points, const LinkPushes* p
   rows_.set_contacts(points, kinematics());
   before_ = articulation_.velocity();
   solve(state.q);
-  if (law_.saturate(a_)) {
+  for (int again = 0; again < kRepeats && law_.saturate(a_); ++again) {
     articulation_.set_velocity(before_);
     solve(state.q);
   }

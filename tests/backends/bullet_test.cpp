@@ -371,6 +371,30 @@ TEST_F(Bullet, AllJointsHoldAtTheirStops) {
   EXPECT_LT(backend->state().v.cwiseAbs().maxCoeff(), 0.05);
 }
 
+// All joints swing by 1.2 rad, 1.5 times a second, while it falls: stops, ground and limits of effort at once.
+TEST_F(Bullet, EffortAndStopsHoldInThrashing) {
+  const Scene scene = test::g1_scene();
+  const RobotModel& robot = *scene.robot;
+  const auto backend = make_backend("bullet", scene);
+  backend->reset(robot.standing_state());
+  JointCommand command = robot.default_command(robot.neutral);
+  double violation = 0.0;
+  int saturated = 0;
+  for (int i = 0; i < 1000; ++i) {
+    for (int k = 0; k < robot.dof(); ++k)
+      command.q_target[k] = robot.neutral[k] + 1.2 * std::sin(2.0 * M_PI * 1.5 * i * scene.dt + 1.7 * k);
+    ASSERT_EQ(backend->step(command), Outcome::kOk);
+    ASSERT_LT(backend->state().v.cwiseAbs().maxCoeff(), 200.0);
+    violation = std::max(violation, largest_violation(robot, backend->state()));
+    for (int k = 0; k < robot.dof(); ++k) {
+      ASSERT_LE(std::abs(backend->torques()[k]), robot.joints[k].effort);
+      if (std::abs(backend->torques()[k]) == robot.joints[k].effort) ++saturated;
+    }
+  }
+  EXPECT_GT(saturated, 100);
+  EXPECT_LT(violation, 0.1);
+}
+
 TEST_F(Bullet, StandsAndCarriesItsWeight) {
   const Scene scene = test::g1_scene();
   const RobotModel& robot = *scene.robot;
