@@ -7,15 +7,15 @@ namespace duet {
 std::span<const EngineOption> ode_option_table() {
   static const std::vector<EngineOption> table = {
       number_option("joint_erp", 0.8, 0.0, 1.0, "share of a hinge's drift that a step removes"),
-      number_option("joint_cfm", 1e-10, 0.0, 1.0, "compliance of hinges [m/(N s)]"),
+      number_option("joint_cfm", 0.0, 0.0, 1.0, "compliance of hinges [m/(N s)]"),
       number_option("stop_erp", 0.2, 0.0, 1.0, "share of what a joint has passed its stop by that a step removes"),
       number_option("stop_cfm", 1e-9, 0.0, 1.0, "compliance of joint stops [rad/(N m s)]"),
       number_option("contact_erp", 0.2, 0.0, 1.0, "share of the depth of a rigid contact that a step removes"),
-      number_option("contact_cfm", 1e-6, 0.0, 1.0, "compliance of rigid contacts [m/(N s)]"),
+      number_option("contact_cfm", 1e-8, 1e-12, 1.0, "compliance of rigid contacts and of friction [m/(N s)]"),
       choice_option("friction", {"active", "bounded"},
                     "active: contacts foreseen to stick have no bound on friction; a step that then breaks one is "
                     "repeated with all bounds. bounded: all bounds in every step"),
-      integer_option("sweeps", 30, 1, 10000, "sweeps at most of the contact solver that foresees ODE's forces")};
+      integer_option("sweeps", 100, 1, 10000, "of Gauss-Seidel where the forecast of ODE's forces does not settle")};
   return table;
 }
 

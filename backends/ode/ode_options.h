@@ -13,7 +13,7 @@ struct OdeOptions {
   Softness stop = {};     // of joint stops
   Softness contact = {};  // of contacts with the ground and between links
   bool stick = true;      // contacts that are foreseen to stick are given to ODE without a bound on friction
-  int sweeps = 0;         // of the contact solver that foresees ODE's forces
+  int sweeps = 0;         // of Gauss-Seidel, where the forecast of ODE's forces needs it
 };
 
 std::span<const EngineOption> ode_option_table();

@@ -1,7 +1,6 @@
 #include "backends/ode/ode_stepper.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "backends/ode/ode_library.h"
 
@@ -23,7 +22,7 @@ OdeStepper::OdeStepper(const Scene& scene, std::size_t contacts)
       dt_(scene.dt),
       options_(ode_options(scene.options)),
       law_(scene),
-      solver_(*robot_, contacts, scene.dt, options_.sweeps),
+      forecast_(*robot_, contacts, scene.dt, options_.sweeps),
       world_((enter_ode(), scene), options_, contacts),
       stuck_(contacts, 0),
       before_(world_.size()) {
@@ -53,23 +52,32 @@ bool OdeStepper::foresee(const RobotState& state, const JointCommand& command, s
   law_.begin(state, command);
   Q_.setZero();
   if (pushes != nullptr) add_pushes(*pushes);
-  solver_.clear();
-  for (const ContactPoint& point : points)
-    solver_.add(point, softness_of(point, options_, dt_), world_.rotations(), world_.positions());
-  add_stops(state);
   v_before_ << state.v_WB, state.w_WB_B, state.v;
-  foresee_acceleration();
-  if (law_.saturate(a_)) foresee_acceleration();
+  foresee_free();
+  forecast_.clear();
+  for (const ContactPoint& point : points)
+    forecast_.add(point, softness_of(point, options_, dt_), options_.contact.cfm, world_.rotations(),
+                  world_.positions(), v_);
+  add_stops(state);
+  foresee_contacts();
+  if (law_.saturate(a_)) {
+    foresee_free();
+    foresee_contacts();
+  }
   law_.equivalent_torques(a_, tau_);
-  return tau_.allFinite();
+  add_stop_torques();
+  return v_.allFinite() && v_.cwiseAbs().maxCoeff() < OdeWorld::kInsane;
 }
 
-void OdeStepper::foresee_acceleration() {
+void OdeStepper::foresee_free() {
   law_.forces(Q_, a_);
   law_.factor().solve(a_);
-  if (solver_.size() == 0) return;
   v_ = v_before_ + dt_ * a_;
-  solver_.solve(law_.factor(), v_);
+}
+
+void OdeStepper::foresee_contacts() {
+  if (forecast_.empty()) return;
+  forecast_.solve(law_.factor(), v_);
   a_ = (v_ - v_before_) / dt_;
 }
 
@@ -77,10 +85,16 @@ void OdeStepper::add_stops(const RobotState& state) {
   for (int i = 0; i < robot_->dof(); ++i) {
     const double below = robot_->joints[i].lower - state.q[i], above = state.q[i] - robot_->joints[i].upper;
     if (below >= 0.0)
-      solver_.add_stop(i, 1.0, below, options_.stop);
+      forecast_.add_stop(i, 1.0, below, options_.stop);
     else if (above >= 0.0)
-      solver_.add_stop(i, -1.0, above, options_.stop);
+      forecast_.add_stop(i, -1.0, above, options_.stop);
   }
+}
+
+// Where a range is so wide that ODE has no stop for it, the one that is foreseen acts as a torque.
+void OdeStepper::add_stop_torques() {
+  for (int i = 0; i < robot_->dof(); ++i)
+    if (!world_.has_stop(i)) tau_[i] += forecast_.stop_impulse(i) / dt_;
 }
 
 void OdeStepper::add_pushes(const LinkPushes& pushes) {
@@ -104,25 +118,22 @@ void OdeStepper::step(std::span<const ContactPoint> points, const LinkPushes* pu
   world_.step();
 }
 
-// ODE bounds each of two tangential forces. With the first along the force that is foreseen, the pair is Coulomb's
-// cone.
 OdeContact OdeStepper::contact(const ContactPoint& point, std::size_t i, bool all_bounded) {
-  const Eigen::Vector3d force_W = solver_.impulse(i) / dt_;
-  const double normal = force_W.dot(point.n_W), bound = point.friction * std::max(0.0, normal);
-  const Eigen::Vector3d tangential = force_W - normal * point.n_W;
-  const double size = tangential.norm();
-  stuck_[i] = static_cast<char>(!all_bounded && size < kSticks * bound);
-  OdeContact result{.link = point.link,
-                    .other = point.side == ContactSide::kRobot ? point.other : -1,
-                    .p_W = point.p_W,
-                    .depth = point.depth,
-                    .softness = softness_of(point, options_, dt_),
-                    .friction_bound = stuck_[i] != 0 ? std::numeric_limits<double>::infinity() : bound};
-  result.axes_W.col(0) = point.n_W;
-  result.axes_W.col(1) = size > 1e-9 * bound ? Eigen::Vector3d(tangential / size) : point.n_W.unitOrthogonal();
-  result.axes_W.col(2) = point.n_W.cross(result.axes_W.col(1));
-  result.velocity = result.axes_W.transpose() * point.v_other_W;
-  return result;
+  const Eigen::Vector3d force = forecast_.impulse(i) / dt_;
+  const double bound = point.friction * std::max(0.0, force.x());
+  stuck_[i] =
+      static_cast<char>(!all_bounded && point.side == ContactSide::kGround && force.tail<2>().norm() < kSticks * bound);
+  const Eigen::Matrix3d& axes_W = forecast_.axes_W(i);
+  return {.link = point.link,
+          .other = point.side == ContactSide::kRobot ? point.other : -1,
+          .p_W = point.p_W,
+          .axes_W = axes_W,
+          .velocity = axes_W.transpose() * point.v_other_W,
+          .depth = point.depth,
+          .softness = softness_of(point, options_, dt_),
+          .slip = options_.contact.cfm,
+          .friction_bound = bound,
+          .stuck = stuck_[i] != 0};
 }
 
 bool OdeStepper::all_stuck(std::span<const ContactPoint> points) const {

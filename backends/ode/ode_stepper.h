@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "backends/contact_solver.h"
 #include "backends/implicit_law.h"
 #include "backends/link_pushes.h"
 #include "backends/narrow_phase.h"
+#include "backends/ode/contact_forecast.h"
 #include "backends/ode/ode_world.h"
 
 namespace duet {
@@ -34,8 +34,10 @@ class OdeStepper {
  private:
   bool foresee(const RobotState& state, const JointCommand& command, std::span<const ContactPoint> points,
                const LinkPushes* pushes);
-  void foresee_acceleration();
+  void foresee_free();
+  void foresee_contacts();
   void add_stops(const RobotState& state);
+  void add_stop_torques();
   void add_pushes(const LinkPushes& pushes);
   void step(std::span<const ContactPoint> points, const LinkPushes* pushes, bool all_bounded);
   [[nodiscard]] OdeContact contact(const ContactPoint& point, std::size_t i, bool all_bounded);
@@ -45,7 +47,7 @@ class OdeStepper {
   double dt_;
   OdeOptions options_;
   ImplicitLaw law_;
-  ContactSolver solver_;
+  ContactForecast forecast_;
   OdeWorld world_;
   Eigen::VectorXd Q_, v_before_, v_, a_, tau_;
   Eigen::MatrixXd push_jacobian_;

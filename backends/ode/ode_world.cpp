@@ -15,7 +15,6 @@ namespace {
 constexpr double kFullTurn = 2.0 * std::numbers::pi;
 // ODE measures a hinge modulo a turn; a stop needs this much room before the angle jumps. [rad]
 constexpr double kStopRoom = 0.5;
-constexpr double kInsane = 1e4;            // [m/s], [rad/s]
 constexpr std::size_t kExpectedRows = 48;  // of contacts and stops: what a step's memory is made for
 constexpr int kBodyValues = 3 + 4 + 12 + 3 + 3;
 
@@ -30,6 +29,9 @@ void copy(const Eigen::Vector3d& from, dReal* to) { std::copy_n(from.data(), 3, 
 
 }  // namespace
 
+void OdeWorld::Delete::operator()(dxThreadingImplementation* threading) const {
+  dThreadingFreeImplementation(threading);
+}
 void OdeWorld::Delete::operator()(dxWorld* world) const { dWorldDestroy(world); }
 void OdeWorld::Delete::operator()(dxJointGroup* group) const { dJointGroupDestroy(group); }
 void OdeWorld::Delete::operator()(dJointFeedback* feedback) const { delete[] feedback; }
@@ -37,6 +39,7 @@ void OdeWorld::Delete::operator()(dJointFeedback* feedback) const { delete[] fee
 OdeWorld::OdeWorld(const Scene& scene, const OdeOptions& options, std::size_t contacts)
     : robot_(scene.robot),
       dt_(scene.dt),
+      threading_(dThreadingAllocateSelfThreadedImplementation()),
       world_(dWorldCreate()),
       contact_joints_(dJointGroupCreate(0)),
       feedback_(new dJointFeedback[contacts]),
@@ -44,6 +47,9 @@ OdeWorld::OdeWorld(const Scene& scene, const OdeOptions& options, std::size_t co
       kinematics_(*robot_),
       R_WL_(robot_->links.size()),
       p_WL_(robot_->links.size()) {
+  if (threading_ == nullptr) throw std::runtime_error("ode: no memory for a world");
+  dWorldSetStepThreadingImplementation(world_.get(), dThreadingImplementationGetFunctions(threading_.get()),
+                                       threading_.get());
   dWorldSetGravity(world_.get(), scene.gravity.x(), scene.gravity.y(), scene.gravity.z());
   dWorldSetERP(world_.get(), options.joint.erp);
   dWorldSetCFM(world_.get(), options.joint.cfm);
@@ -85,7 +91,8 @@ void OdeWorld::make_hinges(const OdeOptions& options) {
     dJointSetHingeAnchor(hinge, p.x(), p.y(), p.z());
     dJointSetHingeAxis(hinge, axis.x(), axis.y(), axis.z());
     const double half_range = 0.5 * (robot_->joints[i].upper - robot_->joints[i].lower);
-    if (half_range > std::numbers::pi - kStopRoom) continue;
+    has_stop_.push_back(half_range <= std::numbers::pi - kStopRoom);
+    if (!has_stop_.back()) continue;
     dJointSetHingeParam(hinge, dParamStopERP, options.stop.erp);
     dJointSetHingeParam(hinge, dParamStopCFM, options.stop.cfm);
     dJointSetHingeParam(hinge, dParamLoStop, -half_range);
@@ -97,7 +104,10 @@ void OdeWorld::make_hinges(const OdeOptions& options) {
 void OdeWorld::reserve_memory() {
   OdeContact contact;
   contact.friction_bound = 1.0;
-  for (std::size_t i = 0; i < std::min(capacity_, kExpectedRows / 3); ++i) add_contact(contact);
+  for (std::size_t i = 0; i < std::min(capacity_, kExpectedRows / 3); ++i) {
+    contact.p_W.x() = static_cast<double>(i);
+    add_contact(contact);
+  }
   step();
   clear_contacts();
 }
@@ -185,12 +195,18 @@ void OdeWorld::clear_contacts() {
 }
 
 void OdeWorld::add_contact(const OdeContact& contact) {
+  const dJointID joint = contact.stuck ? make_anchor(contact) : make_contact(contact);
+  dJointSetFeedback(joint, &feedback_[contacts_++]);
+}
+
+dJointID OdeWorld::make_contact(const OdeContact& contact) {
   dContact c{};
   c.surface.mode = dContactApprox0 | dContactSoftERP | dContactSoftCFM | dContactFDir1 | dContactMotion1 |
-                   dContactMotion2 | dContactMotionN;
+                   dContactMotion2 | dContactMotionN | dContactSlip1 | dContactSlip2;
   c.surface.mu = contact.friction_bound;
   c.surface.soft_erp = contact.softness.erp;
   c.surface.soft_cfm = contact.softness.cfm;
+  c.surface.slip1 = c.surface.slip2 = contact.slip;
   c.surface.motionN = contact.velocity[0];
   c.surface.motion1 = contact.velocity[1];
   c.surface.motion2 = contact.velocity[2];
@@ -200,7 +216,19 @@ void OdeWorld::add_contact(const OdeContact& contact) {
   copy(contact.axes_W.col(1), c.fdir1);
   const dJointID joint = dJointCreateContact(world_.get(), contact_joints_.get(), &c);
   dJointAttach(joint, bodies_[contact.link], contact.other < 0 ? nullptr : bodies_[contact.other]);
-  dJointSetFeedback(joint, &feedback_[contacts_++]);
+  return joint;
+}
+
+dJointID OdeWorld::make_anchor(const OdeContact& contact) {
+  const dJointID joint = dJointCreateBall(world_.get(), contact_joints_.get());
+  dJointAttach(joint, bodies_[contact.link], nullptr);
+  const Eigen::Vector3d& p = contact.p_W;
+  const Eigen::Vector3d out = p + contact.depth * contact.axes_W.col(0);
+  dJointSetBallAnchor(joint, p.x(), p.y(), p.z());
+  dJointSetBallAnchor2(joint, out.x(), out.y(), out.z());
+  dJointSetBallParam(joint, dParamERP, contact.softness.erp);
+  dJointSetBallParam(joint, dParamCFM, contact.softness.cfm);
+  return joint;
 }
 
 void OdeWorld::step() {

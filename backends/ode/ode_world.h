@@ -16,6 +16,7 @@ struct dxWorld;
 struct dxBody;
 struct dxJoint;
 struct dxJointGroup;
+struct dxThreadingImplementation;
 struct dJointFeedback;
 
 namespace duet {
@@ -29,11 +30,16 @@ struct OdeContact {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();    // along the axes, that the link shall have [m/s]
   double depth = 0.0;                                    // [m]
   Softness softness = {};                                // along the normal
-  double friction_bound = 0.0;                           // along either tangent [N]; infinity: none
+  double slip = 0.0;                                     // compliance along the tangents [m/(N s)]
+  double friction_bound = 0.0;                           // along either tangent [N]
+  // Holds the point to the ground along all axes instead, with the softness of the normal.
+  bool stuck = false;
 };
 
 class OdeWorld {
  public:
+  static constexpr double kInsane = 1e4;  // faster than any robot [m/s], [rad/s]
+
   // `contacts`: the most of one step. Throws std::runtime_error with ODE's message.
   OdeWorld(const Scene& scene, const OdeOptions& options, std::size_t contacts);
   ~OdeWorld();
@@ -46,11 +52,12 @@ class OdeWorld {
   [[nodiscard]] std::span<const Eigen::Vector3d> positions() const { return p_WL_; }
   // `state.q` must be near (within half a turn): ODE measures angles modulo a turn.
   void read(RobotState& state) const;
-  // False where a link moves faster than any robot, or is nowhere.
+  // False where a link moves faster than kInsane, or is nowhere.
   [[nodiscard]] bool sane() const;
 
   // Of the next step only.
   void clear_forces();
+  [[nodiscard]] bool has_stop(int joint) const { return has_stop_[joint]; }  // that ODE can hold
   void add_torque(int joint, double torque);
   void add_force(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_L);
   void clear_contacts();
@@ -66,6 +73,7 @@ class OdeWorld {
 
  private:
   struct Delete {
+    void operator()(dxThreadingImplementation* threading) const;
     void operator()(dxWorld* world) const;
     void operator()(dxJointGroup* group) const;
     void operator()(dJointFeedback* feedback) const;
@@ -75,14 +83,19 @@ class OdeWorld {
   void reserve_memory();
   void move_body(int link, const Eigen::Quaterniond& R_WL, const Eigen::Vector3d& p_WL);
   void read_poses();
+  [[nodiscard]] dxJoint* make_contact(const OdeContact& contact);
+  [[nodiscard]] dxJoint* make_anchor(const OdeContact& contact);
 
   std::shared_ptr<const RobotModel> robot_;
   double dt_;
+  // Without one of its own a world steps through a job list that all worlds of the process share.
+  std::unique_ptr<dxThreadingImplementation, Delete> threading_;
   std::unique_ptr<dxWorld, Delete> world_;
   std::unique_ptr<dxJointGroup, Delete> contact_joints_;
   std::vector<dxBody*> bodies_;   // of links
   std::vector<dxJoint*> hinges_;  // of joints
   std::vector<double> middle_;    // position of a joint where its hinge's angle is 0 [rad]
+  std::vector<bool> has_stop_;    // of joints
   std::unique_ptr<dJointFeedback[], Delete> feedback_;
   std::size_t contacts_ = 0, capacity_;
   Kinematics kinematics_;
