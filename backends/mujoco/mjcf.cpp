@@ -19,8 +19,8 @@ constexpr const char* kImpedance = "0.95 0.99 0.001";  // of the ground and of t
 // More points, and rows of theirs and of joint stops, than a robot touches with at once; a world stays below a
 // mebibyte, of which the rows take most.
 constexpr int kContacts = 64;
-constexpr int kRows = 205;
-// What the solver and the collision take from MuJoCo's stack at most with so many rows, with a margin (tests look).
+constexpr int kRows = 192;
+// What the solver and the collision take from MuJoCo's stack at most with so many rows, with a margin.
 constexpr int kStackPerRow = 60, kStack = 8000;  // [doubles]
 // Capsules wait here until the partner is set.
 constexpr double kFarAway = 1000.0;  // [m]
