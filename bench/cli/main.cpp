@@ -59,6 +59,7 @@ int main(int argc, char** argv) {
   add_compare(app, session);
   add_check(app, session);
   add_bless(app, session);
+  add_validate(app, session);
   add_verify(app, session);
   add_bench(app, session);
   return run_command(app, argc, argv, session);

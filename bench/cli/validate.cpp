@@ -1,0 +1,135 @@
+// duet validate: the conformance suite in every engine, and the parity certificate of it.
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+
+#include "backends/factory.h"
+#include "bench/certificate.h"
+#include "bench/cli/command.h"
+#include "bench/parity_page.h"
+#include "bench/profile.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "results/text_table.h"
+
+namespace duet::cli {
+namespace {
+
+struct ValidateArguments {
+  std::vector<std::string> engines, scenes;
+  std::string profile = "parity", effort = "quick", output;
+};
+
+std::vector<std::string> chosen_engines(const ValidateArguments& arguments) {
+  std::vector<std::string> names = arguments.engines;
+  for (const std::string& name : names) static_cast<void>(engine_module(name));
+  if (!names.empty()) return names;
+  for (const EngineInfo& engine : engines())
+    if (engine.physics && engine.available) names.push_back(engine.name);
+  if (names.empty()) throw MissingError("no physics engine is there to validate (duet doctor says why)");
+  return names;
+}
+
+std::vector<std::string> chosen_scenes(const ValidateArguments& arguments) {
+  for (const std::string& name : arguments.scenes) static_cast<void>(conformance::find_scene(name));
+  if (!arguments.scenes.empty()) return arguments.scenes;
+  std::vector<std::string> names;
+  for (const conformance::ConformanceScene& scene : conformance::scenes()) names.emplace_back(scene.name);
+  return names;
+}
+
+std::vector<conformance::EngineReport> run_scenes(const ValidateArguments& arguments, const Profile& profile,
+                                                  Progress& progress) {
+  const std::vector<std::string> names = chosen_engines(arguments), scenes = chosen_scenes(arguments);
+  const auto g1 = std::make_shared<const RobotModel>(load_robot(default_card_path()));
+  std::vector<conformance::EngineReport> reports;
+  for (const std::string& name : names) {
+    const EngineSettings settings = profile.settings(name);
+    conformance::EngineReport report{
+        .engine = name,
+        .version = engine_module(name).version(),
+        .settings = {.dt = settings.dt,
+                     .options = settings.options,
+                     .effort = arguments.effort == "full" ? conformance::Effort::kFull : conformance::Effort::kQuick,
+                     .g1 = g1},
+        .scenes = {}};
+    progress.start("validating " + name, static_cast<int>(scenes.size()), "scenes");
+    for (const std::string& scene : scenes) {
+      report.scenes.push_back({scene, conformance::run_scene(conformance::find_scene(scene), name, report.settings)});
+      progress.advance();
+    }
+    progress.finish();
+    reports.push_back(std::move(report));
+  }
+  conformance::agree(reports);
+  return reports;
+}
+
+std::string tolerance_text(const conformance::Measurement& found) {
+  return found.relative ? fmt::format("{:.2g} %", 100.0 * found.tolerance) : fmt::format("{:.2g}", found.tolerance);
+}
+
+std::string engine_table(const CertifiedEngine& engine) {
+  TextTable table{.header = {"scene", "quantity", "verdict", "dt [ms]", "found", "expected", "tolerance", "unit"},
+                  .rows = {},
+                  .label_columns = 3};
+  for (const CertifiedMeasurement& entry : engine.measurements) {
+    const conformance::Measurement& found = entry.found;
+    table.rows.push_back({found.scene, found.quantity, std::string(conformance::to_string(entry.verdict)),
+                          fmt::format("{:g}", 1e3 * found.dt), fmt::format("{:.4g}", found.value),
+                          fmt::format("{:.4g}", found.expected), tolerance_text(found), found.unit});
+  }
+  return markdown_table(table);
+}
+
+std::string summary(const CertifiedEngine& engine) {
+  return fmt::format("{} {} ({}, {:g} ms): {} passed, {} asserted deviation{}, {} failed\n", engine.name,
+                     engine.version, engine.profile, 1e3 * engine.dt, engine.tally.passed, engine.tally.deviations,
+                     engine.tally.deviations == 1 ? "" : "s", engine.tally.failed);
+}
+
+void run_validate(Session& session, const ValidateArguments& arguments) {
+  const Profile profile = load_profile(arguments.profile);
+  Progress progress(session.progress());
+  const std::vector<conformance::EngineReport> reports = run_scenes(arguments, profile, progress);
+  const Certificate certificate =
+      certify(reports, profile.name, fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))));
+  const nlohmann::json json = certificate_json(certificate);
+  std::string tables, summaries;
+  for (const CertifiedEngine& engine : certificate.engines) {
+    tables += fmt::format("## {}\n\n{}\n", engine.name, engine_table(engine));
+    summaries += summary(engine);
+    if (engine.tally.failed > 0) session.exit_code = kExitDeterminism;
+  }
+  for (const conformance::EngineReport& report : reports)
+    for (const std::string& stale : conformance::stale_deviations(report)) note(session, stale);
+  if (!arguments.output.empty()) {
+    const std::filesystem::path folder = arguments.output;
+    write_file(folder / "certificate.json", json.dump(1) + "\n");
+    write_file(folder / "parity.html", parity_page(certificate));
+    note(session, fmt::format("wrote {0}/certificate.json and {0}/parity.html", arguments.output));
+  }
+  print(session, tables + summaries, json);
+}
+
+}  // namespace
+
+void add_validate(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(
+      app, session, "validate", "check physics engines against closed forms and one another (exit code 5 if one fails)",
+      "duet validate --engine mujoco,ode --effort full -o parity");
+  auto arguments = std::make_shared<ValidateArguments>();
+  command->add_option("--engine", arguments->engines, "engines; default: all that are there")->delimiter(',');
+  command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file")
+      ->capture_default_str();
+  command->add_option("--effort", arguments->effort, "quick, or full: more step sizes and longer runs")
+      ->check(CLI::IsMember({"quick", "full"}))
+      ->capture_default_str();
+  command->add_option("--scene", arguments->scenes, "scenes; default: all")->delimiter(',');
+  command->add_option("-o,--output", arguments->output, "folder for certificate.json and parity.html");
+  command->callback([&session, arguments] { run_validate(session, *arguments); });
+}
+
+}  // namespace duet::cli
