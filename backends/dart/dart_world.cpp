@@ -184,14 +184,17 @@ bool DartWorld::step(const JointCommand& command, const RobotState& state, std::
   solver_->clear_failure();
   rows_->set(points);
   set_law(command, state);
-  if (!forces_are_sensible() || !positions_are_sensible(state) || !velocities_are_sensible() || !move()) return false;
-  if (saturate(state)) {
+  if (!forces_are_sensible() || !positions_are_sensible(state) || !velocities_are_sensible()) return false;
+  skeleton_->computeForwardDynamics();
+  if (saturate()) skeleton_->computeForwardDynamics();
+  if (!move()) return false;
+  if (saturate()) {  // because of what the contacts did: once more from the begin
     base_->setVelocitiesStatic(V);
     for (std::size_t i = 0; i < hinges_.size(); ++i) hinges_[i]->setVelocity(0, state.v[static_cast<Eigen::Index>(i)]);
-    use_law();
+    skeleton_->computeForwardDynamics();
     if (!move()) return false;
   }
-  find_torques(state);
+  find_torques();
   skeleton_->integratePositions(dt_);
   return true;
 }
@@ -214,9 +217,8 @@ void DartWorld::use_law() {
   skeleton_->dirtyArticulatedInertia(0);
 }
 
-// What simulation::World::step does with the velocities.
+// What simulation::World::step does with the velocities once the accelerations are known.
 bool DartWorld::move() {
-  skeleton_->computeForwardDynamics();
   skeleton_->integrateVelocities(dt_);
   if (!velocities_are_sensible()) return false;
   rows_->set_alone(!limit_joints());
@@ -256,11 +258,11 @@ bool DartWorld::limit_joints() {
   return any;
 }
 
-// Where the law's torque passes its limit with the accelerations of the step, the limit becomes the drive: the step is
-// then to be made once more, from its begin.
-bool DartWorld::saturate(const RobotState& state) {
+// Where the law's torque passes its limit with the accelerations that were found, the limit becomes the drive. True
+// where that changed anything.
+bool DartWorld::saturate() {
   bool changed = false;
-  find_torques(state);
+  find_torques();
   for (std::size_t i = 0; i < law_.size(); ++i) {
     const double effort = robot_->joints[i].effort;
     if (std::abs(law_[i].torque) <= effort) continue;
@@ -268,15 +270,13 @@ bool DartWorld::saturate(const RobotState& state) {
     law_[i].implicit_inertia = 0.0;
     changed = true;
   }
+  if (changed) use_law();
   return changed;
 }
 
-void DartWorld::find_torques(const RobotState& state) {
-  for (std::size_t i = 0; i < law_.size(); ++i) {
-    const double v = state.v[static_cast<Eigen::Index>(i)];
-    const double acceleration = (hinges_[i]->getVelocitiesStatic()[0] - v) / dt_;
-    law_[i].torque = law_[i].drive - law_[i].implicit_inertia * acceleration;
-  }
+void DartWorld::find_torques() {
+  for (std::size_t i = 0; i < law_.size(); ++i)
+    law_[i].torque = law_[i].drive - law_[i].implicit_inertia * hinges_[i]->getAccelerationsStatic()[0];
 }
 
 Eigen::Vector3d DartWorld::contact_force(std::size_t index) const { return rows_->force(index); }

@@ -62,8 +62,8 @@ class DartWorld {
   void use_law();
   [[nodiscard]] bool forces_are_sensible() const;
   [[nodiscard]] bool velocities_are_sensible() const;
-  bool saturate(const RobotState& state);
-  void find_torques(const RobotState& state);
+  bool saturate();
+  void find_torques();
   bool move();
   bool limit_joints();
 
