@@ -249,7 +249,9 @@ bool ContactSolver::solve_modes() {
       if (a.mode == Mode::kOpen) continue;
       const int ia = static_cast<int>(3 * i), lines = a.mode == Mode::kStick ? 3 : 1;
       system_.block(a.at, b.at, lines, columns) = G_.block(ia, jb, lines, columns);
-      if (columns == 1) system_.block(a.at, b.at, lines, 1) += b.friction * (G_.block(ia, jb + 1, lines, 2) * b.drag);
+      if (columns == 1)
+        system_.col(b.at).segment(a.at, lines) += b.friction * (b.drag.x() * G_.col(jb + 1).segment(ia, lines) +
+                                                                b.drag.y() * G_.col(jb + 2).segment(ia, lines));
     }
     unknowns_.segment(b.at, columns) = missing_.segment(jb, columns);
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "robots/dynamics.h"
+#include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -195,6 +196,24 @@ TEST(ContactSolver, ForcesBetweenLinksAreEqualAndOpposite) {
   EXPECT_GT(step.solver.impulse(0).x(), 0.0);
   EXPECT_NEAR(step.solver.generalized_impulse().head<6>().norm(), 0.0, 1e-12);
   EXPECT_NEAR(step.velocity_at(point, v).x(), 0.0, 1e-3);
+}
+
+TEST(ContactSolver, AllocatesNothingWhetherContactsStickSlideOrAreMany) {
+  const auto robot = test::g1();
+  RobotState state = robot->standing_state();
+  for (const double depth : {1.5e-3, 0.5}) {  // on its feet; sunk to the thighs
+    state.X_WB.p.z() = robot->standing_height - depth;
+    Step step(robot, state, 0.6);
+    for (const double speed : {0.0, 0.5}) {
+      Eigen::VectorXd v = Eigen::VectorXd::Zero(6 + robot->dof());
+      v.head<3>() << speed, 0.1 * speed, -0.1;
+      const long before = test::allocation_count();
+      step.solver.clear();
+      for (const ContactPoint& point : step.points) step.solver.add(point, kRigid, step.rotations(), step.positions());
+      step.solver.solve(step.factor, v);
+      EXPECT_EQ(test::allocation_count(), before) << depth << " " << speed;
+    }
+  }
 }
 
 TEST(ContactSolver, EqualInputGivesEqualBitsWhateverCameBefore) {
