@@ -9,7 +9,8 @@
 namespace duet {
 namespace {
 
-constexpr int kUsualRows = 96;
+constexpr int kUsualRows = 39;
+constexpr std::size_t kUsualParts = 16;
 constexpr int kPivots = 12;
 constexpr double kSlow = 1e-9;      // a slip without direction [m/s]
 constexpr double kRounding = 1e-9;  // of the largest impulse, and of the velocities wanted
@@ -41,18 +42,21 @@ bool eliminate(Eigen::Ref<Eigen::MatrixXd> A, Eigen::Ref<Eigen::VectorXd> x) {
 }  // namespace
 
 ContactForecast::ContactForecast(const RobotModel& robot, std::size_t contacts, double dt, int sweeps)
-    : robot_(&robot), dt_(dt), sweeps_(sweeps), parts_(contacts + robot.joints.size()), stop_impulses_(robot.dof()) {
-  const int n = 6 + robot.dof();
-  for (Part& part : parts_) {
-    part.support.reserve(2 * n);
-    part.J = TreeFactor::Triple::Zero(n, 3);
-    part.Y = TreeFactor::Triple::Zero(n, 3);
-  }
-  const std::size_t most = 3 * contacts + robot.joints.size();
-  rows_.reserve(most);
-  free_.reserve(most);
-  change_ = Eigen::VectorXd::Zero(n);
-  reserve(std::min(kUsualRows, static_cast<int>(most)));
+    : robot_(&robot), dt_(dt), sweeps_(sweeps), stop_impulses_(robot.dof()) {
+  const std::size_t most = contacts + robot.joints.size();
+  while (parts_.size() < std::min(kUsualParts, most)) parts_.push_back(new_part());
+  rows_.reserve(3 * most);
+  free_.reserve(3 * most);
+  change_ = Eigen::VectorXd::Zero(6 + robot.dof());
+  reserve(std::min(kUsualRows, static_cast<int>(3 * most)));
+}
+
+ContactForecast::Part ContactForecast::new_part() const {
+  const int n = 6 + robot_->dof();
+  Part part;
+  part.support.reserve(2 * n);
+  part.J = part.Y = TreeFactor::Triple::Zero(n, 3);
+  return part;
 }
 
 void ContactForecast::reserve(int rows) {
@@ -72,6 +76,7 @@ void ContactForecast::clear() {
 }
 
 ContactForecast::Part& ContactForecast::next_part() {
+  if (used_ == parts_.size()) parts_.push_back(new_part());
   Part& part = parts_[used_++];
   for (const int k : part.support) {
     part.J.row(k).setZero();

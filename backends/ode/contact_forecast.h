@@ -55,6 +55,7 @@ class ContactForecast {
     double friction = 0.0, compliance = 0.0, target = 0.0;
     Mode mode = Mode::kFree;
   };
+  [[nodiscard]] Part new_part() const;
   Part& next_part();
   void add_row(Part& part, double friction, double compliance, double target);
   void add_link(Part& part, int link, double sign, const Eigen::Vector3d& p_W, std::span<const Eigen::Matrix3d> R_WL,

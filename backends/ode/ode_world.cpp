@@ -15,7 +15,7 @@ namespace {
 constexpr double kFullTurn = 2.0 * std::numbers::pi;
 // ODE measures a hinge modulo a turn; a stop needs this much room before the angle jumps. [rad]
 constexpr double kStopRoom = 0.5;
-constexpr std::size_t kExpectedRows = 48;  // of contacts and stops: what a step's memory is made for
+constexpr std::size_t kUsualContacts = 11;  // what a step's memory is made for
 constexpr int kBodyValues = 3 + 4 + 12 + 3 + 3;
 
 using RowMajor3x4 = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
@@ -102,9 +102,12 @@ void OdeWorld::make_hinges(const OdeOptions& options) {
 
 // ODE takes a step's memory when it first needs it: it does so now, for more rows than the robot alone has.
 void OdeWorld::reserve_memory() {
+  const dWorldStepReserveInfo no_more = {
+      .struct_size = sizeof(dWorldStepReserveInfo), .reserve_factor = 1.0F, .reserve_minimum = 0};
+  dWorldSetStepMemoryReservationPolicy(world_.get(), &no_more);
   OdeContact contact;
   contact.friction_bound = 1.0;
-  for (std::size_t i = 0; i < std::min(capacity_, kExpectedRows / 3); ++i) {
+  for (std::size_t i = 0; i < std::min(capacity_, kUsualContacts); ++i) {
     contact.p_W.x() = static_cast<double>(i);
     add_contact(contact);
   }
