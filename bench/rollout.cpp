@@ -40,9 +40,16 @@ class StepMeter {
     for (const Contact& contact : backend_.contacts())
       if (contact.side == ContactSide::kGround) ground += contact.f_W;
     ++steps_;
+    ++steps_of_tick_;
     vertical_ += ground.z();
-    peak_ = std::max(peak_, ground.norm());
+    tick_ += ground;
     if (safety_) safety_->add(backend_.contacts());
+  }
+
+  void end_tick() {
+    if (steps_of_tick_ > 0) peak_ = std::max(peak_, tick_.norm() / steps_of_tick_);
+    tick_.setZero();
+    steps_of_tick_ = 0;
   }
 
   void finish(Rollout& rollout) const {
@@ -54,7 +61,9 @@ class StepMeter {
   const Backend& backend_;
   std::optional<ContactSafety> safety_;
   long steps_ = 0;
+  int steps_of_tick_ = 0;
   double vertical_ = 0.0, peak_ = 0.0;
+  Eigen::Vector3d tick_ = Eigen::Vector3d::Zero();  // sum over the steps of this tick
 };
 
 Outcome advance(Backend& backend, const JointCommand& command, int steps, StepMeter& meter) {
@@ -63,6 +72,7 @@ Outcome advance(Backend& backend, const JointCommand& command, int steps, StepMe
     if (outcome != Outcome::kOk) return outcome;
     meter.add();
   }
+  meter.end_tick();
   return has_fallen(backend.state()) ? Outcome::kFell : Outcome::kOk;
 }
 

@@ -19,10 +19,11 @@ namespace duet {
 
 inline constexpr double kControlRate = 50.0;  // [Hz]
 
-// Ground reaction on the robot, over all physics steps.
+// Ground reaction on the robot: the sum over its contacts. The peak is a mean over a control period, as a rigid
+// impact's force in one step is its impulse over the step and says nothing of the robot.
 struct GroundForce {
-  double mean = 0.0;  // of the vertical component [N]
-  double peak = 0.0;  // largest magnitude of one step's sum [N]
+  double mean = 0.0;  // of the vertical component over all physics steps [N]
+  double peak = 0.0;  // largest magnitude of the mean over 20 ms [N]
 };
 
 struct RolloutSetup {
