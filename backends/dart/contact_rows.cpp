@@ -65,7 +65,9 @@ void ContactRows::update() {
     responses_.add(contacts_[i].link);
     if (points_[i].other != nullptr) responses_.add(contacts_[i].other);
   }
-  if (!points_.empty()) responses_.update();
+  if (points_.empty()) return;
+  for (const int joint : stops_) responses_.add_hinge(joint);
+  responses_.update();
 }
 
 void ContactRows::aim(const ContactPoint& contact, Point& point) {
@@ -118,16 +120,15 @@ void ContactRows::getInformation(dart::constraint::ConstraintInfo* info) {
   }
 }
 
+// The constraints of stops read the answer from their joints.
 void ContactRows::applyUnitImpulse(std::size_t row) {
   applied_ = row;
-  if (alone_) return;
-  const Point& point = points_[row / 3];
-  skeleton_->clearConstraintImpulses();
-  if (point.other == nullptr)
-    skeleton_->updateBiasImpulse(point.body, rows_[row].J);
-  else
-    skeleton_->updateBiasImpulse(point.body, rows_[row].J, point.other, rows_[row].J_other);
-  skeleton_->updateVelocityChange();
+  const ContactPoint& contact = contacts_[row / 3];
+  for (const int joint : responses_.hinges()) {
+    double change = responses_.of_hinge(joint, contact.link) * rows_[row].J;
+    if (contact.side == ContactSide::kRobot) change += responses_.of_hinge(joint, contact.other) * rows_[row].J_other;
+    responses_.hinge(joint).setVelocityChange(0, change);
+  }
 }
 
 // With `with_cfm` DART asks for the answer to this constraint's own last impulse, else to another's.

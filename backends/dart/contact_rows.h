@@ -28,8 +28,8 @@ class ContactRows final : public dart::constraint::ConstraintBase {
 
   // The points of the coming step; they must stay as they are until it ends.
   void set(std::span<const ContactPoint> points);
-  // Whether other constraints share the coming solution: they read unit impulses from the skeleton.
-  void set_alone(bool alone) { alone_ = alone; }
+  // The joints whose stops DART will solve for together with the points.
+  void set_stops(std::span<const int> joints) { stops_ = joints; }
   // Of the step that has ended: force of the other side on the link at points[index], mean over the step. [N], W.
   [[nodiscard]] Eigen::Vector3d force(std::size_t index) const;
 
@@ -71,7 +71,7 @@ class ContactRows final : public dart::constraint::ConstraintBase {
   std::vector<Row> rows_;
   LinkResponses responses_;
   std::vector<Eigen::Vector6d> answers_;  // by link: change of velocity by the last unit impulse
-  bool alone_ = true;
+  std::span<const int> stops_;
   std::size_t applied_ = 0;  // row of the last unit impulse
 };
 

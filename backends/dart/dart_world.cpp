@@ -76,6 +76,7 @@ std::span<const EngineOption> dart_options() {
 DartWorld::DartWorld(const Scene& scene, std::size_t contact_capacity)
     : robot_(scene.robot), dt_(scene.dt), solver_(make_solver(scene)), law_(scene.robot->joints.size()) {
   build(scene);
+  stops_.reserve(hinges_.size());
   rows_ = std::make_shared<ContactRows>(skeleton_, bodies_, LinkResponses(robot_, bodies_, hinges_),
                                         rigid_contact(scene.options), dt_, contact_capacity);
   solver_->addSkeleton(skeleton_);
@@ -221,7 +222,8 @@ void DartWorld::use_law() {
 bool DartWorld::move() {
   skeleton_->integrateVelocities(dt_);
   if (!velocities_are_sensible()) return false;
-  rows_->set_alone(!limit_joints());
+  limit_joints();
+  rows_->set_stops(stops_);
   solver_->solve();
   if (skeleton_->isImpulseApplied()) {
     skeleton_->computeImpulseForwardDynamics();
@@ -245,17 +247,16 @@ bool DartWorld::velocities_are_sensible() const {
 }
 
 // DART makes a constraint for every joint whose limits are enforced and then looks whether the step would pass them;
-// the limits of the others are not enforced in this step. True where one is.
-bool DartWorld::limit_joints() {
-  bool any = false;
-  for (std::size_t i = 0; i < hinges_.size(); ++i) {
+// the limits of the others are not enforced in this step.
+void DartWorld::limit_joints() {
+  stops_.clear();
+  for (int i = 0; i < static_cast<int>(hinges_.size()); ++i) {
     const RobotJoint& joint = robot_->joints[i];
     const double q = hinges_[i]->getPositionsStatic()[0], next = q + dt_ * hinges_[i]->getVelocitiesStatic()[0];
     const bool limited = std::min(q, next) < joint.lower || std::max(q, next) > joint.upper;
     hinges_[i]->setLimitEnforcement(limited);
-    any = any || limited;
+    if (limited) stops_.push_back(i);
   }
-  return any;
 }
 
 // Where the law's torque passes its limit with the accelerations that were found, the limit becomes the drive. True

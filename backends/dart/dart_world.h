@@ -65,7 +65,7 @@ class DartWorld {
   bool saturate();
   void find_torques();
   bool move();
-  bool limit_joints();
+  void limit_joints();
 
   std::shared_ptr<const RobotModel> robot_;
   double dt_;
@@ -76,6 +76,7 @@ class DartWorld {
   std::shared_ptr<ContactRows> rows_;
   std::unique_ptr<GroupSolver> solver_;
   std::vector<Law> law_;
+  std::vector<int> stops_;  // joints that the step would bring past a stop
 };
 
 }  // namespace duet

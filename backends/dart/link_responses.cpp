@@ -38,16 +38,28 @@ LinkResponses::LinkResponses(std::shared_ptr<const RobotModel> robot, std::vecto
     if (slot_[shape.link] < 0) slot_[shape.link] = slots_++;
   blocks_.resize(static_cast<std::size_t>(slots_) * slots_);
   added_.reserve(slots_);
+  added_hinges_.reserve(hinges_.size());
+  hinge_rows_.resize(static_cast<std::size_t>(slots_) * hinges_.size());
 }
 
 void LinkResponses::clear() {
   added_.clear();
+  added_hinges_.clear();
   for (Link& link : links_) link.needed = false;
 }
 
 void LinkResponses::add(int link) {
   if (std::find(added_.begin(), added_.end(), link) != added_.end()) return;
   added_.push_back(link);
+  need(link);
+}
+
+void LinkResponses::add_hinge(int joint) {
+  added_hinges_.push_back(joint);
+  need(joint + 1);
+}
+
+void LinkResponses::need(int link) {
   for (; link >= 0; link = robot_->links[link].parent) links_[link].needed = true;
 }
 
@@ -84,8 +96,9 @@ void LinkResponses::hit(int index) {
     Link& link = links_[i];
     if (!link.needed) continue;
     link.V = from_parent(link.R, link.p, links_[robot_->links[i].parent].V);
-    const Eigen::Matrix<double, 1, 6> hinge = link.inverse * (link.h - link.U.transpose() * link.V);
+    const Row6 hinge = link.inverse * (link.h - link.U.transpose() * link.V);
     link.V.noalias() += link.S * hinge;
+    hinge_rows_[static_cast<std::size_t>(slot_[index]) * hinges_.size() + i - 1] = hinge;
   }
   for (const int moved : added_) blocks_[slot_[index] * slots_ + slot_[moved]] = links_[moved].V;
 }

@@ -15,6 +15,8 @@ namespace duet {
 
 class LinkResponses {
  public:
+  using Row6 = Eigen::Matrix<double, 1, 6>;
+
   // `bodies` by link, `hinges` by joint.
   LinkResponses(std::shared_ptr<const RobotModel> robot, std::vector<dart::dynamics::BodyNode*> bodies,
                 std::vector<ImplicitHinge*> hinges);
@@ -22,12 +24,19 @@ class LinkResponses {
   // The links that matter now are those of add() since clear(). Poses and inertias are read by update().
   void clear();
   void add(int link);
+  void add_hinge(int joint);  // its answers matter too
   void update();
   [[nodiscard]] std::span<const int> links() const { return added_; }
+  [[nodiscard]] std::span<const int> hinges() const { return added_hinges_; }
+  [[nodiscard]] ImplicitHinge& hinge(int joint) const { return *hinges_[joint]; }
   // Change of velocity of link `moved` per unit impulse on `hit`: both as DART has them, angular above linear, about
   // the link's origin in its frame.
   [[nodiscard]] const Eigen::Matrix6d& of(int moved, int hit) const {
     return blocks_[slot_[hit] * slots_ + slot_[moved]];
+  }
+  // Change of velocity of a hinge per unit impulse on link `hit`.
+  [[nodiscard]] const Row6& of_hinge(int joint, int hit) const {
+    return hinge_rows_[static_cast<std::size_t>(slot_[hit]) * hinges_.size() + joint];
   }
 
  private:
@@ -35,12 +44,13 @@ class LinkResponses {
     bool needed = false;
     Eigen::Matrix3d R;  // of the link in its parent
     Eigen::Vector3d p;
-    Eigen::Vector6d S, U;           // motion of the hinge; articulated inertia times that
-    double inverse = 0.0;           // of the inertia that the hinge feels
-    Eigen::Matrix<double, 1, 6> h;  // impulse on the hinge
-    Eigen::Matrix6d V;              // velocities
+    Eigen::Vector6d S, U;  // motion of the hinge; articulated inertia times that
+    double inverse = 0.0;  // of the inertia that the hinge feels
+    Row6 h;                // impulse on the hinge
+    Eigen::Matrix6d V;     // velocities
   };
   void read(int link);
+  void need(int link);
   void hit(int link);
 
   std::shared_ptr<const RobotModel> robot_;
@@ -52,6 +62,8 @@ class LinkResponses {
   std::vector<int> slot_;   // of a link that has a shape, else -1
   int slots_ = 0;
   std::vector<Eigen::Matrix6d> blocks_;
+  std::vector<int> added_hinges_;  // joints
+  std::vector<Row6> hinge_rows_;
 };
 
 }  // namespace duet
