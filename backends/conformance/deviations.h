@@ -5,13 +5,16 @@
 #include <span>
 #include <string_view>
 
+#include "backends/conformance/conformance.h"
+
 namespace duet::conformance {
 
 struct Deviation {
   std::string_view engine, scene;
   std::string_view quantity;  // or how several of them begin
   std::string_view reason;
-  double bound = 0.0;  // error_of() stays at or below
+  double bound = 0.0;             // error_of() stays at or below
+  Effort shows = Effort::kQuick;  // kFull: only the smaller or larger steps of full effort show it
 };
 
 std::span<const Deviation> deviations();

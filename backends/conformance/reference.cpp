@@ -130,7 +130,7 @@ double energy_above_base(const RobotModel& robot, const RobotState& state, doubl
     const LinkMotion& motion = motions[i];
     const double mass = robot.links[i].mass;
     energy += 0.5 * mass * motion.v.squaredNorm() + 0.5 * motion.w.dot(motion.inertia * motion.w) +
-              mass * gravity * motion.com.z();
+              mass * gravity * (motion.com.z() - state.X_WB.p.z());
   }
   return energy;
 }

@@ -27,7 +27,8 @@ struct Momentum {
 };
 Momentum momentum_of(const RobotModel& robot, const RobotState& state);
 
-// Kinetic and potential energy (zero at z = 0) of the links other than the base. [J]
+// Kinetic energy of the links other than the base, and their potential energy above the base: a heavy base that gives
+// way by centimetres in a minute does not count. [J]
 double energy_above_base(const RobotModel& robot, const RobotState& state, double gravity);
 
 double largest_joint_error(const RobotState& a, const RobotState& b);  // [rad]

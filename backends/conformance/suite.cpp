@@ -162,7 +162,7 @@ std::vector<std::string> stale_deviations(const EngineReport& report) {
   if (!report.settings.options.empty() || report.settings.dt != Settings{}.dt) return {};
   std::vector<std::string> stale;
   for (const Deviation& entry : deviations()) {
-    if (entry.engine != report.engine) continue;
+    if (entry.engine != report.engine || entry.shows > report.settings.effort) continue;
     bool measured = false, deviates = false;
     for_each_measurement(report, [&](const Measurement& measurement) {
       if (measurement.scene != entry.scene || !measurement.quantity.starts_with(entry.quantity)) return;
