@@ -81,12 +81,12 @@ void trim(Recording& recording, int frames) {
     recording.partner = recording.partner.slice(0, frames);
 }
 
-std::string describe(Outcome outcome, int tick) {
+std::string describe(Outcome outcome, int tick, std::string_view engine) {
   switch (outcome) {
     case Outcome::kFell:
       return fmt::format("the robot fell at {:.2f} s", tick / kControlRate);
     case Outcome::kDiverged:
-      return fmt::format("the engine's state diverged at {:.2f} s", tick / kControlRate);
+      return fmt::format("the state of {} diverged at {:.2f} s", engine, tick / kControlRate);
     case Outcome::kTimedOut:
       return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kControlRate);
     default:
@@ -155,7 +155,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   }
   meter.finish(rollout);
   trim(recording, tick);
-  recording.message = describe(recording.outcome, tick);
+  recording.message = describe(recording.outcome, tick, backend.name());
   rollout.late_plans = scheduler.late_ticks();
   rollout.state_hash = hash.hex();
   return rollout;

@@ -177,14 +177,14 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::s
 
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
   check_filters(options, suite);
+  RunSummary summary;
+  summary.absent_engines = absent_engines(suite, options);
   const std::string hash = suite_hash(suite);
   const auto robot = load_shared_robot(suite.robot);
   RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
                                                     utc_now(), capture_environment(), options.certificate});
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
 
-  RunSummary summary;
-  summary.absent_engines = absent_engines(suite, options);
   std::vector<EpisodeSpec> missing;
   for (const EpisodeSpec& spec : plan_episodes(suite, clips)) {
     if (!selected(options, spec)) continue;

@@ -60,10 +60,13 @@ std::string resolved_yaml(const Suite& suite) {
                   fmt::join(suite.engines, ", "), fmt::join(suite.controllers, ", "), fmt::join(suite.policies, ", "));
   text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\n", suite.episodes_per_clip,
                       to_string(suite.start), suite.start_radius, to_string(suite.partner));
-  text += fmt::format("profile:\n  name: {}\n  engines:\n", suite.profile.name);
+  std::vector<std::string> settings;
   for (const std::string& engine : suite.engines)
     if (engine != "playback")
-      text += fmt::format("    {}: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
+      settings.push_back(
+          fmt::format("\n    {}: {}", engine, resolved_settings(engine, suite.profile.settings(engine))));
+  text += fmt::format("profile:\n  name: {}\n  engines:{}\n", suite.profile.name,
+                      settings.empty() ? " {}" : fmt::format("{}", fmt::join(settings, "")));
   if (!suite.contact_limits.empty()) text += fmt::format("contact_limits: \"{}\"\n", suite.contact_limits);
   if (!suite.robot.empty()) text += fmt::format("robot: \"{}\"\n", suite.robot);
   text += fmt::format("detector: {{version: {}, thresholds: {}}}\n", to_string(suite.detector),

@@ -1,0 +1,127 @@
+// Engines that are missing, broken or fail in mid-episode: said by name, and the others go on. The program is run as a
+// user runs it, with a folder of engines of the test's own ($DUET_ENGINES).
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+
+#include "core/file.h"
+#include "results/run_directory.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+struct Ended {
+  int code = -1;
+  std::string text;  // both streams
+};
+
+class Faults : public testing::Test {
+ protected:
+  Faults() {
+    fs::create_directory(engines());
+    for (const auto& entry : fs::directory_iterator(DUET_BUILT_ENGINES))
+      fs::create_symlink(entry.path(), fs::path(engines()) / entry.path().filename());
+    fs::create_symlink(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_faulty.so");
+  }
+  [[nodiscard]] std::string engines() const { return folder_ / "engines"; }
+
+  [[nodiscard]] Ended run(const std::string& arguments) const {
+    const std::string command = "DUET_ENGINES='" + engines() + "' '" + DUET_PROGRAM + "' " + arguments + " 2>&1";
+    FILE* pipe = popen(command.c_str(), "r");
+    Ended ended;
+    std::array<char, 4096> buffer{};
+    while (const size_t count = fread(buffer.data(), 1, buffer.size(), pipe)) ended.text.append(buffer.data(), count);
+    ended.code = WEXITSTATUS(pclose(pipe));
+    return ended;
+  }
+
+  // A suite of one clip in these engines, `fault` in the faulty one.
+  [[nodiscard]] std::string suite(const std::string& engine_names, const std::string& fault = "throw") const {
+    std::string path = folder_ / "suite.yaml";
+    write_file(path,
+               "schema: duet.suite/1\nname: faults\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+               "engines: [" +
+                   engine_names + "]\ncontrollers: [pd]\npolicies: [replay]\nnull_arm: false\n" +
+                   "profile: {name: mine, engines: {faulty: {fault: " + fault + "}}}\n");
+    return path;
+  }
+
+  [[nodiscard]] std::map<std::string, EpisodeRow> rows() const {
+    std::map<std::string, EpisodeRow> by_engine;
+    for (const EpisodeRow& row : load_run(folder_ / "run").rows) by_engine[row.engine] = row;
+    return by_engine;
+  }
+
+  test::ScratchFolder folder_;
+};
+
+TEST_F(Faults, AModuleInTheFolderIsAnEngine) {
+  const Ended ended = run("list engines");
+  EXPECT_EQ(ended.code, 0);
+  EXPECT_THAT(ended.text, HasSubstr("faulty"));
+}
+
+TEST_F(Faults, AnEngineThatThrowsEndsItsEpisodeByNameAndTheOthersGoOn) {
+  const Ended ended = run("run " + suite("playback, faulty") + " -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 3) << ended.text;
+  const auto row = rows();
+  ASSERT_EQ(row.size(), 2U);
+  EXPECT_EQ(row.at("faulty").outcome, Outcome::kError);
+  EXPECT_THAT(row.at("faulty").message, HasSubstr("faulty: an error of the engine itself"));
+  EXPECT_EQ(row.at("faulty").success, false);
+  EXPECT_EQ(row.at("playback").outcome, Outcome::kOk);
+}
+
+TEST_F(Faults, AnEngineThatDivergesSaysSoByName) {
+  const Ended ended = run("run " + suite("playback, faulty", "diverge") + " -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 0) << ended.text;
+  const auto row = rows();
+  EXPECT_EQ(row.at("faulty").outcome, Outcome::kDiverged);
+  EXPECT_THAT(row.at("faulty").message, AllOf(HasSubstr("faulty"), HasSubstr("diverged at 0.5")));
+  EXPECT_EQ(row.at("playback").outcome, Outcome::kOk);
+}
+
+TEST_F(Faults, AnEngineWhoseLibraryIsMissingHasRowsThatSayWhy) {
+  fs::remove(fs::path(engines()) / "duet_ode.so");
+  write_file((fs::path(engines()) / "duet_ode.so").string(), "not a shared object");
+  const Ended ended = run("run " + suite("playback, ode") + " -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 3) << ended.text;
+  EXPECT_THAT(ended.text, HasSubstr("engine 'ode' is absent"));
+  const auto row = rows();
+  ASSERT_EQ(row.size(), 2U);
+  EXPECT_EQ(row.at("ode").outcome, Outcome::kUnsupported);
+  EXPECT_THAT(row.at("ode").message, HasSubstr("duet_ode.so"));
+  EXPECT_EQ(row.at("playback").outcome, Outcome::kOk);
+}
+
+TEST_F(Faults, ARunWithNoEngineAtAllIsRefused) {
+  fs::remove(fs::path(engines()) / "duet_ode.so");
+  const Ended ended = run("run " + suite("ode") + " -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 4) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("engine 'ode' is absent"), HasSubstr("duet_ode.so")));
+  EXPECT_FALSE(fs::exists(folder_ / "run"));
+}
+
+TEST_F(Faults, DoctorNamesABrokenModule) {
+  fs::remove(fs::path(engines()) / "duet_dart.so");
+  write_file((fs::path(engines()) / "duet_dart.so").string(), "not a shared object");
+  const Ended ended = run("doctor --need dart");
+  EXPECT_EQ(ended.code, 4);
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("absent engine dart"), HasSubstr("duet_dart.so")));
+}
+
+TEST_F(Faults, AModuleOfAnotherNameIsRefused) {
+  fs::copy_file(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_other.so");
+  EXPECT_THAT(run("list engines").text, HasSubstr("names itself 'faulty'"));
+}
+
+}  // namespace
+}  // namespace duet
