@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "metrics/detector.h"
 #include "metrics/diagnostics.h"
 #include "metrics/retargeting.h"
+#include "motion/human_motion.h"
+#include "robots/human_body.h"
 #include "robots/kinematics.h"
 
 namespace duet {
@@ -16,13 +19,39 @@ void add_finite(const std::map<std::string, double>& values, std::map<std::strin
     if (std::isfinite(value)) out[name] = value;
 }
 
-void add_contacts(const Rollout& rollout, EpisodeRow& row) {
+void add_strongest_contacts(const ContactSafetyResult& safety, const PairedMotion& clip, const RobotModel& robot,
+                            EpisodeRow& row) {
+  std::vector<ContactEvent> events = safety.events;
+  const auto kept = static_cast<std::ptrdiff_t>(std::min(events.size(), kMostRowContacts));
+  std::stable_sort(events.begin(), events.end(),
+                   [](const ContactEvent& a, const ContactEvent& b) { return a.peak_force > b.peak_force; });
+  events.erase(events.begin() + kept, events.end());
+  std::sort(events.begin(), events.end(), [](const ContactEvent& a, const ContactEvent& b) {
+    return std::tie(a.begin, a.link, a.capsule) < std::tie(b.begin, b.link, b.capsule);
+  });
+  const HumanBody human = make_human_body(bone_lengths(clip.partner));
+  for (const ContactEvent& event : events) {
+    row.contacts.push_back({.link = robot.links.at(event.link).name,
+                            .region = safety.regions.at(event.region).region,
+                            .capsule = human.capsules.at(event.capsule).name,
+                            .begin_s = event.begin,
+                            .duration_s = event.duration,
+                            .peak_n = event.peak_force,
+                            .impulse_ns = event.impulse,
+                            .depth_m = event.depth,
+                            .windowed_mean_n = event.windowed_mean});
+  }
+  row.contacts_total = static_cast<long>(safety.events.size()) + static_cast<long>(safety.events_left_out);
+}
+
+void add_contacts(const Rollout& rollout, const PairedMotion& clip, const RobotModel& robot, EpisodeRow& row) {
   row.forces = {{"ground.mean_n", rollout.ground.mean}, {"ground.peak_n", rollout.ground.peak}};
   if (!rollout.safety) return;
   row.contact_peak_n = rollout.safety->peak_force;
   row.contact_impulse_ns = rollout.safety->impulse;
   add_finite(contact_forces(*rollout.safety), row.forces);
   add_finite(contact_safety_metrics(*rollout.safety), row.metrics);
+  add_strongest_contacts(*rollout.safety, clip, robot, row);
 }
 
 // [mm]
@@ -101,7 +130,7 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.frames = recording.frames();
   row.sim_s = recording.frames() / recording.rate_hz;
   row.late_plans = rollout.late_plans;
-  add_contacts(rollout, row);
+  add_contacts(rollout, *setup.clip, robot, row);
   row.trace = state_trace(recording, robot);
   row.state_hash = rollout.state_hash;
   row.success = false;

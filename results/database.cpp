@@ -23,12 +23,16 @@ CREATE TABLE episodes (
   perturbation TEXT NOT NULL, robot_digest TEXT NOT NULL, arm TEXT NOT NULL,
   outcome TEXT NOT NULL, message TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
   fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
-  contact_peak_n REAL, contact_impulse_ns REAL, late_plans INTEGER NOT NULL,
+  contact_peak_n REAL, contact_impulse_ns REAL, contacts_total INTEGER NOT NULL, late_plans INTEGER NOT NULL,
   state_hash TEXT NOT NULL, started_at TEXT NOT NULL);
 CREATE TABLE metrics (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE forces (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
+CREATE TABLE contacts (
+  key TEXT NOT NULL REFERENCES episodes(key), number INTEGER NOT NULL,
+  link TEXT NOT NULL, region TEXT NOT NULL, capsule TEXT NOT NULL, begin_s REAL, duration_s REAL,
+  peak_n REAL, impulse_ns REAL, depth_m REAL, windowed_mean_n REAL, PRIMARY KEY (key, number));
 CREATE TABLE verdicts (
   key TEXT NOT NULL REFERENCES episodes(key), version TEXT NOT NULL, thresholds TEXT NOT NULL,
   success INTEGER NOT NULL, frames INTEGER NOT NULL, PRIMARY KEY (key, version, thresholds));
@@ -121,9 +125,10 @@ class RowWriter {
   explicit RowWriter(Database& database)
       : database_(database),
         episode_(database.prepare("INSERT INTO episodes VALUES "
-                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
+                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
         metric_(database.prepare("INSERT INTO metrics VALUES (?,?,?)")),
         force_(database.prepare("INSERT INTO forces VALUES (?,?,?)")),
+        contact_(database.prepare("INSERT INTO contacts VALUES (?,?,?,?,?,?,?,?,?,?,?)")),
         verdict_(database.prepare("INSERT INTO verdicts VALUES (?,?,?,?,?)")),
         value_(database.prepare("INSERT INTO verdict_values VALUES (?,?,?,?,?,?)")) {}
 
@@ -131,6 +136,7 @@ class RowWriter {
     write_episode(row);
     write_finite(row.key, row.metrics, metric_.get());
     write_finite(row.key, row.forces, force_.get());
+    write_contacts(row);
     for (const Verdict& verdict : row.verdicts) write_verdict(row.key, verdict);
   }
 
@@ -165,6 +171,7 @@ class RowWriter {
         .number(row.wall_s)
         .number(row.contact_peak_n)
         .number(row.contact_impulse_ns)
+        .integer(row.contacts_total)
         .integer(row.late_plans)
         .text(row.state_hash)
         .text(row.started_at);
@@ -176,6 +183,25 @@ class RowWriter {
       if (!std::isfinite(value)) continue;
       Parameters(statement).text(key).text(name).number(value);
       database_.step(statement);
+    }
+  }
+
+  void write_contacts(const EpisodeRow& row) {
+    std::int64_t number = 0;
+    for (const RowContact& contact : row.contacts) {
+      Parameters(contact_.get())
+          .text(row.key)
+          .integer(number++)
+          .text(contact.link)
+          .text(contact.region)
+          .text(contact.capsule)
+          .number(contact.begin_s)
+          .number(contact.duration_s)
+          .number(contact.peak_n)
+          .number(contact.impulse_ns)
+          .number(contact.depth_m)
+          .number(contact.windowed_mean_n);
+      database_.step(contact_.get());
     }
   }
 
@@ -203,7 +229,7 @@ class RowWriter {
   }
 
   Database& database_;
-  StatementHandle episode_, metric_, force_, verdict_, value_;
+  StatementHandle episode_, metric_, force_, contact_, verdict_, value_;
 };
 
 void fill(const std::vector<EpisodeRow>& rows, const std::string& file, const std::string& shown_path) {

@@ -1,5 +1,5 @@
-// results.sqlite, derived from rows and rebuildable: tables episodes, metrics, forces, verdicts (schema
-// in docs/file-formats.md); traces stay in the rows.
+// results.sqlite, derived from rows and rebuildable: tables episodes, metrics, forces, contacts,
+// verdicts (schema in docs/file-formats.md); traces stay in the rows.
 #pragma once
 
 #include <string>

@@ -40,6 +40,25 @@ nlohmann::json to_json(const Verdict& verdict) {
           {"frames", verdict.frames}};
 }
 
+nlohmann::json to_json(const RowContact& contact) {
+  return {{"link", contact.link},
+          {"region", contact.region},
+          {"capsule", contact.capsule},
+          {"begin_s", number_or_null(contact.begin_s)},
+          {"duration_s", number_or_null(contact.duration_s)},
+          {"peak_n", number_or_null(contact.peak_n)},
+          {"impulse_ns", number_or_null(contact.impulse_ns)},
+          {"depth_m", number_or_null(contact.depth_m)},
+          {"windowed_mean_n", number_or_null(contact.windowed_mean_n)}};
+}
+
+template <typename T>
+nlohmann::json list_json(const std::vector<T>& items) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const T& item : items) list.push_back(to_json(item));
+  return list;
+}
+
 int small_integer(JsonFields& fields, const std::string& key, const std::string& what) {
   const std::int64_t value = fields.integer(key);
   if (value < 0 || value > std::numeric_limits<int>::max()) {
@@ -62,15 +81,34 @@ Verdict verdict_from_json(const nlohmann::json& json, const std::string& what) {
   return verdict;
 }
 
-std::vector<Verdict> verdicts_from_json(const nlohmann::json& json) {
+RowContact contact_from_json(const nlohmann::json& json, const std::string& what) {
+  JsonFields fields(json, what);
+  RowContact contact;
+  contact.link = fields.text("link");
+  contact.region = fields.text("region");
+  contact.capsule = fields.text("capsule");
+  contact.begin_s = fields.number_or_nan("begin_s");
+  contact.duration_s = fields.number_or_nan("duration_s");
+  contact.peak_n = fields.number_or_nan("peak_n");
+  contact.impulse_ns = fields.number_or_nan("impulse_ns");
+  contact.depth_m = fields.number_or_nan("depth_m");
+  contact.windowed_mean_n = fields.number_or_nan("windowed_mean_n");
+  fields.refuse_unknown();
+  return contact;
+}
+
+// `what`: one item, "verdict".
+template <typename T>
+std::vector<T> items_from_json(const nlohmann::json& json, const std::string& key, const char* what,
+                               T (*item_from_json)(const nlohmann::json&, const std::string&)) {
   if (!json.is_array()) {
-    throw InputError(fmt::format("episode row: key 'verdicts': expected a list, found {}", json.type_name()));
+    throw InputError(fmt::format("episode row: key '{}': expected a list, found {}", key, json.type_name()));
   }
-  std::vector<Verdict> verdicts;
+  std::vector<T> items;
   for (const nlohmann::json& entry : json) {
-    verdicts.push_back(verdict_from_json(entry, fmt::format("episode row: verdict {}", verdicts.size())));
+    items.push_back(item_from_json(entry, fmt::format("episode row: {} {}", what, items.size())));
   }
-  return verdicts;
+  return items;
 }
 
 Outcome outcome_from(const std::string& name) {
@@ -177,7 +215,7 @@ void read_result(JsonFields& fields, EpisodeRow& row) {
   row.outcome = outcome_from(fields.text("outcome"));
   row.message = fields.text("message");
   if (!fields.at("success").is_null()) row.success = fields.boolean("success");
-  row.verdicts = verdicts_from_json(fields.at("verdicts"));
+  row.verdicts = items_from_json(fields.at("verdicts"), "verdicts", "verdict", verdict_from_json);
   row.metrics = fields.numbers("metrics", false);
   row.fell = fields.boolean("fell");
   row.frames = small_integer(fields, "frames", "episode row");
@@ -195,6 +233,10 @@ void read_engine_details(JsonFields& fields, EpisodeRow& row) {
   row.engine_profile = fields.text("engine_profile");
   row.profile_digest = fields.text("profile_digest");
   row.forces = fields.numbers("forces", false);
+  if (fields.has("contacts")) {
+    row.contacts = items_from_json(fields.at("contacts"), "contacts", "contact", contact_from_json);
+  }
+  if (fields.has("contacts_total")) row.contacts_total = small_integer(fields, "contacts_total", "episode row");
   row.trace = trace_from_json(fields.at("trace"));
 }
 
@@ -213,8 +255,6 @@ std::string episode_key(const EpisodeRow& row) {
 }
 
 nlohmann::json to_json(const EpisodeRow& row) {
-  nlohmann::json verdicts = nlohmann::json::array();
-  for (const Verdict& verdict : row.verdicts) verdicts.push_back(to_json(verdict));
   return {{"schema", kRowSchema},
           {"key", row.key},
           {"suite", row.suite},
@@ -236,7 +276,7 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"outcome", std::string(to_string(row.outcome))},
           {"message", row.message},
           {"success", row.success.has_value() ? nlohmann::json(*row.success) : nlohmann::json(nullptr)},
-          {"verdicts", std::move(verdicts)},
+          {"verdicts", list_json(row.verdicts)},
           {"metrics", finite_only(row.metrics)},
           {"fell", row.fell},
           {"frames", row.frames},
@@ -245,6 +285,8 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"contact_peak_n", number_or_null(row.contact_peak_n)},
           {"contact_impulse_ns", number_or_null(row.contact_impulse_ns)},
           {"forces", finite_only(row.forces)},
+          {"contacts", list_json(row.contacts)},
+          {"contacts_total", row.contacts_total},
           {"trace", to_json(row.trace)},
           {"late_plans", row.late_plans},
           {"state_hash", row.state_hash},

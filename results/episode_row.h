@@ -32,6 +32,19 @@ struct StateTrace {
   std::vector<std::vector<int>> mm;  // per frame x, y, z of each point in turn [mm], frame W; empty: not recorded
 };
 
+// One contact of one robot link with one capsule of a solid human.
+struct RowContact {
+  std::string link, region, capsule;  // "left_wrist_yaw_link", "upper_arm", "right_upper_arm"
+  double begin_s = 0.0;               // from the episode's begin [s]
+  double duration_s = 0.0;            // [s]
+  double peak_n = 0.0;                // [N]
+  double impulse_ns = 0.0;            // of the force's magnitude [N s]
+  double depth_m = 0.0;               // largest [m]
+  double windowed_mean_n = 0.0;       // largest mean over the window of the measurement, 0.1 s [N]
+};
+
+inline constexpr std::size_t kMostRowContacts = 16;
+
 struct EpisodeRow {
   std::string key;  // SHA-256 of what makes the episode what it is (episode_key)
   std::string suite, suite_version, suite_hash;
@@ -54,6 +67,8 @@ struct EpisodeRow {
   // Finite values only, by dotted name ("human.chest.peak_n"); the ending is the unit: _n [N], _ns [N s], _s [s],
   // _n_cm2 [N/cm^2]; any other: a ratio or a flag (1 or 0).
   std::map<std::string, double> forces;
+  std::vector<RowContact> contacts;  // with a solid human: the kMostRowContacts of the largest peak force, by begin
+  long contacts_total = 0;           // those that are left out included
   StateTrace trace;
   int late_plans = 0;
   std::string state_hash;  // SHA-256 over the state trajectory

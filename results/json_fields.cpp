@@ -34,6 +34,11 @@ const nlohmann::json& JsonFields::at(const std::string& key) {
   return *found;
 }
 
+bool JsonFields::has(const std::string& key) {
+  asked_.insert(key);
+  return json_.contains(key);
+}
+
 std::string JsonFields::text(const std::string& key) {
   const nlohmann::json& value = at(key);
   if (!value.is_string()) wrong_type(key, "a string", value);

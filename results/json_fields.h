@@ -22,6 +22,7 @@ class JsonFields {
   // `what` names the object in messages ("episode row", "run.json"). Throws InputError where `json` is no object.
   JsonFields(const nlohmann::json& json, std::string what);
 
+  bool has(const std::string& key);                  // a key that may be absent
   const nlohmann::json& at(const std::string& key);  // throws InputError where it is missing
   std::string text(const std::string& key);
   bool boolean(const std::string& key);

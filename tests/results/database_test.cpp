@@ -55,6 +55,10 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
       testing::ElementsAre("parity|dddd"));
   EXPECT_THAT(query(path, "SELECT name, value FROM forces ORDER BY name"),
               testing::ElementsAre("ground.mean_n|343.125", "human.chest.quasi_static_n|12.3"));
+  EXPECT_THAT(query(path,
+                    "SELECT number, link, region, capsule, begin_s, duration_s, peak_n, impulse_ns, depth_m, "
+                    "windowed_mean_n, contacts_total FROM contacts JOIN episodes USING (key)"),
+              testing::ElementsAre("0|left_wrist_yaw_link|chest|chest_left|1.25|0.3|81.5|3.25|0.00326|60.5|19"));
   EXPECT_THAT(query(path, "SELECT version, thresholds, success, frames FROM verdicts"),
               testing::ElementsAre("paper|strict|1|31"));
   EXPECT_THAT(

@@ -40,6 +40,17 @@ TEST(EpisodeRow, SurvivesTheWayThroughText) {
   EXPECT_EQ(back.engine_profile, "parity");
   EXPECT_EQ(back.profile_digest, row.profile_digest);
   EXPECT_EQ(back.forces, row.forces);  // bit for bit
+  ASSERT_EQ(back.contacts.size(), 1U);
+  EXPECT_EQ(back.contacts[0].link, "left_wrist_yaw_link");
+  EXPECT_EQ(back.contacts[0].region, "chest");
+  EXPECT_EQ(back.contacts[0].capsule, "chest_left");
+  EXPECT_EQ(back.contacts[0].begin_s, 1.25);
+  EXPECT_EQ(back.contacts[0].duration_s, 0.1 + 0.2);
+  EXPECT_EQ(back.contacts[0].peak_n, 81.5);
+  EXPECT_EQ(back.contacts[0].impulse_ns, 3.25);
+  EXPECT_EQ(back.contacts[0].depth_m, 0.00326);
+  EXPECT_EQ(back.contacts[0].windowed_mean_n, 60.5);
+  EXPECT_EQ(back.contacts_total, 19);
   EXPECT_EQ(back.trace.rate_hz, 12.5);
   EXPECT_EQ(back.trace.points, row.trace.points);
   EXPECT_EQ(back.trace.mm, row.trace.mm);
@@ -49,14 +60,42 @@ TEST(EpisodeRow, ReadsRowsOfTheFirstSchema) {
   nlohmann::json json = to_json(full_row());
   json["schema"] = 1;
   EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
-  for (const char* key : {"engine_profile", "profile_digest", "forces", "trace"}) json.erase(key);
+  for (const char* key : {"engine_profile", "profile_digest", "forces", "contacts", "contacts_total", "trace"})
+    json.erase(key);
   const EpisodeRow row = row_from_json(json);
   EXPECT_EQ(row.key, full_row().key);
   EXPECT_EQ(row.late_plans, 2);
   EXPECT_EQ(row.engine_profile, "");
   EXPECT_EQ(row.profile_digest, "");
   EXPECT_TRUE(row.forces.empty());
+  EXPECT_TRUE(row.contacts.empty());
   EXPECT_TRUE(row.trace.mm.empty());
+}
+
+TEST(EpisodeRow, AbsentContactsReadAsNone) {
+  nlohmann::json json = to_json(full_row());
+  json.erase("contacts");
+  json.erase("contacts_total");
+  const EpisodeRow row = row_from_json(json);
+  EXPECT_TRUE(row.contacts.empty());
+  EXPECT_EQ(row.contacts_total, 0);
+}
+
+TEST(EpisodeRow, ContactsAreReadStrictly) {
+  const auto with = [](const char* key, nlohmann::json value) {
+    nlohmann::json json = to_json(full_row());
+    json["contacts"][0][key] = std::move(value);
+    return refusal(json);
+  };
+  EXPECT_EQ(with("peak_n", "81"), "episode row: contact 0: key 'peak_n': expected a number or null, found \"81\"");
+  EXPECT_EQ(with("link", 3), "episode row: contact 0: key 'link': expected a string, found 3");
+  EXPECT_THAT(with("peak", 3), HasSubstr("contact 0: unknown key 'peak': did you mean 'peak_n'?"));
+  const nlohmann::json whole = to_json(full_row());
+  for (const auto& [key, value] : whole.at("contacts").at(0).items()) {
+    nlohmann::json json = whole;
+    json["contacts"][0].erase(key);
+    EXPECT_EQ(refusal(json), "episode row: contact 0: key '" + key + "' is missing");
+  }
 }
 
 TEST(EpisodeRow, ATraceWithoutFramesIsNull) {
@@ -103,6 +142,7 @@ TEST(EpisodeRow, NumbersThatAreNotFiniteAreNeverWritten) {
   row.verdicts[0].values = {{"distance", infinity}, {"frames", 3.0}};
   row.verdicts[0].margins = {{"overall", nan}};
   row.forces = {{"ground.peak_n", infinity}, {"ground.mean_n", 343.0}};
+  row.contacts[0].peak_n = nan;
   row.contact_peak_n = infinity;
   row.wall_s = nan;
   const std::string text = to_json(row).dump();
@@ -115,11 +155,13 @@ TEST(EpisodeRow, NumbersThatAreNotFiniteAreNeverWritten) {
   EXPECT_EQ(back.verdicts[0].values.at("frames"), 3.0);
   EXPECT_TRUE(std::isnan(back.verdicts[0].margins.at("overall")));
   EXPECT_TRUE(std::isnan(back.contact_peak_n));
+  EXPECT_TRUE(std::isnan(back.contacts[0].peak_n));
 }
 
-TEST(EpisodeRow, EveryKeyIsNeeded) {
+TEST(EpisodeRow, EveryKeyButContactsIsNeeded) {
   const nlohmann::json whole = to_json(full_row());
   for (const auto& [key, value] : whole.items()) {
+    if (key.starts_with("contacts")) continue;
     nlohmann::json json = whole;
     json.erase(key);
     EXPECT_EQ(refusal(json), "episode row: key '" + key + "' is missing");
@@ -166,6 +208,8 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
   EXPECT_THAT(with("metrics", {{"jpe", nullptr}}), HasSubstr("key 'metrics.jpe': expected a number, found null"));
   EXPECT_THAT(with("forces", {{"ground.peak_n", nullptr}}),
               HasSubstr("key 'forces.ground.peak_n': expected a number, found null"));
+  EXPECT_THAT(with("contacts", 2), HasSubstr("key 'contacts': expected a list, found number"));
+  EXPECT_THAT(with("contacts_total", -1), HasSubstr("key 'contacts_total': expected a whole number of at least 0"));
   EXPECT_THAT(with("engine_profile", 2), HasSubstr("key 'engine_profile': expected a string, found 2"));
   EXPECT_THAT(with("sim_s", "5"), HasSubstr("key 'sim_s': expected a number or null"));
   EXPECT_THAT(with("verdicts", {{"paper", 1}}), HasSubstr("expected a list, found object"));
@@ -196,13 +240,13 @@ TEST(EpisodeKey, IsOfWhatTheEpisodeIsAndOfNothingElse) {
 }
 
 TEST(EpisodeKey, PartsDoNotRunTogether) {
-  EpisodeRow a = full_row();
-  a.task = "hug";
-  a.clip = "x";
-  EpisodeRow b = full_row();
-  b.task = "hu";
-  b.clip = "gx";
-  EXPECT_NE(episode_key(a), episode_key(b));
+  const auto key_of = [](const std::string& task, const std::string& clip) {
+    EpisodeRow row = full_row();
+    row.task = task;
+    row.clip = clip;
+    return episode_key(row);
+  };
+  EXPECT_NE(key_of("hug", "x"), key_of("hu", "gx"));
 }
 
 }  // namespace

@@ -44,6 +44,16 @@ inline EpisodeRow full_row() {
   row.contact_peak_n = 81.5;
   row.contact_impulse_ns = 3.25;
   row.forces = {{"ground.mean_n", 343.125}, {"human.chest.quasi_static_n", 12.1 + 0.2}};
+  row.contacts = {{.link = "left_wrist_yaw_link",
+                   .region = "chest",
+                   .capsule = "chest_left",
+                   .begin_s = 1.25,
+                   .duration_s = 0.1 + 0.2,
+                   .peak_n = 81.5,
+                   .impulse_ns = 3.25,
+                   .depth_m = 0.00326,
+                   .windowed_mean_n = 60.5}};
+  row.contacts_total = 19;
   row.trace = {
       .rate_hz = 12.5, .points = {"root", "left_hand"}, .mm = {{0, -1, 790, 210, 180, 900}, {1, 0, 789, 2, 3, 4}}};
   row.late_plans = 2;
