@@ -1,7 +1,8 @@
-#include <unistd.h>
+#include <malloc.h>
 
 #include <algorithm>
-#include <fstream>
+#include <atomic>
+#include <latch>
 #include <memory>
 #include <thread>
 
@@ -76,28 +77,33 @@ std::vector<Figure> time_overhead(const std::string& engine, const BenchmarkOpti
           {name + ":bare_step", 1e6 * times.bare, "us", "", true}};
 }
 
-// Wall time in which `worlds` robots, divided over the threads, each stand for a second. [s]
-double stand_seconds(const std::string& engine, int worlds, int threads) {
+// Wall time in which episodes of a second of standing are worked off by the threads, a world each. [s]
+double stand_seconds(const std::string& engine, int episodes, int threads) {
   const Scene scene = standing_scene(engine);
   const RobotState start = scene.robot->standing_state();
   const JointCommand command = scene.robot->default_command(start.q);
-  const auto work = [&](int first) {
-    for (int i = first; i < worlds; i += threads) backend_step_seconds(*make_backend(engine, scene), start, command);
+  std::latch built(threads + 1);
+  std::atomic<int> next = 0;
+  const auto work = [&] {
+    const std::unique_ptr<Backend> backend = make_backend(engine, scene);
+    built.arrive_and_wait();
+    while (next++ < episodes) backend_step_seconds(*backend, start, command);
   };
-  const double begin = wall_seconds();
   std::vector<std::thread> pool;
-  for (int i = 0; i < threads; ++i) pool.emplace_back(work, i);
+  for (int i = 0; i < threads; ++i) pool.emplace_back(work);
+  built.arrive_and_wait();
+  const double begin = wall_seconds();
   for (std::thread& thread : pool) thread.join();
   return wall_seconds() - begin;
 }
 
 std::vector<Figure> time_scaling(const std::string& engine, const BenchmarkOptions& options) {
-  constexpr int kWorlds = 8;
+  constexpr int kEpisodes = 16;
   double one = 1e9, many = 1e9;
   const double begin = wall_seconds();
   do {
-    one = std::min(one, stand_seconds(engine, kWorlds, 1));
-    many = std::min(many, stand_seconds(engine, kWorlds, options.threads));
+    one = std::min(one, stand_seconds(engine, kEpisodes, 1));
+    many = std::min(many, stand_seconds(engine, kEpisodes, options.threads));
   } while (wall_seconds() - begin < 3.0 * options.seconds);
   const std::string name = "backend/" + engine + "/scaling";
   // The target is for two cores; with another number the figure is printed as it is.
@@ -105,11 +111,10 @@ std::vector<Figure> time_scaling(const std::string& engine, const BenchmarkOptio
           {name + ":threads", static_cast<double>(options.threads), "1", "", true}};
 }
 
-double resident_kib() {
-  std::ifstream file("/proc/self/statm");
-  double all = 0.0, resident = 0.0;
-  file >> all >> resident;
-  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1024.0;
+// What this thread's allocations hold: the heap's used blocks and the large ones beside it.
+double allocated_kib() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd) / 1024.0;
 }
 
 // Memory is that of worlds beyond the first, which also pays for what all share.
@@ -126,9 +131,9 @@ std::vector<Figure> time_world(const std::string& engine, const BenchmarkOptions
     build = std::min(build, cpu_seconds() - begin);
     worlds.back()->reset(start);
     for (int step = 0; step < 5; ++step) worlds.back()->step(command);
-    if (i == 0) before = resident_kib();
+    if (i == 0) before = allocated_kib();
   }
-  const double memory = (resident_kib() - before) / kWorlds;
+  const double memory = (allocated_kib() - before) / kWorlds;
   const double reset = best_call_seconds([&] { worlds.front()->reset(start); }, 0.1);
   const std::string name = "backend/" + engine + "/world";
   return {at_most(name + ":memory", memory, "KiB", 1024.0), at_most(name + ":build", 1e3 * build, "ms", 10.0),
@@ -150,7 +155,7 @@ void add_backend_benchmarks(std::vector<Benchmark>& list) {
                     [target](const BenchmarkOptions& options) { return time_step(target, options); }});
     list.push_back({name + "/overhead", "the same over a bare loop of the same engine calls",
                     [engine](const BenchmarkOptions& options) { return time_overhead(engine, options); }});
-    list.push_back({name + "/scaling", "worlds on all threads against one",
+    list.push_back({name + "/scaling", "episodes per second on all threads against one",
                     [engine](const BenchmarkOptions& options) { return time_scaling(engine, options); }});
     list.push_back({name + "/world", "memory, building and resetting of a world",
                     [engine](const BenchmarkOptions& options) { return time_world(engine, options); }});
