@@ -297,8 +297,17 @@ std::string too_few_engines(const CrossEngine& result) {
 std::string markdown_of(const TitledTable& titled) {
   std::string text = "### " + titled.title + "\n\n";
   if (!titled.caption.empty()) text += titled.caption + "\n\n";
-  if (!titled.table.rows.empty()) text += markdown_table(titled.table) + "\n";
+  if (!titled.table.rows.empty()) text += markdown_table(titled.table);
+  if (!titled.table.rows.empty() && !titled.notes.empty()) text += "\n";
   for (const std::string& note : titled.notes) text += note + "\n";
+  return text;
+}
+
+std::string latex_of(const TitledTable& titled) {
+  std::string text = fmt::format("% {}\n", titled.title);
+  if (!titled.caption.empty()) text += fmt::format("% {}\n", titled.caption);
+  for (const std::string& note : titled.notes) text += fmt::format("% {}\n", note);
+  if (!titled.table.rows.empty()) text += latex_table(titled.table);
   return text;
 }
 
@@ -312,14 +321,9 @@ std::string cross_engine_markdown(const CrossEngine& result) {
 
 std::string cross_engine_latex(const CrossEngine& result) {
   const std::vector<TitledTable> tables = cross_engine_tables(result);
-  if (tables.empty()) return "% " + too_few_engines(result) + "\n";
+  if (tables.empty()) return fmt::format("% {}\n", too_few_engines(result));
   std::string text = "% \\usepackage{booktabs}\n";
-  for (const TitledTable& titled : tables) {
-    text += "\n% " + titled.title + "\n";
-    if (!titled.caption.empty()) text += "% " + titled.caption + "\n";
-    for (const std::string& note : titled.notes) text += "% " + note + "\n";
-    if (!titled.table.rows.empty()) text += latex_table(titled.table);
-  }
+  for (const TitledTable& titled : tables) text.append("\n").append(latex_of(titled));
   return text;
 }
 

@@ -27,6 +27,8 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
 
 // "### title", caption, table, notes.
 std::string markdown_of(const TitledTable& titled);
+// The title, caption and notes as comments, then the tabular.
+std::string latex_of(const TitledTable& titled);
 
 // Names of the combinations: columns "Controller", "Perturbation", "Policy" as far as they differ, and what they have
 // in common ("Controller vmc, perturbation clean."). Of all entries in turn.

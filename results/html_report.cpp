@@ -127,6 +127,7 @@ std::string html_report(const ReportContent& content) {
   };
   add("leaderboard", "Leaderboard", leaderboard_section(content));
   add("engines", "Across engines", cross_engine_html(content));
+  add("contacts", "Contact with people", contacts_html(content.contacts));
   add("retargeting", "Retargeting", retargeting_html(content));
   add("clips", "Clips", stories_section(content));
   add("environment", "Environment", environment_section(content));

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "results/contact_table.h"
 #include "results/cross_engine.h"
 #include "results/leaderboard.h"
 #include "results/metric_column.h"
@@ -38,6 +39,7 @@ struct ReportContent {
   std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
   std::vector<ClipStory> stories;
   std::optional<CrossEngine> cross_engine;  // section "Across engines"
+  ContactTable contacts;                    // section "Contact with people", where it has groups
   nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
 };
 

@@ -11,7 +11,11 @@ std::string cell_html(const std::string& cell, bool label) {
   const std::size_t bracket = cell.find(" [");
   const bool interval = bracket != std::string::npos && cell.ends_with(']') && !label;
   if (label) return fmt::format(R"(<th scope="row" class="l">{}</th>)", escape_html(cell));
-  if (!interval) return fmt::format("<td{}>{}</td>", cell == "-" ? R"( class="zero")" : "", escape_html(cell));
+  if (!interval) {
+    const bool over_limit = cell.ends_with('*') || cell.ends_with("*)");
+    const char* mark = over_limit ? R"( class="over")" : cell == "-" ? R"( class="zero")" : "";
+    return fmt::format("<td{}>{}</td>", mark, escape_html(cell));
+  }
   return fmt::format(R"(<td><span class="rate">{}</span><span class="ci">{}</span></td>)",
                      escape_html(cell.substr(0, bracket)), escape_html(cell.substr(bracket + 1)));
 }
@@ -34,7 +38,9 @@ std::string table_html(const TitledTable& titled) {
   return html + "</tbody></table></div>";
 }
 
-std::string titled_html(const TitledTable& titled) {
+}  // namespace
+
+std::string titled_table_html(const TitledTable& titled) {
   std::string html = fmt::format("<h3>{}</h3>", escape_html(titled.title));
   if (!titled.table.rows.empty()) html += table_html(titled);
   if (titled.table.rows.empty() && !titled.caption.empty()) {
@@ -44,8 +50,6 @@ std::string titled_html(const TitledTable& titled) {
   return html + "\n";
 }
 
-}  // namespace
-
 std::string cross_engine_html(const ReportContent& content) {
   if (!content.cross_engine.has_value()) return "";
   const CrossEngine& result = *content.cross_engine;
@@ -54,8 +58,8 @@ std::string cross_engine_html(const ReportContent& content) {
                                     : engine_plot_html(result) +
                                           "<p>Dots: success in each engine with its interval; bar: the mean over "
                                           "engines, on the shade of its interval.</p>\n";
-  for (const TitledTable& titled : tables) html += titled_html(titled);
-  return html + titled_html(certificate_table(content.certificate, result.engines));
+  for (const TitledTable& titled : tables) html += titled_table_html(titled);
+  return html + titled_table_html(certificate_table(content.certificate, result.engines));
 }
 
 }  // namespace duet

@@ -8,6 +8,8 @@
 
 namespace duet {
 
+struct TitledTable;  // results/cross_engine_tables.h
+
 std::string escape_html(std::string_view text);  // also for attribute values in double quotes
 
 // Style sheet and script of the report.
@@ -25,10 +27,16 @@ std::string key_frames_svg(const std::vector<KeyFrame>& frames);
 // there are none.
 std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss);
 
+// Heading of level 3, table and notes. A cell that ends with an asterisk is over a limit and stands out.
+std::string titled_table_html(const TitledTable& titled);
+
 // The drawing of engine_plot_svg within the report, styled by it.
 std::string engine_plot_html(const CrossEngine& result);
 // Tables, plot and parity certificate; "" where the content has no comparison of engines.
 std::string cross_engine_html(const ReportContent& content);
+
+// Mark of the limits, notes and tables; "" for a table without groups.
+std::string contacts_html(const ContactTable& table);
 
 std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
 std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts

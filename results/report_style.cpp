@@ -41,6 +41,8 @@ tbody tr:hover{background:var(--faint)}
 tr.control{color:var(--soft)}
 tr.control th{font-weight:400;font-style:italic}
 td.zero{color:var(--source)}
+td.over{color:var(--null);font-weight:600}
+section>p.warning{color:var(--ink);border-left:3px solid var(--null);padding-left:10px;font-weight:600}
 .ci{color:var(--soft);font-size:12px;display:block}
 .rate{font-weight:600}
 .unit{color:var(--soft);font-weight:400}

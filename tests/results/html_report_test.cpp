@@ -144,6 +144,26 @@ TEST(HtmlReport, SaysWhereThereIsOneEngineOnly) {
   EXPECT_THAT(html, AllOf(HasSubstr("these results have one physics engine, mujoco."), Not(HasSubstr("<h3>Spread"))));
 }
 
+TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
+  ReportContent solid = content();
+  EXPECT_THAT(html_report(solid), Not(HasSubstr("Contact with people")));
+  std::vector<EpisodeRow> rows = two_engines();
+  solid.contacts = contact_table(rows);
+  EXPECT_THAT(html_report(solid), Not(HasSubstr("<details open>")));
+  const std::string evil = "\"><script>x</script>&'";
+  for (EpisodeRow& row : rows) {
+    row.forces["human." + evil + ".peak_n"] = 150.0;
+    row.forces["human." + evil + ".worst_ratio"] = 1.5;
+    if (row.engine == "ode") row.engine = row.policy = evil;
+  }
+  solid.contacts = contact_table(rows);
+  const std::string html = html_report(solid);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"contacts\""), HasSubstr("class=\"warning\">Limits: unverified"),
+                          HasSubstr("<td class=\"over\">150 (1.50*)</td>"), HasSubstr("<details open>"),
+                          Not(HasSubstr("<script>x"))));
+}
+
 TEST(HtmlReport, EmptyContentHasNoEmptySections) {
   const std::string html = html_report({});
   EXPECT_EQ(unbalanced_tag(html), "");
