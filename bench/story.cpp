@@ -108,6 +108,7 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int 
   content.entries = leaderboard(rows);
   content.columns = metric_columns();
   content.cross_engine = across_engines(rows);
+  content.contacts = contact_table(rows);
   content.certificate = runs.front().info.certificate;
   if (!with_clips) return content;
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "core/digest.h"
 #include "results/cross_engine_tables.h"
 
 namespace duet {
@@ -62,10 +61,6 @@ std::vector<std::string> coverage_notes(const std::vector<nlohmann::json>& certi
 
 }  // namespace
 
-std::string certificate_digest(const nlohmann::json& certificate) {
-  return sha256_hex(certificate.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-}
-
 TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<RunEngine>& engines) {
   TitledTable titled{.title = kTitle, .caption = "", .table = {}, .notes = {}};
   if (!certificate.is_object()) {
@@ -74,8 +69,8 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
     return titled;
   }
   titled.caption = fmt::format("Effort {}, made {}, digest {:.12}.", text_of(certificate, "effort"),
-                               text_of(certificate, "created_at"), certificate_digest(certificate));
-  titled.table = {.header = {"Engine", "Version", "Profile", "Scenes passed", "Asserted deviations", "Failed"},
+                               text_of(certificate, "created_at"), text_of(certificate, "digest"));
+  titled.table = {.header = {"Engine", "Version", "Profile", "Checks passed", "Asserted deviations", "Failed"},
                   .rows = {},
                   .label_columns = 3};
   const std::vector<nlohmann::json> certified = engines_in(certificate);

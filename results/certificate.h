@@ -10,10 +10,7 @@
 
 namespace duet {
 
-// SHA-256 of the certificate as JSON text with sorted keys and no spaces.
-std::string certificate_digest(const nlohmann::json& certificate);
-
-// Heading of level 3 and a table: engine, version, profile, scenes passed, asserted deviations, failed. `engines` of
+// Heading of level 3 and a table: engine, version, profile, checks passed, asserted deviations, failed. `engines` of
 // the results: one that the certificate does not cover, or of another version or profile, is named. For null the
 // sentence that none is attached.
 std::string certificate_markdown(const nlohmann::json& certificate, const std::vector<RunEngine>& engines = {});

@@ -40,7 +40,7 @@ struct LeaderboardEntry {
 // suites or suite versions, an episode that is there twice.
 std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options = {});
 
-std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries);
+std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries, bool with_metrics = true);
 std::string leaderboard_csv(const std::vector<LeaderboardEntry>& entries);
 std::string leaderboard_latex(const std::vector<LeaderboardEntry>& entries);
 nlohmann::json leaderboard_json(const std::vector<LeaderboardEntry>& entries);

@@ -165,7 +165,7 @@ nlohmann::json json_of(const LeaderboardEntry& entry) {
 
 }  // namespace
 
-std::string leaderboard_markdown(const Entries& entries) {
+std::string leaderboard_markdown(const Entries& entries, bool with_metrics) {
   const std::vector<LeaderboardRow> rows = leaderboard_rows(entries);
   const RowLabels labels = row_labels(rows);
   std::string text = labels.caption.empty() ? "" : labels.caption + "\n\n";
@@ -175,7 +175,7 @@ std::string leaderboard_markdown(const Entries& entries) {
     text += "\nSuccess in % under each detector version / threshold set, all tasks:\n\n";
     text += markdown_table(verdict_table(entries, rows, labels));
   }
-  if (!metric_names(entries).empty()) {
+  if (with_metrics && !metric_names(entries).empty()) {
     text += "\nMean over the episodes that have the metric, all tasks:\n\n";
     const std::vector<std::vector<LeaderboardRow>> engines = rows_by_engine(rows);
     for (const std::vector<LeaderboardRow>& of_engine : engines) {

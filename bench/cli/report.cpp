@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <functional>
 
 #include "bench/cli/command.h"
+#include "bench/cli/tables.h"
 #include "bench/parallel.h"
 #include "bench/story.h"
 #include "core/file.h"
@@ -65,47 +67,54 @@ void write_format(const std::string& format, const std::string& path, const std:
   if (format == "sqlite") write_database(all_rows(runs), path);
 }
 
-// engines.md and the like, and engines.svg: what changes when only the engine does.
-void write_engines(const CrossEngine& engines, const nlohmann::json& certificate, const std::string& folder,
-                   const std::vector<std::string>& formats, nlohmann::json& written) {
-  const auto write = [&](const std::string& name, const std::string& text) {
-    const std::string path = (std::filesystem::path(folder) / name).string();
-    write_file(path, text);
-    written.push_back(path);
-  };
-  for (const std::string& format : formats) {
+using Writer = std::function<void(const std::string& name, const std::string& text)>;
+
+// What changes when only the engine does, and what the robot's contacts do to people, where there is anything to say.
+void write_tables(const Tables& tables, const std::string& format, const Writer& write) {
+  if (tables.has_engines()) {
     if (format == "md")
-      write("engines.md", cross_engine_markdown(engines) + "\n" + certificate_markdown(certificate, engines.engines));
-    if (format == "csv") write("engines.csv", cross_engine_csv(engines));
-    if (format == "json") write("engines.json", cross_engine_json(engines).dump(2) + "\n");
-    if (format == "tex") write("engines.tex", cross_engine_latex(engines));
+      write("engines.md", cross_engine_markdown(tables.engines) + "\n" +
+                              certificate_markdown(tables.certificate, tables.engines.engines));
+    if (format == "csv") write("engines.csv", cross_engine_csv(tables.engines));
+    if (format == "json") write("engines.json", cross_engine_json(tables.engines).dump(2) + "\n");
+    if (format == "tex") write("engines.tex", cross_engine_latex(tables.engines));
+    if (format == "html") write("engines.svg", engine_plot_svg(tables.engines));
   }
-  write("engines.svg", engine_plot_svg(engines));
+  if (tables.has_contacts()) {
+    if (format == "md") write("contacts.md", contact_table_markdown(tables.contacts));
+    if (format == "csv") write("contacts.csv", contact_table_csv(tables.contacts));
+    if (format == "json") write("contacts.json", contact_table_json(tables.contacts).dump(2) + "\n");
+    if (format == "tex") write("contacts.tex", contact_table_latex(tables.contacts));
+  }
 }
 
 void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
   const std::vector<Run> runs = load_runs(arguments.runs);
-  const std::vector<LeaderboardEntry> entries = leaderboard(all_rows(runs));
+  const Tables tables = make_tables(all_rows(runs), runs.front().info.certificate);
   const std::filesystem::path folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
   Progress progress(session.progress());
-  nlohmann::json written = nlohmann::json::array();
+  nlohmann::json json = {{"files", nlohmann::json::array()}};
+  const auto wrote = [&](const std::string& path) {
+    json["files"].push_back(path);
+    note(session, "wrote " + path);
+  };
+  const Writer write = [&](const std::string& name, const std::string& text) {
+    const std::string path = (folder / name).string();
+    write_file(path, text);
+    wrote(path);
+  };
   for (const std::string& format : arguments.formats) {
     const std::string name = format == "html"     ? "report.html"
                              : format == "sqlite" ? "results.sqlite"
                                                   : "leaderboard." + format;
     const std::string path = (folder / name).string();
-    write_format(format, path, runs, entries, arguments, progress);
-    written.push_back(path);
-    note(session, "wrote " + path);
+    write_format(format, path, runs, tables.leaderboard, arguments, progress);
+    wrote(path);
+    write_tables(tables, format, write);
   }
-  const CrossEngine engines = across_engines(all_rows(runs));
-  const nlohmann::json& certificate = runs.front().info.certificate;
-  if (engines.engines.size() > 1) write_engines(engines, certificate, folder.string(), arguments.formats, written);
-  print(session,
-        leaderboard_markdown(entries) + "\n" + cross_engine_markdown(engines) + "\n" +
-            certificate_markdown(certificate, engines.engines),
-        {{"files", written}, {"leaderboard", leaderboard_json(entries)}, {"engines", cross_engine_json(engines)}});
+  add_tables(tables, json);
+  print(session, tables_text(tables), json);
 }
 
 }  // namespace

@@ -6,13 +6,12 @@
 
 #include "bench/certificate.h"
 #include "bench/cli/command.h"
+#include "bench/cli/tables.h"
 #include "bench/clips.h"
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
 #include "bench/runner.h"
-#include "bench/story.h"
 #include "core/require.h"
-#include "results/leaderboard.h"
 
 namespace duet::cli {
 namespace {
@@ -87,21 +86,17 @@ void run_run(Session& session, RunArguments arguments) {
   const RunSummary summary = run_suite(suite, arguments.output, arguments.options, progress);
   session.exit_code = exit_code(summary);
   note(session, describe(summary, suite, arguments.output));
-  const std::vector<EpisodeRow> rows = load_run(arguments.output).rows;
-  const std::vector<LeaderboardEntry> entries = leaderboard(rows);
-  const CrossEngine engines = across_engines(rows);
-  std::string text = leaderboard_markdown(entries);
-  if (engines.engines.size() > 1) text += "\n" + cross_engine_markdown(engines);
-  print(session, text,
-        {{"run", arguments.output},
-         {"planned", summary.planned},
-         {"already_there", summary.already_there},
-         {"run_now", summary.run},
-         {"outcomes", summary.outcomes},
-         {"complete", summary.end == RunEnd::kComplete},
-         {"absent_engines", summary.absent_engines},
-         {"leaderboard", leaderboard_json(entries)},
-         {"engines", cross_engine_json(engines)}});
+  const Run run = load_run(arguments.output);
+  const Tables tables = make_tables(run.rows, run.info.certificate);
+  nlohmann::json json = {{"run", arguments.output},
+                         {"planned", summary.planned},
+                         {"already_there", summary.already_there},
+                         {"run_now", summary.run},
+                         {"outcomes", summary.outcomes},
+                         {"absent_engines", summary.absent_engines},
+                         {"complete", summary.end == RunEnd::kComplete}};
+  add_tables(tables, json);
+  print(session, tables_text(tables), json);
 }
 
 }  // namespace

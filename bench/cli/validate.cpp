@@ -20,6 +20,7 @@ namespace {
 struct ValidateArguments {
   std::vector<std::string> engines, scenes;
   std::string profile = "parity", effort = "quick", output;
+  bool all = false;
 };
 
 std::vector<std::string> chosen_engines(const ValidateArguments& arguments) {
@@ -71,17 +72,19 @@ std::string tolerance_text(const conformance::Measurement& found) {
   return found.relative ? fmt::format("{:.2g} %", 100.0 * found.tolerance) : fmt::format("{:.2g}", found.tolerance);
 }
 
-std::string engine_table(const CertifiedEngine& engine) {
+// Every check, or only those that did not pass.
+std::string engine_table(const CertifiedEngine& engine, bool all) {
   TextTable table{.header = {"scene", "quantity", "verdict", "dt [ms]", "found", "expected", "tolerance", "unit"},
                   .rows = {},
                   .label_columns = 3};
   for (const CertifiedMeasurement& entry : engine.measurements) {
+    if (!all && entry.verdict == conformance::Verdict::kPass) continue;
     const conformance::Measurement& found = entry.found;
     table.rows.push_back({found.scene, found.quantity, std::string(conformance::to_string(entry.verdict)),
                           fmt::format("{:g}", 1e3 * found.dt), fmt::format("{:.4g}", found.value),
                           fmt::format("{:.4g}", found.expected), tolerance_text(found), found.unit});
   }
-  return markdown_table(table);
+  return table.rows.empty() ? "" : fmt::format("\n{}\n", markdown_table(table));
 }
 
 std::string summary(const CertifiedEngine& engine) {
@@ -97,10 +100,9 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
   const Certificate certificate =
       certify(reports, profile.name, fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))));
   const nlohmann::json json = certificate_json(certificate);
-  std::string tables, summaries;
+  std::string text;
   for (const CertifiedEngine& engine : certificate.engines) {
-    tables += fmt::format("## {}\n\n{}\n", engine.name, engine_table(engine));
-    summaries += summary(engine);
+    text += summary(engine) + engine_table(engine, arguments.all);
     if (engine.tally.failed > 0) session.exit_code = kExitDeterminism;
   }
   for (const conformance::EngineReport& report : reports)
@@ -111,7 +113,7 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
     write_file(folder / "parity.html", parity_page(certificate));
     note(session, fmt::format("wrote {0}/certificate.json and {0}/parity.html", arguments.output));
   }
-  print(session, tables + summaries, json);
+  print(session, text, json);
 }
 
 }  // namespace
@@ -128,6 +130,7 @@ void add_validate(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"quick", "full"}))
       ->capture_default_str();
   command->add_option("--scene", arguments->scenes, "scenes; default: all")->delimiter(',');
+  command->add_flag("--all", arguments->all, "print every check, not only those that did not pass");
   command->add_option("-o,--output", arguments->output, "folder for certificate.json and parity.html");
   command->callback([&session, arguments] { run_validate(session, *arguments); });
 }

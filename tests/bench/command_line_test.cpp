@@ -37,7 +37,7 @@ Answer duet_program(const std::string& arguments, const std::string& prefix = ""
 
 TEST(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"doctor", "list", "synth", "import", "retarget", "score", "run", "report", "compare",
-                              "check", "bless", "verify", "bench"}) {
+                              "check", "bless", "verify", "validate", "bench"}) {
     const Answer answer = duet_program(std::string(command) + " --help");
     EXPECT_EQ(answer.code, 0) << command;
     EXPECT_THAT(answer.out, HasSubstr("Example:\n  duet " + std::string(command))) << command;

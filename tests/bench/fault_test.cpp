@@ -118,6 +118,23 @@ TEST_F(Faults, DoctorNamesABrokenModule) {
   EXPECT_THAT(ended.text, AllOf(HasSubstr("absent engine dart"), HasSubstr("duet_dart.so")));
 }
 
+TEST_F(Faults, ACertificateEditedByHandIsRefusedAndAGoodOneIsKept) {
+  const Ended made = run("validate -q --engine mujoco --scene armature -o " + (folder_ / "parity"));
+  if (made.code == 4) GTEST_SKIP() << "not run: engine mujoco absent";
+  const std::string path = folder_ / "parity/certificate.json";
+  const std::string run_it = "run " + suite("playback") + " -q --certificate " + path + " -o " + (folder_ / "run");
+  ASSERT_EQ(run(run_it).code, 0);
+  EXPECT_EQ(load_run(folder_ / "run").info.certificate.at("engines").at(0).at("name"), "mujoco");
+  fs::remove_all(folder_ / "run");
+  std::string text = read_file(path);
+  text.replace(text.find("\"quick\""), 7, "\"full\"");
+  write_file(path, text);
+  const Ended refused = run(run_it);
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.text, AllOf(HasSubstr("certificate.json"), HasSubstr("digest")));
+  EXPECT_FALSE(fs::exists(folder_ / "run"));
+}
+
 TEST_F(Faults, AModuleOfAnotherNameIsRefused) {
   fs::copy_file(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_other.so");
   EXPECT_THAT(run("list engines").text, HasSubstr("names itself 'faulty'"));

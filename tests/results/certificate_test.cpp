@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "core/digest.h"
-
 namespace duet {
 namespace {
 
@@ -13,7 +11,7 @@ using testing::Not;
 
 nlohmann::json certificate() {
   return nlohmann::json::parse(R"({"schema": "duet.certificate/1", "effort": "full",
-    "created_at": "2026-01-02T03:04:05Z", "engines": [
+    "created_at": "2026-01-02T03:04:05Z", "digest": "0123456789abcdef", "engines": [
       {"name": "mujoco", "version": "2.2.2", "profile": "parity", "passed": 20, "failed": 0, "deviations": 1},
       {"name": "ode", "version": "0.16.2", "profile": "parity", "passed": ["a", "b"], "failed": [], "deviations": {}}
     ]})");
@@ -24,9 +22,7 @@ TEST(Certificate, IsATableOfEngines) {
   EXPECT_THAT(text, AllOf(HasSubstr("### Parity certificate\n"),
                           HasSubstr("| mujoco | 2.2.2   | parity  |            20 |                   1 |      0 |"),
                           HasSubstr("| ode    | 0.16.2  | parity  |             2 |                   0 |      0 |"),
-                          HasSubstr("Effort full, made 2026-01-02T03:04:05Z, digest " +
-                                    certificate_digest(certificate()).substr(0, 12) + ".")));
-  EXPECT_EQ(certificate_digest({{"b", 1}, {"a", "x"}}), sha256_hex(R"({"a":"x","b":1})"));
+                          HasSubstr("Effort full, made 2026-01-02T03:04:05Z, digest 0123456789ab.")));
 }
 
 TEST(Certificate, WithoutOneSaysHowToMakeOne) {

@@ -1,0 +1,31 @@
+// The tables of a run as `duet run` and `duet report` print them.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "results/contact_table.h"
+#include "results/cross_engine.h"
+#include "results/leaderboard.h"
+
+namespace duet::cli {
+
+struct Tables {
+  std::vector<LeaderboardEntry> leaderboard;
+  CrossEngine engines;
+  ContactTable contacts;
+  nlohmann::json certificate;  // null: none is attached
+
+  [[nodiscard]] bool has_engines() const { return engines.engines.size() > 1; }
+  [[nodiscard]] bool has_contacts() const { return !contacts.groups.empty(); }
+};
+
+Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate);
+
+// Markdown for a terminal: with several engines the metrics of each are left to the files; their drift is shown.
+std::string tables_text(const Tables& tables);
+// "leaderboard", and where there are any "engines" and "contacts", added to `json`.
+void add_tables(const Tables& tables, nlohmann::json& json);
+
+}  // namespace duet::cli
