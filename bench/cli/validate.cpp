@@ -43,7 +43,7 @@ std::vector<std::string> chosen_scenes(const ValidateArguments& arguments) {
 
 std::vector<conformance::EngineReport> run_scenes(const ValidateArguments& arguments, const Profile& profile,
                                                   Progress& progress) {
-  const std::vector<std::string> names = chosen_engines(arguments), scenes = chosen_scenes(arguments);
+  const std::vector<std::string> scenes = chosen_scenes(arguments), names = chosen_engines(arguments);
   const auto g1 = std::make_shared<const RobotModel>(load_robot(default_card_path()));
   std::vector<conformance::EngineReport> reports;
   for (const std::string& name : names) {
