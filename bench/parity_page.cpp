@@ -26,6 +26,13 @@ tr.deviation td.verdict{color:var(--other);font-weight:600}
 @media(max-width:560px){.plots{grid-template-columns:1fr}}
 )css";
 
+constexpr const char* kPictureStyle = R"css(
+svg{--t1:#0072b2;--t2:#d55e00;--t3:#009e73;--t4:#cc79a7;--t5:#8a6d00;--t6:#3f8fc4;--t7:#666;--t8:#444}
+text{font:12px system-ui,sans-serif;fill:#555}text.title{font-weight:700;font-size:14px;fill:#222}.grid{stroke:#ddd}
+polyline{fill:none;stroke-width:1.6}
+@media(prefers-color-scheme:dark){text{fill:#a6adb6}text.title{fill:#e7e8ea}.grid{stroke:#3a4048}}
+)css";
+
 struct Axis {
   double low, high;  // log10, whole decades
   double from, to;   // [px]
@@ -231,6 +238,29 @@ std::string accuracy_plot_svg(const std::vector<CertifiedEngine>& engines, const
     if (const AccuracyCurve* curve = curve_of(engines[i], scene); curve != nullptr)
       svg += curve_svg(engines[i], *curve, colour_of(i), x, y);
   return svg + key_svg(engines, scene) + "</svg>";
+}
+
+std::string parity_svg(const Certificate& certificate) {
+  constexpr const char* kScenes[] = {"free-flight", "chain", "saturation", "rolling-ball"};
+  constexpr double kTitle = 44.0;
+  std::string panels;
+  int panel = 0;
+  for (const char* scene : kScenes) {
+    std::string plot = accuracy_plot_svg(certificate.engines, scene);
+    if (plot.empty()) continue;
+    const double x = panel % 2 * kWidth, y = panel / 2 * (kHeight + kTitle);
+    const AccuracyCurve& curve = first_curve(certificate, scene);
+    panels += fmt::format(R"(<text class="title" x="{0}" y="{1}">{3}</text><text x="{0}" y="{2}">{4}{5}</text>)",
+                          x + 12.0, y + 20.0, y + 37.0, scene, escape_html(curve.error),
+                          curve.unit.empty() ? "" : " [" + escape_html(curve.unit) + "]");
+    plot.insert(4, fmt::format(R"( x="{}" y="{}" width="{}" height="{}")", x, y + kTitle, kWidth, kHeight));
+    panels += plot;
+    ++panel;
+  }
+  if (panel == 0) return "";
+  const double width = std::min(panel, 2) * kWidth, height = (panel + 1) / 2 * (kHeight + kTitle);
+  return fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\"><style>{}</style>{}</svg>\n",
+                     width, height, kPictureStyle, panels);
 }
 
 std::string parity_page(const Certificate& certificate) {

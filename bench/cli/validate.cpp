@@ -111,6 +111,8 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
     const std::filesystem::path folder = arguments.output;
     write_file(folder / "certificate.json", json.dump(1) + "\n");
     write_file(folder / "parity.html", parity_page(certificate));
+    if (const std::string picture = parity_svg(certificate); !picture.empty())
+      write_file(folder / "parity.svg", picture);
     note(session, fmt::format("wrote {0}/certificate.json and {0}/parity.html", arguments.output));
   }
   print(session, text, json);

@@ -172,6 +172,18 @@ std::string any_engine() {
   return "";
 }
 
+TEST(ParityPicture, HasAPanelForEachOfItsScenesThatRan) {
+  const std::string engine = any_engine();
+  if (engine.empty()) GTEST_SKIP() << "not run: no physics engine is there";
+  const test::ScratchFolder folder;
+  validate("-q --engine " + engine + " --scene chain,saturation,armature -o " + (folder / "parity"));
+  const std::string svg = read_file(folder / "parity/parity.svg");
+  EXPECT_THAT(svg, HasSubstr(">chain</text>"));
+  EXPECT_THAT(svg, HasSubstr(">saturation</text>"));
+  EXPECT_THAT(svg, Not(HasSubstr(">free-flight</text>")));
+  EXPECT_THAT(svg, Not(HasSubstr("nan")));
+}
+
 TEST(ValidateCommand, WritesACertificateThatReadsBackAndAPage) {
   const std::string engine = any_engine();
   if (engine.empty()) GTEST_SKIP() << "not run: no physics engine is there";
