@@ -5,12 +5,18 @@
 #include "core/random.h"
 
 namespace duet {
+namespace {
+
+constexpr const char* kPlayback = "playback";
+
+}  // namespace
 
 std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips) {
   std::vector<EpisodeSpec> plan;
   const std::string suite_id = suite.name + "@" + suite.version;
   for (const std::string& engine : suite.engines) {
     for (const std::string& controller : suite.controllers) {
+      if (engine == kPlayback && controller != suite.controllers.front()) continue;  // it moves without one
       const auto add = [&](const std::string& policy, const std::string& arm) {
         for (const PairedMotion& clip : clips) {
           for (int episode = 0; episode < suite.episodes_per_clip; ++episode) {
@@ -38,7 +44,7 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::strin
   row.episode = spec.episode;
   row.seed = spec.seed;
   row.engine = spec.engine;
-  if (spec.engine != "playback") {
+  if (spec.engine != kPlayback) {
     row.engine_profile = suite.profile.name;
     row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
   }

@@ -20,7 +20,7 @@ struct EpisodeSpec {
 };
 
 // Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine and
-// controller.
+// controller; playback under the first controller only, as none acts in it.
 std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips);
 
 // A row with everything that is known before the episode runs, its key included.
