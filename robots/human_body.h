@@ -21,7 +21,7 @@ struct HumanCapsule {
   std::string name = {};    // "left_forearm"
   std::string region = {};  // "head", "neck", "chest", "abdomen", "back", "pelvis", "upper_arm", "forearm", "hand",
                             // "thigh", "shin", "foot"
-  int joint_a = 0;  // SMPL-24 joints at its two ends
+  int joint_a = 0;          // SMPL-24 joints at its two ends
   int joint_b = 0;
   double radius = 0.0;  // [m]
   // The axis runs from a + begin (b - a) to a + end (b - a): a head reaches beyond its joint, a hand beyond the
