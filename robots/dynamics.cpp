@@ -98,8 +98,6 @@ void Dynamics::accumulate_composites() {
   }
 }
 
-// Composite rigid bodies: a unit acceleration of joint i alone moves what it carries as one body; the force and moment
-// that this takes are projected on the joints between it and the base.
 void Dynamics::mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> out) {
   kinematics_.update(state.X_WB, state.q);
   accumulate_composites();
@@ -107,6 +105,8 @@ void Dynamics::mass_matrix(const RobotState& state, Eigen::Ref<Eigen::MatrixXd> 
   for (int j = 0; j < model_->dof(); ++j) out(6 + j, 6 + j) += model_->joints[j].armature;
 }
 
+// Composite rigid bodies: a unit acceleration of joint i alone moves what it carries as one body; the force and moment
+// that this takes are projected on the joints between it and the base.
 void Dynamics::project_composites(Eigen::Ref<Eigen::MatrixXd> out) const {
   out.setZero();
   const Eigen::Matrix3d& R = kinematics_.R_WL(0);

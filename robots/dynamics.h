@@ -11,8 +11,8 @@ namespace duet {
 
 inline constexpr double kGravity = 9.81;  // [m/s^2], along -z of W
 
-// The same three as below without allocation after construction: for loops that call them often. Not thread-safe; keeps
-// a reference to the model, which must outlive it.
+// The three functions below, and mass and bias in one pass, without allocation after construction: for loops. Not
+// thread-safe; keeps a reference to the model, which must outlive it.
 class Dynamics {
  public:
   explicit Dynamics(const RobotModel& model, const Eigen::Vector3d& gravity_W = {0.0, 0.0, -kGravity});

@@ -53,13 +53,6 @@ void TreeFactor::solve(Eigen::VectorXd& x) const {
   }
 }
 
-void TreeFactor::half_solve(Columns& x) const {
-  for (int i = static_cast<int>(parent_.size()) - 1; i >= 0; --i) {
-    x.row(i) *= inverse_[i];
-    for (const int j : ancestors_[i]) x.row(j).noalias() -= L_(i, j) * x.row(i);
-  }
-}
-
 void TreeFactor::half_solve(std::span<const int> rows, Triple& x) const {
   for (const int i : rows) {
     const Eigen::RowVector3d scaled = inverse_[i] * x.row(i);
@@ -74,14 +67,6 @@ void TreeFactor::solve(std::span<const int> rows, Triple& x) const {
     Eigen::RowVector3d value = x.row(i);
     for (const int j : ancestors_[i]) value -= L_(i, j) * x.row(j);
     x.row(i) = inverse_[i] * value;
-  }
-}
-
-void TreeFactor::solve(Columns& x) const {
-  half_solve(x);
-  for (int i = 0; i < static_cast<int>(parent_.size()); ++i) {
-    for (const int j : ancestors_[i]) x.row(i).noalias() -= L_(i, j) * x.row(j);
-    x.row(i) *= inverse_[i];
   }
 }
 

@@ -13,7 +13,6 @@ namespace duet {
 
 class TreeFactor {
  public:
-  using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   using Triple = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
   // Of the generalised velocity of robots/kinematics.h: 6 + dof rows.
@@ -23,12 +22,10 @@ class TreeFactor {
   bool compute(const Eigen::MatrixXd& mass, const Eigen::VectorXd& joint_inertia);
   // x <- H^-1 x
   void solve(Eigen::VectorXd& x) const;
-  void solve(Columns& x) const;
-  // x <- L^-T x: the products of two such columns are those of the columns with H^-1 between them.
-  void half_solve(Columns& x) const;
   // The same for three columns that are zero outside `rows`, which fall and hold the ancestors of all they hold.
-  void half_solve(std::span<const int> rows, Triple& x) const;
   void solve(std::span<const int> rows, Triple& x) const;
+  // x <- L^-T x: the products of two such columns are those of the columns with H^-1 between them.
+  void half_solve(std::span<const int> rows, Triple& x) const;
 
  private:
   std::vector<int> parent_;                  // of each row: the next row that its joint's motion reaches; -1: none
