@@ -15,8 +15,7 @@ constexpr double kUnitTolerance = 1e-6;
 void check_link(const RobotLink& link) {
   require(std::isfinite(link.mass) && link.mass > 0.0,
           fmt::format("Scene: link '{}' has mass {} kg, expected more than 0", link.name, link.mass));
-  const Eigen::Vector3d moments = link.inertia.selfadjointView<Eigen::Lower>().eigenvalues();
-  require(link.inertia.allFinite() && moments.minCoeff() > 0.0,
+  require(link.inertia.allFinite() && link.inertia.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() > 0.0,
           fmt::format("Scene: the inertia of link '{}' is not positive definite", link.name));
 }
 
@@ -85,6 +84,11 @@ const double* take(const double* from, Vector& vector) {
 }
 
 }  // namespace
+
+bool speeds_are_sane(const RobotState& state) {
+  const auto sane = [](const auto& v) { return (v.array().abs() < kDivergedSpeed).all(); };
+  return sane(state.v_WB) && sane(state.w_WB_B) && sane(state.v);
+}
 
 Backend::Backend(Scene scene) : scene_(checked(std::move(scene))) {
   const int n = scene_.robot->dof();

@@ -1,6 +1,6 @@
 // One physics engine (or none) behind one interface. Public functions check arguments once and call the private hooks;
-// adapters never repeat the checks. Not thread-safe: one backend per thread. After construction nothing allocates in
-// step().
+// adapters never repeat the checks. Not thread-safe: one backend per thread. After construction nothing
+// allocates in step() but what an engine's README names.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,9 +25,16 @@ struct Snapshot {
 // The 24 joints of the partner at an instant, and their velocities, as columns [m], [m/s], frame W.
 using HumanJoints = Eigen::Matrix<double, 3, 24>;
 
+// Faster than any robot: an engine whose base or joint moves at more has diverged. [m/s], [rad/s]
+inline constexpr double kDivergedSpeed = 1e4;
+// False also where a velocity is not a number.
+bool speeds_are_sane(const RobotState& state);
+
 class Backend {
  public:
-  explicit Backend(Scene scene);  // throws std::invalid_argument: no robot, dt not in (0, 0.02], friction < 0
+  // Throws std::invalid_argument: no robot, dt not in (0, 0.02], a friction or skin that is negative, a gravity that is
+  // not finite, a link without mass or whose inertia is not positive definite.
+  explicit Backend(Scene scene);
   virtual ~Backend() = default;
   Backend(const Backend&) = delete;
   Backend& operator=(const Backend&) = delete;

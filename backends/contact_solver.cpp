@@ -16,6 +16,7 @@ constexpr int kFirstGuess = 4;            // sweeps before the first, each next 
 constexpr int kTurns = 4;                 // of corrections, per guess
 constexpr double kOpening = 1e-9;         // approach of an open contact [m/s]
 constexpr double kSlip = 1e-5;            // that has a direction [m/s]
+constexpr double kSoftest = 1e-9;         // h K + D of a spring and damper of nothing [N s/m]
 constexpr double kDirection = 3e-3;       // of slip [rad], and of a share of the cone
 
 // Nearest point of the disc with this radius.
@@ -53,7 +54,7 @@ double largest_eigenvalue(const Eigen::Matrix2d& m) {
 }  // namespace
 
 Softness spring_damper(double stiffness, double damping, double dt) {
-  const double both = dt * stiffness + damping;
+  const double both = std::max(dt * stiffness + damping, kSoftest);
   return {.erp = dt * stiffness / both, .cfm = 1.0 / both};
 }
 

@@ -1,5 +1,5 @@
 // Contacts and joint stops of one step as soft unilateral rows with Coulomb's cone, seen through an inertia A = M + S
-// (backends/implicit_law.h). For engines without a contact solver of their own and for those that must foresee theirs.
+// (backends/implicit_law.h). For engines without a contact solver of their own.
 // With the velocity v0 that the step would end with, the impulses p [N s] and the velocity u of the other side,
 //   v = v0 + A^-1 J^T p,   0 <= p_n  complementary to  n (J v - u) + cfm p_n / dt - erp depth / dt >= 0,
 //   |p_t| <= friction p_n, against the slip where equal.
@@ -22,7 +22,7 @@ struct Softness {
   double erp = 1.0;
   double cfm = 0.0;
 };
-// Of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt; not both 0.
+// Of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt. Both 0: no force.
 Softness spring_damper(double stiffness, double damping, double dt);
 
 class ContactSolver {

@@ -16,12 +16,12 @@ ImplicitLaw::ImplicitLaw(const Scene& scene)
       inertia_(Eigen::VectorXd::Zero(robot_->dof())),
       a_(Eigen::VectorXd::Zero(6 + robot_->dof())) {}
 
-void ImplicitLaw::begin(const RobotState& state, const JointCommand& command) {
+bool ImplicitLaw::begin(const RobotState& state, const JointCommand& command) {
   dynamics_.update(state);
-  begin(state, command, dynamics_.mass(), dynamics_.bias());
+  return begin(state, command, dynamics_.mass(), dynamics_.bias());
 }
 
-void ImplicitLaw::begin(const RobotState& state, const JointCommand& command, const Eigen::MatrixXd& mass,
+bool ImplicitLaw::begin(const RobotState& state, const JointCommand& command, const Eigen::MatrixXd& mass,
                         const Eigen::VectorXd& bias) {
   mass_ = &mass;
   bias_ = &bias;
@@ -30,12 +30,7 @@ void ImplicitLaw::begin(const RobotState& state, const JointCommand& command, co
     inertia_[i] = robot_->joints[i].armature + dt_ * kd + dt_ * dt_ * kp;
     drive_[i] = kp * (command.q_target[i] - state.q[i] - dt_ * state.v[i]) - kd * state.v[i] + command.tau_ff[i];
   }
-  factorise();
-}
-
-void ImplicitLaw::factorise() {
-  if (!factor_.compute(*mass_, inertia_))
-    throw std::runtime_error("the mass matrix is not positive definite");
+  return factor_.compute(mass, inertia_);
 }
 
 void ImplicitLaw::forces(const Eigen::VectorXd& Q, Eigen::VectorXd& out) const {
@@ -61,7 +56,8 @@ bool ImplicitLaw::saturate(const Eigen::VectorXd& a) {
     inertia_[i] = joint.armature;
     changed = true;
   }
-  if (changed) factorise();
+  if (changed && !factor_.compute(*mass_, inertia_))
+    throw std::runtime_error("the mass matrix is not positive definite");
   return changed;
 }
 

@@ -12,8 +12,7 @@ namespace duet {
 
 class PhysicsBackend : public Backend {
  protected:
-  // `contacts`: the most that one step reports. Throws what Backend does, and std::invalid_argument for a link without
-  // mass or with an inertia that no body has.
+  // Throws what Backend does.
   explicit PhysicsBackend(const Scene& scene);
 
   MovingPartner partner_;

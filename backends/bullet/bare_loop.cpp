@@ -2,21 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <ctime>
-
 #include "backends/bullet/bullet_world.h"
+#include "backends/thread_clock.h"
 #include "core/require.h"
 
 namespace duet {
-namespace {
-
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
 
 double bullet_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
   require(steps >= 1, fmt::format("bullet_bare_step_seconds: steps is {}, expected >= 1", steps));
@@ -25,12 +15,12 @@ double bullet_bare_step_seconds(const Scene& scene, const RobotState& state, con
   world.articulation().write(state);
   RobotState read = state;
   Eigen::VectorXd torques = Eigen::VectorXd::Zero(scene.robot->dof());
-  const double begin = cpu_seconds();
+  const double begin = thread_cpu_seconds();
   for (int step = 0; step < steps; ++step) {
     if (!world.begin(read, command)) break;
     world.step(narrow_phase.collide(world.kinematics(), {}), nullptr, read, torques);
   }
-  return cpu_seconds() - begin;
+  return thread_cpu_seconds() - begin;
 }
 
 }  // namespace duet

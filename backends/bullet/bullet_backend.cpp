@@ -10,8 +10,6 @@
 namespace duet {
 namespace {
 
-constexpr double kAbsurd = 1e4;  // [m/s], [rad/s]
-
 std::string engine_version() { return fmt::format("{}.{}", btGetVersion() / 100, btGetVersion() % 100); }
 
 class BulletBackend final : public PhysicsBackend {
@@ -30,8 +28,7 @@ class BulletBackend final : public PhysicsBackend {
     if (!world_.begin(state_, command)) return Outcome::kDiverged;
     const std::span<const ContactPoint> points = collide();
     world_.step(points, &pushes_, state_, torques_);
-    const Eigen::Map<const Eigen::VectorXd> velocity = std::as_const(world_).articulation().velocity();
-    if (!(velocity.cwiseAbs().maxCoeff() < kAbsurd)) return Outcome::kDiverged;
+    if (!speeds_are_sane(state_)) return Outcome::kDiverged;
     contacts_.clear();
     for (std::size_t i = 0; i < points.size(); ++i)
       contacts_.push_back(reported(points[i], world_.rows().contact_force(i)));

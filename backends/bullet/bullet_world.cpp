@@ -1,7 +1,5 @@
 #include "backends/bullet/bullet_world.h"
 
-#include <stdexcept>
-
 namespace duet {
 namespace {
 
@@ -41,14 +39,7 @@ BulletWorld::BulletWorld(const Scene& scene, std::size_t contacts)
       before_(Q_),
       torques_(Eigen::VectorXd::Zero(robot_->dof())) {}
 
-bool BulletWorld::begin(const RobotState& state, const JointCommand& command) {
-  try {
-    law_.begin(state, command);
-  } catch (const std::runtime_error&) {
-    return false;
-  }
-  return true;
-}
+bool BulletWorld::begin(const RobotState& state, const JointCommand& command) { return law_.begin(state, command); }
 
 // The law's limit is taken with the contact forces of the step: where a torque passes it, the step is made again.
 void BulletWorld::step(std::span<const ContactPoint> points, const LinkPushes* pushes, RobotState& state,

@@ -1,5 +1,4 @@
-// Ankle feedback on the centre of mass, so that the G1 under plain PD stands: reference/engines.md section 1. Internal
-// to backends/conformance.
+// Ankle feedback on the centre of mass, so that the G1 under plain PD stands. Internal to backends/conformance.
 #pragma once
 
 #include "robots/kinematics.h"

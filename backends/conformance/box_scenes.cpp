@@ -1,4 +1,4 @@
-// The tumbling box of suite.md 0.6: flight of a single body.
+// The tumbling box of Open Robotics' benchmark: flight of a single body.
 #include <algorithm>
 
 #include "backends/conformance/scenes.h"

@@ -48,7 +48,7 @@ RobotState integrate_law(const Scene& scene, RobotState state, const JointComman
   const Eigen::VectorXd no_force = Eigen::VectorXd::Zero(6 + scene.robot->dof());
   const int steps = steps_in(seconds, scene.dt);
   for (int i = 0; i < steps; ++i) {
-    law.begin(state, command);
+    if (!law.begin(state, command)) throw std::runtime_error("the integration of the law diverged");
     law.solve(no_force);
     const Eigen::VectorXd& a = law.acceleration();
     state.v_WB += scene.dt * a.head<3>();

@@ -7,7 +7,7 @@
 
 namespace duet::conformance {
 
-// The box of suite.md 0.6 (Open Robotics' benchmark): 10 kg, 0.1 x 0.4 x 0.9 m. No shape.
+// The box of Open Robotics' benchmark of free bodies: 10 kg, 0.1 x 0.4 x 0.9 m. No shape.
 std::shared_ptr<const RobotModel> tumbling_box();
 
 // 10 kg on four spheres of 20 mm, 0.4 m apart, its origin 0.1 m over the ground.

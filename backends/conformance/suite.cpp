@@ -88,6 +88,7 @@ const ConformanceScene& find_scene(std::string_view name) {
       std::find_if(kScenes.begin(), kScenes.end(), [&](const auto& scene) { return scene.name == name; });
   if (found != kScenes.end()) return *found;
   std::vector<std::string> names;
+  names.reserve(kScenes.size());
   for (const ConformanceScene& scene : kScenes) names.emplace_back(scene.name);
   throw std::invalid_argument(unknown_name_message("conformance scene", name, names));
 }

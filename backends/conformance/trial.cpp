@@ -3,20 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 
 #include "backends/factory.h"
+#include "backends/thread_clock.h"
 
 namespace duet::conformance {
-namespace {
-
-double thread_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
 
 Trial::Trial(std::string engine, const Settings& settings, std::string scene, SceneRun& run)
     : engine_(std::move(engine)), settings_(settings), scene_(std::move(scene)), run_(run) {}
@@ -83,9 +74,9 @@ void Trial::first_order(const std::string& quantity, const std::vector<double>& 
 World::World(const Trial& trial, const Scene& scene) : backend_(make_backend(trial.engine(), scene)) {}
 
 void World::step(const JointCommand& command) {
-  const double before = thread_seconds();
+  const double before = thread_cpu_seconds();
   const Outcome outcome = backend_->step(command);
-  cpu_ += thread_seconds() - before;
+  cpu_ += thread_cpu_seconds() - before;
   ++steps_;
   if (outcome != Outcome::kOk) throw std::runtime_error(fmt::format("diverged at {:.4g} s", backend_->time()));
 }

@@ -2,21 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <ctime>
-
 #include "backends/dart/dart_world.h"
+#include "backends/thread_clock.h"
 #include "core/require.h"
 
 namespace duet {
-namespace {
-
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
 
 double dart_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
   require(steps >= 1, fmt::format("dart_bare_step_seconds: steps is {}, expected >= 1", steps));
@@ -27,13 +17,13 @@ double dart_bare_step_seconds(const Scene& scene, const RobotState& state, const
   std::vector<Eigen::Matrix3d> R_WL(scene.robot->links.size());
   std::vector<Eigen::Vector3d> p_WL(scene.robot->links.size());
   RobotState read = state;
-  const double begin = cpu_seconds();
+  const double begin = thread_cpu_seconds();
   for (int step = 0; step < steps; ++step) {
     world.read_poses(R_WL, p_WL);
     if (!world.step(command, read, narrow_phase.collide(R_WL, p_WL, nobody))) break;
     world.read_state(read);
   }
-  return cpu_seconds() - begin;
+  return thread_cpu_seconds() - begin;
 }
 
 }  // namespace duet

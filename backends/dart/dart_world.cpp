@@ -10,6 +10,7 @@
 #include <dart/dynamics/FreeJoint.hpp>
 #include <dart/dynamics/Skeleton.hpp>
 
+#include "backends/backend.h"
 #include "backends/dart/contact_rows.h"
 #include "backends/dart/group_solver.h"
 #include "backends/dart/implicit_hinge.h"
@@ -22,9 +23,8 @@ using dart::dynamics::FreeJoint;
 using dart::dynamics::Joint;
 using dart::dynamics::Skeleton;
 
-// Beyond these a run has diverged. Debian's libdart ends the process at the first NaN (assertions are on in it), so
-// nothing that could overflow may reach it.
-constexpr double kFastest = 1e4;     // [m/s], [rad/s]
+// Beyond these, and kDivergedSpeed, a run has diverged. Debian's libdart ends the process at the first NaN (assertions
+// are on in it), so nothing that could overflow may reach it.
 constexpr double kFarthest = 1e9;    // [m], [rad]
 constexpr double kStrongest = 1e15;  // [N], [N m]
 
@@ -239,7 +239,7 @@ bool DartWorld::forces_are_sensible() const {
 }
 
 bool DartWorld::velocities_are_sensible() const {
-  const auto sensible = [](double speed) { return std::abs(speed) < kFastest; };  // false for NaN
+  const auto sensible = [](double speed) { return std::abs(speed) < kDivergedSpeed; };  // false for NaN
   const Eigen::Vector6d& V = base_->getVelocitiesStatic();
   return std::all_of(V.data(), V.data() + V.size(), sensible) &&
          std::all_of(hinges_.begin(), hinges_.end(),

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "backends/dart/alignment.h"
 #include "backends/engine_options.h"
 #include "backends/link_pushes.h"
 #include "backends/narrow_phase.h"

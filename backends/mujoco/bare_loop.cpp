@@ -3,22 +3,12 @@
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
-#include <ctime>
-
 #include "backends/mujoco/mujoco_law.h"
 #include "backends/mujoco/mujoco_model.h"
+#include "backends/thread_clock.h"
 #include "core/require.h"
 
 namespace duet {
-namespace {
-
-double cpu_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
 
 double mujoco_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
   require(steps >= 1, fmt::format("mujoco_bare_step_seconds: steps is {}, expected >= 1", steps));
@@ -28,7 +18,7 @@ double mujoco_bare_step_seconds(const Scene& scene, const RobotState& state, con
   write_state(state, compiled, d);
   MujocoLaw law(scene, compiled);
   RobotState read = state;
-  const double begin = cpu_seconds();
+  const double begin = thread_cpu_seconds();
   for (int step = 0; step < steps; ++step) {
     law.begin(read, command);
     mj_step1(&m, &d);
@@ -36,7 +26,7 @@ double mujoco_bare_step_seconds(const Scene& scene, const RobotState& state, con
     law.integrate();
     read_state(compiled, read);
   }
-  return cpu_seconds() - begin;
+  return thread_cpu_seconds() - begin;
 }
 
 }  // namespace duet

@@ -21,8 +21,6 @@
 namespace duet {
 namespace {
 
-constexpr double kAbsurdSpeed = 1e4;  // [m/s, rad/s]
-
 class MujocoBackend final : public Backend {
  public:
   explicit MujocoBackend(const Scene& scene)
@@ -111,7 +109,7 @@ class MujocoBackend final : public Backend {
   [[nodiscard]] bool diverged() const {
     if (d_.warning[mjWARN_BADQPOS].number + d_.warning[mjWARN_BADQVEL].number + d_.warning[mjWARN_BADQACC].number > 0)
       return true;
-    return Eigen::Map<const Eigen::VectorXd>(d_.qvel, m_.nv).cwiseAbs().maxCoeff() > kAbsurdSpeed;
+    return Eigen::Map<const Eigen::VectorXd>(d_.qvel, m_.nv).cwiseAbs().maxCoeff() > kDivergedSpeed;
   }
 
   void check_buffers() const {

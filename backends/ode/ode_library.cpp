@@ -11,8 +11,6 @@
 namespace duet {
 namespace {
 
-thread_local long complaints = 0;
-
 // ODE ends the process where a handler of errors returns; it is C++ inside and lets exceptions pass.
 [[noreturn]] void throw_error(int number, const char* format, va_list arguments) {
   std::array<char, 500> text{};
@@ -20,7 +18,7 @@ thread_local long complaints = 0;
   throw std::runtime_error(fmt::format("ode: {} (error {})", text.data(), number));
 }
 
-void count_complaint(int, const char*, va_list) { ++complaints; }
+void say_nothing(int, const char*, va_list) {}
 
 struct Library {
   Library() {
@@ -29,7 +27,7 @@ struct Library {
       throw std::runtime_error("ode: the library was built with single precision, expected double");
     if (dGetErrorHandler() == nullptr) dSetErrorHandler(throw_error);
     if (dGetDebugHandler() == nullptr) dSetDebugHandler(throw_error);
-    if (dGetMessageHandler() == nullptr) dSetMessageHandler(count_complaint);
+    if (dGetMessageHandler() == nullptr) dSetMessageHandler(say_nothing);
   }
 };
 
@@ -49,8 +47,6 @@ void enter_ode() {
   static const Library library;
   thread_local const ThreadData data;
 }
-
-long ode_complaints() { return complaints; }
 
 std::string ode_version() { return dODE_VERSION; }
 

@@ -11,9 +11,6 @@ namespace duet {
 // start.
 void enter_ode();
 
-// Complaints of ODE's solver in this thread (a row that it gave up) since the thread's first call.
-long ode_complaints();
-
 std::string ode_version();
 
 }  // namespace duet

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "backends/backend.h"
 #include "backends/ode/ode_library.h"
 
 namespace duet {
@@ -38,7 +39,6 @@ bool OdeStepper::advance(const JointCommand& command, std::span<const ContactPoi
   world_.write_to(before_);
   step(points, pushes, !options_.stick);
   if (!all_stuck(points)) {
-    ++repeated_;
     world_.read_from(before_);
     step(points, pushes, true);
   }
@@ -49,7 +49,7 @@ bool OdeStepper::advance(const JointCommand& command, std::span<const ContactPoi
 
 bool OdeStepper::foresee(const RobotState& state, const JointCommand& command, std::span<const ContactPoint> points,
                          const LinkPushes* pushes) {
-  law_.begin(state, command);
+  if (!law_.begin(state, command)) return false;
   Q_.setZero();
   if (pushes != nullptr) add_pushes(*pushes);
   v_before_ << state.v_WB, state.w_WB_B, state.v;
@@ -66,7 +66,7 @@ bool OdeStepper::foresee(const RobotState& state, const JointCommand& command, s
   }
   law_.equivalent_torques(a_, tau_);
   add_stop_torques();
-  return v_.allFinite() && v_.cwiseAbs().maxCoeff() < OdeWorld::kInsane;
+  return v_.allFinite() && v_.cwiseAbs().maxCoeff() < kDivergedSpeed;
 }
 
 void OdeStepper::foresee_free() {

@@ -29,7 +29,6 @@ class OdeStepper {
   [[nodiscard]] Eigen::Vector3d contact_force(std::size_t i) const { return world_.contact_force(i); }
   // The law's torques in the last step. [N m]
   void torques(Eigen::VectorXd& out) const { law_.torques(a_, out); }
-  [[nodiscard]] long repeated() const { return repeated_; }  // steps so far that broke a contact foreseen to stick
 
  private:
   bool foresee(const RobotState& state, const JointCommand& command, std::span<const ContactPoint> points,
@@ -53,7 +52,6 @@ class OdeStepper {
   Eigen::MatrixXd push_jacobian_;
   std::vector<char> stuck_;     // contacts of the last step that had no bound on friction
   std::vector<double> before_;  // the world before the step
-  long repeated_ = 0;
 };
 
 }  // namespace duet

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "backends/backend.h"
+
 namespace duet {
 namespace {
 
@@ -173,8 +175,8 @@ void OdeWorld::read(RobotState& state) const {
 bool OdeWorld::sane() const {
   return std::all_of(bodies_.begin(), bodies_.end(), [](const dBodyID body) {
     return vector(dBodyGetPosition(body)).allFinite() &&
-           vector(dBodyGetLinearVel(body)).squaredNorm() < kInsane * kInsane &&
-           vector(dBodyGetAngularVel(body)).squaredNorm() < kInsane * kInsane;
+           vector(dBodyGetLinearVel(body)).squaredNorm() < kDivergedSpeed * kDivergedSpeed &&
+           vector(dBodyGetAngularVel(body)).squaredNorm() < kDivergedSpeed * kDivergedSpeed;
   });
 }
 

@@ -38,8 +38,6 @@ struct OdeContact {
 
 class OdeWorld {
  public:
-  static constexpr double kInsane = 1e4;  // faster than any robot [m/s], [rad/s]
-
   // `contacts`: the most of one step. Throws std::runtime_error with ODE's message.
   OdeWorld(const Scene& scene, const OdeOptions& options, std::size_t contacts);
   ~OdeWorld();
@@ -52,7 +50,7 @@ class OdeWorld {
   [[nodiscard]] std::span<const Eigen::Vector3d> positions() const { return p_WL_; }
   // `state.q` must be near (within half a turn): ODE measures angles modulo a turn.
   void read(RobotState& state) const;
-  // False where a link moves faster than kInsane, or is nowhere.
+  // False where a link moves faster than kDivergedSpeed, or is nowhere.
   [[nodiscard]] bool sane() const;
 
   // Of the next step only.

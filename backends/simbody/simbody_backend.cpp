@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <stdexcept>
 
 #include "backends/engine_module.h"
@@ -11,15 +10,9 @@
 namespace duet {
 namespace {
 
-constexpr double kAbsurd = 1e4;  // [m/s], [rad/s]
-
-std::runtime_error named(const std::exception& error) {
-  return std::runtime_error(fmt::format("simbody: {}", error.what()));
-}
-
 class SimbodyBackend final : public PhysicsBackend {
  public:
-  explicit SimbodyBackend(const Scene& scene) : PhysicsBackend(scene), stepper_(scene) {}
+  explicit SimbodyBackend(const Scene& scene) : PhysicsBackend(scene), stepper_(scene, narrow_phase_.capacity()) {}
 
   [[nodiscard]] std::string_view name() const override { return "simbody"; }
   [[nodiscard]] std::string version() const override { return simbody_version(); }
@@ -31,14 +24,18 @@ class SimbodyBackend final : public PhysicsBackend {
   void read_from(std::span<const double>) override {}
 
   Outcome advance(const JointCommand& command) override {
-    try {
-      stepper_.step(state_, command, pushes_, partner_, narrow_phase_);
-    } catch (const std::exception& error) {
-      throw named(error);
-    }
+    if (!step(command) || !speeds_are_sane(state_)) return Outcome::kDiverged;
     stepper_.law().torques(stepper_.acceleration(), torques_);
     report_contacts();
-    return absurd() ? Outcome::kDiverged : Outcome::kOk;
+    return Outcome::kOk;
+  }
+
+  bool step(const JointCommand& command) {
+    try {
+      return stepper_.step(state_, command, pushes_, partner_, narrow_phase_);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(fmt::format("simbody: {}", error.what()));
+    }
   }
 
   void report_contacts() {
@@ -46,12 +43,6 @@ class SimbodyBackend final : public PhysicsBackend {
     const std::span<const ContactPoint> points = narrow_phase_.points();
     for (std::size_t i = 0; i < points.size(); ++i)
       contacts_.push_back(reported(points[i], stepper_.contacts().impulse(i) / scene().dt));
-  }
-
-  // Also where a velocity is not a number.
-  [[nodiscard]] bool absurd() const {
-    const auto sane = [](const auto& v) { return (v.array().abs() < kAbsurd).all(); };
-    return !(sane(state_.v_WB) && sane(state_.w_WB_B) && sane(state_.v));
   }
 
   SimbodyStepper stepper_;

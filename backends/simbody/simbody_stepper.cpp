@@ -16,29 +16,30 @@ Eigen::Quaterniond rotation_of(const Eigen::Vector3d& turn) {
 
 }  // namespace
 
-SimbodyStepper::SimbodyStepper(const Scene& scene)
+SimbodyStepper::SimbodyStepper(const Scene& scene, std::size_t contacts)
     : robot_(scene.robot),
       dt_(scene.dt),
       settings_(simbody_settings(scene.options)),
       rigid_(spring_damper(settings_.contact_stiffness, settings_.contact_damping, scene.dt)),
       model_(scene.robot, scene.gravity),
       law_(scene),
-      contacts_(*robot_, NarrowPhase(scene).capacity(), scene.dt, settings_.sweeps),
+      contacts_(*robot_, contacts, scene.dt, settings_.sweeps),
       no_force_(Eigen::VectorXd::Zero(6 + robot_->dof())),
       v_begin_(no_force_),
       v_(no_force_),
       a_(no_force_) {}
 
-void SimbodyStepper::step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
+bool SimbodyStepper::step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
                           const MovingPartner& partner, NarrowPhase& narrow_phase) {
   model_.update(state);
   if (pushes.any()) apply(pushes);
   const std::span<const ContactPoint> points = narrow_phase.collide(model_.rotations(), model_.positions(), partner);
   v_begin_ << state.v_WB, state.w_WB_B, state.v;
-  law_.begin(state, command, model_.mass(), model_.update_bias());
+  if (!law_.begin(state, command, model_.mass(), model_.update_bias())) return false;
   solve(state, points);
   if (law_.saturate(a_)) solve(state, points);
   advance(state);
+  return true;
 }
 
 void SimbodyStepper::apply(const LinkPushes& pushes) {

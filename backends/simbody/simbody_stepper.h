@@ -17,11 +17,12 @@ namespace duet {
 
 class SimbodyStepper {
  public:
-  explicit SimbodyStepper(const Scene& scene);  // throws std::invalid_argument for its options, and what Simbody does
+  // `contacts`: the most of one step. Throws std::invalid_argument for its options, and what Simbody does.
+  SimbodyStepper(const Scene& scene, std::size_t contacts);
 
-  // Moves `state` on by dt; points() and contacts() are then of the step.
-  void step(RobotState& state, const JointCommand& command, const LinkPushes& pushes, const MovingPartner& partner,
-            NarrowPhase& narrow_phase);
+  // Moves `state` on by dt; contacts() are then of the step. False where the state has diverged: it stays as it was.
+  [[nodiscard]] bool step(RobotState& state, const JointCommand& command, const LinkPushes& pushes,
+                          const MovingPartner& partner, NarrowPhase& narrow_phase);
 
   [[nodiscard]] const ContactSolver& contacts() const { return contacts_; }  // contact i is of point i
   [[nodiscard]] const ImplicitLaw& law() const { return law_; }

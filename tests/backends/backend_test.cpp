@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "backends/factory.h"
+#include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
 
@@ -56,6 +57,75 @@ TEST(Backend, RefusesNegativeFrictionAndSkinByName) {
                 HasSubstr("skin stiffness"));
     EXPECT_THAT(refused_scene([&](Scene& s) { s.human.capsules = {{.skin = {.damping = bad}}}; }),
                 HasSubstr("skin damping"));
+  }
+}
+
+TEST(Backend, RefusesAGravityThatIsNotFinite) {
+  EXPECT_THAT(refused_scene([](Scene& s) { s.gravity.y() = kNan; }), HasSubstr("gravity is not finite"));
+}
+
+TEST(Backend, RefusesLinksWithoutMassOrInertiaByName) {
+  for (const double bad : {0.0, -1.0, kNan, kInfinity}) {
+    const auto message = [bad](void (*change)(RobotLink&, double)) {
+      return refused_scene([&](Scene& s) {
+        const auto robot = test::wheel();
+        change(robot->links[1], bad);
+        s.robot = robot;
+      });
+    };
+    EXPECT_THAT(message([](RobotLink& link, double value) { link.mass = value; }), HasSubstr("link 'rim' has mass"))
+        << bad;
+    EXPECT_THAT(message([](RobotLink& link, double value) { link.inertia(1, 1) = value; }),
+                HasSubstr("inertia of link 'rim' is not positive definite"))
+        << bad;
+  }
+}
+
+// Of the engines that are here.
+std::vector<std::string> physics_engines() {
+  std::vector<std::string> names;
+  for (const EngineInfo& info : engines())
+    if (info.physics && info.available) names.push_back(info.name);
+  return names;
+}
+
+TEST(EveryEngine, SkinOfNeitherSpringNorDamperGivesNoForce) {
+  Scene scene;
+  scene.robot = test::sledge();
+  scene.partner = PartnerMode::kSolid;
+  scene.human.capsules = {{.name = "left_hand", .region = "hand", .joint_a = 20, .joint_b = 22, .radius = 0.05}};
+  scene.human.capsules[0].skin = {.stiffness = 0.0, .damping = 0.0};
+  HumanJoints joints = HumanJoints::Zero();  // 10 mm inside the front spheres
+  joints.col(20) = Eigen::Vector3d(0.26, 0.4, 0.02);
+  joints.col(22) = Eigen::Vector3d(0.26, -0.4, 0.02);
+  for (const std::string& engine : physics_engines()) {
+    const auto backend = make_backend(engine, scene);
+    backend->reset(test::state_of(*scene.robot, {0.0, 0.0, 0.1}));
+    backend->set_partner(joints, HumanJoints::Zero());
+    int touched = 0;
+    for (int i = 0; i < 50; ++i) {
+      ASSERT_EQ(backend->step(test::no_torque(*scene.robot)), Outcome::kOk) << engine;
+      for (const Contact& contact : backend->contacts()) {
+        if (contact.side != ContactSide::kHuman) continue;
+        ++touched;
+        EXPECT_LT(contact.f_W.norm(), 1e-6) << engine;
+      }
+    }
+    EXPECT_GE(touched, 100) << engine;
+    EXPECT_LT(std::abs(backend->state().X_WB.p.x()), 1e-6) << engine;
+  }
+}
+
+TEST(EveryEngine, StartBeyondAllNumbersDivergesAndDoesNotThrow) {
+  const Scene scene = test::g1_scene();
+  for (const std::string& engine : physics_engines()) {
+    const auto backend = make_backend(engine, scene);
+    RobotState state = scene.robot->standing_state();
+    state.X_WB.p.x() = 1e200;
+    backend->reset(state);
+    EXPECT_EQ(backend->step(scene.robot->default_command(scene.robot->neutral)), Outcome::kDiverged) << engine;
+    backend->reset(scene.robot->standing_state());
+    EXPECT_EQ(backend->step(scene.robot->default_command(scene.robot->neutral)), Outcome::kOk) << engine;
   }
 }
 

@@ -87,6 +87,13 @@ TEST(ContactSolver, SpringAndDamperAreTakenImplicitly) {
   EXPECT_DOUBLE_EQ(soft.cfm, 1.0 / 250.0);
 }
 
+TEST(ContactSolver, NeitherSpringNorDamperIsSoftAndFinite) {
+  const Softness nothing = spring_damper(0.0, 0.0, kDt);
+  EXPECT_EQ(nothing.erp, 0.0);
+  EXPECT_GT(nothing.cfm, 1e8);
+  EXPECT_LT(nothing.cfm, 1e10);
+}
+
 TEST(ContactSolver, WithoutContactNothingChanges) {
   Step step(test::sledge(), test::state_of(*test::sledge(), {0.0, 0.0, 1.0}), 0.5);
   Eigen::VectorXd v = Eigen::VectorXd::LinSpaced(6, -1.0, 1.0);

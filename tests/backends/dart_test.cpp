@@ -410,7 +410,7 @@ TEST_F(Dart, LawIsTheSharedOneWithItsLimit) {
     }
     backend->reset(state);
     ASSERT_EQ(backend->step(command), Outcome::kOk);
-    law.begin(state, command);
+    ASSERT_TRUE(law.begin(state, command));
     law.solve(Eigen::VectorXd::Zero(6 + robot.dof()));
     Eigen::VectorXd torques(robot.dof());
     law.torques(law.acceleration(), torques);

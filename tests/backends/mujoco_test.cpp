@@ -243,7 +243,7 @@ TEST_F(Mujoco, LawAndLimitAreImplicitLawsInFreeFlight) {
   int saturated = 0;
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(backend->step(far.command), Outcome::kOk);
-    law.begin(state, far.command);
+    ASSERT_TRUE(law.begin(state, far.command));
     law.solve(Eigen::VectorXd::Zero(35));
     law.torques(law.acceleration(), torques);
     take_step(law, scene.dt, state);
@@ -267,7 +267,7 @@ TEST_F(Mujoco, SaturatedStepConvergesToTheLawWithFineSteps) {
   ImplicitLaw law(fine);
   RobotState state = far.state;
   for (int i = 0; i < 2000; ++i) {
-    law.begin(state, far.command);
+    ASSERT_TRUE(law.begin(state, far.command));
     law.solve(Eigen::VectorXd::Zero(35));
     take_step(law, fine.dt, state);
   }

@@ -2,6 +2,7 @@
 // what it keeps per process and per thread.
 #include <dlfcn.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <thread>
@@ -432,6 +433,12 @@ Trace fall(Backend& backend, int begin, int end) {
   return run;
 }
 
+void append(Trace& to, const Trace& from) {
+  to.states.insert(to.states.end(), from.states.begin(), from.states.end());
+  to.contacts.insert(to.contacts.end(), from.contacts.begin(), from.contacts.end());
+  to.forces.insert(to.forces.end(), from.forces.begin(), from.forces.end());
+}
+
 bool same(const Trace& a, const Trace& b) {
   return a.contacts == b.contacts && a.forces == b.forces && std::ranges::equal(a.states, b.states, test::same);
 }
@@ -471,6 +478,32 @@ TEST_F(Ode, AWorldMayMoveToAnotherThread) {
     backend.reset();
   }).join();
   EXPECT_EQ(there.states.size(), 50U);
+}
+
+// Worlds without a threading implementation of their own share one list of jobs in the process and crash it.
+TEST_F(Ode, ManyWorldsStepInSeveralThreadsAtOnce) {
+  constexpr int kThreads = 4, kWorlds = 3, kSteps = 300;
+  const Scene scene = test::g1_scene();
+  const auto alone = make_backend("ode", scene);
+  alone->reset(scene.robot->standing_state());
+  const Trace expected = fall(*alone, 0, kSteps);
+  std::array<std::array<Trace, kWorlds>, kThreads> found;
+  std::vector<std::thread> threads;
+  threads.reserve(kThreads);
+  for (auto& traces : found)
+    threads.emplace_back([&] {
+      std::array<std::unique_ptr<Backend>, kWorlds> worlds;
+      for (auto& world : worlds) {
+        world = make_backend("ode", scene);
+        world->reset(scene.robot->standing_state());
+      }
+      for (int i = 0; i < kSteps; ++i)
+        for (int k = 0; k < kWorlds; ++k) append(traces[k], fall(*worlds[k], i, i + 1));
+    });
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& traces : found)
+    for (const Trace& trace : traces) EXPECT_TRUE(same(trace, expected));
+  EXPECT_GT(expected.forces.size(), static_cast<size_t>(kSteps));
 }
 
 TEST_F(Ode, ContinuesBitwiseFromASnapshotInTheMiddleOfAFallAndAfterIt) {

@@ -352,7 +352,7 @@ TEST_F(Simbody, TheLimitHoldsForTheG1UnderATargetFarAway) {
   EXPECT_TRUE(limited);
 }
 
-// The centre of mass kept over the feet through the ankles, at 100 Hz: reference/engines.md section 1.
+// The centre of mass kept over the feet through the ankles, at 100 Hz.
 void balance(const Backend& backend, Kinematics& kinematics, Eigen::Vector2d& before, JointCommand& command) {
   const RobotModel& robot = *backend.scene().robot;
   kinematics.update(backend.state().X_WB, backend.state().q);
