@@ -1,5 +1,5 @@
 // The page of a parity certificate: error against cost of each scene, and every measurement. Self-contained (no
-// network, no script needed), light and dark. Form of the plots: SimBenchmark (reference/suite.md 0.5).
+// network, no script needed), light and dark. Form of the plots: SimBenchmark.
 #pragma once
 
 #include <string>

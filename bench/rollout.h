@@ -45,7 +45,7 @@ struct Rollout {
   bool interrupted = false;
 };
 
-// Runs until the reference ends, the robot falls (base below 0.45 m or tilted past acos 0.7; engines.md section 3), the
+// Runs until the reference ends, the robot falls (base below 0.45 m or tilted past acos 0.7), the
 // state diverges or the wall limit passes. Never throws for what the experiment may measure.
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
 

@@ -59,7 +59,7 @@ struct RegionStiffness {
   std::string_view region;
   double newton_per_millimetre;
 };
-// ISO/TS 15066's effective spring constants as hardware.md 4.4 prints them. A head capsule takes the face's, which is
+// ISO/TS 15066's effective spring constants as public tables print them. A head capsule takes the face's, which is
 // softer than the skull; the foot, which the standard leaves out, the shin's.
 constexpr RegionStiffness kStiffness[] = {{"head", 75.0}, {"neck", 50.0},   {"chest", 25.0},     {"abdomen", 10.0},
                                           {"back", 35.0}, {"pelvis", 25.0}, {"upper_arm", 30.0}, {"forearm", 40.0},

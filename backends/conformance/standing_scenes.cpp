@@ -102,7 +102,7 @@ void measure_fall(Trial& trial) {
 namespace {
 
 constexpr double kPressSpeed = 0.2, kPressGap = 0.01, kPressDepth = 0.03;  // [m/s], [m]
-constexpr double kPressStart = 1.5, kPress = 1.5, kLongPress = 3.0;        // [s]
+constexpr double kPressStart = 1.5, kPress = 3.0;                          // [s]
 constexpr double kHandRadius = 0.05, kPressHeight = 0.17;                  // over the torso link's origin [m]
 
 HumanBody one_chest() {
@@ -147,8 +147,7 @@ Press press(const Trial& trial, double dt) {
   Press found;
   const Momentum before = momentum_of(world.robot(), world.state());
   const double travel = (kPressGap + kPressDepth) / kPressSpeed;
-  const int steps = steps_in(trial.full() ? kLongPress : kPress, dt), stop = steps_in(travel, dt),
-            watch = steps_in(0.3, dt);
+  const int steps = steps_in(kPress, dt), stop = steps_in(travel, dt), watch = steps_in(0.3, dt);
   double all = 0.0;
   world.backend().set_partner(joints, moving);
   for (int i = 0; i < steps; ++i) {
