@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "robots/dynamics.h"
 #include "robots/kinematics.h"
+#include "tests/backends/contact_scene.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -529,6 +530,24 @@ TEST_F(Bullet, OptionsReachTheSolver) {
   backend->reset(beyond);
   backend->step(test::no_torque(*robot));
   EXPECT_NEAR(backend->state().q[0], 1.04, 1e-6);
+}
+
+struct BulletContact : test::ContactScene {
+  BulletContact() : ContactScene("bullet") {}
+};
+
+TEST_F(BulletContact, TooManyContactsWithTheHumanAreAnErrorThatSaysSo) {
+  auto robot = test::sledge();
+  robot->shapes.resize(100, robot->shapes[3]);  // in one place
+  scene.robot = robot;
+  scene.human.capsules.resize(2, scene.human.capsules[0]);
+  scene.partner = PartnerMode::kSolid;
+  RobotState flying = rest;
+  flying.X_WB.p.z() = 100.0;
+  start(flying);
+  backend->set_partner(test::hand_before_sledge(flying, -0.001), HumanJoints::Zero());
+  const std::string message = test::thrown_message<std::runtime_error>([&] { backend->step(test::no_torque(*robot)); });
+  EXPECT_EQ(message.rfind("bullet: more than", 0), 0U) << message;
 }
 
 }  // namespace

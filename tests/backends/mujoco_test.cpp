@@ -10,6 +10,7 @@
 #include "backends/implicit_law.h"
 #include "core/random.h"
 #include "robots/dynamics.h"
+#include "tests/backends/contact_scene.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -397,6 +398,33 @@ TEST_F(Mujoco, ContinuesBitwiseFromASnapshotInTheMiddleOfAFall) {
   fresh->restore(snapshot);
   EXPECT_TRUE(same(fall(*fresh, 300, 900), first));
   EXPECT_EQ(fresh->time(), 900 * scene.dt);
+}
+
+struct MujocoContact : test::ContactScene {
+  MujocoContact() : ContactScene("mujoco") {}
+};
+
+TEST_F(MujocoContact, SkinIsThatOfTheCapsuleInEverySolverAndCone) {
+  scene.partner = PartnerMode::kSolid;
+  scene.friction.robot_ground = 10.0;
+  for (const double stiffness : {1e4, 7.5e4})
+    for (const char* solver : {"newton", "cg", "pgs"})
+      for (const char* cone : {"elliptic", "pyramidal"}) {
+        scene.options = {{"solver", solver}, {"cone", cone}, {"iterations", "500"}, {"tolerance", "1e-12"}};
+        scene.human.capsules[0].skin.stiffness = stiffness;
+        start(rest);
+        run(0.2);
+        backend->set_partner(test::hand_before_sledge(backend->state(), -0.001), HumanJoints::Zero());
+        run(0.5);
+        int touching = 0;
+        for (const Contact& contact : backend->contacts()) {
+          if (contact.side != ContactSide::kHuman) continue;
+          ++touching;
+          EXPECT_NEAR(-contact.f_W.x(), stiffness * contact.depth, 0.01 * stiffness * contact.depth)
+              << solver << " " << cone;
+        }
+        EXPECT_EQ(touching, 2);
+      }
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "robots/dynamics.h"
 #include "robots/kinematics.h"
+#include "tests/backends/contact_scene.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -571,6 +572,28 @@ TEST_F(Ode, ErrorsOfTheLibraryBecomeExceptionsAndMessagesAreSilent) {
   say(1, "a complaint");
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   dlclose(library);
+}
+
+struct OdeContact : test::ContactScene {
+  OdeContact() : ContactScene("ode") {}
+};
+
+TEST_F(OdeContact, BoundedFrictionGivesTheSameForcesAsActive) {
+  start(rest);
+  backend->push(0, {20.0, 0.0, 0.0}, rest.X_WB.p);
+  run(0.2);
+  const std::vector<Contact> active(backend->contacts().begin(), backend->contacts().end());
+  scene.options = {{"friction", "bounded"}};
+  start(rest);
+  backend->push(0, {20.0, 0.0, 0.0}, rest.X_WB.p);
+  run(0.2);
+  ASSERT_EQ(backend->contacts().size(), active.size());
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < active.size(); ++i) {
+    EXPECT_NEAR(active[i].f_W.z(), backend->contacts()[i].f_W.z(), 0.01);
+    a += active[i].f_W;
+  }
+  EXPECT_NEAR((a - test::force_of(*backend, ContactSide::kGround)).norm(), 0.0, 0.01);
 }
 
 }  // namespace
