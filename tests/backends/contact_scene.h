@@ -1,20 +1,16 @@
 // The sledge on the ground and a human of one hand, in the engine of a test; skips the test where the engine is absent.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
-#include "backends/factory.h"
 #include "robots/dynamics.h"
+#include "tests/backends/engine_names.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
 
 namespace duet::test {
 
 inline constexpr double kMass = 10.0;  // of the sledge
-
-inline std::vector<std::string> engine_names() { return {"mujoco", "bullet", "dart", "ode", "simbody"}; }
-inline std::string engine_of(const ::testing::TestParamInfo<std::string>& info) { return info.param; }
 
 // A human of one capsule, the left hand: joint 20 to joint 22.
 inline HumanBody hand() {
@@ -48,9 +44,7 @@ inline Eigen::Vector3d force_of(const Backend& backend, ContactSide side) {
 struct ContactScene : ::testing::Test {
   explicit ContactScene(std::string engine_name) : engine(std::move(engine_name)) {}
   void SetUp() override {
-    const std::vector<EngineInfo> known = engines();
-    if (std::ranges::none_of(known, [this](const EngineInfo& info) { return info.name == engine && info.available; }))
-      GTEST_SKIP() << "not run: engine " << engine << " absent";
+    if (!is_here(engine)) GTEST_SKIP() << "not run: engine " << engine << " absent";
     scene.robot = sledge();
     scene.human = hand();
     scene.partner = PartnerMode::kNone;

@@ -2,8 +2,6 @@
 // its Debian build: it prints, it ends the process at a NaN, and a detector of it brings a second Bullet.
 #include <cmath>
 #include <fstream>
-#include <limits>
-#include <thread>
 
 #include "backends/factory.h"
 #include "backends/implicit_law.h"
@@ -37,20 +35,6 @@ struct Dart : ::testing::Test {
 };
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
-
-TEST_F(Dart, FallsAsSemiImplicitEulerDoes) {
-  const auto backend = make(test::sledge());
-  RobotState state = test::state_of(*backend->scene().robot, {0.3, -0.2, 50.0});
-  state.v_WB = {1.0, 2.0, 3.0};
-  backend->reset(state);
-  const int steps = 250;
-  for (int i = 0; i < steps; ++i) ASSERT_EQ(backend->step(test::no_torque(*backend->scene().robot)), Outcome::kOk);
-  const double t = backend->time(), dt = backend->scene().dt;
-  EXPECT_NEAR(backend->state().X_WB.p.x(), 0.3 + t, kAlgebra);
-  EXPECT_NEAR(backend->state().X_WB.p.y(), -0.2 + 2.0 * t, kAlgebra);
-  EXPECT_NEAR(backend->state().X_WB.p.z(), 50.0 + 3.0 * t - 0.5 * kGravity * t * (t + dt), kAlgebra);
-  EXPECT_NEAR(backend->state().v_WB.z(), 3.0 - kGravity * t, kAlgebra);
-}
 
 TEST_F(Dart, ReportsVelocitiesInOurFrames) {
   // The origin of the base is not its centre of mass, about which it turns.
@@ -110,51 +94,9 @@ struct DartWheel : Dart {
     backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
     command = test::no_torque(*backend->scene().robot);
   }
-  static constexpr double kInertia = test::kWheelInertia + test::kWheelArmature;
   std::unique_ptr<Backend> backend;
   JointCommand command;
 };
-
-TEST_F(DartWheel, TurnsWithItsArmature) {
-  command.tau_ff[0] = 0.5;
-  for (int i = 0; i < 100; ++i) backend->step(command);
-  EXPECT_NEAR(backend->state().v[0], 0.5 / kInertia * backend->time(), 1e-6);  // the base gives way by 1e-6
-  EXPECT_NEAR(backend->torques()[0], 0.5, kAlgebra);
-}
-
-TEST_F(DartWheel, FollowsTheTorqueLawLinearlyImplicitly) {
-  command.q_target[0] = 0.2;
-  command.tau_ff[0] = 0.3;
-  double q = 0.0, v = 0.0;
-  const double dt = backend->scene().dt;
-  for (int i = 0; i < 200; ++i) {
-    const double kp = i < 100 ? 8.0 : 20.0, kd = i < 100 ? 0.9 : 0.3;  // gains may change at every step
-    command.kp[0] = kp;
-    command.kd[0] = kd;
-    backend->step(command);
-    const double a = (kp * (0.2 - q - dt * v) - kd * v + 0.3) / (kInertia + dt * kd + dt * dt * kp);
-    v += dt * a;
-    q += dt * v;
-    ASSERT_NEAR(backend->state().q[0], q, 1e-6);
-    ASSERT_NEAR(backend->state().v[0], v, 1e-6);
-    ASSERT_NEAR(backend->torques()[0], kp * (0.2 - q) - kd * v + 0.3, 1e-4);
-  }
-}
-
-TEST_F(DartWheel, ClampsTheWholeLawNotItsSpring) {
-  command.tau_ff[0] = 100.0;  // effort is 10
-  backend->step(command);
-  EXPECT_EQ(backend->torques()[0], 10.0);
-  EXPECT_NEAR(backend->state().v[0], 10.0 / kInertia * backend->scene().dt, 1e-6);
-  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0});
-  state.v[0] = 20.0;
-  backend->reset(state);
-  command.tau_ff[0] = 0.0;
-  command.kd[0] = 5.0;  // asks for -100
-  backend->step(command);
-  EXPECT_EQ(backend->torques()[0], -10.0);
-  EXPECT_NEAR(backend->state().v[0], 20.0 - 10.0 / kInertia * backend->scene().dt, 1e-5);
-}
 
 TEST_F(DartWheel, StopsAtItsLimits) {
   for (const double side : {1.0, -1.0}) {
@@ -169,35 +111,6 @@ TEST_F(DartWheel, StopsAtItsLimits) {
     EXPECT_NEAR(backend->state().q[0], side, 1e-3);
     EXPECT_NEAR(backend->state().v[0], 0.0, 1e-3);
   }
-}
-
-TEST_F(Dart, JointsMayTurnMoreThanOnceAndStop) {
-  auto robot = test::wheel();
-  robot->joints[0].lower = -2.0 * M_PI;
-  robot->joints[0].upper = 2.0 * M_PI;
-  const auto backend = make(robot);
-  RobotState state = test::state_of(*robot, {0.0, 0.0, 1000.0});
-  state.v[0] = 10.0;
-  backend->reset(state);
-  JointCommand command = test::no_torque(*robot);
-  for (int i = 0; i < 250; ++i) backend->step(command);
-  EXPECT_NEAR(backend->state().q[0], 5.0, 1e-3);
-  command.tau_ff[0] = 5.0;
-  for (int i = 0; i < 1000; ++i) backend->step(command);
-  EXPECT_NEAR(backend->state().q[0], 2.0 * M_PI, 1e-3);
-}
-
-TEST_F(Dart, RangesFarFromZeroHaveStops) {
-  auto robot = test::wheel();
-  robot->joints[0].lower = 2.0;
-  robot->joints[0].upper = 5.0;
-  robot->neutral[0] = 4.0;
-  const auto backend = make(robot);
-  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
-  JointCommand command = test::no_torque(*robot);
-  command.tau_ff[0] = 5.0;
-  for (int i = 0; i < 1000; ++i) backend->step(command);
-  EXPECT_NEAR(backend->state().q[0], 5.0, 1e-3);
 }
 
 TEST_F(Dart, DivergenceIsAValueAndFinalUntilReset) {
@@ -219,25 +132,6 @@ TEST_F(Dart, DivergenceIsAValueAndFinalUntilReset) {
   backend->reset(state);
   EXPECT_EQ(backend->step(test::no_torque(*robot)), Outcome::kOk);
   EXPECT_LT(std::abs(backend->state().v[0]), 1e-9);  // nothing is left of those torques
-}
-
-TEST_F(Dart, BranchedTreesKeepTheCardsJointOrder) {
-  auto robot = test::wheel();
-  RobotLink second = robot->links[1], child = robot->links[1];
-  second.name = "second";
-  child.name = "child";
-  child.parent = 1;
-  robot->links.insert(robot->links.end(), {second, child});
-  robot->joints.resize(3, robot->joints[0]);
-  robot->neutral = Eigen::VectorXd::Zero(3);
-  const auto backend = make(robot);
-  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
-  JointCommand command = test::no_torque(*robot);
-  command.tau_ff[1] = 0.5;
-  for (int i = 0; i < 10; ++i) backend->step(command);
-  EXPECT_GT(backend->state().q[1], 1e-4);
-  EXPECT_NEAR(backend->state().q[0], 0.0, 1e-9);
-  EXPECT_NEAR(backend->state().q[2], 0.0, 1e-9);
 }
 
 double largest_violation(const RobotModel& robot, const RobotState& state) {
@@ -295,67 +189,6 @@ TEST_F(Dart, StandsAndCarriesItsWeight) {
   }
   const double weight = robot.total_mass() * kGravity;
   EXPECT_NEAR(force, weight, 1e-3 * weight);
-}
-
-// A run that falls over: contacts come and go, everything is excited.
-struct Trace {
-  std::vector<RobotState> states;
-  std::vector<size_t> contacts;
-  std::vector<Eigen::Vector3d> forces;
-};
-
-Trace fall(Backend& backend, int begin, int end) {
-  const RobotModel& robot = *backend.scene().robot;
-  Trace run;
-  JointCommand command = robot.default_command(robot.neutral);
-  for (int i = begin; i < end; ++i) {
-    command.q_target[3] = robot.neutral[3] + 0.3 * std::sin(0.02 * i);
-    EXPECT_EQ(backend.step(command), Outcome::kOk);
-    run.states.push_back(backend.state());
-    run.contacts.push_back(backend.contacts().size());
-    for (const Contact& contact : backend.contacts()) run.forces.push_back(contact.f_W);
-  }
-  return run;
-}
-
-bool same(const Trace& a, const Trace& b) {
-  return a.contacts == b.contacts && a.forces == b.forces && std::ranges::equal(a.states, b.states, test::same);
-}
-
-TEST_F(Dart, RunsAgainBitwiseAfterResetInAFreshWorldAndInAnotherThread) {
-  const Scene scene = test::g1_scene();
-  const auto backend = make_backend("dart", scene);
-  backend->reset(scene.robot->standing_state());
-  const Trace first = fall(*backend, 0, 800);
-  backend->reset(scene.robot->standing_state());
-  EXPECT_TRUE(same(fall(*backend, 0, 800), first));
-  Trace other;
-  std::thread thread([&] {
-    const auto fresh = make_backend("dart", scene);
-    fresh->reset(scene.robot->standing_state());
-    other = fall(*fresh, 0, 800);
-  });
-  thread.join();
-  EXPECT_TRUE(same(other, first));
-}
-
-TEST_F(Dart, ContinuesBitwiseFromASnapshotInTheMiddleOfAFallAndAfterIt) {
-  const Scene scene = test::g1_scene();
-  for (const int begin : {300, 900}) {
-    const auto backend = make_backend("dart", scene);
-    backend->reset(scene.robot->standing_state());
-    backend->push(9, {3.0, 1.0, 0.0}, scene.robot->standing_state().X_WB.p);
-    fall(*backend, 0, begin);
-    ASSERT_FALSE(backend->contacts().empty());
-    const Snapshot snapshot = backend->snapshot();
-    const Trace first = fall(*backend, begin, begin + 500);
-    backend->restore(snapshot);
-    EXPECT_TRUE(same(fall(*backend, begin, begin + 500), first)) << begin;
-    const auto fresh = make_backend("dart", scene);
-    fresh->restore(snapshot);
-    EXPECT_TRUE(same(fall(*fresh, begin, begin + 500), first)) << begin;
-    EXPECT_EQ(fresh->time(), (begin + 500) * scene.dt);
-  }
 }
 
 // Moving, with velocity products: a step of 1 us against M a = tau - b.

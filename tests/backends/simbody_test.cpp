@@ -1,7 +1,5 @@
 // Simbody against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
 #include <cmath>
-#include <limits>
-#include <thread>
 
 #include "backends/factory.h"
 #include "core/random.h"
@@ -31,20 +29,6 @@ struct Simbody : ::testing::Test {
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
 
-TEST_F(Simbody, FallsAsSemiImplicitEulerDoes) {
-  const auto backend = make(test::sledge());
-  RobotState state = test::state_of(*backend->scene().robot, {0.3, -0.2, 50.0});
-  state.v_WB = {1.0, 2.0, 3.0};
-  backend->reset(state);
-  const int steps = 250;
-  for (int i = 0; i < steps; ++i) ASSERT_EQ(backend->step(test::no_torque(*backend->scene().robot)), Outcome::kOk);
-  const double t = backend->time(), dt = backend->scene().dt;
-  EXPECT_NEAR(backend->state().X_WB.p.x(), 0.3 + t, kAlgebra);
-  EXPECT_NEAR(backend->state().X_WB.p.y(), -0.2 + 2.0 * t, kAlgebra);
-  EXPECT_NEAR(backend->state().X_WB.p.z(), 50.0 + 3.0 * t - 0.5 * kGravity * t * (t + dt), kAlgebra);
-  EXPECT_NEAR(backend->state().v_WB.z(), 3.0 - kGravity * t, kAlgebra);
-}
-
 TEST_F(Simbody, ReportsVelocitiesInOurFrames) {
   const auto backend = make(test::sledge());
   RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 50.0});
@@ -69,30 +53,6 @@ struct SimbodyWheel : Simbody {
   std::unique_ptr<Backend> backend;
   JointCommand command;
 };
-
-TEST_F(SimbodyWheel, TurnsWithItsArmature) {
-  command.tau_ff[0] = 0.5;
-  for (int i = 0; i < 100; ++i) backend->step(command);
-  EXPECT_NEAR(backend->state().v[0], 0.5 / kInertia * backend->time(), 1e-6);  // the base gives way by 1e-6
-  EXPECT_EQ(backend->torques()[0], 0.5);
-}
-
-TEST_F(SimbodyWheel, FollowsTheTorqueLawTakenImplicitly) {
-  command.q_target[0] = 0.2;
-  command.kp[0] = 8.0;
-  command.kd[0] = 0.9;
-  command.tau_ff[0] = 0.3;
-  double q = 0.0, v = 0.0;
-  const double dt = backend->scene().dt;
-  for (int i = 0; i < 200; ++i) {
-    backend->step(command);
-    v = (kInertia * v + dt * (8.0 * (0.2 - q) + 0.3)) / (kInertia + dt * 0.9 + dt * dt * 8.0);
-    q += dt * v;
-    ASSERT_NEAR(backend->state().q[0], q, 1e-6);
-    ASSERT_NEAR(backend->state().v[0], v, 1e-6);
-    ASSERT_NEAR(backend->torques()[0], 8.0 * (0.2 - q) + 0.3 - 0.9 * v, 1e-4);  // of the end of the step
-  }
-}
 
 TEST_F(SimbodyWheel, GainsMayChangeAtEveryStep) {
   double q = 0.0, v = 0.0;
@@ -121,21 +81,6 @@ TEST_F(Simbody, AStiffServoIsStable) {
   for (int i = 0; i < 100; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk);
   EXPECT_NEAR(backend->state().q[0], 0.5, 1e-4);
   EXPECT_NEAR(backend->state().v[0], 0.0, 1e-4);
-}
-
-TEST_F(SimbodyWheel, ClampsTheWholeLawNotItsSpring) {
-  command.tau_ff[0] = 100.0;  // effort is 10
-  backend->step(command);
-  EXPECT_EQ(backend->torques()[0], 10.0);
-  EXPECT_NEAR(backend->state().v[0], 10.0 / kInertia * backend->scene().dt, 1e-6);
-  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0});
-  state.v[0] = 20.0;
-  backend->reset(state);
-  command.tau_ff[0] = 0.0;
-  command.kd[0] = 5.0;  // asks for -100
-  backend->step(command);
-  EXPECT_EQ(backend->torques()[0], -10.0);
-  EXPECT_NEAR(backend->state().v[0], 20.0 - 10.0 / kInertia * backend->scene().dt, 1e-5);
 }
 
 TEST_F(SimbodyWheel, StopsAtBothLimitsWithoutPassingThem) {
@@ -228,26 +173,6 @@ TEST_F(Simbody, BareLoopTakesTimeAndRefusesNoSteps) {
             std::string::npos);
 }
 
-TEST_F(Simbody, BranchedTreesKeepTheCardsJointOrder) {
-  // A second wheel on the base listed between a wheel and its child: Simbody orders speeds as it likes.
-  auto robot = test::wheel();
-  RobotLink second = robot->links[1], child = robot->links[1];
-  second.name = "second";
-  child.name = "child";
-  child.parent = 1;
-  robot->links.insert(robot->links.end(), {second, child});
-  robot->joints.resize(3, robot->joints[0]);
-  robot->neutral = Eigen::VectorXd::Zero(3);
-  const auto backend = make(robot);
-  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
-  JointCommand command = test::no_torque(*robot);
-  command.tau_ff[1] = 0.5;
-  for (int i = 0; i < 10; ++i) backend->step(command);
-  EXPECT_GT(backend->state().q[1], 1e-4);
-  EXPECT_NEAR(backend->state().q[0], 0.0, 1e-9);
-  EXPECT_NEAR(backend->state().q[2], 0.0, 1e-9);
-}
-
 TEST_F(Simbody, AccelerationsAgreeWithOurDynamics) {
   const auto backend = make(test::g1(), 1e-6);
   const RobotModel& robot = *backend->scene().robot;
@@ -277,63 +202,6 @@ TEST_F(Simbody, AccelerationsAgreeWithOurDynamics) {
     found /= backend->scene().dt;
     EXPECT_LT((found - expected).norm() / expected.norm(), 1e-6);
   }
-}
-
-// A run that falls over: contacts come and go, everything is excited.
-struct Trace {
-  std::vector<RobotState> states;
-  std::vector<size_t> contacts;
-};
-
-Trace fall(Backend& backend, int begin, int end) {
-  const RobotModel& robot = *backend.scene().robot;
-  Trace run;
-  JointCommand command = robot.default_command(robot.neutral);
-  for (int i = begin; i < end; ++i) {
-    command.q_target[3] = robot.neutral[3] + 0.3 * std::sin(0.02 * i);
-    EXPECT_EQ(backend.step(command), Outcome::kOk);
-    run.states.push_back(backend.state());
-    run.contacts.push_back(backend.contacts().size());
-  }
-  return run;
-}
-
-bool same(const Trace& a, const Trace& b) {
-  return a.contacts == b.contacts && std::ranges::equal(a.states, b.states, test::same);
-}
-
-TEST_F(Simbody, RunsAgainBitwiseAfterResetInAFreshWorldAndInAnotherThread) {
-  const Scene scene = test::g1_scene();
-  const auto backend = make_backend("simbody", scene);
-  backend->reset(scene.robot->standing_state());
-  const Trace first = fall(*backend, 0, 1000);
-  backend->reset(scene.robot->standing_state());
-  EXPECT_TRUE(same(fall(*backend, 0, 1000), first));
-  Trace other;
-  std::thread thread([&] {
-    const auto fresh = make_backend("simbody", scene);
-    fresh->reset(scene.robot->standing_state());
-    other = fall(*fresh, 0, 1000);
-  });
-  thread.join();
-  EXPECT_TRUE(same(other, first));
-}
-
-TEST_F(Simbody, ContinuesBitwiseFromASnapshotInTheMiddleOfAFall) {
-  const Scene scene = test::g1_scene();
-  const auto backend = make_backend("simbody", scene);
-  backend->reset(scene.robot->standing_state());
-  backend->push(9, {3.0, 1.0, 0.0}, scene.robot->standing_state().X_WB.p);
-  fall(*backend, 0, 300);
-  ASSERT_FALSE(backend->contacts().empty());
-  const Snapshot snapshot = backend->snapshot();
-  const Trace first = fall(*backend, 300, 900);
-  backend->restore(snapshot);
-  EXPECT_TRUE(same(fall(*backend, 300, 900), first));
-  const auto fresh = make_backend("simbody", scene);
-  fresh->restore(snapshot);
-  EXPECT_TRUE(same(fall(*fresh, 300, 900), first));
-  EXPECT_EQ(fresh->time(), 900 * scene.dt);
 }
 
 TEST_F(Simbody, TheLimitHoldsForTheG1UnderATargetFarAway) {
