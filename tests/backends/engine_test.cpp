@@ -17,7 +17,7 @@ using test::Trace;
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
 
-// Of a constant torque as it is reported: MuJoCo and Simbody give it exactly, the others from their solution of the step.
+// Of a constant torque as it is reported: MuJoCo and Simbody give it exactly, the others as their step solves for it.
 double torque_rounding(const std::string& engine) { return engine == "mujoco" || engine == "simbody" ? 0.0 : kAlgebra; }
 
 struct Engine : ::testing::TestWithParam<std::string> {
