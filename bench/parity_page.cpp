@@ -248,7 +248,8 @@ std::string parity_svg(const Certificate& certificate) {
   for (const char* scene : kScenes) {
     std::string plot = accuracy_plot_svg(certificate.engines, scene);
     if (plot.empty()) continue;
-    const double x = panel % 2 * kWidth, y = panel / 2 * (kHeight + kTitle);
+    const int row = panel / 2, column = panel % 2;
+    const double x = column * kWidth, y = row * (kHeight + kTitle);
     const AccuracyCurve& curve = first_curve(certificate, scene);
     panels += fmt::format(R"(<text class="title" x="{0}" y="{1}">{3}</text><text x="{0}" y="{2}">{4}{5}</text>)",
                           x + 12.0, y + 20.0, y + 37.0, scene, escape_html(curve.error),
@@ -258,7 +259,8 @@ std::string parity_svg(const Certificate& certificate) {
     ++panel;
   }
   if (panel == 0) return "";
-  const double width = std::min(panel, 2) * kWidth, height = (panel + 1) / 2 * (kHeight + kTitle);
+  const int rows = (panel + 1) / 2;
+  const double width = std::min(panel, 2) * kWidth, height = rows * (kHeight + kTitle);
   return fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\"><style>{}</style>{}</svg>\n",
                      width, height, kPictureStyle, panels);
 }

@@ -90,6 +90,7 @@ double stand_seconds(const std::string& engine, int episodes, int threads) {
     while (next++ < episodes) backend_step_seconds(*backend, start, command);
   };
   std::vector<std::thread> pool;
+  pool.reserve(threads);
   for (int i = 0; i < threads; ++i) pool.emplace_back(work);
   built.arrive_and_wait();
   const double begin = wall_seconds();
