@@ -27,11 +27,6 @@ std::vector<std::string> physics_engines() {
   return names;
 }
 
-bool is_available(const std::string& name) {
-  const std::vector<EngineInfo> all = engines();
-  return std::any_of(all.begin(), all.end(), [&](const EngineInfo& e) { return e.name == name && e.available; });
-}
-
 EngineSettings read_settings(const YAML::Node& node, const std::string& engine, const std::string& file) {
   const auto fail = [&](const YAML::Node& at, const std::string& message) {
     throw InputError(fmt::format("{}:{}: {}", file, std::max(at.Mark().line, 0) + 1, message));
@@ -65,6 +60,11 @@ std::filesystem::path shipped_folder() {
 }
 
 }  // namespace
+
+bool is_available(const std::string& engine) {
+  const std::vector<EngineInfo> all = engines();
+  return std::any_of(all.begin(), all.end(), [&](const EngineInfo& e) { return e.name == engine && e.available; });
+}
 
 void check_step(double dt) {
   const double steps = kControlPeriod / dt;

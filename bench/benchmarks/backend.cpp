@@ -141,11 +141,6 @@ std::vector<Figure> time_world(const std::string& engine, const BenchmarkOptions
           at_most(name + ":reset", 1e6 * reset, "us", 200.0)};
 }
 
-bool is_available(const std::string& engine) {
-  const std::vector<EngineInfo> all = engines();
-  return std::any_of(all.begin(), all.end(), [&](const EngineInfo& e) { return e.name == engine && e.available; });
-}
-
 }  // namespace
 
 void add_backend_benchmarks(std::vector<Benchmark>& list) {
