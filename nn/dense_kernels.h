@@ -1,0 +1,30 @@
+// Dense linear algebra in float for networks: one source compiled for three instruction sets, chosen at run time. The
+// only float arithmetic of the project beside PAIR's lanes. Thread-safe: no state. gemv and elu do not allocate; gemm
+// may (blocking buffers).
+#pragma once
+
+#include <string_view>
+
+namespace duet {
+
+struct DenseKernels {
+  std::string_view level;  // "x86-64-v4", "x86-64-v3", "x86-64-v2"
+  // C = op(A) op(B), or C += it with `accumulate`. Column-major without gaps: C is (m, n), op(A) (m, k), op(B) (k, n).
+  void (*gemm)(bool transpose_a, bool transpose_b, int m, int n, int k, const float* A, const float* B, float* C,
+               bool accumulate);
+  // y = W x + b, W (rows, cols) row-major as PyTorch and ONNX store it; b may be null.
+  void (*gemv)(int rows, int cols, const float* W, const float* x, const float* b, float* y);
+  // x <- elu(x), in place; and d <- d elu'(.), where `a` holds elu's results.
+  void (*elu)(int n, float* x);
+  void (*elu_backward)(int n, const float* a, float* d);
+  // One step of Adam on n parameters p with gradient g, already scaled: moments m and v are updated.
+  // step: lr / (1 - beta1^t); v is divided by `correction` = 1 - beta2^t.
+  void (*adam)(int n, const float* g, float scale, float step, float correction, float* m, float* v, float* p);
+};
+
+// The widest set that this machine has; or the one named, for tests (throws std::invalid_argument where it is unknown
+// or the machine lacks it).
+const DenseKernels& dense_kernels();
+const DenseKernels& dense_kernels(std::string_view level);
+
+}  // namespace duet

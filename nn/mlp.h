@@ -1,0 +1,41 @@
+// A multilayer perceptron with ELU between its layers, in float: weights as values, evaluated at batch 1 without
+// allocation. What WBC-Sim's oracle and student are.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "core/random.h"
+
+namespace duet {
+
+struct MlpLayer {
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W;  // (out, in)
+  Eigen::VectorXf b;
+};
+
+struct Mlp {
+  std::vector<MlpLayer> layers;
+
+  [[nodiscard]] int inputs() const { return layers.empty() ? 0 : static_cast<int>(layers.front().W.cols()); }
+  [[nodiscard]] int outputs() const { return layers.empty() ? 0 : static_cast<int>(layers.back().W.rows()); }
+  [[nodiscard]] std::vector<int> sizes() const;  // inputs, each layer's outputs
+};
+
+// Weights normal with deviation 1.3 / sqrt(inputs) (the last layer: output_scale / sqrt(inputs)), biases 0.
+Mlp random_mlp(const std::vector<int>& sizes, float output_scale, Random& random);
+
+// Evaluates one network again and again; keeps a reference to it. No allocation after construction.
+class MlpRunner {
+ public:
+  explicit MlpRunner(const Mlp& mlp);
+  // The result stays valid until the next call.
+  std::span<const float> run(std::span<const float> input);
+
+ private:
+  const Mlp& mlp_;
+  std::vector<Eigen::VectorXf> values_;  // after each layer
+};
+
+}  // namespace duet

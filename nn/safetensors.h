@@ -1,0 +1,37 @@
+// The safetensors format: named tensors and a text dictionary in one file. 8 bytes of header length (little endian), a
+// JSON header, raw little-endian tensors. We read F16, F32 and F64 (as float) and I64 and I32 (as float, exact up to
+// 2^24; larger is refused), and write F32 or F16.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+struct Tensor {
+  std::vector<std::int64_t> shape;
+  std::vector<float> values;  // row-major
+};
+
+struct SafeTensors {
+  std::map<std::string, std::string> metadata;  // the header's __metadata__
+  std::map<std::string, Tensor> tensors;
+};
+
+enum class TensorType { kF32, kF16 };
+
+// Throws InputError naming file, tensor, expected and found: truncated, a header that is not JSON or longer than the
+// file, overlapping or uncovered bytes, a shape that does not give the byte count, an unknown type, a number that is not
+// finite.
+SafeTensors read_safetensors(const std::string& path);
+SafeTensors parse_safetensors(std::string_view bytes, const std::string& file);
+
+// Written to a temporary file beside it and renamed: a killed program leaves the old file or the new one. Throws
+// std::invalid_argument where a shape does not give the number of values or F16 cannot hold a value, std::runtime_error
+// where the file cannot be written. The same content gives the same bytes.
+void write_safetensors(const std::string& path, const SafeTensors& content, TensorType type = TensorType::kF32);
+
+}  // namespace duet

@@ -1,0 +1,33 @@
+#include "nn/mlp.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace duet {
+namespace {
+
+TEST(Mlp, EqualsTheFormulaInDouble) {
+  Random random(1, 2);
+  Mlp mlp = random_mlp({7, 12, 5, 3}, 1.0F, random);
+  for (MlpLayer& layer : mlp.layers) layer.b.setLinSpaced(-0.5F, 0.5F);
+  Eigen::VectorXf input = Eigen::VectorXf::LinSpaced(7, -1.0F, 2.0F);
+  Eigen::VectorXd x = input.cast<double>();
+  for (size_t i = 0; i < mlp.layers.size(); ++i) {
+    x = (mlp.layers[i].W.cast<double>() * x + mlp.layers[i].b.cast<double>()).eval();
+    if (i + 1 < mlp.layers.size())
+      for (double& value : x) value = value > 0 ? value : std::expm1(value);
+  }
+  MlpRunner runner(mlp);
+  const std::span<const float> y = runner.run({input.data(), 7});
+  ASSERT_EQ(y.size(), 3U);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(y[i], x[i], 1e-5);
+}
+
+TEST(Mlp, SizesAreThoseAskedFor) {
+  Random random(1, 2);
+  EXPECT_EQ(random_mlp({4, 3, 2}, 1.0F, random).sizes(), (std::vector<int>{4, 3, 2}));
+}
+
+}  // namespace
+}  // namespace duet
