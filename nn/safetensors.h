@@ -24,14 +24,15 @@ struct SafeTensors {
 enum class TensorType { kF32, kF16 };
 
 // Throws InputError naming file, tensor, expected and found: truncated, a header that is not JSON or longer than the
-// file, overlapping or uncovered bytes, a shape that does not give the byte count, an unknown type, a number that is not
-// finite.
+// file, overlapping or uncovered bytes, a shape that does not give the byte count, an unknown type, a number that is
+// not finite.
 SafeTensors read_safetensors(const std::string& path);
 SafeTensors parse_safetensors(std::string_view bytes, const std::string& file);
 
 // Written to a temporary file beside it and renamed: a killed program leaves the old file or the new one. Throws
-// std::invalid_argument where a shape does not give the number of values or F16 cannot hold a value, std::runtime_error
-// where the file cannot be written. The same content gives the same bytes.
+// std::invalid_argument where a shape does not give the number of values, a value is not finite or F16 cannot hold it,
+// or a name is not UTF-8; InputError where the file cannot be written. The same content gives the same bytes.
 void write_safetensors(const std::string& path, const SafeTensors& content, TensorType type = TensorType::kF32);
+std::string safetensors_bytes(const SafeTensors& content, TensorType type = TensorType::kF32);
 
 }  // namespace duet

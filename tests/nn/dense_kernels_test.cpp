@@ -43,8 +43,8 @@ TEST(DenseKernels, GemmEqualsDoubleForEveryTransposition) {
     for (const bool ta : {false, true})
       for (const bool tb : {false, true}) {
         const MatrixXf A = random_matrix(ta ? k : m, ta ? m : k, 1), B = random_matrix(tb ? n : k, tb ? k : n, 2);
-        const Eigen::MatrixXd a = (ta ? A.transpose().eval() : A).cast<double>();
-        const Eigen::MatrixXd b = (tb ? B.transpose().eval() : B).cast<double>();
+        const Eigen::MatrixXd a = (ta ? MatrixXf(A.transpose()) : A).cast<double>();
+        const Eigen::MatrixXd b = (tb ? MatrixXf(B.transpose()) : B).cast<double>();
         MatrixXf C = random_matrix(m, n, 3);
         const Eigen::MatrixXd sum = C.cast<double>() + a * b;
         kernels->gemm(ta, tb, m, n, k, A.data(), B.data(), C.data(), true);

@@ -1,0 +1,161 @@
+#include "nn/safetensors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+template <typename T>
+std::string bytes_of(std::vector<T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+std::string file_of(const std::string& header, const std::string& data) {
+  return bytes_of<std::uint64_t>({header.size()}) + header + data;
+}
+
+std::string one_tensor(const std::string& type, const std::string& shape, const std::string& data) {
+  return file_of(R"({"w":{"dtype":")" + type + R"(","shape":)" + shape + R"(,"data_offsets":[0,)" +
+                     std::to_string(data.size()) + "]}}",
+                 data);
+}
+
+SafeTensors sample() {
+  SafeTensors content;
+  content.metadata = {{"kind", "student"}, {"note", "a \"quoted\" line\n"}};
+  content.tensors["b"] = {{2}, {0.25F, -3.0F}};
+  content.tensors["a"] = {{2, 3}, {1.0F, 2.0F, 3.0F, 0.1F, -0.0F, 1e-38F}};
+  content.tensors["scalar"] = {{}, {7.0F}};
+  content.tensors["empty"] = {{0, 4}, {}};
+  return content;
+}
+
+std::string refusal(const std::string& bytes) {
+  return test::thrown_message<InputError>([&] { parse_safetensors(bytes, "net.safetensors"); });
+}
+
+TEST(SafeTensors, WhatIsWrittenIsReadBack) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net.safetensors";
+  write_safetensors(path, sample());
+  const SafeTensors read = read_safetensors(path);
+  EXPECT_EQ(read.metadata, sample().metadata);
+  ASSERT_EQ(read.tensors.size(), 4U);
+  for (const auto& [name, tensor] : sample().tensors) {
+    EXPECT_EQ(read.tensors.at(name).shape, tensor.shape) << name;
+    EXPECT_EQ(read.tensors.at(name).values, tensor.values) << name;
+  }
+}
+
+TEST(SafeTensors, HeaderIsPaddedToEightBytesAndTheBytesRepeat) {
+  const std::string bytes = safetensors_bytes(sample());
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data(), sizeof length);
+  EXPECT_EQ(length % 8, 0U);
+  EXPECT_EQ(bytes.substr(8 + length).size(), 4 * (2 + 6 + 1));
+  EXPECT_EQ(bytes, safetensors_bytes(sample()));
+}
+
+TEST(SafeTensors, HalfPrecisionRoundsToNearest) {
+  SafeTensors content;
+  content.tensors["w"] = {{4}, {1.0F + 0x1p-11F, 65504.0F, 0x1p-24F, -0.1F}};
+  const SafeTensors read = parse_safetensors(safetensors_bytes(content, TensorType::kF16), "x");
+  EXPECT_THAT(read.tensors.at("w").values, ElementsAre(1.0F, 65504.0F, 0x1p-24F, testing::FloatNear(-0.1F, 0x1p-14F)));
+}
+
+TEST(SafeTensors, EveryTypeIsReadAsFloat) {
+  const auto read = [](const std::string& type, const std::string& data) {
+    return parse_safetensors(one_tensor(type, "[2]", data), "x").tensors.at("w").values;
+  };
+  EXPECT_THAT(read("F64", bytes_of<double>({0.5, -1e30})), ElementsAre(0.5F, -1e30F));
+  EXPECT_THAT(read("F16", bytes_of<std::uint16_t>({0x3C00, 0xC000})), ElementsAre(1.0F, -2.0F));
+  EXPECT_THAT(read("I32", bytes_of<std::int32_t>({-7, 1 << 24})), ElementsAre(-7.0F, 16777216.0F));
+  EXPECT_THAT(read("I64", bytes_of<std::int64_t>({-(1 << 24), 3})), ElementsAre(-16777216.0F, 3.0F));
+}
+
+TEST(SafeTensors, HeadersThatAreNotOnesAreRefused) {
+  EXPECT_THAT(refusal(""), HasSubstr("'net.safetensors': safetensors: expected 8 bytes of header length, found 0"));
+  EXPECT_THAT(refusal(bytes_of<std::uint64_t>({~std::uint64_t{0}})),
+              HasSubstr("expected a header of 18446744073709551615 bytes, found 0 (truncated?)"));
+  EXPECT_THAT(refusal(file_of("{\"w\":", "")), HasSubstr("expected a header in JSON"));
+  EXPECT_THAT(refusal(file_of("[]", "")), HasSubstr("expected a JSON object as header, found array"));
+  EXPECT_THAT(refusal(file_of(R"({"__metadata__":[]})", "")), HasSubstr("expected an object, found array"));
+  EXPECT_THAT(refusal(file_of(R"({"__metadata__":{"a":1}})", "")), HasSubstr("'a': expected a string, found number"));
+  EXPECT_THAT(refusal(file_of(R"({"w":3})", "")), HasSubstr("tensor 'w': expected an object, found number"));
+}
+
+TEST(SafeTensors, TensorsThatDoNotFitTheBytesAreRefused) {
+  const std::string two = bytes_of<float>({1.0F, 2.0F});
+  EXPECT_THAT(refusal(one_tensor("F32", "[3]", two)),
+              HasSubstr("tensor 'w': shape (3) of F32 does not give the 8 bytes found"));
+  EXPECT_THAT(refusal(one_tensor("F32", "[4294967296,4294967296,2]", two)), HasSubstr("does not give the 8 bytes"));
+  EXPECT_THAT(refusal(one_tensor("F32", "[-2]", two)), HasSubstr("shape: expected whole numbers from 0"));
+  EXPECT_THAT(refusal(one_tensor("F32", "[2.0]", two)), HasSubstr("shape: expected whole numbers from 0"));
+  EXPECT_THAT(refusal(one_tensor("F32", "2", two)), HasSubstr("expected an array 'shape', found none"));
+  EXPECT_THAT(refusal(one_tensor("BF16", "[4]", two)),
+              HasSubstr("dtype: expected one of F16, F32, F64, I32, I64, found 'BF16'"));
+  const std::string good = one_tensor("F32", "[2]", two);
+  EXPECT_THAT(refusal(good.substr(0, good.size() - 1)), HasSubstr("interval in [0, 7], found [0, 8] (truncated?)"));
+  EXPECT_THAT(refusal(good + "x"), HasSubstr("expected 8 bytes of tensors, found 9"));
+  EXPECT_THAT(refusal(file_of(R"({"w":{"dtype":"F32","shape":[],"data_offsets":[0,1,2]}})", two)),
+              HasSubstr("data_offsets: expected 2 numbers, found 3"));
+}
+
+TEST(SafeTensors, OverlapsAndGapsAreRefused) {
+  const std::string two = bytes_of<float>({1.0F, 2.0F});
+  const auto header = [](int begin, int end) {
+    return R"({"a":{"dtype":"F32","shape":[1],"data_offsets":[0,4]},"b":{"dtype":"F32","shape":[1],"data_offsets":[)" +
+           std::to_string(begin) + "," + std::to_string(end) + "]}}";
+  };
+  EXPECT_EQ(refusal(file_of(header(4, 8), two)), "(nothing was thrown)");
+  EXPECT_THAT(refusal(file_of(header(2, 6), two)), HasSubstr("'b': expected to begin at byte 4, found 2 (overlap)"));
+  EXPECT_THAT(refusal(file_of(header(8, 12), two + "1234")),
+              HasSubstr("'b': expected to begin at byte 4, found 8 (gap)"));
+  EXPECT_THAT(refusal(file_of(header(8, 4), two)), HasSubstr("found [8, 4]"));
+}
+
+TEST(SafeTensors, NumbersThatFloatDoesNotHoldAreRefused) {
+  EXPECT_THAT(refusal(one_tensor("F32", "[2]", bytes_of<float>({1.0F, std::nanf("")}))),
+              HasSubstr("tensor 'w': expected finite numbers, found nan at index 1"));
+  EXPECT_THAT(refusal(one_tensor("F16", "[1]", bytes_of<std::uint16_t>({0x7C00}))), HasSubstr("found inf at index 0"));
+  EXPECT_THAT(refusal(one_tensor("F64", "[1]", bytes_of<double>({1e300}))), HasSubstr("found inf at index 0"));
+  EXPECT_THAT(refusal(one_tensor("I64", "[1]", bytes_of<std::int64_t>({(1 << 24) + 1}))),
+              HasSubstr("expected integers within 2^24, found a larger one at index 0"));
+}
+
+TEST(SafeTensors, WhatCannotBeStoredIsNotWritten) {
+  const auto message = [](const Tensor& tensor, TensorType type, const std::string& name = "w") {
+    SafeTensors content;
+    content.tensors[name] = tensor;
+    return test::thrown_message<std::invalid_argument>([&] { safetensors_bytes(content, type); });
+  };
+  EXPECT_THAT(message({{3}, {1.0F}}, TensorType::kF32), HasSubstr("shape (3) does not give the 1 values found"));
+  EXPECT_THAT(message({{-1}, {1.0F}}, TensorType::kF32), HasSubstr("shape (-1)"));
+  EXPECT_THAT(message({{1}, {65520.0F}}, TensorType::kF16), HasSubstr("tensor 'w': F16 cannot hold 65520"));
+  EXPECT_THAT(message({{1}, {std::numeric_limits<float>::infinity()}}, TensorType::kF32), HasSubstr("found inf"));
+  EXPECT_THAT(message({{1}, {1.0F}}, TensorType::kF32, "__metadata__"), HasSubstr("'__metadata__'"));
+  EXPECT_THAT(message({{1}, {1.0F}}, TensorType::kF32, "\xff"), HasSubstr("UTF-8"));
+}
+
+TEST(SafeTensors, AFolderThatCannotBeWrittenIsNamed) {
+  EXPECT_THAT(test::thrown_message<InputError>([] { write_safetensors("/proc/none/net", sample()); }),
+              HasSubstr("/proc/none/net"));
+  EXPECT_THAT(test::thrown_message<InputError>([] { read_safetensors("/proc/none/net"); }),
+              HasSubstr("/proc/none/net"));
+}
+
+}  // namespace
+}  // namespace duet
