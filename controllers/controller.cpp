@@ -1,5 +1,10 @@
 #include "controllers/controller.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "controllers/guard.h"
 #include "controllers/pd.h"
 #include "controllers/vmc.h"
 #include "core/names.h"
@@ -8,18 +13,56 @@
 namespace duet {
 namespace {
 
-std::unique_ptr<Controller> make_default_vmc(std::shared_ptr<const RobotModel> robot) {
+using Robot = std::shared_ptr<const RobotModel>;
+
+// A controller by name: what is said of it, and how it is made once its options are known to be its own.
+struct Entry {
+  const char* name;
+  ControllerInfo (*info)(const std::string& name);
+  std::unique_ptr<Controller> (*make)(const std::string& name, Robot robot, const ControllerOptions& options);
+};
+
+ControllerInfo pd_info(const std::string& name) {
+  return {name, "The card's gains around the reference's joint angles, without balance", "g1", false, {}};
+}
+std::unique_ptr<Controller> make_pd(const std::string&, Robot robot, const ControllerOptions&) {
+  return make_pd_controller(std::move(robot));
+}
+
+ControllerInfo vmc_info(const std::string& name) {
+  return {
+      name, "Inverse dynamics with planned contact forces; balances on both feet and does not step", "g1", false, {}};
+}
+std::unique_ptr<Controller> make_vmc(const std::string&, Robot robot, const ControllerOptions&) {
   return make_vmc_controller(std::move(robot));
 }
 
-struct Entry {
-  const char* name;
-  std::unique_ptr<Controller> (*make)(std::shared_ptr<const RobotModel>);
-};
+constexpr Entry kControllers[] = {{"pd", pd_info, make_pd}, {"vmc", vmc_info, make_vmc}};
 
-constexpr Entry kControllers[] = {{"pd", make_pd_controller}, {"vmc", make_default_vmc}};
+const Entry& find_entry(const std::string& name) {
+  for (const Entry& entry : kControllers)
+    if (name == entry.name) return entry;
+  throw std::invalid_argument(unknown_name_message("controller", name, controller_names()));
+}
+
+void check_options(const ControllerInfo& info, const ControllerOptions& options) {
+  std::vector<std::string> known;
+  for (const ControllerOption& option : info.options) known.push_back(option.name);
+  for (const auto& [name, value] : options) {
+    require(!known.empty(), fmt::format("controller '{}': expected no option, found '{}'", info.name, name));
+    if (std::find(known.begin(), known.end(), name) == known.end())
+      throw std::invalid_argument(
+          fmt::format("controller '{}': {}", info.name, unknown_name_message("option", name, known)));
+  }
+}
 
 }  // namespace
+
+std::vector<ControllerInfo> controllers() {
+  std::vector<ControllerInfo> infos;
+  for (const Entry& entry : kControllers) infos.push_back(entry.info(entry.name));
+  return infos;
+}
 
 std::vector<std::string> controller_names() {
   std::vector<std::string> names;
@@ -27,11 +70,14 @@ std::vector<std::string> controller_names() {
   return names;
 }
 
-std::unique_ptr<Controller> make_controller(const std::string& name, std::shared_ptr<const RobotModel> robot) {
+ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
+
+std::unique_ptr<Controller> make_controller(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                            const ControllerOptions& options) {
   require(robot != nullptr, "make_controller: no robot");
-  for (const Entry& entry : kControllers)
-    if (name == entry.name) return entry.make(std::move(robot));
-  throw std::invalid_argument(unknown_name_message("controller", name, controller_names()));
+  const Entry& entry = find_entry(name);
+  check_options(entry.info(name), options);
+  return make_guarded(entry.make(name, robot, options), robot);
 }
 
 }  // namespace duet

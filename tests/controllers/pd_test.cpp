@@ -12,11 +12,22 @@ using test::thrown_message;
 using ::testing::HasSubstr;
 
 TEST(Controllers, AreMadeByNameAndKnowTheirs) {
-  EXPECT_EQ(controller_names(), (std::vector<std::string>{"pd", "vmc"}));
-  for (const std::string& name : controller_names()) {
+  EXPECT_THAT(controller_names(), ::testing::IsSupersetOf({"pd", "vmc"}));
+  for (const std::string name : {"pd", "vmc"}) {
     const auto controller = make_controller(name, test::g1());
     EXPECT_EQ(controller->name(), name);
     EXPECT_FALSE(controller->walks());
+  }
+}
+
+TEST(Controllers, AreDescribedInOneLineEach) {
+  const std::vector<ControllerInfo> infos = controllers();
+  ASSERT_EQ(infos.size(), controller_names().size());
+  for (size_t i = 0; i < infos.size(); ++i) {
+    EXPECT_EQ(infos[i].name, controller_names()[i]);
+    EXPECT_FALSE(infos[i].about.empty());
+    EXPECT_EQ(infos[i].about.find('\n'), std::string::npos);
+    EXPECT_FALSE(infos[i].robot.empty());
   }
 }
 
@@ -25,6 +36,10 @@ TEST(Controllers, RefuseAnUnknownNameAndNoRobot) {
   EXPECT_THAT(message, HasSubstr("unknown controller 'vcm'"));
   EXPECT_THAT(message, HasSubstr("'vmc'"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_controller("pd", nullptr); }), HasSubstr("no robot"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                make_controller("pd", test::g1(), {{"gain", "2"}});
+              }),
+              HasSubstr("controller 'pd': expected no option, found 'gain'"));
 }
 
 TEST(Pd, IsTheCardsGainsAroundTheReference) {

@@ -1,0 +1,162 @@
+#include "controllers/guard.h"
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "tests/backends/allocation_count.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Commands the reference's angles plus `offset`, which a test makes broken.
+class Offset final : public Controller {
+ public:
+  Offset(const double& offset, int& calls) : offset_(offset), calls_(calls) {}
+  [[nodiscard]] std::string_view name() const override { return "offset"; }
+  [[nodiscard]] bool walks() const override { return true; }
+  void reset(const RobotState&) override {}
+  void act(const RobotState&, const Reference& reference, JointCommand& command) override {
+    ++calls_;
+    command = test::g1()->default_command(reference.q);
+    command.q_target[3] += offset_;
+    command.kp.setConstant(77.0);
+  }
+
+ private:
+  const double& offset_;
+  int& calls_;
+};
+
+struct Guarded : ::testing::Test {
+  Guarded() { controller->reset(state); }
+  void act() { controller->act(state, reference, command); }
+
+  std::shared_ptr<const RobotModel> robot = test::g1();
+  double offset = 0.0;
+  int calls = 0;
+  std::unique_ptr<Controller> controller = make_guarded(std::make_unique<Offset>(offset, calls), robot);
+  RobotState state = robot->standing_state();
+  Reference reference{state.X_WB, robot->neutral};
+  JointCommand command;
+};
+
+TEST_F(Guarded, PassesFiniteCommandsOnUnchanged) {
+  offset = 0.25;
+  act();
+  EXPECT_DOUBLE_EQ(command.q_target[3], robot->neutral[3] + 0.25);
+  EXPECT_EQ(command.kp[0], 77.0);
+  EXPECT_EQ(controller->name(), "offset");
+  EXPECT_TRUE(controller->walks());
+  EXPECT_EQ(controller->faults().observations + controller->faults().actions, 0);
+}
+
+TEST_F(Guarded, HoldsTheLastFiniteCommandForFiveTicksThenRampsDown) {
+  offset = 0.25;
+  act();
+  state.q[3] = 0.7;
+  for (const double broken : {kNan, kInfinity, -kInfinity, kNan, kNan}) {
+    offset = broken;
+    act();
+    EXPECT_DOUBLE_EQ(command.q_target[3], robot->neutral[3] + 0.25);
+    EXPECT_EQ(command.kp[0], 77.0);
+    EXPECT_FALSE(controller->faults().stopped);
+  }
+  act();
+  EXPECT_TRUE(controller->faults().stopped);
+  EXPECT_EQ(controller->faults().actions, 6);
+  EXPECT_DOUBLE_EQ(command.q_target[3], 0.7);
+  EXPECT_DOUBLE_EQ(command.kp[0], robot->joints[0].kp);
+  for (int tick = 0; tick < kGuardRampTicks; ++tick) {
+    const double before = command.kp[0];
+    act();
+    EXPECT_LT(command.kp[0], before);
+  }
+  EXPECT_EQ(command.kp.norm(), 0.0);
+  EXPECT_DOUBLE_EQ(command.kd[0], robot->joints[0].kd);
+}
+
+TEST_F(Guarded, StaysStoppedUntilReset) {
+  offset = kNan;
+  for (int tick = 0; tick < 10; ++tick) act();
+  offset = 0.0;
+  const int calls_before = calls;
+  act();
+  EXPECT_EQ(calls, calls_before);
+  EXPECT_TRUE(controller->faults().stopped);
+  controller->reset(state);
+  EXPECT_FALSE(controller->faults().stopped);
+  EXPECT_EQ(controller->faults().actions, 0);
+  act();
+  EXPECT_EQ(command.kp[0], 77.0);
+}
+
+TEST_F(Guarded, KeepsBrokenStatesAndReferencesFromTheController) {
+  act();
+  int expected = 0;
+  const auto broken = [&](double& value) {
+    const double good = value;
+    value = kNan;
+    act();
+    EXPECT_EQ(controller->faults().observations, ++expected);
+    EXPECT_TRUE(command.q_target.allFinite());
+    value = good;
+    act();  // a good tick in between: no five in a row
+  };
+  const int calls_before = calls;
+  broken(state.q[7]);
+  broken(state.v[7]);
+  broken(state.v_WB[1]);
+  broken(state.w_WB_B[2]);
+  broken(state.X_WB.p[0]);
+  broken(state.X_WB.R.coeffs()[1]);
+  broken(reference.q[5]);
+  broken(reference.X_WB.p[2]);
+  broken(reference.X_WB.R.coeffs()[3]);
+  EXPECT_EQ(calls - calls_before, expected);
+  EXPECT_FALSE(controller->faults().stopped);
+}
+
+TEST_F(Guarded, FreezesAtTheAnglesLastMeasuredWhereTheStateIsLost) {
+  state.q[3] = 0.7;
+  act();
+  state.q[3] = kNan;
+  for (int tick = 0; tick < 8; ++tick) act();
+  EXPECT_TRUE(controller->faults().stopped);
+  EXPECT_DOUBLE_EQ(command.q_target[3], 0.7);
+}
+
+TEST_F(Guarded, HoldsTheStartWhereNothingWasEverFinite) {
+  offset = kNan;
+  act();
+  EXPECT_EQ(command.q_target, state.q);
+  EXPECT_DOUBLE_EQ(command.kp[0], robot->joints[0].kp);
+}
+
+TEST_F(Guarded, RefusesAnotherRobotsSizes) {
+  reference.q.resize(12);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { act(); }),
+              HasSubstr("controller 'offset': expected a reference of 29 joints, found 12"));
+  state.q[0] = kNan;
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { controller->reset(state); }), HasSubstr("finite state"));
+}
+
+TEST_F(Guarded, AllocatesNothingInTheSafeStop) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: the sanitizer counts";
+  act();
+  state.q[0] = kNan;
+  const long before = test::allocation_count();
+  for (int tick = 0; tick < 40; ++tick) act();
+  EXPECT_EQ(test::allocation_count(), before);
+}
+
+}  // namespace
+}  // namespace duet
