@@ -24,6 +24,7 @@ CREATE TABLE episodes (
   outcome TEXT NOT NULL, message TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
   fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
   contact_peak_n REAL, contact_impulse_ns REAL, contacts_total INTEGER NOT NULL, late_plans INTEGER NOT NULL,
+  faults_observations INTEGER NOT NULL, faults_actions INTEGER NOT NULL, faults_stopped INTEGER NOT NULL,
   state_hash TEXT NOT NULL, started_at TEXT NOT NULL);
 CREATE TABLE metrics (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
@@ -125,7 +126,7 @@ class RowWriter {
   explicit RowWriter(Database& database)
       : database_(database),
         episode_(database.prepare("INSERT INTO episodes VALUES "
-                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
+                                  "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
         metric_(database.prepare("INSERT INTO metrics VALUES (?,?,?)")),
         force_(database.prepare("INSERT INTO forces VALUES (?,?,?)")),
         contact_(database.prepare("INSERT INTO contacts VALUES (?,?,?,?,?,?,?,?,?,?,?)")),
@@ -173,6 +174,9 @@ class RowWriter {
         .number(row.contact_impulse_ns)
         .integer(row.contacts_total)
         .integer(row.late_plans)
+        .integer(row.faults.observations)
+        .integer(row.faults.actions)
+        .integer(row.faults.stopped ? 1 : 0)
         .text(row.state_hash)
         .text(row.started_at);
     database_.step(episode_.get());

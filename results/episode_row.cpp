@@ -157,7 +157,7 @@ nlohmann::json to_json(const StateTrace& trace) {
 template <typename T, typename Holds>
 std::vector<T> list_of(const nlohmann::json& json, const std::string& where, const char* expected, Holds holds) {
   if (!json.is_array() || !std::all_of(json.begin(), json.end(), holds)) {
-    throw InputError(fmt::format("episode row: trace: {}: expected a list of {}", where, expected));
+    throw InputError(fmt::format("episode row: {}: expected a list of {}", where, expected));
   }
   return json.get<std::vector<T>>();
 }
@@ -173,17 +173,65 @@ StateTrace trace_from_json(const nlohmann::json& json) {
   if (json.is_null()) return trace;
   JsonFields fields(json, "episode row: trace");
   trace.rate_hz = fields.number("rate_hz");
-  trace.points = list_of<std::string>(fields.at("points"), "key 'points'", "names",
+  trace.points = list_of<std::string>(fields.at("points"), "trace: key 'points'", "names",
                                       [](const nlohmann::json& name) { return name.is_string(); });
   const nlohmann::json& frames = fields.at("mm");
   if (!frames.is_array() || frames.empty()) throw InputError("episode row: trace: key 'mm': expected a list of frames");
   for (const nlohmann::json& frame : frames) {
-    const std::string where = fmt::format("key 'mm': frame {}", trace.mm.size());
+    const std::string where = fmt::format("trace: key 'mm': frame {}", trace.mm.size());
     trace.mm.push_back(list_of<int>(frame, where, "whole numbers of 32 bits", is_small_integer));
   }
   fields.refuse_unknown();
   if (const std::string fault = fault_of(trace); !fault.empty()) throw InputError("episode row: trace: " + fault);
   return trace;
+}
+
+// What is wrong with a foot trace, "" where nothing is.
+std::string fault_of(const FootTrace& feet) {
+  if (!std::isfinite(feet.rate_hz) || feet.rate_hz <= 0.0) {
+    return fmt::format("key 'rate_hz': expected a number above 0, found {}", feet.rate_hz);
+  }
+  if (feet.left_mm.size() == feet.right_mm.size()) return "";
+  return fmt::format("expected as many heights of both feet, found {} of the left and {} of the right",
+                     feet.left_mm.size(), feet.right_mm.size());
+}
+
+nlohmann::json to_json(const FootTrace& feet) {
+  if (feet.left_mm.empty() && feet.right_mm.empty()) return nullptr;
+  const std::string fault = fault_of(feet);
+  require(fault.empty(), "episode row: feet: " + fault);
+  return {{"rate_hz", feet.rate_hz}, {"left_mm", feet.left_mm}, {"right_mm", feet.right_mm}};
+}
+
+FootTrace feet_from_json(const nlohmann::json& json) {
+  FootTrace feet;
+  if (json.is_null()) return feet;
+  JsonFields fields(json, "episode row: feet");
+  feet.rate_hz = fields.number("rate_hz");
+  const auto heights = [&](const char* key) {
+    return list_of<int>(fields.at(key), fmt::format("feet: key '{}'", key), "whole numbers of 32 bits",
+                        is_small_integer);
+  };
+  feet.left_mm = heights("left_mm");
+  feet.right_mm = heights("right_mm");
+  fields.refuse_unknown();
+  if (const std::string fault = fault_of(feet); !fault.empty()) throw InputError("episode row: feet: " + fault);
+  return feet;
+}
+
+nlohmann::json to_json(const RowFaults& faults) {
+  return {{"observations", faults.observations}, {"actions", faults.actions}, {"stopped", faults.stopped}};
+}
+
+RowFaults faults_from_json(const nlohmann::json& json) {
+  const char* what = "episode row: faults";
+  JsonFields fields(json, what);
+  RowFaults faults;
+  faults.observations = small_integer(fields, "observations", what);
+  faults.actions = small_integer(fields, "actions", what);
+  faults.stopped = fields.boolean("stopped");
+  fields.refuse_unknown();
+  return faults;
 }
 
 std::int64_t read_schema(JsonFields& fields) {
@@ -240,6 +288,12 @@ void read_engine_details(JsonFields& fields, EpisodeRow& row) {
   row.trace = trace_from_json(fields.at("trace"));
 }
 
+// New in schema 3.
+void read_controller_details(JsonFields& fields, EpisodeRow& row) {
+  row.feet = feet_from_json(fields.at("feet"));
+  row.faults = faults_from_json(fields.at("faults"));
+}
+
 }  // namespace
 
 std::string episode_key(const EpisodeRow& row) {
@@ -288,6 +342,8 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"contacts", list_json(row.contacts)},
           {"contacts_total", row.contacts_total},
           {"trace", to_json(row.trace)},
+          {"feet", to_json(row.feet)},
+          {"faults", to_json(row.faults)},
           {"late_plans", row.late_plans},
           {"state_hash", row.state_hash},
           {"started_at", row.started_at}};
@@ -300,6 +356,7 @@ EpisodeRow row_from_json(const nlohmann::json& json) {
   read_identity(fields, row);
   read_result(fields, row);
   if (schema >= 2) read_engine_details(fields, row);
+  if (schema >= 3) read_controller_details(fields, row);
   fields.refuse_unknown();
   return row;
 }

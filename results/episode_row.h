@@ -13,7 +13,7 @@
 
 namespace duet {
 
-inline constexpr int kRowSchema = 2;  // rows of schema 1 are read too; what they lack stays empty
+inline constexpr int kRowSchema = 3;  // rows of schemas 1 and 2 are read too; what they lack stays empty
 
 struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"
@@ -30,6 +30,21 @@ struct StateTrace {
   double rate_hz = 10.0;             // frame i is at i / rate_hz [s]
   std::vector<std::string> points;   // "root", "left_hand", "right_hand"
   std::vector<std::vector<int>> mm;  // per frame x, y, z of each point in turn [mm], frame W; empty: not recorded
+};
+
+// How often the controller met a number that is not finite, and what it did.
+struct RowFaults {
+  int observations = 0;  // ticks on which the state or the reference was not finite
+  int actions = 0;       // ticks on which the command was not finite
+  bool stopped = false;  // the safe stop was entered
+
+  [[nodiscard]] bool any() const { return observations > 0 || actions > 0 || stopped; }
+};
+
+// Height of the lowest point of each sole over the ground, of a robot whose controller walks.
+struct FootTrace {
+  double rate_hz = 25.0;               // frame i is at i / rate_hz [s]
+  std::vector<int> left_mm, right_mm;  // as long as one another [mm]; empty: not recorded
 };
 
 // One contact of one robot link with one capsule of a solid human.
@@ -70,6 +85,8 @@ struct EpisodeRow {
   std::vector<RowContact> contacts;  // with a solid human: the kMostRowContacts of the largest peak force, by begin
   long contacts_total = 0;           // those that are left out included
   StateTrace trace;
+  FootTrace feet;
+  RowFaults faults;
   int late_plans = 0;
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
@@ -80,7 +97,7 @@ struct EpisodeRow {
 std::string episode_key(const EpisodeRow& row);
 
 // NaN and infinity are never written: such metrics and forces are left out, all other such numbers become null.
-// Throws std::invalid_argument for a trace whose frames do not fit its points.
+// Throws std::invalid_argument for a trace whose frames do not fit its points, and for feet of different lengths.
 nlohmann::json to_json(const EpisodeRow& row);
 // null reads as NaN. Throws InputError naming the key and the fault; unknown keys are refused.
 EpisodeRow row_from_json(const nlohmann::json& json);

@@ -126,9 +126,11 @@ std::string html_report(const ReportContent& content) {
     if (!body.empty()) sections.push_back({id, title, std::move(body)});
   };
   add("leaderboard", "Leaderboard", leaderboard_section(content));
+  add("controllers", "Controllers", controllers_html(content));
   add("engines", "Across engines", cross_engine_html(content));
   add("contacts", "Contact with people", contacts_html(content.contacts));
   add("retargeting", "Retargeting", retargeting_html(content));
+  add("training", "Training", training_html(content));
   add("clips", "Clips", stories_section(content));
   add("environment", "Environment", environment_section(content));
   std::string html = fmt::format(

@@ -9,9 +9,12 @@
 #include <vector>
 
 #include "results/contact_table.h"
+#include "results/controller_table.h"
 #include "results/cross_engine.h"
 #include "results/leaderboard.h"
+#include "results/line_plot.h"
 #include "results/metric_column.h"
+#include "results/training_curves.h"
 
 namespace duet {
 
@@ -40,8 +43,15 @@ struct ReportContent {
   std::vector<ClipStory> stories;
   std::optional<CrossEngine> cross_engine;  // section "Across engines"
   ContactTable contacts;                    // section "Contact with people", where it has groups
+  ControllerTable controllers;              // section "Controllers", where it has entries
+  std::vector<LinePlot> foot_plots;         // in that section
+  std::vector<TrainingCurves> curves;       // section "Training"
   nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
 };
+
+// Heights of both soles over time in one episode of each controller that has one: of its first by task, clip and
+// number, one that ended well and was clean before others.
+std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows);
 
 std::string html_report(const ReportContent& content);
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "results/leaderboard_rows.h"
+#include "results/line_plot.h"
 #include "results/report_parts.h"
 
 namespace duet {
@@ -69,15 +70,6 @@ Axis axis_of(const std::vector<Curve>& curves) {
   }
   low = std::min(low, 0.0);
   return {.low = low, .high = high > low ? high : low + 1.0, .logarithmic = false};
-}
-
-double nice_step(double span, int intervals) {
-  const double raw = span / intervals;
-  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * decade >= raw) return factor * decade;
-  }
-  return 10.0 * decade;
 }
 
 std::string horizontal_line(double y, const std::string& label) {

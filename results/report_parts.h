@@ -38,6 +38,10 @@ std::string cross_engine_html(const ReportContent& content);
 // Mark of the limits, notes and tables; "" for a table without groups.
 std::string contacts_html(const ContactTable& table);
 
+// Tables and foot heights; the curves. "" where there are none.
+std::string controllers_html(const ReportContent& content);
+std::string training_html(const ReportContent& content);
+
 std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
 std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts
 std::string episode_metrics_html(const ReportContent& content);                 // "" without metrics

@@ -100,6 +100,9 @@ article.clip h3{margin:0 0 4px;display:flex;gap:12px;align-items:baseline;flex-w
 .plot .axis{stroke:var(--soft)}
 .plot polyline,.plot path{fill:none;stroke-width:1.8;stroke-linejoin:round}
 .plot .key{fill:var(--ink)}
+.plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(380px,1fr));gap:14px 28px;margin:10px 0}
+.plots figure{margin:0;border:1px solid var(--line);border-radius:6px;background:var(--panel);padding:10px 14px 6px}
+.plots figcaption{font-size:13px;color:var(--ink);margin:0 0 4px}
 table.board{font-size:13.5px}
 .board th,.board td{padding:7px 8px}
 .board .ci{font-size:11.5px}

@@ -53,6 +53,10 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
   EXPECT_THAT(
       query(path, "SELECT engine_profile, substr(profile_digest, 1, 4) FROM episodes WHERE suite = 'hhoi-core'"),
       testing::ElementsAre("parity|dddd"));
+  EXPECT_THAT(query(path,
+                    "SELECT late_plans, faults_observations, faults_actions, faults_stopped FROM episodes "
+                    "WHERE suite = 'hhoi-core'"),
+              testing::ElementsAre("2|3|1|1"));
   EXPECT_THAT(query(path, "SELECT name, value FROM forces ORDER BY name"),
               testing::ElementsAre("ground.mean_n|343.125", "human.chest.quasi_static_n|12.3"));
   EXPECT_THAT(query(path,

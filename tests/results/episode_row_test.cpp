@@ -54,13 +54,53 @@ TEST(EpisodeRow, SurvivesTheWayThroughText) {
   EXPECT_EQ(back.trace.rate_hz, 12.5);
   EXPECT_EQ(back.trace.points, row.trace.points);
   EXPECT_EQ(back.trace.mm, row.trace.mm);
+  EXPECT_EQ(back.feet.rate_hz, 25.0);
+  EXPECT_EQ(back.feet.left_mm, row.feet.left_mm);
+  EXPECT_EQ(back.feet.right_mm, row.feet.right_mm);
+  EXPECT_EQ(back.faults.observations, 3);
+  EXPECT_EQ(back.faults.actions, 1);
+  EXPECT_TRUE(back.faults.stopped);
+}
+
+TEST(EpisodeRow, ReadsRowsOfTheSecondSchema) {
+  nlohmann::json json = to_json(full_row());
+  json["schema"] = 2;
+  EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
+  json.erase("feet");
+  json.erase("faults");
+  const EpisodeRow row = row_from_json(json);
+  EXPECT_EQ(row.trace.mm, full_row().trace.mm);
+  EXPECT_TRUE(row.feet.left_mm.empty());
+  EXPECT_FALSE(row.faults.any());
+}
+
+TEST(EpisodeRow, FeetAndFaultsAreReadStrictly) {
+  const auto with = [](const char* object, const char* key, nlohmann::json value) {
+    nlohmann::json json = to_json(full_row());
+    json[object][key] = std::move(value);
+    return refusal(json);
+  };
+  EXPECT_EQ(with("feet", "left_mm", {1, 2}),
+            "episode row: feet: expected as many heights of both feet, found 2 of the left and 3 of the right");
+  EXPECT_THAT(with("feet", "right_mm", {1, 2, 0.5}),
+              HasSubstr("episode row: feet: key 'right_mm': expected a list of whole numbers"));
+  EXPECT_THAT(with("feet", "rate_hz", 0), HasSubstr("key 'rate_hz': expected a number above 0, found 0"));
+  EXPECT_THAT(with("feet", "left", 0), HasSubstr("feet: unknown key 'left'"));
+  EXPECT_THAT(with("faults", "actions", -1), HasSubstr("faults: key 'actions': expected a whole number of at least 0"));
+  EXPECT_THAT(with("faults", "stopped", 1), HasSubstr("faults: key 'stopped': expected true or false"));
+  EpisodeRow row = full_row();
+  row.feet.left_mm.pop_back();
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { to_json(row); }), HasSubstr("feet: expected as many"));
+  row.feet = {};
+  EXPECT_TRUE(to_json(row).at("feet").is_null());
 }
 
 TEST(EpisodeRow, ReadsRowsOfTheFirstSchema) {
   nlohmann::json json = to_json(full_row());
   json["schema"] = 1;
   EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
-  for (const char* key : {"engine_profile", "profile_digest", "forces", "contacts", "contacts_total", "trace"})
+  for (const char* key :
+       {"engine_profile", "profile_digest", "forces", "contacts", "contacts_total", "trace", "feet", "faults"})
     json.erase(key);
   const EpisodeRow row = row_from_json(json);
   EXPECT_EQ(row.key, full_row().key);
@@ -197,7 +237,7 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
     json[key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_THAT(with("schema", 3), HasSubstr("expected schema 1 to 2, found 3"));
+  EXPECT_THAT(with("schema", 4), HasSubstr("expected schema 1 to 3, found 4"));
   EXPECT_THAT(with("key", ""), HasSubstr("key 'key'"));
   EXPECT_THAT(with("episode", -1), HasSubstr("key 'episode': expected a whole number of at least 0, found -1"));
   EXPECT_THAT(with("episode", 1.5), HasSubstr("key 'episode': expected a whole number, found 1.5"));

@@ -239,5 +239,44 @@ TEST(IntervalBar, SpansTheUnitInterval) {
   EXPECT_THAT(interval_bar_svg(0.5, {.low = 0.4, .high = 0.6}, 0.25, 110), HasSubstr("class=\"null\" x1=\"30.0\""));
 }
 
+EpisodeRow walking(const std::string& controller, int number, Outcome outcome) {
+  EpisodeRow row = test::engine_episode("mujoco", "replay", number, true, controller);
+  row.outcome = outcome;
+  row.metrics = {{"hf_ratio", 0.25}};
+  row.feet = {.rate_hz = 25.0, .left_mm = {0, 60, 0}, .right_mm = {50, 0, 40}};
+  return row;
+}
+
+TEST(HtmlReport, ShowsControllersStepsAndTraining) {
+  const std::vector<EpisodeRow> rows = {walking("wbc_sim", 0, Outcome::kOk)};
+  ReportContent shown = content();
+  shown.controllers = controller_table(rows);
+  shown.foot_plots = foot_plots(rows);
+  shown.curves = {parse_curves("steps,return\n0,1\n10,2\n", "<curves>.csv")};
+  const std::string html = html_report(shown);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(
+      html, AllOf(HasSubstr("id=\"controllers\""), HasSubstr("another experiment"), HasSubstr("height of the sole [m]"),
+                  HasSubstr("id=\"training\""), HasSubstr("&lt;curves&gt;.csv"), HasSubstr("return against steps")));
+  EXPECT_THAT(html_report(content()), AllOf(Not(HasSubstr("id=\"controllers\"")), Not(HasSubstr("id=\"training\""))));
+}
+
+TEST(FootPlots, OneEpisodePerControllerThatEndedWellFirst) {
+  EpisodeRow still = walking("vmc", 0, Outcome::kOk);
+  still.feet = {};
+  EpisodeRow null = walking("null_arm", 0, Outcome::kOk);
+  null.arm = "null";
+  EpisodeRow pushed = walking("homie", 1, Outcome::kOk);
+  pushed.perturbation = "push";
+  const std::vector<LinePlot> plots =
+      foot_plots({walking("homie", 0, Outcome::kFell), pushed, walking("homie", 4, Outcome::kOk),
+                  walking("wbc_sim", 0, Outcome::kFell), still, null});
+  ASSERT_EQ(plots.size(), 2U);
+  EXPECT_THAT(plots[0].title, AllOf(HasSubstr("homie: hug-1 in mujoco"), Not(HasSubstr("push"))));
+  EXPECT_THAT(plots[1].title, HasSubstr("wbc_sim"));
+  EXPECT_EQ(plots[0].series.at(0).y, (std::vector<double>{0.0, 0.06, 0.0}));
+  EXPECT_EQ(plots[0].series.at(1).x, (std::vector<double>{0.0, 0.04, 0.08}));
+}
+
 }  // namespace
 }  // namespace duet

@@ -56,6 +56,8 @@ inline EpisodeRow full_row() {
   row.contacts_total = 19;
   row.trace = {
       .rate_hz = 12.5, .points = {"root", "left_hand"}, .mm = {{0, -1, 790, 210, 180, 900}, {1, 0, 789, 2, 3, 4}}};
+  row.feet = {.rate_hz = 25.0, .left_mm = {0, 61, -1}, .right_mm = {4, 0, 0}};
+  row.faults = {.observations = 3, .actions = 1, .stopped = true};
   row.late_plans = 2;
   row.state_hash = std::string(64, 'c');
   row.started_at = "2026-01-02T03:04:05Z";
