@@ -47,7 +47,7 @@ struct ControllerInfo {
   std::vector<ControllerOption> options;
 };
 
-// Those that ship with duet: "pd", "vmc", "wbc_sim", "homie", "twist2", "playground", "rl_gym", ...; a name that ends in
+// Those that ship with duet: "pd", "vmc", "wbc_sim", "homie", "twist2", "playground", "rl_gym", ... A name that ends in
 // ".yaml" is the path of an IO descriptor (controllers/descriptor.h) and as good as one of them.
 std::vector<ControllerInfo> controllers();
 std::vector<std::string> controller_names();

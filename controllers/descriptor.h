@@ -1,0 +1,97 @@
+// An IO descriptor: what a controller's network is shown and what its output means, as data. A tracker is added by
+// writing one (docs/adding-a-controller.md). Format: docs/file-formats.md, "IO descriptor". Joints are named, not yet
+// bound to a robot.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controllers/channel.h"
+
+namespace duet {
+
+// In the network's order.
+struct DescriptorJoint {
+  std::string name;
+  int line = 0;
+  double neutral = 0.0;          // the default pose [rad]
+  double kp = 0.0, kd = 0.0;     // [N m/rad], [N m s/rad]
+  std::optional<double> effort;  // the target is moved until the torque at the tick is within it [N m]
+  std::optional<double>
+      action;  // scale of its output [rad]; none: it is not moved by the network, but by the reference
+};
+
+// A joint that a body may have and the network knows nothing of: it follows the reference.
+struct OtherJoint {
+  std::string name;
+  int line = 0;
+  double kp = 0.0, kd = 0.0;
+};
+
+struct ChannelGroup {
+  std::string name;
+  int line = 0;
+  std::vector<Channel> channels;
+};
+
+// Groups side by side, now or over the last frames (oldest first).
+struct InputPart {
+  int line = 0;
+  std::vector<int> groups;
+  int frames = 1;            // the current one counted where it is among them
+  bool current = true;       // whether the current frame is the last of them
+  bool starts_full = false;  // before the first frame: that frame repeated, else zeros
+};
+
+struct DescriptorInput {
+  std::string name;  // of the network's input; "" for its only one
+  int line = 0;
+  std::vector<InputPart> parts;
+};
+
+// What may be commanded of one direction.
+struct CommandRange {
+  double lower = 0.0, upper = 0.0;
+  double steps_from = 0.0;  // the smallest command that is answered by steps
+};
+
+// A controller that is told a velocity, not a pose (controllers/root_conversion.h).
+struct VelocityInterface {
+  CommandRange forward, lateral, yaw;  // [m/s], [m/s], [rad/s]
+  CommandRange height;                 // [m]; lower == upper where the controller takes none
+  double height_offset = 0.0;          // of the pelvis over the commanded height, measured [m]
+};
+
+struct Descriptor {
+  std::string file;  // where it was read, for messages
+  std::string name, about, licence;
+  std::string robot;    // card: robots/g1/<robot>.yaml
+  std::string network;  // file name
+  bool walks = false;
+  bool waist_locked = false;  // unless the option says otherwise
+  std::vector<DescriptorJoint> joints;
+  std::vector<OtherJoint> other_joints;
+  std::vector<ChannelGroup> groups;
+  std::vector<DescriptorInput> inputs;
+  std::string output;  // of the network; "" for its only one
+  int output_line = 0;
+  double action_clip = std::numeric_limits<double>::infinity();  // of the output's size, before its scale
+  bool around_reference = false;  // actions are added to the reference's angles instead of the default pose
+  std::optional<VelocityInterface> command;
+
+  [[nodiscard]] int actions() const;  // joints with an action
+  [[nodiscard]] int group_size(const ChannelGroup& group) const;
+  [[nodiscard]] int part_size(const InputPart& part) const;  // of one frame
+  [[nodiscard]] int input_size(const DescriptorInput& input) const;
+  // "frame: command_velocity 0..2, command_height 3, ...; 6 frames of 76": how input_size comes about.
+  [[nodiscard]] std::string input_layout(const DescriptorInput& input) const;
+};
+
+// Throws InputError("FILE:LINE: ...") as YamlSection does.
+Descriptor parse_descriptor(const std::string& text, const std::string& file);
+Descriptor read_descriptor(const std::string& path);
+
+}  // namespace duet

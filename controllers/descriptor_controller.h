@@ -1,0 +1,25 @@
+// A controller made of an IO descriptor and a network. It is bound to its robot by the names of joints.
+#pragma once
+
+#include <memory>
+
+#include "controllers/controller.h"
+#include "controllers/descriptor.h"
+#include "nn/network.h"
+
+namespace duet {
+
+// What `duet list controllers` says of it, with the options that it takes.
+ControllerInfo descriptor_info(const Descriptor& descriptor);
+
+// `network_path` names the network in messages. The options `network` and `engine` are the loader's and not looked at.
+// Throws std::invalid_argument for a robot that lacks one of its joints or has one that it does not know, and for an
+// option's value that it does not know; InputError for a network whose inputs and outputs are not the descriptor's,
+// with the channels' places.
+std::unique_ptr<Controller> make_descriptor_controller(const Descriptor& descriptor,
+                                                       std::shared_ptr<const RobotModel> robot,
+                                                       std::unique_ptr<Network> network,
+                                                       const std::string& network_path,
+                                                       const ControllerOptions& options = {});
+
+}  // namespace duet

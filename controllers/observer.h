@@ -1,0 +1,99 @@
+// Builds a network's inputs from what a controller senses, as an IO descriptor says: channels, scales, histories.
+// Nothing allocates after construction.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "controllers/descriptor.h"
+#include "controllers/root_conversion.h"
+#include "core/robot_state.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+
+// How the reference moves, from its values one tick apart: it has no velocities of its own.
+class ReferenceRates {
+ public:
+  ReferenceRates(int joints, double dt) : dt_(dt), qd_(Eigen::VectorXd::Zero(joints)) {}
+  void reset() { seen_ = false; }
+  void update(const Reference& reference);  // the first after a reset: at rest
+
+  [[nodiscard]] const Eigen::Vector3d& v_WB() const { return v_WB_; }      // [m/s]
+  [[nodiscard]] const Eigen::Vector3d& w_WB_B() const { return w_WB_B_; }  // [rad/s]
+  [[nodiscard]] const Eigen::VectorXd& qd() const { return qd_; }          // [rad/s]
+
+ private:
+  double dt_;
+  bool seen_ = false;
+  Reference last_;
+  Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero(), w_WB_B_ = Eigen::Vector3d::Zero();
+  Eigen::VectorXd qd_;
+};
+
+// All that a channel can show at a tick; borrowed.
+struct Senses {
+  const RobotState& state;
+  const Reference& reference;
+  const ReferenceRates& rates;
+  const VelocityCommand& command;
+  std::span<const float> action;  // the network's last output
+  long tick = 0;                  // since reset
+};
+
+class Observer {
+ public:
+  // `robot_joints`: index in the robot of each of the descriptor's joints. Throws std::invalid_argument for an anchor
+  // frame that the robot lacks.
+  Observer(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::vector<int> robot_joints);
+
+  void reset();
+  void update(const Senses& senses);
+  // Numbers of the input in the order of Descriptor::inputs, after the last update.
+  [[nodiscard]] std::span<const float> input(int index) const { return inputs_[index].values; }
+
+ private:
+  struct BoundChannel {
+    Channel spec;
+    int frame = -1;  // the anchor's, in the robot
+  };
+  struct Group {
+    std::vector<BoundChannel> channels;
+    std::vector<float> values;
+  };
+  struct Part {
+    InputPart spec;
+    int size = 0;
+    std::vector<float> past;  // frames of it, oldest first
+  };
+  struct Input {
+    std::vector<Part> parts;
+    std::vector<float> values;
+  };
+
+  void fill_group(Group& group, const Senses& senses);
+  void fill_channel(const BoundChannel& bound, const Senses& senses, std::vector<double>& out) const;
+  void fill_joints(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
+  void fill_frames(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
+  void fill_anchor(const BoundChannel& bound, std::vector<double>& out) const;
+  void fill_part(Part& part, std::span<float> out);
+
+  std::shared_ptr<const RobotModel> robot_;  // the kinematics' model
+  std::vector<int> joints_;
+  Eigen::VectorXd neutral_;  // per descriptor's joint
+  double action_clip_;
+  bool anchored_ = false;
+  Kinematics kinematics_, reference_kinematics_;
+  std::vector<Group> groups_;
+  std::vector<Input> inputs_;
+  std::vector<double> scratch_;  // one channel before scaling
+  std::vector<float> frame_;     // one frame of a part
+  bool first_ = true;
+};
+
+// Angles of R_WB = Rz(yaw) Ry(pitch) Rx(roll) [rad].
+Eigen::Vector2d roll_pitch_of(const Eigen::Quaterniond& R_WB);
+
+}  // namespace duet
