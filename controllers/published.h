@@ -1,0 +1,23 @@
+// The published controllers that ship as IO descriptors (controllers/descriptors), and where their networks are.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "controllers/controller.h"
+#include "controllers/descriptor.h"
+
+namespace duet {
+
+// `name`: of a shipped descriptor, or the path of a descriptor (it ends in ".yaml"). Throws MissingError for a shipped
+// one that is not there, InputError for one that is broken.
+Descriptor load_descriptor(const std::string& name);
+
+// The file that the option `network` names; else the descriptor's in $DUET_MODELS, else in $DUET_SHARED/models, else in
+// ../shared/models of the source tree. Throws MissingError naming the places.
+std::string find_network(const Descriptor& descriptor, const ControllerOptions& options);
+
+std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                           const ControllerOptions& options);
+
+}  // namespace duet

@@ -1,0 +1,368 @@
+// What each published controller's network is shown, number by number, against the tables of its own documentation, and
+// what becomes of its answer. The network is a fake.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "controllers/descriptor_controller.h"
+#include "controllers/observer.h"
+#include "core/require.h"
+#include "tests/backends/allocation_count.h"
+#include "tests/controllers/fake_network.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+// Of float arithmetic on numbers of size 1 to 30.
+constexpr double kNear = 4e-6;
+
+// A controller over a fake network, in a state whose numbers can be told apart.
+struct Layout {
+  Layout(const std::string& name, int input, int output, const ControllerOptions& options = {}, const char* in = "x",
+         const char* out = "y")
+      : descriptor(load_descriptor(name)), robot(test::body(descriptor.robot)) {
+    std::vector<Port> inputs = {{in, input}};
+    if (name == "beyond_mimic") inputs.push_back({"time_step", 1});
+    controller = make_descriptor_controller(
+        descriptor, robot, std::make_unique<test::FakeNetwork>(inputs, std::vector<Port>{{out, output}}, memory),
+        "fake", options);
+    state = robot->standing_state();
+    state.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
+                   Eigen::AngleAxisd(-0.1, Eigen::Vector3d::UnitX());
+    state.v_WB = {0.3, -0.2, 0.1};
+    state.w_WB_B = {0.11, 0.22, 0.33};
+    for (int j = 0; j < robot->dof(); ++j) {
+      state.q[j] = 0.01 * (j + 1);
+      state.v[j] = 1.0 + 0.1 * j;
+    }
+    reference = {robot->standing_state().X_WB, Eigen::VectorXd::Zero(robot->dof())};
+    for (int j = 0; j < robot->dof(); ++j) reference.q[j] = 2.0 + 0.01 * j;
+    reference.X_WB.R =
+        Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX());
+    controller->reset(state);
+    for (size_t a = 0; a < memory.answered[0].size(); ++a) memory.answered[0][a] = 0.1F * static_cast<float>(a + 1);
+  }
+  void act() { controller->act(state, reference, command); }
+  // The reference goes on for a tick: 1 cm in x, 2 cm in y of W, turns about its own z axis by 0.01 rad.
+  void go_on() {
+    reference.X_WB.p += Eigen::Vector3d(0.01, 0.02, 0.0);
+    reference.X_WB.R = reference.X_WB.R * Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitZ());
+  }
+  [[nodiscard]] double shown(int index) const { return memory.shown[0][index]; }
+  [[nodiscard]] int joint(const std::string& name) const { return robot->joint_index(name + "_joint"); }
+  [[nodiscard]] double neutral(int j) const {
+    for (const DescriptorJoint& each : descriptor.joints)
+      if (each.name == robot->joints[j].name) return each.neutral;
+    return 0.0;
+  }
+  void expect_vector(int first, const Eigen::Vector3d& v, const char* what) const {
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(shown(first + i), v[i], kNear) << what << " " << i;
+  }
+  // q - default, scaled speeds, previous action: of the first `joints` joints of the robot's order.
+  void expect_joints(int positions, int velocities, double scale, int joints) const {
+    for (int j = 0; j < joints; ++j) {
+      EXPECT_NEAR(shown(positions + j), state.q[j] - neutral(j), kNear) << robot->joints[j].name;
+      EXPECT_NEAR(shown(velocities + j), scale * state.v[j], kNear) << robot->joints[j].name;
+    }
+  }
+  void expect_action(int first, int count, double factor) const {
+    for (int a = 0; a < count; ++a) EXPECT_NEAR(shown(first + a), factor * 0.1 * (a + 1), kNear) << a;
+  }
+  [[nodiscard]] Eigen::Vector3d gravity() const { return state.X_WB.R.conjugate() * Eigen::Vector3d(0, 0, -1); }
+
+  Descriptor descriptor;
+  std::shared_ptr<const RobotModel> robot;
+  test::FakeMemory memory;
+  std::unique_ptr<Controller> controller;
+  RobotState state;
+  Reference reference;
+  JointCommand command;
+};
+
+TEST(RlGymLayout, IsThe47NumbersOfItsDeployment) {
+  Layout l("rl_gym", 47, 12, {{"command", "0.5,-0.3,0.8"}});
+  l.act();
+  l.expect_action(33, 12, 0.0);
+  EXPECT_NEAR(l.shown(45), 0.0, kNear);
+  EXPECT_NEAR(l.shown(46), 1.0, kNear);
+  l.act();
+  l.expect_vector(0, 0.25 * l.state.w_WB_B, "gyro");
+  l.expect_vector(3, l.gravity(), "gravity");
+  l.expect_vector(6, {1.0, -0.6, 0.2}, "command");
+  l.expect_joints(9, 21, 0.05, 12);
+  l.expect_action(33, 12, 1.0);
+  const double phase = 2.0 * std::numbers::pi * 0.02 / 0.8;
+  EXPECT_NEAR(l.shown(45), std::sin(phase), kNear);
+  EXPECT_NEAR(l.shown(46), std::cos(phase), kNear);
+  for (int a = 0; a < 12; ++a) EXPECT_NEAR(l.command.q_target[a], l.neutral(a) + 0.25 * 0.1 * (a + 1), kNear);
+  EXPECT_EQ(l.command.kp[3], 150.0);
+  EXPECT_EQ(l.command.kd[3], 4.0);
+}
+
+TEST(HomieLayout, IsSixFramesOf76OldestFirstFromZeros) {
+  Layout l("homie", 456, 12, {{"command", "0.3,-0.2,0.6,0.5"}});
+  l.act();
+  for (int i = 0; i < 380; ++i) EXPECT_EQ(l.shown(i), 0.0) << i;
+  l.act();
+  for (int i = 0; i < 304; ++i) EXPECT_EQ(l.shown(i), 0.0) << i;
+  const int f = 380;
+  l.expect_vector(f, {0.6, -0.4, 0.3}, "command");
+  EXPECT_NEAR(l.shown(f + 3), 0.5, kNear);
+  l.expect_vector(f + 4, 0.5 * l.state.w_WB_B, "gyro");
+  l.expect_vector(f + 7, l.gravity(), "gravity");
+  l.expect_joints(f + 10, f + 37, 0.05, 27);
+  l.expect_action(f + 64, 12, 1.0);
+  EXPECT_NEAR(l.shown(304 + 64), 0.0, kNear);  // the frame before: no action yet
+  EXPECT_NEAR(l.shown(304 + 10), l.shown(f + 10), kNear);
+}
+
+TEST(HomieLayout, LegsAreTheNetworksTheRestFollowsTheReference) {
+  Layout l("homie", 456, 12, {{"command", "0,0,0"}});
+  l.memory.answered[0][0] = 1e4F;
+  l.act();
+  EXPECT_NEAR(l.command.q_target[0], -0.1 + 0.25 * 100.0, kNear);  // clipped
+  EXPECT_NEAR(l.command.q_target[3], 0.3 + 0.25 * 0.4, kNear);
+  for (int j = 12; j < 27; ++j) EXPECT_EQ(l.command.q_target[j], l.reference.q[j]) << l.robot->joints[j].name;
+  EXPECT_EQ(l.command.kp[l.joint("left_knee")], 300.0);
+  EXPECT_EQ(l.command.kp[l.joint("right_wrist_yaw")], 5.0);
+  EXPECT_EQ(l.command.kd[l.joint("waist_yaw")], 5.0);
+  l.act();
+  EXPECT_EQ(l.shown(380 + 64), 100.0);
+}
+
+TEST(HomieLayout, YawScaleIsThatOfTrainingOrOfDeployment) {
+  Layout l("homie", 456, 12, {{"command", "0,0,0.8"}, {"yaw_scale", "0.25"}});
+  l.act();
+  EXPECT_NEAR(l.shown(380 + 2), 0.2, kNear);
+  EXPECT_NEAR(l.shown(380 + 3), 0.74, kNear);
+}
+
+TEST(HomieLayout, WaistIsHeldOrFreeOnABodyThatHasOne) {
+  const Descriptor homie = load_descriptor("homie");
+  const auto robot = test::body("g1");
+  for (const char* waist : {"locked", "free"}) {
+    test::FakeMemory memory;
+    const auto controller = make_descriptor_controller(
+        homie, robot,
+        std::make_unique<test::FakeNetwork>(std::vector<Port>{{"x", 456}}, std::vector<Port>{{"y", 12}}, memory),
+        "fake", {{"waist", waist}, {"command", "0,0,0"}});
+    Reference reference{robot->standing_state().X_WB, robot->neutral};
+    reference.q[robot->joint_index("waist_pitch_joint")] = 0.2;
+    JointCommand command;
+    controller->reset(robot->standing_state());
+    controller->act(robot->standing_state(), reference, command);
+    EXPECT_EQ(command.q_target[robot->joint_index("waist_pitch_joint")], waist == std::string("free") ? 0.2 : 0.0);
+    EXPECT_EQ(command.kp[robot->joint_index("waist_pitch_joint")], 300.0);
+  }
+}
+
+TEST(Twist2Layout, IsTheReferenceTheRobotTenFramesAndTheReferenceAgain) {
+  Layout l("twist2", 1432, 29);
+  l.act();
+  for (int i = 127; i < 1397; ++i) EXPECT_EQ(l.shown(i), 0.0) << i;
+  l.go_on();
+  l.act();
+  const Eigen::Vector3d v = l.reference.X_WB.R.conjugate() * Eigen::Vector3d(0.5, 1.0, 0.0);
+  for (const int first : {0, 1397}) {
+    EXPECT_NEAR(l.shown(first), v.x(), kNear);
+    EXPECT_NEAR(l.shown(first + 1), v.y(), kNear);
+    EXPECT_NEAR(l.shown(first + 2), l.reference.X_WB.p.z(), kNear);
+    const Eigen::Vector2d tilt = roll_pitch_of(l.reference.X_WB.R);
+    EXPECT_NEAR(l.shown(first + 3), tilt.x(), kNear);
+    EXPECT_NEAR(l.shown(first + 4), tilt.y(), kNear);
+    EXPECT_NEAR(l.shown(first + 5), 0.5, 1e-5);
+    for (int j = 0; j < 29; ++j) EXPECT_NEAR(l.shown(first + 6 + j), 2.0 + 0.01 * j, kNear);
+  }
+  l.expect_vector(35, 0.25 * l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(38), -0.1, kNear);
+  EXPECT_NEAR(l.shown(39), 0.2, kNear);
+  for (int j = 0; j < 29; ++j) {
+    const bool ankle = j == 4 || j == 5 || j == 10 || j == 11;
+    EXPECT_NEAR(l.shown(40 + j), l.state.q[j] - l.neutral(j), kNear) << j;
+    EXPECT_NEAR(l.shown(69 + j), ankle ? 0.0 : 0.05 * l.state.v[j], kNear) << j;
+  }
+  l.expect_action(98, 29, 1.0);
+  // The newest frame of the history is the first tick's: its reference stood still, it had no action yet.
+  const int last = 127 + 9 * 127;
+  EXPECT_EQ(l.shown(last), 0.0);
+  EXPECT_NEAR(l.shown(last + 40), l.shown(40), kNear);
+  EXPECT_EQ(l.shown(last + 98), 0.0);
+  for (int i = 127; i < last; ++i) EXPECT_EQ(l.shown(i), 0.0) << i;
+}
+
+TEST(Twist2Layout, ActionIsClippedForTheTargetAndRawInTheObservation) {
+  Layout l("twist2", 1432, 29);
+  l.memory.answered[0][7] = -30.0F;
+  l.act();
+  EXPECT_NEAR(l.command.q_target[7], -5.0, kNear);
+  EXPECT_NEAR(l.command.q_target[16], 0.4 + 0.5 * 1.7, kNear);
+  l.act();
+  EXPECT_EQ(l.shown(98 + 7), -30.0);
+}
+
+TEST(PlaygroundLayout, IsThe103NumbersWithTheVelocityOfTheInertialUnit) {
+  Layout l("playground", 103, 29, {{"command", "0.8,-0.1,0.5"}});
+  l.act();
+  const Eigen::Vector3d velocity =
+      l.state.X_WB.R.conjugate() * l.state.v_WB + l.state.w_WB_B.cross(Eigen::Vector3d(0.04525, 0, -0.08339));
+  l.expect_vector(0, velocity, "velocity");
+  l.expect_vector(3, l.state.w_WB_B, "gyro");
+  l.expect_vector(6, l.gravity(), "gravity");
+  l.expect_vector(9, {0.8, -0.1, 0.5}, "command");
+  l.expect_joints(12, 41, 1.0, 29);
+  l.expect_action(70, 29, 0.0);
+  EXPECT_NEAR(l.shown(99), 1.0, kNear);
+  EXPECT_NEAR(l.shown(100), -1.0, kNear);
+  l.act();
+  const double step = 2.0 * std::numbers::pi * 1.5 * 0.02;
+  EXPECT_NEAR(l.shown(99), std::cos(step), kNear);
+  EXPECT_NEAR(l.shown(100), -std::cos(step), kNear);
+  EXPECT_NEAR(l.shown(101), std::sin(step), kNear);
+  EXPECT_NEAR(l.shown(102), -std::sin(step), kNear);
+  EXPECT_NEAR(l.command.q_target[14], 0.073 + 0.5 * 1.5, kNear);
+  EXPECT_EQ(l.command.kp[4], 20.0);
+  EXPECT_EQ(l.command.kd[5], 0.2);
+}
+
+TEST(GmtLayout, IsTwentyFramesAheadTheRobotAndTwentyFramesBack) {
+  Layout l("gmt", 2154, 23);
+  l.act();
+  l.act();
+  for (int step = 0; step < 20; ++step) {
+    const int first = 30 * step;
+    EXPECT_NEAR(l.shown(first), l.reference.X_WB.p.z(), kNear);
+    EXPECT_NEAR(l.shown(first + 2), roll_pitch_of(l.reference.X_WB.R).y(), kNear);
+    for (int i = 3; i < 7; ++i) EXPECT_NEAR(l.shown(first + i), 0.0, kNear);
+    EXPECT_NEAR(l.shown(first + 7), 2.0, kNear);
+    EXPECT_NEAR(l.shown(first + 29), l.reference.q[l.joint("right_elbow")], kNear);
+  }
+  l.expect_vector(600, 0.25 * l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(603), -0.1, kNear);
+  EXPECT_NEAR(l.shown(605 + 4), l.state.q[4] + 0.2, kNear);
+  EXPECT_EQ(l.shown(628 + 4), 0.0);
+  EXPECT_NEAR(l.shown(628 + 3), 0.05 * l.state.v[3], kNear);
+  l.expect_action(651, 23, 1.0);
+  EXPECT_NEAR(l.shown(2154 - 74), 0.25 * l.state.w_WB_B.x(), kNear);
+  EXPECT_EQ(l.shown(2154 - 75), 0.0);
+  EXPECT_EQ(l.command.q_target[l.joint("left_wrist_yaw")], l.reference.q[l.joint("left_wrist_yaw")]);
+}
+
+TEST(GmtLayout, TorqueAtTheTickStaysWithinItsEffort) {
+  Layout l("gmt", 2154, 23);
+  l.memory.answered[0][0] = 10.0F;
+  l.act();
+  const double torque = 100.0 * (l.command.q_target[0] - l.state.q[0]) - 2.0 * l.state.v[0];
+  EXPECT_NEAR(torque, 88.0, 1e-9);
+}
+
+TEST(BeyondMimicLayout, ShowsTheReferenceInTheRobotsAnchorInIsaacLabsOrder) {
+  Layout l("beyond_mimic", 160, 29, {}, "obs", "actions");
+  l.act();
+  EXPECT_NEAR(l.shown(0), l.reference.q[l.joint("left_hip_pitch")], kNear);
+  EXPECT_NEAR(l.shown(1), l.reference.q[l.joint("right_hip_pitch")], kNear);
+  EXPECT_NEAR(l.shown(2), l.reference.q[l.joint("waist_yaw")], kNear);
+  for (int j = 29; j < 58; ++j) EXPECT_EQ(l.shown(j), 0.0);
+  Kinematics robot(*l.robot), wanted(*l.robot);
+  robot.update(l.state.X_WB, l.state.q);
+  wanted.update(l.reference.X_WB, l.reference.q);
+  const int torso = l.robot->frame_index("torso_link");
+  const Pose error = robot.frame_pose(torso).inverse() * wanted.frame_pose(torso);
+  l.expect_vector(58, error.p, "anchor");
+  const Eigen::Matrix3d R = error.R.toRotationMatrix();
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(l.shown(61 + k), R(k / 2, k % 2), kNear);
+  l.expect_vector(67, l.state.X_WB.R.conjugate() * l.state.v_WB, "velocity");
+  l.expect_vector(70, l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(73), l.state.q[0] + 0.312, kNear);
+  EXPECT_NEAR(l.shown(102 + 2), l.state.v[12], kNear);
+  l.act();
+  l.expect_action(131, 29, 1.0);
+  EXPECT_EQ(l.memory.shown[1][0], 1.0F);
+  EXPECT_NEAR(l.command.q_target[l.joint("right_knee")], 0.669 + 0.3507 * 1.1, kNear);
+}
+
+TEST(Layouts, StartAgainAtAReset) {
+  for (const auto& [name, input, output] :
+       {std::tuple{"homie", 456, 12}, std::tuple{"twist2", 1432, 29}, std::tuple{"rl_gym", 47, 12}}) {
+    Layout l(name, input, output);
+    l.act();
+    const std::vector<float> first = l.memory.shown[0];
+    l.act();
+    EXPECT_NE(l.memory.shown[0], first) << name;
+    l.controller->reset(l.state);
+    l.act();
+    EXPECT_EQ(l.memory.shown[0], first) << name;
+    EXPECT_EQ(l.memory.resets, 2);
+  }
+}
+
+TEST(Layouts, AreFilledWithoutAllocation) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: the sanitizer counts";
+  const std::tuple<const char*, int, int, const char*, const char*> all[] = {
+      {"homie", 456, 12, "x", "y"},      {"twist2", 1432, 29, "x", "y"}, {"rl_gym", 47, 12, "x", "y"},
+      {"playground", 103, 29, "x", "y"}, {"gmt", 2154, 23, "x", "y"},    {"beyond_mimic", 160, 29, "obs", "actions"}};
+  for (const auto& [name, input, output, in, out] : all) {
+    Layout l(name, input, output, {}, in, out);
+    l.act();
+    const long before = test::allocation_count();
+    for (int tick = 0; tick < 20; ++tick) {
+      l.go_on();
+      l.act();
+    }
+    EXPECT_EQ(test::allocation_count(), before) << name;
+  }
+}
+
+TEST(Layouts, RefuseANetworkOfAnotherSizeWithThePlacesOfTheChannels) {
+  const std::string message = thrown_message<InputError>([] { Layout("rl_gym", 48, 12); });
+  EXPECT_THAT(message, HasSubstr("rl_gym.yaml:"));
+  EXPECT_THAT(message,
+              HasSubstr("input 'x': expected 48 numbers, found 47 of the channels: base_angular_velocity 0..2"));
+  EXPECT_THAT(message, HasSubstr("gait_sine 45, gait_cosine 46"));
+  EXPECT_THAT(thrown_message<InputError>([] { Layout("homie", 400, 12); }), HasSubstr("(6 frames of 76)"));
+  EXPECT_THAT(thrown_message<InputError>([] { Layout("rl_gym", 47, 29); }),
+              HasSubstr("output 'y': expected 12 numbers, one for each joint with an action, found 29"));
+  EXPECT_THAT(thrown_message<InputError>([] { Layout("beyond_mimic", 160, 29, {}, "observation", "actions"); }),
+              HasSubstr("unknown input 'obs'"));
+}
+
+TEST(Layouts, RefuseARobotOfOtherJoints) {
+  const auto make = [](const char* name, const char* card, int input, int output) {
+    return thrown_message<std::invalid_argument>([=] {
+      test::FakeMemory memory;
+      make_descriptor_controller(load_descriptor(name), test::body(card),
+                                 std::make_unique<test::FakeNetwork>(std::vector<Port>{{"x", input}},
+                                                                     std::vector<Port>{{"y", output}}, memory),
+                                 "fake");
+    });
+  };
+  EXPECT_THAT(make("twist2", "g1_12dof", 1432, 29),
+              HasSubstr("controller 'twist2' with robot 'g1_12dof': unknown joint 'waist_yaw_joint'"));
+  EXPECT_THAT(make("twist2", "g1_27dof", 1432, 29), HasSubstr("it was made for 'g1_twist2'"));
+}
+
+TEST(Layouts, RefuseOptionsValuesTheyDoNotKnow) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                Layout("homie", 456, 12, {{"command", "1,2"}});
+              }),
+              HasSubstr("expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '1,2'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                Layout("homie", 456, 12, {{"conversion", "direkt"}});
+              }),
+              HasSubstr("unknown conversion 'direkt': did you mean 'direct'?"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                Layout("homie", 456, 12, {{"waist", "stiff"}});
+              }),
+              HasSubstr("option 'waist'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                Layout("homie", 456, 12, {{"yaw_scale", "fast"}});
+              }),
+              HasSubstr("expected a number, found 'fast'"));
+}
+
+}  // namespace
+}  // namespace duet
