@@ -1,0 +1,13 @@
+// Stands for nn/libtorch_network.cpp where libtorch was not found.
+#include "core/require.h"
+#include "nn/network_engines.h"
+
+namespace duet {
+
+bool libtorch_built_in() { return false; }
+
+std::unique_ptr<Network> libtorch_network(const std::string& path) {
+  throw MissingError("cannot read '" + path + "': this build has no libtorch");
+}
+
+}  // namespace duet

@@ -1,0 +1,213 @@
+#include "nn/onnx_model.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <onnx/onnx_pb.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <climits>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+using onnx::AttributeProto;
+using onnx::TensorProto;
+
+// Values of one stored type out of a tensor's raw bytes or out of the field that protobuf keeps for it.
+template <typename Stored, typename Out, typename Field>
+std::vector<Out> values_of(const TensorProto& tensor, const Field& field) {
+  std::vector<Out> values;
+  if (!tensor.has_raw_data()) {
+    for (const auto value : field) values.push_back(static_cast<Out>(value));
+    return values;
+  }
+  const std::string& raw = tensor.raw_data();
+  values.reserve(raw.size() / sizeof(Stored));
+  for (std::size_t at = 0; at + sizeof(Stored) <= raw.size(); at += sizeof(Stored)) {
+    Stored value;
+    std::memcpy(&value, raw.data() + at, sizeof value);
+    values.push_back(static_cast<Out>(value));
+  }
+  return values;
+}
+
+std::vector<float> halves_of(const TensorProto& tensor) {
+  std::vector<float> values;
+  for (const auto bits : values_of<std::uint16_t, std::uint16_t>(tensor, tensor.int32_data()))
+    values.push_back(Eigen::half_impl::half_to_float(Eigen::half_impl::raw_uint16_to_half(bits)));
+  return values;
+}
+
+class Parser {
+ public:
+  explicit Parser(const std::string& file) { graph_.file = file; }
+
+  OnnxGraph parse(std::string_view bytes) {
+    onnx::ModelProto model;
+    if (bytes.empty() || bytes.size() > INT_MAX || !model.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+      refuse("expected an ONNX model, found bytes that are not one (truncated?)");
+    graph_.opset = opset(model);
+    read(model.graph());
+    return std::move(graph_);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& problem) const {
+    throw InputError(fmt::format("'{}': {}", graph_.file, problem));
+  }
+
+  [[nodiscard]] int opset(const onnx::ModelProto& model) const {
+    for (const auto& import : model.opset_import()) {
+      if (!own_domain(import.domain())) continue;
+      if (import.version() < kOldestOpset || import.version() > kNewestOpset)
+        refuse(fmt::format("ONNX operator set: expected {} to {}, found {}", kOldestOpset, kNewestOpset,
+                           import.version()));
+      return static_cast<int>(import.version());
+    }
+    refuse("expected an ONNX model with an operator set, found none (truncated?)");
+  }
+
+  static bool own_domain(const std::string& domain) { return domain.empty() || domain == "ai.onnx"; }
+
+  void read(const onnx::GraphProto& graph) {
+    if (graph.sparse_initializer_size() > 0) refuse("expected dense constants, found a sparse one");
+    for (const TensorProto& constant : graph.initializer())
+      if (!graph_.constants.emplace(constant.name(), tensor(constant, constant.name())).second)
+        refuse(fmt::format("constant '{}' stands in the file twice", constant.name()));
+    for (const auto& input : graph.input())
+      if (!graph_.constants.contains(input.name())) graph_.inputs.push_back(port(input, "input"));
+    for (const auto& output : graph.output()) graph_.outputs.push_back(port(output, "output"));
+    for (const auto& found : graph.node()) graph_.nodes.push_back(node(found));
+    if (graph_.outputs.empty()) refuse("expected outputs, found none (truncated?)");
+  }
+
+  [[nodiscard]] OnnxPort port(const onnx::ValueInfoProto& info, const std::string& kind) const {
+    const std::string place = fmt::format("{} '{}'", kind, info.name());
+    const auto& type = info.type().tensor_type();
+    if (!info.type().has_tensor_type() || (kind == "input" && type.elem_type() != TensorProto::FLOAT))
+      refuse(fmt::format("{}: expected a tensor of float, found {}", place, type_name(type.elem_type())));
+    OnnxPort port{info.name(), {}};
+    for (const auto& dim : type.shape().dim()) {
+      if (dim.has_dim_value() && dim.dim_value() < 1)
+        refuse(fmt::format("{}: expected sizes from 1, found {}", place, dim.dim_value()));
+      port.shape.push_back(dim.has_dim_value() ? dim.dim_value() : -1);
+    }
+    return port;
+  }
+
+  static std::string type_name(int type) {
+    return TensorProto::DataType_IsValid(type) ? TensorProto::DataType_Name(static_cast<TensorProto::DataType>(type))
+                                               : fmt::format("type {}", type);
+  }
+
+  [[nodiscard]] OnnxTensor tensor(const TensorProto& from, const std::string& name) const {
+    const std::string place = fmt::format("constant '{}'", name);
+    if (from.data_location() == TensorProto::EXTERNAL || from.external_data_size() > 0)
+      refuse(place + ": expected its numbers in the file, found them in another (external data)");
+    OnnxTensor tensor;
+    tensor.shape.assign(from.dims().begin(), from.dims().end());
+    read_values(from, place, tensor);
+    check_count(tensor, place);
+    check_finite(tensor, place);
+    return tensor;
+  }
+
+  void read_values(const TensorProto& from, const std::string& place, OnnxTensor& to) const {
+    to.type = ElementType::kInteger;
+    switch (from.data_type()) {
+      case TensorProto::FLOAT:
+        to.type = ElementType::kFloat;
+        to.floats = values_of<float, float>(from, from.float_data());
+        return;
+      case TensorProto::DOUBLE:
+        to.type = ElementType::kFloat;
+        to.floats = values_of<double, float>(from, from.double_data());
+        return;
+      case TensorProto::FLOAT16:
+        to.type = ElementType::kFloat;
+        to.floats = halves_of(from);
+        return;
+      case TensorProto::INT64:
+        to.integers = values_of<std::int64_t, std::int64_t>(from, from.int64_data());
+        return;
+      case TensorProto::INT32:
+        to.integers = values_of<std::int32_t, std::int64_t>(from, from.int32_data());
+        return;
+      case TensorProto::BOOL:
+        to.type = ElementType::kBoolean;
+        to.integers = values_of<std::uint8_t, std::int64_t>(from, from.int32_data());
+        for (std::int64_t& value : to.integers) value = value != 0 ? 1 : 0;
+        return;
+      default:
+        refuse(fmt::format("{}: expected FLOAT, DOUBLE, FLOAT16, INT64, INT32 or BOOL, found {}", place,
+                           type_name(from.data_type())));
+    }
+  }
+
+  void check_count(const OnnxTensor& tensor, const std::string& place) const {
+    const std::size_t found = std::max(tensor.floats.size(), tensor.integers.size());
+    std::size_t expected = 1;
+    for (const std::int64_t size : tensor.shape) {
+      // A product beyond what was found stays beyond it unless a size is 0, so it is cut there against overflow.
+      if (size < 0) refuse(fmt::format("{}: expected sizes from 0, found {}", place, size));
+      expected = size == 0 ? 0 : std::min(expected, found + 1) * std::min<std::size_t>(size, found + 1);
+    }
+    if (expected != found)
+      refuse(fmt::format("{}: shape ({}) does not give the {} values found (truncated?)", place,
+                         fmt::join(tensor.shape, ", "), found));
+  }
+
+  void check_finite(const OnnxTensor& tensor, const std::string& place) const {
+    for (const float value : tensor.floats)
+      if (std::isnan(value) || (std::isinf(value) && tensor.floats.size() > 1))
+        refuse(fmt::format("{}: expected finite numbers, found {}", place, value));
+  }
+
+  [[nodiscard]] OnnxNode node(const onnx::NodeProto& from) const {
+    OnnxNode node;
+    node.op = own_domain(from.domain()) ? from.op_type() : from.domain() + "." + from.op_type();
+    node.name = from.name().empty() ? fmt::format("{}#{}", node.op, graph_.nodes.size()) : from.name();
+    node.inputs.assign(from.input().begin(), from.input().end());
+    node.outputs.assign(from.output().begin(), from.output().end());
+    for (const AttributeProto& attribute : from.attribute())
+      if (!node.attributes.emplace(attribute.name(), value(attribute, node)).second)
+        refuse(fmt::format("node '{}' ({}): attribute '{}' stands there twice", node.name, node.op, attribute.name()));
+    return node;
+  }
+
+  [[nodiscard]] OnnxAttribute value(const AttributeProto& from, const OnnxNode& node) const {
+    switch (from.type()) {
+      case AttributeProto::INT:
+        return from.i();
+      case AttributeProto::FLOAT:
+        return from.f();
+      case AttributeProto::STRING:
+        return from.s();
+      case AttributeProto::INTS:
+        return std::vector<std::int64_t>(from.ints().begin(), from.ints().end());
+      case AttributeProto::FLOATS:
+        return std::vector<float>(from.floats().begin(), from.floats().end());
+      case AttributeProto::STRINGS:
+        return std::vector<std::string>(from.strings().begin(), from.strings().end());
+      case AttributeProto::TENSOR:
+        return tensor(from.t(), node.name);
+      default:
+        refuse(fmt::format("node '{}': operator {} is not supported (attribute '{}' is of another kind)", node.name,
+                           node.op, from.name()));
+    }
+  }
+
+  OnnxGraph graph_;
+};
+
+}  // namespace
+
+OnnxGraph parse_onnx(std::string_view bytes, const std::string& file) { return Parser(file).parse(bytes); }
+
+}  // namespace duet

@@ -1,0 +1,57 @@
+// What an ONNX file says, free of protobuf: a graph of named nodes, its constants and its ports. Nothing is evaluated
+// here. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace duet {
+
+using Shape = std::vector<std::int64_t>;
+
+enum class ElementType { kFloat, kInteger, kBoolean };
+
+// Floating-point types of any width come as float, integers and booleans of any width as int64.
+struct OnnxTensor {
+  ElementType type = ElementType::kFloat;
+  Shape shape;
+  std::vector<float> floats;           // of kFloat
+  std::vector<std::int64_t> integers;  // of the others
+};
+
+using OnnxAttribute = std::variant<std::int64_t, float, std::string, std::vector<std::int64_t>, std::vector<float>,
+                                   std::vector<std::string>, OnnxTensor>;
+
+struct OnnxNode {
+  std::string name;  // never empty: "Gemm#3" where the file gives none
+  std::string op;    // with its domain in front where that is not ONNX's own: "com.microsoft.FusedGemm"
+  std::vector<std::string> inputs, outputs;  // "" where one is left out
+  std::map<std::string, OnnxAttribute> attributes;
+};
+
+struct OnnxPort {
+  std::string name;
+  Shape shape;  // -1: not fixed by the file; empty also where the file gives none
+};
+
+struct OnnxGraph {
+  std::string file;
+  int opset = 0;
+  std::vector<OnnxPort> inputs;  // without those that are constants; float
+  std::vector<OnnxPort> outputs;
+  std::map<std::string, OnnxTensor> constants;
+  std::vector<OnnxNode> nodes;  // each after those whose outputs it reads
+};
+
+inline constexpr int kOldestOpset = 11, kNewestOpset = 17;
+
+// Throws InputError naming file, place, expected and found: not an ONNX model or truncated, an operator set outside
+// [kOldestOpset, kNewestOpset], constants in other files, of an unknown type, of a wrong number of bytes, or not finite
+// (a single number may be infinite: a bound of Clip).
+OnnxGraph parse_onnx(std::string_view bytes, const std::string& file);
+
+}  // namespace duet

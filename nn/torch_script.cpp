@@ -1,0 +1,213 @@
+#include "nn/torch_script.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <map>
+
+#include "core/require.h"
+#include "core/zip.h"
+#include "nn/dense_kernels.h"
+#include "nn/mlp.h"
+#include "nn/recurrent_cell.h"
+
+namespace duet {
+namespace {
+
+constexpr std::size_t kMaxEntry = std::size_t{1} << 28;
+
+// The parts of the archive that matter: the tensors by number, the module's pickle, all code in one text.
+struct Archive {
+  std::map<int, std::vector<float>> tensors;
+  std::string pickle, code;
+};
+
+struct Module {
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W, R;
+  Eigen::VectorXf b;
+  Mlp actor;
+};
+
+class ArchiveReader {
+ public:
+  explicit ArchiveReader(const std::string& file) : file_(file) {}
+
+  Module read(std::string_view bytes) {
+    read_zip(bytes, file_, kMaxEntry, [&](const std::string& entry, const std::string& content) {
+      // "policy/data/0", "policy/data.pkl", "policy/code/..." : the first folder has any name.
+      take(entry.substr(std::min(entry.find('/') + 1, entry.size())), content);
+    });
+    check_kind();
+    return module();
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& problem) const {
+    throw InputError(fmt::format("'{}': TorchScript: {}", file_, problem));
+  }
+
+  [[noreturn]] void refuse_kind(const std::string& found) const {
+    refuse(
+        fmt::format("expected a PolicyExporterLSTM with one LSTM layer and ELU between linear layers, found {} "
+                    "(TorchScript of another kind; needs libtorch)",
+                    found));
+  }
+
+  void take(const std::string& entry, const std::string& content) {
+    if (entry == "data.pkl") archive_.pickle = content;
+    if (entry.starts_with("code/") && entry.ends_with(".py")) archive_.code += content + "\n";
+    if (entry == "byteorder" && !content.starts_with("little")) refuse("expected little-endian numbers");
+    if (!entry.starts_with("data/")) return;
+    const std::string number = entry.substr(5);
+    if (number.empty() || number.size() > 4 ||
+        !std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; }))
+      refuse(fmt::format("expected tensors numbered from 0, found '{}'", entry));
+    archive_.tensors[std::stoi(number)] = floats(entry, content);
+  }
+
+  [[nodiscard]] std::vector<float> floats(const std::string& entry, const std::string& content) const {
+    if (content.size() % sizeof(float) != 0)
+      refuse(fmt::format("tensor '{}': expected 4 bytes a number, found {} bytes", entry, content.size()));
+    std::vector<float> values(content.size() / sizeof(float));
+    if (!values.empty()) std::memcpy(values.data(), content.data(), content.size());
+    for (const float value : values)
+      if (!std::isfinite(value)) refuse(fmt::format("tensor '{}': expected finite numbers, found {}", entry, value));
+    return values;
+  }
+
+  [[nodiscard]] bool says(const std::string& text) const { return archive_.code.find(text) != std::string::npos; }
+
+  // The module's own code says what it is.
+  void check_kind() const {
+    if (archive_.pickle.empty()) refuse("expected an entry 'data.pkl', found none");
+    if (!says("class PolicyExporterLSTM(Module)")) refuse_kind("another module");
+    for (const char* line : {"num_layers : Final[int] = 1\n", "bidirectional : Final[bool] = False\n",
+                             "proj_size : Final[int] = 0\n", "alpha : Final[float] = 1.\n"})
+      if (!says(line))
+        refuse_kind(fmt::format("no line '{}'", std::string_view(line).substr(0, std::strlen(line) - 1)));
+    for (std::size_t at = archive_.pickle.find("Storage"); at != std::string::npos;
+         at = archive_.pickle.find("Storage", at + 1))
+      if (at < 5 || archive_.pickle.compare(at - 5, 5, "Float") != 0) refuse_kind("tensors that are not float");
+  }
+
+  // Linear, ELU, Linear, ...: 2 layers - 1 modules.
+  void check_actor(int layers) const {
+    const auto annotation = [](int k) {
+      return fmt::format("__annotations__[\"{}\"] = __torch__.torch.nn.modules.", k);
+    };
+    for (int k = 0; k < 2 * layers - 1; ++k) {
+      const std::size_t at = archive_.code.find(annotation(k));
+      if (at == std::string::npos) refuse_kind(fmt::format("no module {} in its actor", k));
+      const std::size_t begin = at + annotation(k).size();
+      const std::string_view kind =
+          std::string_view(archive_.code).substr(begin, archive_.code.find('\n', begin) - begin);
+      const bool fits =
+          k % 2 == 0 ? kind.starts_with("linear.") : kind.starts_with("activation.") && kind.ends_with("ELU");
+      if (!fits || (k % 2 == 1 && kind.ends_with("GELU")))
+        refuse_kind(fmt::format("'{}' as module {} of its actor", kind, k));
+    }
+    if (says(annotation(2 * layers - 1))) refuse_kind(fmt::format("more than {} modules in its actor", 2 * layers - 1));
+  }
+
+  // Tensors by number, as the exporter's members stand: hidden state, cell state, each linear layer's weight and bias,
+  // the LSTM's two matrices and two biases. Their sizes give all shapes.
+  [[nodiscard]] Module module() const {
+    const int count = static_cast<int>(archive_.tensors.size());
+    constexpr int kStates = 2, kLstm = 4;
+    const int layers = (count - kStates - kLstm) / 2;
+    if (count < kStates + 2 + kLstm || count % 2 != 0 || archive_.tensors.rbegin()->first != count - 1)
+      refuse(fmt::format("expected tensors 0 to 2 n + 5, found {} tensors", count));
+    check_actor(layers);
+    Module module;
+    const int hidden = static_cast<int>(archive_.tensors.at(0).size());
+    check(hidden > 0 && archive_.tensors.at(1).size() == archive_.tensors.at(0).size(), 1);
+    int inputs = hidden;
+    for (int k = 0; k < layers; ++k) {
+      module.actor.layers.push_back(layer(kStates + 2 * k, inputs));
+      inputs = static_cast<int>(module.actor.layers.back().b.size());
+    }
+    read_lstm(kStates + 2 * layers, hidden, module);
+    return module;
+  }
+
+  void check(bool condition, int tensor) const {
+    if (!condition)
+      refuse(fmt::format("tensor 'data/{}': its {} numbers do not fit the other tensors", tensor,
+                         archive_.tensors.at(tensor).size()));
+  }
+
+  [[nodiscard]] MlpLayer layer(int first, int inputs) const {
+    const std::vector<float>&W = archive_.tensors.at(first), &b = archive_.tensors.at(first + 1);
+    check(!b.empty() && W.size() == b.size() * inputs, first);
+    MlpLayer layer;
+    layer.b = Eigen::Map<const Eigen::VectorXf>(b.data(), static_cast<Eigen::Index>(b.size()));
+    layer.W = Eigen::Map<const decltype(layer.W)>(W.data(), layer.b.size(), inputs);
+    return layer;
+  }
+
+  void read_lstm(int first, int hidden, Module& module) const {
+    const auto tensor = [&](int k) -> const std::vector<float>& { return archive_.tensors.at(first + k); };
+    const std::size_t rows = 4 * static_cast<std::size_t>(hidden);
+    check(!tensor(0).empty() && tensor(0).size() % rows == 0, first);
+    check(tensor(1).size() == rows * hidden, first + 1);
+    check(tensor(2).size() == rows, first + 2);
+    check(tensor(3).size() == rows, first + 3);
+    const auto inputs = static_cast<Eigen::Index>(tensor(0).size() / rows);
+    const auto gates = static_cast<Eigen::Index>(rows);
+    module.W = Eigen::Map<const decltype(module.W)>(tensor(0).data(), gates, inputs);
+    module.R = Eigen::Map<const decltype(module.R)>(tensor(1).data(), gates, hidden);
+    module.b = Eigen::Map<const Eigen::VectorXf>(tensor(2).data(), gates) +
+               Eigen::Map<const Eigen::VectorXf>(tensor(3).data(), gates);
+  }
+
+  std::string file_;
+  Archive archive_;
+};
+
+class LstmPolicy final : public Network {
+ public:
+  explicit LstmPolicy(Module module)
+      : module_(std::move(module)),
+        actor_(module_.actor),
+        h_(Eigen::VectorXf::Zero(module_.R.cols())),
+        c_(h_),
+        scratch_(8 * h_.size()),
+        inputs_{{"x", static_cast<int>(module_.W.cols())}},
+        outputs_{{"action", module_.actor.outputs()}} {}
+
+  [[nodiscard]] std::span<const Port> inputs() const override { return inputs_; }
+  [[nodiscard]] std::span<const Port> outputs() const override { return outputs_; }
+
+  void run(std::span<const std::span<const float>> inputs, std::span<const std::span<float>> outputs) override {
+    const LstmCell cell{.inputs = inputs_[0].size,
+                        .hidden = static_cast<int>(h_.size()),
+                        .W = module_.W.data(),
+                        .R = module_.R.data(),
+                        .b = module_.b.data(),
+                        .order = kTorchLstmOrder};
+    lstm_step(cell, inputs[0].data(), h_.data(), c_.data(), scratch_.data());
+    std::ranges::copy(actor_.run({h_.data(), static_cast<std::size_t>(h_.size())}), outputs[0].begin());
+  }
+
+  void reset() override {
+    h_.setZero();
+    c_.setZero();
+  }
+
+ private:
+  Module module_;
+  MlpRunner actor_;
+  Eigen::VectorXf h_, c_, scratch_;
+  std::vector<Port> inputs_, outputs_;
+};
+
+}  // namespace
+
+std::unique_ptr<Network> torch_script_network(std::string_view bytes, const std::string& file) {
+  return std::make_unique<LstmPolicy>(ArchiveReader(file).read(bytes));
+}
+
+}  // namespace duet

@@ -1,0 +1,135 @@
+#include "nn/network.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "core/zip.h"
+#include "nn/mlp_file.h"
+#include "nn/safetensors.h"
+#include "tests/backends/allocation_count.h"
+#include "tests/nn/evaluate.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using ::testing::Pointwise;
+
+constexpr double kTolerance = 1e-5;
+
+// What ONNX Runtime 1.16.3 gives for test::wave().
+const std::vector<float> kHomie = {1.621504F,   -0.4413289F, -0.451069F, 0.2446406F, 1.499561F, -0.2426685F,
+                                   -0.6993031F, 0.9277365F,  0.4702923F, 1.281899F,  -1.4428F,  0.1635714F};
+const std::vector<float> kTwist2 = {-1.799943F,  -0.1862341F, 0.02289873F, -0.4585755F, -0.7746909F, -0.2291465F,
+                                    -0.1292005F, -0.5266997F, 0.7326086F,  0.7954054F,  0.9774022F,  -0.4419506F,
+                                    -0.6243433F, 0.4866512F,  0.60649F,    0.6950721F,  -0.6950759F, 0.03133754F,
+                                    -0.7967066F, 0.1574676F,  1.308852F,   -0.6270058F, 2.225753F,   1.61574F,
+                                    -1.080222F,  -0.275581F,  2.881738F,   -0.7926737F, -0.5891808F};
+const std::vector<float> kPlayground = {
+    -0.03404216F, 0.18611F,     -0.1617039F,  0.192837F,   -0.1682846F, -0.05698057F, -0.3521344F, -0.02818271F,
+    0.3307241F,   -0.07400152F, -0.1267114F,  -0.2700883F, -0.0780508F, -0.08273568F, -0.1306079F, 0.01864804F,
+    -0.06357676F, -0.1335106F,  -0.08789083F, 0.2637823F,  0.4697124F,  0.09000928F,  -0.1730191F, -0.1029268F,
+    -0.1036182F,  0.0215461F,   -0.33997F,    0.04942394F, 0.3366146F};
+
+void expect_reference(const std::string& name, const std::vector<float>& reference) {
+  const std::string path = test::shared_file("models/" + name);
+  if (path.empty()) GTEST_SKIP() << "not run: " << name << " absent";
+  const auto network = load_network(path);
+  ASSERT_EQ(network->inputs().size(), 1U);
+  EXPECT_THAT(test::evaluate(*network, {test::wave(network->inputs()[0].size)})[0],
+              Pointwise(FloatNear(kTolerance), reference));
+}
+
+TEST(Network, HomieEqualsOnnxRuntime) { expect_reference("homie_deploy.onnx", kHomie); }
+TEST(Network, Twist2EqualsOnnxRuntime) { expect_reference("twist2_1017_20k.onnx", kTwist2); }
+TEST(Network, PlaygroundEqualsOnnxRuntime) { expect_reference("playground_g1_policy.onnx", kPlayground); }
+
+TEST(Network, PublishedPoliciesAllocateNothingInRun) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: a counting malloc is absent";
+  bool any = false;
+  for (const char* name :
+       {"homie_deploy.onnx", "twist2_1017_20k.onnx", "playground_g1_policy.onnx", "unitree_rl_gym_g1_motion.pt"}) {
+    const std::string path = test::shared_file(std::string("models/") + name);
+    if (path.empty()) continue;
+    any = true;
+    const auto network = load_network(path);
+    const std::vector<float> in = test::wave(network->inputs()[0].size);
+    std::vector<float> out(network->outputs()[0].size);
+    const std::span<const float> inputs[] = {in};
+    const std::span<float> outputs[] = {out};
+    network->run(inputs, outputs);
+    const long before = test::allocation_count();
+    network->run(inputs, outputs);
+    network->reset();
+    EXPECT_EQ(test::allocation_count() - before, 0) << name;
+  }
+  if (!any) GTEST_SKIP() << "not run: published policies absent";
+}
+
+TEST(Network, NanInComesOutAsNan) {
+  const std::string path = test::shared_file("models/homie_deploy.onnx");
+  if (path.empty()) GTEST_SKIP() << "not run: homie_deploy.onnx absent";
+  const auto network = load_network(path);
+  std::vector<float> in = test::wave(456);
+  in[450] = std::nanf("");
+  const std::vector<float> out = test::evaluate(*network, {in})[0];
+  for (const float value : out) EXPECT_TRUE(std::isnan(value));
+}
+
+TEST(Network, APerceptronInSafetensorsIsRecognised) {
+  const test::ScratchFolder folder;
+  Random random(1, 2);
+  const Mlp mlp = random_mlp({5, 8, 3}, 0.5F, random);
+  SafeTensors content;
+  add_mlp(content, "student", mlp);
+  write_safetensors(folder / "net", content);
+  const auto network = load_network(folder / "net");
+  const std::vector<float> x = test::wave(5);
+  EXPECT_THAT(test::evaluate(*network, {x})[0], Pointwise(FloatNear(1e-7), MlpRunner(mlp).run(x)));
+  add_mlp(content, "teacher", mlp);
+  write_safetensors(folder / "two", content);
+  EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "two"); }),
+              HasSubstr("expected one multilayer perceptron ('<name>.0.weight'), found 2 [student, teacher]"));
+}
+
+TEST(Network, UnknownEngineNamesThosePresent) {
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { load_network("x", "tensorrt"); }),
+              HasSubstr("no network engine 'tensorrt' in this build. It has: duet"));
+  EXPECT_EQ(network_engines().front(), "duet");
+}
+
+TEST(Network, FilesThatAreNoNetworksAreRefused) {
+  const test::ScratchFolder folder;
+  const auto refusal = [&](const std::string& bytes) {
+    write_file(folder / "net", bytes);
+    return test::thrown_message<InputError>([&] { load_network(folder / "net"); });
+  };
+  EXPECT_THAT(refusal(""), HasSubstr("expected an ONNX model, found bytes that are not one (truncated?)"));
+  EXPECT_THAT(refusal("hello, this is a text"), HasSubstr("net': expected an ONNX model"));
+  EXPECT_THAT(refusal(zip_bytes({{"a/data.pkl", "x"}})), HasSubstr("TorchScript of another kind; needs libtorch"));
+  EXPECT_THAT(refusal("PK and no more"), HasSubstr("not a zip archive or truncated"));
+  EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "none"); }), HasSubstr("none"));
+}
+
+TEST(Network, TruncatedPoliciesAreRefused) {
+  const test::ScratchFolder folder;
+  for (const char* name : {"playground_g1_policy.onnx", "unitree_rl_gym_g1_motion.pt"}) {
+    const std::string path = test::shared_file(std::string("models/") + name);
+    if (path.empty()) GTEST_SKIP() << "not run: " << name << " absent";
+    const std::string bytes = read_file(path);
+    for (const double part : {0.01, 0.3, 0.9, 0.9999}) {
+      write_file(folder / "cut", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+      EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "cut"); }), HasSubstr("cut'")) << name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,151 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/nn/evaluate.h"
+#include "tests/nn/onnx_writer.h"
+
+namespace duet::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Element (r, c) of a matrix of the operand, which starts at `from` and has `cols` columns.
+double element(const Operand& x, std::int64_t from, std::int64_t cols, std::int64_t r, std::int64_t c) {
+  return static_cast<double>(x.values[from + r * cols + c]);
+}
+
+std::vector<double> product(const Operand& a, const Operand& b, std::int64_t m, std::int64_t n, std::int64_t k,
+                            std::int64_t from_a = 0, std::int64_t from_b = 0) {
+  std::vector<double> y;
+  for (std::int64_t r = 0; r < m; ++r)
+    for (std::int64_t c = 0; c < n; ++c) {
+      y.push_back(0.0);
+      for (std::int64_t i = 0; i < k; ++i) y.back() += element(a, from_a, k, r, i) * element(b, from_b, n, i, c);
+    }
+  return y;
+}
+
+Operand transposed(const Operand& x) {
+  Operand y{{x.shape[1], x.shape[0]}, {}};
+  for (std::int64_t c = 0; c < x.shape[1]; ++c)
+    for (std::int64_t r = 0; r < x.shape[0]; ++r) y.values.push_back(x.values[r * x.shape[1] + c]);
+  return y;
+}
+
+TEST(OnnxLinear, GemmOfEveryTranspositionScaleAndBias) {
+  constexpr std::int64_t n = 5, k = 7;
+  for (const std::int64_t m : {1, 3})
+    for (const bool ta : {false, true})
+      for (const bool tb : {false, true})
+        for (const Shape& bias : {Shape{}, Shape{n}, Shape{1, n}, Shape{m, 1}, Shape{m, n}}) {
+          const Operand a = operand({m, k}, 0), b = operand({k, n}, 1), c = operand(bias, 2);
+          std::vector<double> expected = product(a, b, m, n, k);
+          for (std::int64_t e = 0; e < m * n; ++e) {
+            const std::int64_t r = bias.size() == 2 && bias[0] > 1 ? e / n : 0;
+            const std::int64_t col = !bias.empty() && bias.back() > 1 ? e % n : 0;
+            const std::int64_t width = bias.empty() ? 1 : bias.back();
+            expected[e] = 0.5 * expected[e] + 2.0 * static_cast<double>(c.values[r * width + col]);
+          }
+          expect_node("Gemm", {ta ? transposed(a) : a, tb ? transposed(b) : b, c}, expected,
+                      {{"alpha", 0.5F},
+                       {"beta", 2.0F},
+                       {"transA", std::int64_t{ta ? 1 : 0}},
+                       {"transB", std::int64_t{tb ? 1 : 0}}},
+                      {13});
+        }
+}
+
+TEST(OnnxLinear, GemmWithoutBias) {
+  const Operand a = operand({2, 9}, 0), b = operand({9, 4}, 1);
+  expect_node("Gemm", {a, b}, product(a, b, 2, 4, 9));
+}
+
+TEST(OnnxLinear, MatMulOfVectorsMatricesAndStacks) {
+  const Operand v = operand({3}, 0), M = operand({2, 3}, 1), N = operand({3, 4}, 2), S = operand({5, 2, 3}, 3);
+  expect_node("MatMul", {v, operand({3}, 4)}, product(v, operand({3}, 4), 1, 1, 3));
+  expect_node("MatMul", {M, v}, product(M, v, 2, 1, 3));
+  expect_node("MatMul", {v, N}, product(v, N, 1, 4, 3));
+  expect_node("MatMul", {M, N}, product(M, N, 2, 4, 3));
+  expect_node("MatMul", {S, N}, product(S, N, 10, 4, 3));
+  const Operand T = operand({5, 3, 4}, 5), left = operand({2, 1, 2, 3}, 6), right = operand({4, 3, 2}, 7);
+  std::vector<double> stacked, crossed;
+  for (std::int64_t s = 0; s < 5; ++s)
+    for (const double value : product(S, T, 2, 4, 3, s * 6, s * 12)) stacked.push_back(value);
+  for (std::int64_t s = 0; s < 8; ++s)
+    for (const double value : product(left, right, 2, 2, 3, s / 4 * 6, s % 4 * 6)) crossed.push_back(value);
+  expect_node("MatMul", {S, T}, stacked);
+  expect_node("MatMul", {left, right}, crossed);
+}
+
+struct ConvCase {
+  std::int64_t channels, length, out, kernel, stride, dilation, before, after, groups;
+};
+
+std::vector<double> convolved(const ConvCase& c, const Operand& x, const Operand& W, const Operand& bias) {
+  const std::int64_t in = c.channels / c.groups, per_group = c.out / c.groups;
+  std::vector<double> y;
+  for (std::int64_t o = 0; o < c.out; ++o)
+    for (std::int64_t begin = -c.before; begin + (c.kernel - 1) * c.dilation < c.length + c.after; begin += c.stride) {
+      y.push_back(static_cast<double>(bias.values[o]));
+      for (std::int64_t i = 0; i < in; ++i)
+        for (std::int64_t k = 0; k < c.kernel; ++k) {
+          const std::int64_t at = begin + k * c.dilation, channel = o / per_group * in + i;
+          if (at < 0 || at >= c.length) continue;
+          y.back() += static_cast<double>(x.values[channel * c.length + at]) *
+                      static_cast<double>(W.values[(o * in + i) * c.kernel + k]);
+        }
+    }
+  return y;
+}
+
+TEST(OnnxLinear, ConvolutionEqualsTheSum) {
+  for (const ConvCase& c : {ConvCase{6, 10, 4, 4, 2, 1, 0, 0, 1}, ConvCase{4, 4, 2, 2, 1, 1, 0, 0, 1},
+                            ConvCase{2, 9, 2, 3, 1, 2, 1, 2, 1}, ConvCase{4, 5, 6, 3, 2, 1, 1, 1, 2}}) {
+    const Operand x = operand({1, c.channels, c.length}, 0), bias = operand({c.out}, 2);
+    const Operand W = operand({c.out, c.channels / c.groups, c.kernel}, 1);
+    expect_node("Conv", {x, W, bias}, convolved(c, x, W, bias),
+                {{"strides", std::vector<std::int64_t>{c.stride}},
+                 {"dilations", std::vector<std::int64_t>{c.dilation}},
+                 {"pads", std::vector<std::int64_t>{c.before, c.after}},
+                 {"group", c.groups}},
+                {11});
+  }
+}
+
+TEST(OnnxLinear, AutomaticPaddingPutsTheOddZeroWhereItSays) {
+  const Operand x = operand({1, 1, 5}, 0), W = operand({1, 1, 4}, 1), zero{{1}, {0.0F}};
+  const ConvCase upper{1, 5, 1, 4, 1, 1, 1, 2, 1}, lower{1, 5, 1, 4, 1, 1, 2, 1, 1}, valid{1, 5, 1, 4, 1, 1, 0, 0, 1};
+  expect_node("Conv", {x, W}, convolved(upper, x, W, zero), {{"auto_pad", std::string("SAME_UPPER")}});
+  expect_node("Conv", {x, W}, convolved(lower, x, W, zero), {{"auto_pad", std::string("SAME_LOWER")}});
+  expect_node("Conv", {x, W}, convolved(valid, x, W, zero), {{"auto_pad", std::string("VALID")}});
+}
+
+std::string refusal(const std::string& op, const std::vector<Shape>& shapes, const Attributes& attributes = {}) {
+  OnnxWriter writer;
+  std::vector<std::string> names;
+  for (const Shape& shape : shapes) {
+    names.push_back("in" + std::to_string(names.size()));
+    writer.input(names.back(), shape);
+  }
+  return writer.node(op, names, {"y"}, attributes).output("y").refusal();
+}
+
+TEST(OnnxLinear, MisfitsAreRefused) {
+  EXPECT_EQ(refusal("Gemm", {{2, 3}, {2, 3}}),
+            "'test.onnx': node 'Gemm#0', operator Gemm: shapes (2, 3) and (2, 3) do not fit together");
+  EXPECT_THAT(refusal("Gemm", {{2, 3}, {3}}), HasSubstr("expected two matrices, found shapes (2, 3) and (3)"));
+  EXPECT_THAT(refusal("Gemm", {{2, 3}, {3, 4}, {5}}), HasSubstr("shapes (5) and (2, 4) do not fit together"));
+  EXPECT_THAT(refusal("Gemm", {{1, 3}, {3, 4}, {2, 4}}), HasSubstr("input 2: shape (2, 4) does not fit (1, 4)"));
+  EXPECT_THAT(refusal("MatMul", {{2, 3}, {2, 3}}), HasSubstr("do not fit together"));
+  EXPECT_THAT(refusal("MatMul", {{}, {2}}), HasSubstr("expected vectors or matrices, found a number"));
+  EXPECT_THAT(refusal("Conv", {{1, 3, 4, 4}, {2, 3, 2, 2}}), HasSubstr("expected a 1-D convolution"));
+  EXPECT_THAT(refusal("Conv", {{1, 3, 4}, {2, 2, 2}}), HasSubstr("do not fit together in 1 groups"));
+  EXPECT_THAT(refusal("Conv", {{1, 2, 3}, {2, 2, 4}}), HasSubstr("a kernel of 4 does not fit into 3"));
+  EXPECT_THAT(refusal("Conv", {{1, 2, 3}, {2, 2, 2}}, {{"strides", std::vector<std::int64_t>{0}}}),
+              HasSubstr("attribute 'strides': expected one number from 1"));
+}
+
+}  // namespace
+}  // namespace duet::test
