@@ -1,6 +1,6 @@
 #include "bench/episode.h"
 
-#include <fmt/format.h>
+#include <algorithm>
 
 #include "core/random.h"
 
@@ -9,26 +9,91 @@ namespace {
 
 constexpr const char* kPlayback = "playback";
 
+// Whether playback under one controller is playback under all; asks what the suite says, not what this machine has.
+bool one_playback(const Suite& suite) {
+  const auto robot = [&](const SuiteController& controller) {
+    return suite.robot.empty() ? controller_info(controller.use).robot : suite.robot;
+  };
+  const SuiteController& first = suite.controllers.front();
+  return std::all_of(suite.controllers.begin(), suite.controllers.end(), [&](const SuiteController& controller) {
+    return robot(controller) == robot(first) && start_mode(suite, controller) == start_mode(suite, first);
+  });
+}
+
+// The episodes of one engine, controller and perturbation.
+class Planner {
+ public:
+  Planner(const Suite& suite, std::vector<EpisodeSpec>& plan)
+      : suite_(suite), suite_id_(suite.name + "@" + suite.version), plan_(plan) {}
+
+  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips) {
+    for (const std::string& policy : suite_.policies)
+      if (policy != "null") add(combination, clips, policy, "main");
+    if (suite_.null_arm) add(combination, clips, "null", "null");
+  }
+
+ private:
+  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips, const std::string& policy,
+           const std::string& arm) {
+    for (const PairedMotion& clip : clips) {
+      for (int episode = 0; episode < suite_.episodes_per_clip; ++episode) {
+        EpisodeSpec spec = combination;
+        spec.clip = &clip;
+        spec.policy = policy;
+        spec.arm = arm;
+        spec.episode = episode;
+        spec.seed = seed(clip, episode, "episode");
+        spec.perturbation_seed = seed(clip, episode, "perturbation");
+        plan_.push_back(std::move(spec));
+      }
+    }
+  }
+
+  [[nodiscard]] std::uint64_t seed(const PairedMotion& clip, int episode, const char* stream) const {
+    return suite_.seed + stream_key({suite_id_, to_string(clip.task), clip.clip_id, std::to_string(episode), stream});
+  }
+
+  const Suite& suite_;
+  std::string suite_id_;
+  std::vector<EpisodeSpec>& plan_;
+};
+
 }  // namespace
 
-std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips) {
+StartMode start_mode(const Suite& suite, const SuiteController& controller) {
+  switch (suite.start) {
+    case SuiteStart::kClip:
+      return StartMode::kClip;
+    case SuiteStart::kApproach:
+      return StartMode::kApproach;
+    case SuiteStart::kAct:
+      return StartMode::kAct;
+    case SuiteStart::kAuto:
+      break;
+  }
+  return controller_info(controller.use).walks ? StartMode::kApproach : StartMode::kAct;
+}
+
+std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies) {
   std::vector<EpisodeSpec> plan;
-  const std::string suite_id = suite.name + "@" + suite.version;
+  Planner planner(suite, plan);
+  const bool once = one_playback(suite);
   for (const std::string& engine : suite.engines) {
-    for (const std::string& controller : suite.controllers) {
-      if (engine == kPlayback && controller != suite.controllers.front()) continue;  // it moves without one
-      const auto add = [&](const std::string& policy, const std::string& arm) {
-        for (const PairedMotion& clip : clips) {
-          for (int episode = 0; episode < suite.episodes_per_clip; ++episode) {
-            const std::uint64_t seed = suite.seed + stream_key({suite_id, to_string(clip.task), clip.clip_id,
-                                                                std::to_string(episode), "episode"});
-            plan.push_back({&clip, engine, controller, policy, arm, episode, seed});
-          }
-        }
-      };
-      for (const std::string& policy : suite.policies)
-        if (policy != "null") add(policy, "main");
-      if (suite.null_arm) add("null", "null");
+    for (const SuiteController& controller : suite.controllers) {
+      const bool playback = engine == kPlayback;
+      if (playback && once && controller.name != suite.controllers.front().name) continue;
+      EpisodeSpec combination;
+      combination.engine = engine;
+      combination.controller = controller.name;
+      const std::vector<PairedMotion>& clips = bodies.clips(controller.name);
+      if (playback) {
+        planner.add(combination, clips);
+        continue;
+      }
+      for (const Perturbation& perturbation : suite.perturbations) {
+        combination.perturbation = perturbation.name;
+        planner.add(combination, clips);
+      }
     }
   }
   return plan;
@@ -50,6 +115,7 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::strin
   }
   row.controller = spec.controller;
   row.policy = spec.policy;
+  row.perturbation = spec.perturbation;
   row.arm = spec.arm;
   row.robot_digest = robot.digest;
   row.key = episode_key(row);

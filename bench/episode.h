@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "bench/bodies.h"
 #include "bench/suite.h"
 #include "motion/paired_motion.h"
+#include "policies/phase_adaptation.h"
 #include "results/episode_row.h"
 
 namespace duet {
@@ -17,11 +19,17 @@ struct EpisodeSpec {
   std::string arm = "main";  // "null" for the control arm: policy `null`
   int episode = 0;
   std::uint64_t seed = 0;  // of the episode, the same for every engine, controller and policy
+  std::string perturbation = kCleanName;
+  std::uint64_t perturbation_seed = 0;  // likewise
 };
 
-// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine and
-// controller; playback under the first controller only, as none acts in it.
-std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const std::vector<PairedMotion>& clips);
+// Where episodes of one of the suite's controllers begin.
+StartMode start_mode(const Suite& suite, const SuiteController& controller);
+
+// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine, controller
+// and perturbation. Playback is always clean and, as no controller acts in it, run under the first alone, or under each
+// where they differ in robot or start.
+std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies);
 
 // A row with everything that is known before the episode runs, its key included.
 EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const RobotModel& robot);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "backends/factory.h"
+#include "bench/disturbance.h"
 #include "core/digest.h"
 #include "core/require.h"
 #include "policies/observation_history.h"
@@ -66,9 +67,9 @@ class StepMeter {
   Eigen::Vector3d tick_ = Eigen::Vector3d::Zero();  // sum over the steps of this tick
 };
 
-Outcome advance(Backend& backend, const JointCommand& command, int steps, StepMeter& meter) {
+Outcome advance(Backend& backend, const Disturbance& disturbance, int steps, StepMeter& meter) {
   for (int i = 0; i < steps; ++i) {
-    const Outcome outcome = backend.step(command);
+    const Outcome outcome = backend.step(disturbance.in_effect(i));
     if (outcome != Outcome::kOk) return outcome;
     meter.add();
   }
@@ -132,6 +133,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   Sha256 hash;
   JointCommand command = backend.scene().robot->default_command(setup.start.q);
   StepMeter meter(backend, setup.limits);
+  Disturbance disturbance(setup.perturbation, *backend.scene().robot, setup.start, steps_per_tick, backend.scene().dt,
+                          setup.perturbation_seed);
 
   int tick = 0;
   for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
@@ -140,13 +143,15 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     history.add({partner, backend.state()});
     if (tick % kTicksPerPlan == 0) scheduler.push(policy.plan(history.at(tick)), tick);
     const Reference& reference = scheduler.at(tick);
-    controller.act(backend.state(), reference, command);
+    controller.act(disturbance.seen(backend.state()), reference, command);
+    disturbance.send(command);
 
     record_tick(recording, tick, backend, partner, reference, command);
     hash.update(backend.state());
     backend.set_partner(partner, velocities);
     backend.follow(reference);
-    recording.outcome = advance(backend, command, steps_per_tick, meter);
+    disturbance.push(tick, backend);
+    recording.outcome = advance(backend, disturbance, steps_per_tick, meter);
     if (recording.outcome == Outcome::kOk && Clock::now() > deadline) recording.outcome = Outcome::kTimedOut;
     if (setup.stop_asked && setup.stop_asked()) {
       rollout.interrupted = true;
@@ -157,6 +162,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   trim(recording, tick);
   recording.message = describe(recording.outcome, tick, backend.name());
   rollout.late_plans = scheduler.late_ticks();
+  rollout.faults = controller.faults();
   rollout.state_hash = hash.hex();
   return rollout;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "backends/backend.h"
+#include "bench/perturbation.h"
 #include "controllers/controller.h"
 #include "core/recording.h"
 #include "metrics/contact_safety.h"
@@ -31,6 +32,9 @@ struct RolloutSetup {
   AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
   RobotState start;
   std::uint64_t seed = 0;
+  Perturbation perturbation;  // but its friction and mass, which are the scene's
+  std::uint64_t perturbation_seed = 0;
+  bool foot_trace = false;              // whether the row is to have one
   double wall_limit = 120.0;            // [s]
   std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
   std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
@@ -42,6 +46,7 @@ struct Rollout {
   int late_plans = 0;
   GroundForce ground;
   std::optional<ContactSafetyResult> safety;  // of a solid partner, at physics rate
+  ControllerFaults faults;
   bool interrupted = false;
 };
 

@@ -22,21 +22,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
+constexpr const char* kPlayback = "playback";
 
-StartMode start_mode(const Suite& suite, bool walks) {
-  switch (suite.start) {
-    case SuiteStart::kClip:
-      return StartMode::kClip;
-    case SuiteStart::kApproach:
-      return StartMode::kApproach;
-    case SuiteStart::kAct:
-      return StartMode::kAct;
-    case SuiteStart::kAuto:
-      break;
-  }
-  return walks ? StartMode::kApproach : StartMode::kAct;
-}
+std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 bool chosen(const std::vector<std::string>& filter, const std::string& name) {
   return filter.empty() || std::find(filter.begin(), filter.end(), name) != filter.end();
@@ -45,7 +33,8 @@ bool chosen(const std::vector<std::string>& filter, const std::string& name) {
 bool selected(const RunOptions& options, const EpisodeSpec& spec) {
   return chosen(options.engines, spec.engine) && chosen(options.controllers, spec.controller) &&
          (spec.arm == "null" || chosen(options.policies, spec.policy)) &&
-         chosen(options.tasks, std::string(to_string(spec.clip->task)));
+         chosen(options.tasks, std::string(to_string(spec.clip->task))) &&
+         (spec.engine == kPlayback || chosen(options.perturbations, spec.perturbation));
 }
 
 // The part of a filter that the suite does not have is a mistake of the user, not an empty run.
@@ -59,9 +48,10 @@ void check_filters(const RunOptions& options, const Suite& suite) {
   std::vector<std::string> tasks;
   for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
   check_filter(options.engines, suite.engines, "engine");
-  check_filter(options.controllers, suite.controllers, "controller");
+  check_filter(options.controllers, controller_names_of(suite), "controller");
   check_filter(options.policies, suite.policies, "policy");
   check_filter(options.tasks, tasks, "task");
+  check_filter(options.perturbations, perturbation_names_of(suite), "perturbation");
 }
 
 // Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
@@ -80,6 +70,32 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
   return absent;
 }
 
+// Controllers that the filters leave out need not be there.
+std::vector<std::string> left_out(const Suite& suite, const RunOptions& options) {
+  std::vector<std::string> names;
+  for (const std::string& name : controller_names_of(suite))
+    if (!chosen(options.controllers, name)) names.push_back(name);
+  return names;
+}
+
+// Throws MissingError where all controllers are absent and nothing is left that runs without one.
+void check_controllers(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
+  const std::size_t wanted = suite.controllers.size() - left_out(suite, options).size();
+  const bool playback = std::find(suite.engines.begin(), suite.engines.end(), kPlayback) != suite.engines.end() &&
+                        chosen(options.engines, kPlayback);
+  if (!bodies.absent().empty() && bodies.absent().size() == wanted && !playback)
+    throw MissingError(bodies.absent().begin()->second);
+}
+
+EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
+  row.started_at = utc_now();
+  row.robot_digest.clear();
+  row.outcome = Outcome::kUnsupported;
+  row.message = reason;
+  row.success = false;
+  return row;
+}
+
 std::string trajectory_path(const std::string& folder, const EpisodeRow& row) {
   return (std::filesystem::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
 }
@@ -89,13 +105,21 @@ bool keep_trajectory(const Suite& suite, const EpisodeRow& row) {
   return suite.record == RecordTrajectories::kFailures && !row.success.value_or(false);
 }
 
+// Playback needs none: anything that fits the robot fills its place.
+std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Suite& suite,
+                                               const std::shared_ptr<const RobotModel>& robot) {
+  if (spec.engine == kPlayback) return make_controller("pd", robot);
+  const SuiteController& controller = controller_of(suite, spec.controller);
+  return make_controller(controller.use, robot, controller.options);
+}
+
 void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
               const std::string& trajectory_folder, EpisodeRow& row) {
   const std::unique_ptr<Backend> backend = make_backend(spec.engine, episode_scene(spec, suite, robot));
-  const std::unique_ptr<Controller> controller = make_controller(spec.controller, robot);
+  const std::unique_ptr<Controller> controller = episode_controller(spec, suite, robot);
   const std::unique_ptr<Policy> policy = make_policy(spec.policy, robot);
   row.engine_version = backend->version();
-  const RolloutSetup setup = episode_setup(spec, suite, *robot, controller->walks());
+  const RolloutSetup setup = episode_setup(spec, suite, *robot);
   const Rollout rollout = roll_out(setup, *backend, *controller, *policy);
   if (rollout.interrupted) throw EpisodeInterrupted();
   score_rollout(rollout, setup, suite, readings_of(suite), *robot, row);
@@ -129,8 +153,10 @@ class StopSign {
 
 Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot) {
   const EngineSettings settings = suite.profile.settings(spec.engine);
+  const Perturbation perturbation = perturbation_of(suite, spec.perturbation);
   Scene scene;
-  scene.robot = robot;
+  scene.robot = perturbed_robot(perturbation, robot);
+  scene.friction.robot_ground = perturbation.friction.value_or(scene.friction.robot_ground);
   scene.human = make_human_body(bone_lengths(spec.clip->partner));
   scene.partner = suite.partner;
   scene.dt = settings.dt;
@@ -138,15 +164,19 @@ Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shar
   return scene;
 }
 
-RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot, bool walks) {
+RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot) {
+  const SuiteController& controller = controller_of(suite, spec.controller);
   AdaptationOptions options;
-  options.start = start_mode(suite, walks);
+  options.start = start_mode(suite, controller);
   options.start_radius = suite.start_radius;
   RolloutSetup setup;
   setup.clip = spec.clip;
   setup.reference = adapt_by_phase(spec.clip->robot, spec.clip->phases, robot, options, spec.seed);
   setup.start = robot.standing_state(setup.reference.motion.root.front());
   setup.seed = spec.seed;
+  setup.perturbation = perturbation_of(suite, spec.perturbation);
+  setup.perturbation_seed = spec.perturbation_seed;
+  setup.foot_trace = spec.engine != kPlayback && spec.arm == "main" && controller_info(controller.use).walks;
   setup.wall_limit = suite.wall_limit;
   if (suite.partner == PartnerMode::kSolid)
     setup.limits =
@@ -175,26 +205,47 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::s
   return row;
 }
 
-RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
-  check_filters(options, suite);
-  RunSummary summary;
-  summary.absent_engines = absent_engines(suite, options);
-  const std::string hash = suite_hash(suite);
-  const auto robot = load_shared_robot(suite.robot);
-  RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
-                                                    utc_now(), capture_environment(), options.certificate});
-  const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, options.threads, progress);
+namespace {
 
+EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const Bodies& bodies,
+                         const std::string& trajectory_folder) {
+  const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
+  const auto absent = bodies.absent().find(spec.controller);
+  if (absent != bodies.absent().end() && spec.engine != kPlayback)
+    return unsupported_row(row_for(spec, suite, hash, *robot), absent->second);
+  return run_episode(spec, suite, hash, robot, trajectory_folder);
+}
+
+// Those that are asked for and not in the run yet; counts all and those that are.
+std::vector<EpisodeSpec> missing_episodes(const Suite& suite, const std::string& hash, const Bodies& bodies,
+                                          const RunOptions& options, const RunDirectory& run, RunSummary& summary) {
   std::vector<EpisodeSpec> missing;
-  for (const EpisodeSpec& spec : plan_episodes(suite, clips)) {
+  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
     if (!selected(options, spec)) continue;
     ++summary.planned;
-    if (run.has(row_for(spec, suite, hash, *robot).key)) {
+    if (run.has(row_for(spec, suite, hash, *bodies.robot(spec.controller)).key)) {
       ++summary.already_there;
     } else {
       missing.push_back(spec);
     }
   }
+  return missing;
+}
+
+}  // namespace
+
+RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
+  check_filters(options, suite);
+  RunSummary summary;
+  summary.absent_engines = absent_engines(suite, options);
+  const std::string hash = suite_hash(suite);
+  Bodies bodies(suite, left_out(suite, options));
+  check_controllers(bodies, suite, options);
+  summary.absent_controllers = bodies.absent();
+  RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
+                                                    utc_now(), capture_environment(), options.certificate});
+  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), options.threads, progress));
+  const std::vector<EpisodeSpec> missing = missing_episodes(suite, hash, bodies, options, run, summary);
   const std::string trajectories =
       suite.record == RecordTrajectories::kNone ? "" : (std::filesystem::path(directory) / "trajectories").string();
   const StopSign stop(options.time_limit);
@@ -203,7 +254,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   parallel_for_each(static_cast<int>(missing.size()), options.threads, [&](int i) {
     if (stop.end() != RunEnd::kComplete) return;
     try {
-      const EpisodeRow row = run_episode(missing[i], suite, hash, robot, trajectories);
+      const EpisodeRow row = run_or_refuse(missing[i], suite, hash, bodies, trajectories);
       const std::lock_guard lock(mutex);
       run.append(row);
       ++summary.run;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "metrics/detector.h"
@@ -59,6 +60,27 @@ void append_point(const Eigen::Vector3d& p_W, std::vector<int>& to) {
   for (const double value : p_W) to.push_back(static_cast<int>(std::lround(1000.0 * value)));
 }
 
+// The soles' shapes by the link that carries them, in the card's order: the left foot's first.
+std::vector<std::vector<int>> shapes_of_feet(const RobotModel& robot) {
+  std::vector<std::vector<int>> feet;
+  for (const int shape : robot.feet) {
+    if (feet.empty() || robot.shapes[feet.back().front()].link != robot.shapes[shape].link) feet.emplace_back();
+    feet.back().push_back(shape);
+  }
+  return feet;
+}
+
+int sole_height_mm(const Kinematics& kinematics, const std::vector<int>& shapes) {
+  double lowest = std::numeric_limits<double>::infinity();
+  for (const int i : shapes) {
+    const RobotShape& shape = kinematics.model().shapes[i];
+    const Eigen::Vector3d axis_W = kinematics.R_WL(shape.link) * (shape.X_LS.R * Eigen::Vector3d::UnitZ());
+    const double reach = shape.radius + shape.half_length * std::abs(axis_W.z());
+    lowest = std::min(lowest, kinematics.shape_position(i).z() - reach);
+  }
+  return static_cast<int>(std::lround(1000.0 * lowest));
+}
+
 }  // namespace
 
 StateTrace state_trace(const Recording& recording, const RobotModel& robot) {
@@ -74,6 +96,20 @@ StateTrace state_trace(const Recording& recording, const RobotModel& robot) {
     append_point(state.X_WB.p, frame);
     append_point(kinematics.frame_position(left), frame);
     append_point(kinematics.frame_position(right), frame);
+  }
+  return trace;
+}
+
+FootTrace foot_trace(const Recording& recording, const RobotModel& robot) {
+  const std::vector<std::vector<int>> feet = shapes_of_feet(robot);
+  FootTrace trace;
+  if (feet.size() != 2) return trace;
+  const int stride = static_cast<int>(std::lround(recording.rate_hz / trace.rate_hz));
+  Kinematics kinematics(robot);
+  for (int t = 0; t < recording.frames(); t += stride) {
+    kinematics.update(recording.robot[t].X_WB, recording.robot[t].q);
+    trace.left_mm.push_back(sole_height_mm(kinematics, feet[0]));
+    trace.right_mm.push_back(sole_height_mm(kinematics, feet[1]));
   }
   return trace;
 }
@@ -132,6 +168,8 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.late_plans = rollout.late_plans;
   add_contacts(rollout, *setup.clip, robot, row);
   row.trace = state_trace(recording, robot);
+  if (setup.foot_trace) row.feet = foot_trace(recording, robot);
+  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
   row.state_hash = rollout.state_hash;
   row.success = false;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {

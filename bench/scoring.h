@@ -16,6 +16,9 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
 // Root and hands, ten times a second: what tells when two engines part.
 StateTrace state_trace(const Recording& recording, const RobotModel& robot);
 
+// Heights of the soles, 25 times a second. Empty for a robot whose soles are not on two links.
+FootTrace foot_trace(const Recording& recording, const RobotModel& robot);
+
 // The executed motion in the place of the retargeted one, over the act (A.4.4 changes what is before and after): the 18
 // metrics then say what the engine and the controller cost. As many frames as the act had before the episode ended.
 PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot);

@@ -6,6 +6,9 @@
 #include "bench/parallel.h"
 #include "bench/progress.h"
 #include "bench/scoring.h"
+#include "bench/suite_names.h"
+#include "core/require.h"
+#include "core/share.h"
 #include "metrics/catalogue.h"
 #include "robots/kinematics.h"
 
@@ -70,6 +73,7 @@ std::vector<std::string> notes_of(const Suite& suite) {
           suite.name, suite.version, to_string(suite.start), to_string(suite.partner), suite.profile.name,
           to_string(suite.detector), to_string(suite.thresholds)),
       "Start \"auto\" means: a controller that cannot walk starts at the act position; one that walks approaches.",
+      "Each controller runs on the body that it was made for; joints that the clips lack stay at neutral.",
       "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
       "same episodes.",
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",
@@ -97,11 +101,32 @@ CrossEngine across_engines(const std::vector<EpisodeRow>& rows) {
   return cross_engine(rows, columns);
 }
 
-ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int threads, Progress& progress) {
+std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files, const Suite& suite) {
+  std::vector<TrainingCurves> curves;
+  curves.reserve(files.size());
+  for (const std::string& file : files) curves.push_back(load_curves(file));
+  for (const SuiteController& controller : suite.controllers) {
+    if (!is_plain_name(controller.use)) continue;
+    try {
+      const std::string relative = fmt::format("controllers/{}/curves.csv", controller.use);
+      TrainingCurves kept = load_curves(share_file("training curves", relative));
+      kept.title = relative;
+      if (std::none_of(curves.begin(), curves.end(), [&](const TrainingCurves& c) { return c.title == relative; }))
+        curves.push_back(std::move(kept));
+    } catch (const MissingError&) {
+      continue;  // most have none
+    }
+  }
+  return curves;
+}
+
+ReportContent report_content(const std::vector<Run>& runs, bool with_clips, const std::vector<std::string>& curve_files,
+                             int threads, Progress& progress) {
   ReportContent content;
   std::vector<EpisodeRow> rows;
   for (const Run& run : runs) rows.insert(rows.end(), run.rows.begin(), run.rows.end());
   const Suite suite = parse_suite(runs.front().info.suite_yaml, "suite.yaml");
+  content.curves = training_curves(curve_files, suite);
   content.title = fmt::format("{} {}", suite.name, suite.version);
   content.environment = runs.front().info.environment;
   content.notes = notes_of(suite);
@@ -109,6 +134,8 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, int 
   content.columns = metric_columns();
   content.cross_engine = across_engines(rows);
   content.contacts = contact_table(rows);
+  content.controllers = controller_table(rows);
+  content.foot_plots = foot_plots(rows);
   content.certificate = runs.front().info.certificate;
   if (!with_clips) return content;
 

@@ -3,10 +3,86 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <filesystem>
+
 #include "bench/suite_names.h"
 #include "core/digest.h"
+#include "core/names.h"
+#include "core/require.h"
 
 namespace duet {
+namespace {
+
+template <typename Item>
+std::vector<std::string> names_of(const std::vector<Item>& items) {
+  std::vector<std::string> names;
+  for (const Item& item : items) names.push_back(item.name);
+  return names;
+}
+
+template <typename Item>
+const Item& find_named(const std::vector<Item>& items, const char* kind, const std::string& name) {
+  const auto found = std::find_if(items.begin(), items.end(), [&](const Item& item) { return item.name == name; });
+  require(found != items.end(), unknown_name_message(kind, name, names_of(items)));
+  return *found;
+}
+
+// A plain controller is its name.
+std::string to_yaml(const SuiteController& controller) {
+  if (controller.use == controller.name && controller.options.empty()) return controller.name;
+  std::string text = fmt::format("{{name: {}, use: \"{}\"", controller.name, controller.use);
+  if (controller.options.empty()) return text + "}";
+  std::vector<std::string> options;
+  for (const auto& [name, value] : controller.options) options.push_back(fmt::format("{}: \"{}\"", name, value));
+  return text + fmt::format(", options: {{{}}}}}", fmt::join(options, ", "));
+}
+
+std::string controllers_yaml(const Suite& suite) {
+  std::vector<std::string> texts;
+  for (const SuiteController& controller : suite.controllers) texts.push_back(to_yaml(controller));
+  return fmt::format("controllers: [{}]\n", fmt::join(texts, ", "));
+}
+
+// A suite with nothing but the clean arm says nothing of perturbations.
+std::string perturbations_yaml(const Suite& suite) {
+  if (suite.perturbations.size() == 1 && suite.perturbations.front().name == kCleanName) return "";
+  std::string text = "perturbations:\n";
+  for (const Perturbation& perturbation : suite.perturbations) text += fmt::format("  - {}\n", to_yaml(perturbation));
+  return text;
+}
+
+}  // namespace
+
+bool is_plain_name(std::string_view name) {
+  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
+  return !name.empty() && name.find_first_not_of(kLetters) == std::string_view::npos;
+}
+
+std::string plain_name_message(std::string_view name) {
+  return fmt::format("expected letters, digits and _ . + - only, found '{}'", name);
+}
+
+const SuiteController& controller_of(const Suite& suite, const std::string& name) {
+  return find_named(suite.controllers, "controller", name);
+}
+Perturbation perturbation_of(const Suite& suite, const std::string& name) {
+  return name == kCleanName ? Perturbation{} : find_named(suite.perturbations, "perturbation", name);
+}
+std::vector<std::string> controller_names_of(const Suite& suite) { return names_of(suite.controllers); }
+std::vector<std::string> perturbation_names_of(const Suite& suite) { return names_of(suite.perturbations); }
+
+void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
+                           const std::string& value) {
+  const ControllerInfo info = controller_info(controller_of(suite, controller).use);
+  std::vector<std::string> known = names_of(info.options);
+  require(std::find(known.begin(), known.end(), option) != known.end(),
+          fmt::format("controller '{}': {}", controller,
+                      known.empty() ? fmt::format("expected no option, found '{}'", option)
+                                    : unknown_name_message("option", option, known)));
+  for (SuiteController& entry : suite.controllers)
+    if (entry.name == controller) entry.options[option] = value;
+}
 
 const NameTable<SuiteStart>& start_names() {
   static const NameTable<SuiteStart> names = {{"auto", SuiteStart::kAuto},
@@ -55,9 +131,9 @@ std::string resolved_yaml(const Suite& suite) {
     text += "clips:\n  files:\n";
     for (const std::string& file : suite.clips.files) text += fmt::format("    - \"{}\"\n", file);
   }
-  text +=
-      fmt::format("tasks: [{}]\nengines: [{}]\ncontrollers: [{}]\npolicies: [{}]\n", fmt::join(tasks, ", "),
-                  fmt::join(suite.engines, ", "), fmt::join(suite.controllers, ", "), fmt::join(suite.policies, ", "));
+  text += fmt::format("tasks: [{}]\nengines: [{}]\n{}policies: [{}]\n{}", fmt::join(tasks, ", "),
+                      fmt::join(suite.engines, ", "), controllers_yaml(suite), fmt::join(suite.policies, ", "),
+                      perturbations_yaml(suite));
   text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\n", suite.episodes_per_clip,
                       to_string(suite.start), suite.start_radius, to_string(suite.partner));
   std::vector<std::string> settings;
@@ -87,6 +163,12 @@ std::string suite_hash(const Suite& suite) {
   Suite by_content = suite;  // where a file lies does not matter, what is in it does
   for (std::string& file : by_content.clips.files) file = sha256_file(file);
   if (!suite.contact_limits.empty()) by_content.contact_limits = sha256_file(suite.contact_limits);
+  for (SuiteController& controller : by_content.controllers) {
+    if (controller.use.ends_with(".yaml")) controller.use = sha256_file(controller.use);
+    const auto network = controller.options.find("network");
+    if (network != controller.options.end() && std::filesystem::is_regular_file(network->second))
+      network->second = sha256_file(network->second);
+  }
   return sha256_hex(resolved_yaml(by_content));
 }
 

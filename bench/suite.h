@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "backends/scene.h"
+#include "bench/perturbation.h"
 #include "bench/profile.h"
+#include "controllers/controller.h"
 #include "core/task.h"
 #include "metrics/detector.h"
 #include "policies/phase_adaptation.h"
@@ -25,13 +27,22 @@ struct SuiteClips {
   std::vector<std::string> files;  // clips or paired motions (NPZ)
 };
 
+// A controller as a suite names it: one of duet's, or an IO descriptor, with options, under a name of its own.
+struct SuiteController {
+  std::string name;        // in rows and tables; once per suite
+  std::string use = name;  // for make_controller
+  ControllerOptions options = {};
+};
+
 struct Suite {
   std::string name, version;
   std::string file;  // where it came from, for messages
   std::uint64_t seed = 10000;
   SuiteClips clips;
   std::vector<Task> tasks;
-  std::vector<std::string> engines, controllers, policies;
+  std::vector<std::string> engines, policies;
+  std::vector<SuiteController> controllers;
+  std::vector<Perturbation> perturbations = {Perturbation{}};  // of engines; playback has none
   int episodes_per_clip = 1;
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
@@ -40,7 +51,7 @@ struct Suite {
   DetectorVersion detector = DetectorVersion::kRobot;
   ThresholdSet thresholds = ThresholdSet::kPaper;
   std::string contact_limits;                   // table; empty: the one that ships with duet
-  std::string robot;                            // card; empty: the one that ships with duet
+  std::string robot;                            // card; empty: of each controller the one it was made for
   std::map<std::string, std::string> retarget;  // pair option -> value
   std::map<std::string, std::string> readings;  // "family.option" -> reading
   double wall_limit = 120.0;                    // per episode [s]
@@ -51,13 +62,26 @@ struct Suite {
 using Overrides =
     std::vector<std::pair<std::string, std::string>>;  // dotted key -> value, as `-s clips.synth.per_task=3`
 
+// Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it is
+// playback's.
+const SuiteController& controller_of(const Suite& suite, const std::string& name);
+Perturbation perturbation_of(const Suite& suite, const std::string& name);
+std::vector<std::string> controller_names_of(const Suite& suite);
+std::vector<std::string> perturbation_names_of(const Suite& suite);
+
+// Sets one option of one of the suite's controllers. Throws std::invalid_argument for a name or an option that is not
+// known, with those that are.
+void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
+                           const std::string& value);
+
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});
 Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides = {});
 
 // All keys written out, in a fixed order: what the hash covers and a run directory keeps.
 std::string resolved_yaml(const Suite& suite);
-// SHA-256 of resolved_yaml, the files' digests included.
+// SHA-256 of resolved_yaml, with the content of files (clips, limits, descriptors, networks) in the place of their
+// paths.
 std::string suite_hash(const Suite& suite);
 
 std::string_view to_string(SuiteStart start);

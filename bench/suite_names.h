@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,6 +12,10 @@ namespace duet {
 
 template <typename E>
 using NameTable = std::vector<std::pair<std::string, E>>;
+
+// What names combinations in tables, keys and file names: letters, digits and _ . + - only.
+bool is_plain_name(std::string_view name);
+std::string plain_name_message(std::string_view name);  // the sentence for one that is not
 
 const NameTable<SuiteStart>& start_names();
 const NameTable<PartnerMode>& partner_names();

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <utility>
 
 #include "backends/factory.h"
 #include "bench/suite.h"
@@ -115,6 +116,63 @@ void read_clips(const YamlSection& top, Suite& suite) {
   for (std::string& file : suite.clips.files) file = from_folder_of(suite, file);
 }
 
+// The options of one controller; values as written.
+ControllerOptions read_options(const YamlSection& item, const Suite& suite) {
+  ControllerOptions options;
+  if (!item.has("options")) return options;
+  const YAML::Node node = item.node("options");
+  if (!node.IsMap())
+    item.fail(item.line("options"), fmt::format("options: expected a mapping, found {}", describe(node)));
+  for (const auto& entry : node) {
+    if (!entry.second.IsScalar())
+      item.fail(entry.first.Mark().line + 1, fmt::format("options.{}: expected one value, found {}",
+                                                         entry.first.as<std::string>(), describe(entry.second)));
+    options[entry.first.as<std::string>()] = entry.second.Scalar();
+  }
+  if (const auto network = options.find("network"); network != options.end())
+    network->second = from_folder_of(suite, network->second);
+  return options;
+}
+
+// A name, a descriptor's path, or {name, use, options}.
+SuiteController read_controller(const YAML::Node& node, const Suite& suite) {
+  const std::string file_ending = ".yaml";
+  SuiteController controller;
+  if (node.IsScalar()) {
+    controller.name = controller.use = node.Scalar();
+  } else {
+    const YamlSection item(suite.file, node, "controller", {"name", "use", "options"});
+    controller.name = item.text("name");
+    controller.use = item.has("use") ? item.text("use") : controller.name;
+    controller.options = read_options(item, suite);
+  }
+  if (controller.use.ends_with(file_ending)) controller.use = from_folder_of(suite, controller.use);
+  if (controller.name.ends_with(file_ending)) controller.name = std::filesystem::path(controller.name).stem().string();
+  require(is_plain_name(controller.name), plain_name_message(controller.name));
+  return controller;
+}
+
+void read_controllers(const YamlSection& top, Suite& suite) {
+  for (const YAML::Node& node : top.items("controllers")) {
+    try {
+      SuiteController controller = read_controller(node, suite);
+      const std::vector<std::string> names = controller_names_of(suite);
+      require(std::find(names.begin(), names.end(), controller.name) == names.end(),
+              fmt::format("'{}' is there twice; names tell rows apart", controller.name));
+      const ControllerOptions options = std::exchange(controller.options, {});
+      static_cast<void>(controller_info(controller.use));
+      const std::string name = controller.name;
+      suite.controllers.push_back(std::move(controller));
+      for (const auto& [option, value] : options) set_controller_option(suite, name, option, value);
+    } catch (const std::invalid_argument& error) {
+      top.fail(std::max(node.Mark().line, 0) + 1, fmt::format("controllers: {}", error.what()));
+    }
+  }
+  if (suite.controllers.empty())
+    top.fail(top.has("controllers") ? top.line("controllers") : top.line(),
+             "controllers: expected at least one controller, found none");
+}
+
 // `all`: playback and every engine that this machine has.
 void read_engines(const YamlSection& top, Suite& suite) {
   if (!top.has("engines") || !top.node("engines").IsScalar() || top.text("engines") != "all") {
@@ -135,8 +193,9 @@ void read_lists(const YamlSection& top, Suite& suite) {
     suite.tasks.assign(kTasks.begin(), kTasks.end());
   }
   read_engines(top, suite);
-  get_names(top, "controllers", "controller", controller_names(), suite.controllers);
+  read_controllers(top, suite);
   get_names(top, "policies", "policy", policy_names(), suite.policies);
+  suite.perturbations = read_perturbations(top, suite.file);
 }
 
 // A name, a path (from the suite's folder or from here), or the mapping that a run directory keeps. `dt` is the step of
@@ -207,11 +266,11 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   Suite suite;
   suite.file = file;
   const YamlSection top(file, document, "suite",
-                        {"schema",         "name",         "version",     "seed",     "clips",
-                         "tasks",          "engines",      "controllers", "policies", "episodes_per_clip",
-                         "start",          "start_radius", "partner",     "dt",       "profile",
-                         "contact_limits", "robot",        "detector",    "limits",   "record",
-                         "null_arm",       "retarget",     "readings"});
+                        {"schema",         "name",         "version",     "seed",         "clips",
+                         "tasks",          "engines",      "controllers", "policies",     "episodes_per_clip",
+                         "start",          "start_radius", "partner",     "dt",           "profile",
+                         "contact_limits", "robot",        "detector",    "limits",       "record",
+                         "null_arm",       "retarget",     "readings",    "perturbations"});
   const std::string schema = top.text("schema");
   if (schema != "duet.suite/1")
     top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));

@@ -50,7 +50,7 @@ Estimate estimate(const RowList& rows, const std::string& metric, ClusterBootstr
   for (const double value : values) sum += value;
   result.n = static_cast<long>(values.size());
   result.mean = sum / static_cast<double>(result.n);
-  result.interval = bootstrap.mean(values, clips, level);
+  if (numbers.size() >= 2) result.interval = bootstrap.mean(values, clips, level);
   return result;
 }
 

@@ -40,6 +40,7 @@ inline constexpr std::array<ControllerFigure, 7> kControllerFigures = {
 struct Estimate {
   long n = 0;  // episodes that have it
   double mean = std::numeric_limits<double>::quiet_NaN();
+  // NaN where there are fewer than two clips: one clip drawn again is always itself.
   Interval interval = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 };
 

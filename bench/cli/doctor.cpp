@@ -1,13 +1,15 @@
 // duet doctor: what this build and this machine can do.
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <algorithm>
 
 #include "backends/factory.h"
 #include "bench/cli/command.h"
 #include "bench/parallel.h"
 #include "bench/version.h"
+#include "controllers/controller.h"
 #include "core/require.h"
+#include "core/share.h"
 #include "results/environment.h"
 #include "retarget/pair.h"
 #include "robots/robot_model.h"
@@ -32,6 +34,19 @@ Finding robot_finding() {
   }
 }
 
+// Whether it can be made here: its card is there, its network is found and can be read.
+Finding controller_finding(const ControllerInfo& info) {
+  try {
+    const auto robot = load_shared_robot(share_file("robot card", fmt::format("robots/g1/{}.yaml", info.robot)));
+    static_cast<void>(make_controller(info.name, robot));
+    const bool network = std::any_of(info.options.begin(), info.options.end(),
+                                     [](const ControllerOption& option) { return option.name == "network"; });
+    return {"controller " + info.name, true, fmt::format("body {}{}", info.robot, network ? ", network found" : "")};
+  } catch (const std::exception& error) {
+    return {"controller " + info.name, false, error.what()};
+  }
+}
+
 std::vector<Finding> findings() {
   std::vector<Finding> list;
   for (const EngineInfo& engine : engines())
@@ -41,6 +56,7 @@ std::vector<Finding> findings() {
     kernels += fmt::format("{}{}", kernels.empty() ? "" : ", ", to_string(kernel));
   list.push_back({"PAIR kernels", true, kernels});
   list.push_back(robot_finding());
+  for (const ControllerInfo& info : controllers()) list.push_back(controller_finding(info));
   list.push_back({"machine", true, describe_machine()});
   return list;
 }
@@ -51,7 +67,7 @@ void run_doctor(Session& session, const std::vector<std::string>& needed) {
   std::string text = version_text() + "\n";
   for (const Finding& finding : list) {
     json["parts"].push_back({{"part", finding.part}, {"present", finding.present}, {"detail", finding.detail}});
-    text += fmt::format("  {:<6} {:<16} {}\n", finding.present ? "ok" : "absent", finding.part, finding.detail);
+    text += fmt::format("  {:<6} {:<24} {}\n", finding.present ? "ok" : "absent", finding.part, finding.detail);
   }
   json["environment"] = capture_environment();
   print(session, text, json);

@@ -2,11 +2,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <filesystem>
 #include <functional>
 
 #include "backends/factory.h"
 #include "bench/benchmarks/benchmark.h"
 #include "bench/cli/command.h"
+#include "bench/perturbation.h"
 #include "bench/profile.h"
 #include "controllers/controller.h"
 #include "core/names.h"
@@ -24,6 +27,7 @@ namespace {
 
 struct Listed {
   std::string name, detail;
+  std::vector<std::string> options = {};  // a line each
 };
 using Listing = std::function<std::vector<Listed>()>;
 
@@ -97,9 +101,38 @@ std::vector<Listed> list_pair_options() {
   return list;
 }
 
+std::vector<Listed> list_controllers() {
+  std::vector<Listed> list;
+  for (const ControllerInfo& info : controllers()) {
+    Listed listed{info.name,
+                  fmt::format("body {}, {}; {}", info.robot, info.walks ? "walks" : "does not walk", info.about)};
+    for (const ControllerOption& option : info.options)
+      listed.options.push_back(fmt::format("{} ({}): {}", option.name,
+                                           option.fallback.empty() ? "no default" : "default " + option.fallback,
+                                           option.about));
+    list.push_back(std::move(listed));
+  }
+  return list;
+}
+
+std::vector<Listed> list_perturbations() {
+  std::vector<Listed> list = {{kCleanName, "nothing is disturbed"}};
+  for (const std::string& kind : perturbation_kinds())
+    list.push_back({kind, "default " + to_yaml(default_perturbation(kind))});
+  return list;
+}
+
 std::vector<Listed> list_robots() {
-  const RobotModel robot = load_robot(default_card_path());
-  return {{robot.name, fmt::format("{} joints, {:.4f} kg, {}", robot.dof(), robot.total_mass(), default_card_path())}};
+  std::vector<std::string> cards = {default_card_path()};
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(cards.front()).parent_path()))
+    if (entry.path().extension() == ".yaml" && entry.path() != cards.front()) cards.push_back(entry.path().string());
+  std::sort(cards.begin() + 1, cards.end());
+  std::vector<Listed> list;
+  for (const std::string& card : cards) {
+    const RobotModel robot = load_robot(card);
+    list.push_back({robot.name, fmt::format("{} joints, {:.4f} kg, {}", robot.dof(), robot.total_mass(), card)});
+  }
+  return list;
 }
 
 std::vector<Listed> list_benchmarks() {
@@ -114,7 +147,8 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
       {"engines", list_engines},
       {"engine-options", list_engine_options},
       {"profiles", list_profiles},
-      {"controllers", [] { return named(controller_names()); }},
+      {"controllers", list_controllers},
+      {"perturbations", list_perturbations},
       {"policies", [] { return named(policy_names()); }},
       {"metrics", list_metrics},
       {"readings", list_readings},
@@ -134,7 +168,9 @@ void run_list(const Session& session, const std::string& what) {
     std::string text;
     for (const Listed& entry : listing()) {
       json.push_back({{"name", entry.name}, {"detail", entry.detail}});
+      if (!entry.options.empty()) json.back()["options"] = entry.options;
       text += entry.detail.empty() ? entry.name + "\n" : fmt::format("{:<32} {}\n", entry.name, entry.detail);
+      for (const std::string& option : entry.options) text += fmt::format("{:<34} {}\n", "", option);
     }
     print(session, text, json);
     return;
@@ -148,10 +184,9 @@ void add_list(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
   auto what = std::make_shared<std::string>();
   command
-      ->add_option(
-          "what", *what,
-          "tasks, engines, engine-options, profiles, controllers, policies, metrics, readings, pair-options, robots, "
-          "benchmarks")
+      ->add_option("what", *what,
+                   "tasks, engines, engine-options, profiles, controllers, perturbations, policies, metrics, readings, "
+                   "pair-options, robots, benchmarks")
       ->required();
   command->callback([&session, what] { run_list(session, *what); });
 }

@@ -21,7 +21,7 @@ namespace duet::cli {
 namespace {
 
 struct ReportArguments {
-  std::vector<std::string> runs, formats = {"md", "html"};
+  std::vector<std::string> runs, formats = {"md", "html"}, curves;
   std::string output;
   bool no_clips = false;
   int threads = default_threads();
@@ -63,7 +63,8 @@ void write_format(const std::string& format, const std::string& path, const std:
   if (format == "json") write_file(path, leaderboard_json(entries).dump(2) + "\n");
   if (format == "tex") write_file(path, leaderboard_latex(entries));
   if (format == "html")
-    write_file(path, html_report(report_content(runs, !arguments.no_clips, arguments.threads, progress)));
+    write_file(path,
+               html_report(report_content(runs, !arguments.no_clips, arguments.curves, arguments.threads, progress)));
   if (format == "sqlite") write_database(all_rows(runs), path);
 }
 
@@ -79,6 +80,12 @@ void write_tables(const Tables& tables, const std::string& format, const Writer&
     if (format == "json") write("engines.json", cross_engine_json(tables.engines).dump(2) + "\n");
     if (format == "tex") write("engines.tex", cross_engine_latex(tables.engines));
     if (format == "html") write("engines.svg", engine_plot_svg(tables.engines));
+  }
+  if (tables.has_controllers()) {
+    if (format == "md") write("controllers.md", controller_table_markdown(tables.controllers));
+    if (format == "csv") write("controllers.csv", controller_table_csv(tables.controllers));
+    if (format == "json") write("controllers.json", controller_table_json(tables.controllers).dump(2) + "\n");
+    if (format == "tex") write("controllers.tex", controller_table_latex(tables.controllers));
   }
   if (tables.has_contacts()) {
     if (format == "md") write("contacts.md", contact_table_markdown(tables.contacts));
@@ -127,6 +134,8 @@ void add_report(CLI::App& app, Session& session) {
   command->add_option("-f,--format", arguments->formats, "md, csv, json, tex, html, sqlite (default: md,html)")
       ->delimiter(',');
   command->add_option("-o,--output", arguments->output, "folder (default: the first run directory)");
+  command->add_option("--curves", arguments->curves,
+                      "training curves to show in the HTML (CSV; the first column is the axis)");
   command->add_flag("--no-clips", arguments->no_clips, "HTML without the clips' key frames and loss curves");
   command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
   command->callback([&session, arguments] { run_report(session, *arguments); });

@@ -18,7 +18,7 @@ namespace {
 
 struct RunArguments {
   std::string suite, output, start, partner, profile, certificate;
-  std::vector<std::string> overrides, clips;
+  std::vector<std::string> overrides, clips, networks;
   bool dry_run = false;
   RunOptions options;
 };
@@ -39,6 +39,10 @@ Suite read_suite(const RunArguments& arguments) {
   if (!arguments.profile.empty()) overrides.emplace_back("profile", arguments.profile);
   Suite suite = load_suite(arguments.suite, overrides);
   use_clips(arguments.clips, suite);
+  for (const std::string& text : arguments.networks) {
+    const auto [controller, path] = split_assignment(text);
+    set_controller_option(suite, controller, "network", std::filesystem::absolute(path).lexically_normal().string());
+  }
   return suite;
 }
 
@@ -63,8 +67,9 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
                                  summary.already_there + summary.run, summary.planned, output, summary.already_there,
                                  summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "),
                                  to_string(suite.start), to_string(suite.partner));
-  for (const auto& [engine, reason] : summary.absent_engines)
-    text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
+  for (const auto* absent : {&summary.absent_engines, &summary.absent_controllers})
+    for (const auto& [name, reason] : *absent)
+      text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
   if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
   return text;
 }
@@ -94,6 +99,7 @@ void run_run(Session& session, RunArguments arguments) {
                          {"run_now", summary.run},
                          {"outcomes", summary.outcomes},
                          {"absent_engines", summary.absent_engines},
+                         {"absent_controllers", summary.absent_controllers},
                          {"complete", summary.end == RunEnd::kComplete}};
   add_tables(tables, json);
   print(session, tables_text(tables), json);
@@ -105,6 +111,7 @@ void add_run(CLI::App& app, Session& session) {
   CLI::App* command =
       add_command(app, session, "run", "roll a suite out in its engines, with the null arm; resumes by itself",
                   "duet run suites/core.yaml --output runs/core\n"
+                  "  duet run suites/controllers.yaml --controllers homie --network homie=deploy.onnx -o runs/homie\n"
                   "  duet run suites/core.yaml --clips handshake_paired.npz --output runs/cmu");
   auto arguments = std::make_shared<RunArguments>();
   arguments->options.threads = default_threads();
@@ -115,6 +122,8 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("--clips", arguments->clips,
                       "clips or paired motions (NPZ, folders) in the place of the suite's");
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
+  command->add_option("--network", arguments->networks,
+                      "NAME=PATH: the network of one of the suite's controllers (repeatable)");
   command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
   command->add_option("--partner", arguments->partner, "none, ghost or solid");
   command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");
@@ -124,6 +133,8 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("--controllers", options.controllers, "only these")->delimiter(',');
   command->add_option("--policies", options.policies, "only these (the null arm always runs)")->delimiter(',');
   command->add_option("--tasks", options.tasks, "only these")->delimiter(',');
+  command->add_option("--perturbations", options.perturbations, "only these (playback is always clean)")
+      ->delimiter(',');
   command->add_option("-j,--threads", options.threads, "threads")->capture_default_str()->check(CLI::Range(1, 1024));
   command->add_option("--time-limit", options.time_limit, "of the run [s]; stops resumable (exit code 75)");
   command->add_flag("--dry-run", arguments->dry_run, "print the resolved suite and its hash, run nothing");

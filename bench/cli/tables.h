@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "results/contact_table.h"
+#include "results/controller_table.h"
 #include "results/cross_engine.h"
 #include "results/leaderboard.h"
 
@@ -15,17 +16,19 @@ struct Tables {
   std::vector<LeaderboardEntry> leaderboard;
   CrossEngine engines;
   ContactTable contacts;
+  ControllerTable controllers;
   nlohmann::json certificate;  // null: none is attached
 
   [[nodiscard]] bool has_engines() const { return engines.engines.size() > 1; }
   [[nodiscard]] bool has_contacts() const { return !contacts.groups.empty(); }
+  [[nodiscard]] bool has_controllers() const { return !controllers.entries.empty(); }
 };
 
 Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate);
 
 // Markdown for a terminal: with several engines the metrics of each are left to the files; their drift is shown.
 std::string tables_text(const Tables& tables);
-// "leaderboard", and where there are any "engines" and "contacts", added to `json`.
+// "leaderboard", and where there are any "engines", "contacts" and "controllers", added to `json`.
 void add_tables(const Tables& tables, nlohmann::json& json);
 
 }  // namespace duet::cli

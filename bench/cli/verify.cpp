@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "bench/bodies.h"
 #include "bench/cli/command.h"
 #include "bench/clips.h"
 #include "bench/parallel.h"
@@ -42,14 +43,15 @@ std::vector<Check> run_again(const Run& run, const VerifyArguments& arguments, P
   if (suite_hash(suite) != run.info.suite_hash)
     throw InputError(fmt::format("'{}': the suite's clips are not what they were (hash {:.8}, was {:.8})",
                                  arguments.run, suite_hash(suite), run.info.suite_hash));
-  const auto robot = load_shared_robot(suite.robot);
-  const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, arguments.threads, progress);
-  const std::vector<EpisodeSpec> plan = plan_episodes(suite, clips);
+  Bodies bodies(suite);
+  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), arguments.threads, progress));
+  const std::vector<EpisodeSpec> plan = plan_episodes(suite, bodies);
   std::vector<Check> checks;
   for (EpisodeRow& row : sample_rows(run, arguments.episodes, arguments.seed)) checks.push_back({std::move(row), ""});
   progress.start("running again", static_cast<int>(checks.size()), "episodes");
   parallel_for_each(static_cast<int>(checks.size()), arguments.threads, [&](int i) {
     for (const EpisodeSpec& spec : plan) {
+      const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
       if (row_for(spec, suite, run.info.suite_hash, *robot).key != checks[i].before.key) continue;
       checks[i].now = run_episode(spec, suite, run.info.suite_hash, robot).state_hash;
     }

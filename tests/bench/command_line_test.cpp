@@ -61,6 +61,19 @@ TEST(CommandLine, MissingEngineIsRefusedByName) {
   EXPECT_THAT(answer.err, HasSubstr("warp9"));
 }
 
+TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
+  const Answer controllers = duet_program("list controllers");
+  EXPECT_EQ(controllers.code, 0) << controllers.err;
+  EXPECT_THAT(controllers.out, HasSubstr("body g1, does not walk; "));
+  const Answer perturbations = duet_program("list perturbations");
+  EXPECT_EQ(perturbations.code, 0) << perturbations.err;
+  EXPECT_THAT(perturbations.out, HasSubstr("push: {force: 60, duration: 1, every: 4, link: torso_link}"));
+}
+
+TEST(CommandLine, DoctorSaysWhichControllersCanRun) {
+  EXPECT_THAT(duet_program("doctor").out, HasSubstr("controller vmc"));
+}
+
 TEST(CommandLine, JsonIsOneDocumentOnStandardOutput) {
   for (const char* command : {"doctor --json", "list tasks --json", "list metrics --json", "list readings --json"}) {
     const Answer answer = duet_program(command);
@@ -99,6 +112,14 @@ TEST(CommandLine, SynthRetargetScoreRunReportVerify) {
        {"leaderboard.md", "leaderboard.csv", "leaderboard.json", "leaderboard.tex", "report.html", "results.sqlite"})
     EXPECT_TRUE(std::filesystem::exists(folder / ("report/" + std::string(name)))) << name;
   EXPECT_THAT(read_file(folder / "report/report.html"), HasSubstr("<svg"));
+  write_file(folder / "curves.csv", "steps,return\n0,1\n100,3\n");
+  const std::string report = "report -q " + (folder / "run") + " -f html --no-clips -o " + (folder / "report");
+  ASSERT_EQ(duet_program(report + " --curves " + (folder / "curves.csv")).code, 0);
+  EXPECT_THAT(read_file(folder / "report/report.html"), HasSubstr("return against steps"));
+  write_file(folder / "curves.csv", "steps,return\n0,x\n");
+  const Answer refused = duet_program(report + " --curves " + (folder / "curves.csv"));
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("curves.csv:2: column 'return': expected a number, found 'x'"));
 
   ASSERT_EQ(duet_program("bless -q " + (folder / "run") + " -o " + (folder / "golden.json")).code, 0);
   EXPECT_EQ(duet_program("check -q " + (folder / "run") + " -b " + (folder / "golden.json")).code, 0);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 
 #include "core/file.h"
 #include "results/run_directory.h"
@@ -44,12 +45,13 @@ class Faults : public testing::Test {
   }
 
   // A suite of one clip in these engines, `fault` in the faulty one.
-  [[nodiscard]] std::string suite(const std::string& engine_names, const std::string& fault = "throw") const {
+  [[nodiscard]] std::string suite(const std::string& engine_names, const std::string& fault = "throw",
+                                  const std::string& controllers = "pd") const {
     std::string path = folder_ / "suite.yaml";
     write_file(path,
                "schema: duet.suite/1\nname: faults\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
                "engines: [" +
-                   engine_names + "]\ncontrollers: [pd]\npolicies: [replay]\nnull_arm: false\n" +
+                   engine_names + "]\ncontrollers: [" + controllers + "]\npolicies: [replay]\nnull_arm: false\n" +
                    "profile: {name: mine, engines: {faulty: {fault: " + fault + "}}}\n");
     return path;
   }
@@ -108,6 +110,39 @@ TEST_F(Faults, ARunWithNoEngineAtAllIsRefused) {
   EXPECT_EQ(ended.code, 4) << ended.text;
   EXPECT_THAT(ended.text, AllOf(HasSubstr("engine 'ode' is absent"), HasSubstr("duet_ode.so")));
   EXPECT_FALSE(fs::exists(folder_ / "run"));
+}
+
+constexpr const char* kLost = "{name: lost, use: homie, options: {network: nowhere.onnx}}";
+
+TEST_F(Faults, AControllerWhoseNetworkIsMissingHasRowsThatSayWhyAndTheOthersGoOn) {
+  const std::string run_it =
+      "run " + suite("playback, faulty", "none", std::string("pd, ") + kLost) + " -o " + (folder_ / "run");
+  const Ended ended = run(run_it);
+  EXPECT_EQ(ended.code, 3) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("controller 'lost' is absent"), HasSubstr("nowhere.onnx")));
+  std::map<std::string, EpisodeRow> row;
+  for (const EpisodeRow& found : load_run(folder_ / "run").rows) row[found.engine + " " + found.controller] = found;
+  EXPECT_EQ(row.at("faulty lost").outcome, Outcome::kUnsupported);
+  EXPECT_THAT(row.at("faulty lost").message, HasSubstr("nowhere.onnx"));
+  EXPECT_EQ(row.at("faulty lost").robot_digest, "");
+  EXPECT_EQ(row.at("faulty pd").outcome, Outcome::kOk) << row.at("faulty pd").message;
+  EXPECT_EQ(row.at("playback pd").outcome, Outcome::kOk);
+  EXPECT_EQ(run("run " + (folder_ / "suite.yaml") + " --controllers pd -q -o " + (folder_ / "part")).code, 0);
+}
+
+TEST_F(Faults, ARunWithNoControllerAtAllIsRefused) {
+  const Ended ended = run("run " + suite("faulty", "none", kLost) + " -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 4) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("controller 'lost' is absent"), HasSubstr("nowhere.onnx")));
+  EXPECT_FALSE(fs::exists(folder_ / "run"));
+}
+
+TEST_F(Faults, ANetworkIsForAControllerOfTheSuiteThatHasOne) {
+  const std::string run_it = "run " + suite("playback", "none", std::string("pd, ") + kLost) + " --dry-run --network ";
+  EXPECT_THAT(run(run_it + "lost=elsewhere.onnx").text, HasSubstr("/elsewhere.onnx"));
+  EXPECT_THAT(run(run_it + "pd=x.onnx").text, HasSubstr("controller 'pd': expected no option, found 'network'"));
+  EXPECT_THAT(run(run_it + "losst=x.onnx").text, HasSubstr("did you mean 'lost'"));
+  EXPECT_EQ(run(run_it + "lost").code, 2);
 }
 
 TEST_F(Faults, DoctorNamesABrokenModule) {

@@ -29,7 +29,7 @@ Rollout roll(const Parts& parts, RolloutSetup setup, const std::string& policy =
 
 TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   const Rollout rollout = roll(parts, setup);
   ASSERT_EQ(rollout.recording.frames(), parts.clip.frames());
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
@@ -46,14 +46,14 @@ TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
 
 TEST(Rollout, SameEpisodeGivesTheSameHash) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   EXPECT_EQ(roll(parts, setup).state_hash, roll(parts, setup).state_hash);
   EXPECT_NE(roll(parts, setup).state_hash, roll(parts, setup, "null").state_hash);
 }
 
 TEST(Rollout, PartnerIsTheClipsOwnAtEveryTick) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   const Rollout rollout = roll(parts, setup);
   for (int t = 0; t < rollout.recording.frames(); t += 31)
     EXPECT_EQ(rollout.recording.partner.at(t, kHead), parts.clip.partner.joints.at(t, kHead)) << t;
@@ -70,7 +70,7 @@ TEST(Rollout, PartnerVelocityLeadsToTheNextFrame) {
 
 TEST(Rollout, WallLimitEndsAsTimedOut) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   setup.wall_limit = 1e-9;
   const Rollout rollout = roll(parts, setup);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kTimedOut);
@@ -81,9 +81,47 @@ TEST(Rollout, WallLimitEndsAsTimedOut) {
 
 TEST(Rollout, StopRequestMarksTheEpisodeInterrupted) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot, true);
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   setup.stop_asked = [] { return true; };
   EXPECT_TRUE(roll(parts, setup).interrupted);
+}
+
+// Holds the start pose and says that it met faults; keeps what it was shown.
+class FaultyController final : public Controller {
+ public:
+  explicit FaultyController(const RobotModel& robot) : robot_(robot) {}
+  [[nodiscard]] std::string_view name() const override { return "faulty"; }
+  [[nodiscard]] bool walks() const override { return false; }
+  void reset(const RobotState&) override {}
+  void act(const RobotState& state, const Reference&, JointCommand& command) override {
+    seen.push_back(state.X_WB.p.x());
+    command = robot_.default_command(robot_.neutral);
+  }
+  [[nodiscard]] ControllerFaults faults() const override { return {3, 2, true}; }
+  std::vector<double> seen;
+
+ private:
+  const RobotModel& robot_;
+};
+
+TEST(Rollout, FaultsAndTheDelayedStateAreTheControllers) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  setup.perturbation.delay_ticks = 2;
+  Scene scene;
+  scene.robot = parts.robot;
+  scene.human = make_human_body(bone_lengths(parts.clip.partner));
+  const auto backend = make_backend("playback", scene);
+  FaultyController controller(*parts.robot);
+  const auto policy = make_policy("replay", parts.robot);
+  const Rollout rollout = roll_out(setup, *backend, controller, *policy);
+  EXPECT_EQ(rollout.faults.observations, 3);
+  EXPECT_EQ(rollout.faults.actions, 2);
+  EXPECT_TRUE(rollout.faults.stopped);
+  ASSERT_EQ(controller.seen.size(), rollout.recording.robot.size());
+  for (size_t t = 2; t < controller.seen.size(); ++t)
+    ASSERT_EQ(controller.seen[t], rollout.recording.robot[t - 2].X_WB.p.x()) << t;
+  EXPECT_EQ(controller.seen[1], setup.start.X_WB.p.x());
 }
 
 TEST(Rollout, FallIsLowOrTilted) {

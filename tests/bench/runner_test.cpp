@@ -125,7 +125,7 @@ TEST(Runner, MujocoEpisodesRepeatBitForBit) {
     if (engine.name == "mujoco" && !engine.available) GTEST_SKIP() << "not run: MuJoCo absent";
   Suite suite = test::playback_suite();
   suite.engines = {"mujoco"};
-  suite.controllers = {"vmc"};
+  suite.controllers = {SuiteController{"vmc"}};
   suite.start = SuiteStart::kAct;
   const auto robot = test::g1();
   const PairedMotion clip = test::paired(Task::kWave, *robot);
@@ -135,6 +135,32 @@ TEST(Runner, MujocoEpisodesRepeatBitForBit) {
   EXPECT_EQ(first.outcome, Outcome::kOk) << first.message;
   EXPECT_EQ(first.state_hash, second.state_hash);
   EXPECT_EQ(first.metrics, second.metrics);
+}
+
+TEST(Runner, PerturbedEpisodesDifferFromCleanAndRepeat) {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco" && !engine.available) GTEST_SKIP() << "not run: MuJoCo absent";
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  suite.controllers = {SuiteController{"vmc"}};
+  suite.start = SuiteStart::kAct;
+  for (const std::string& kind : perturbation_kinds()) suite.perturbations.push_back(default_perturbation(kind));
+  suite.perturbations[4].push->every = 1.5;  // within the clip
+  const auto robot = test::g1();
+  PairedMotion clip = test::paired(Task::kWave, *robot);
+  EpisodeSpec spec{&clip, "mujoco", "vmc", "replay", "main", 0, 7};
+  spec.perturbation_seed = 11;
+  std::map<std::string, std::string> by_hash;
+  for (const Perturbation& perturbation : suite.perturbations) {
+    spec.perturbation = perturbation.name;
+    const EpisodeRow row = run_episode(spec, suite, "hash", robot);
+    EXPECT_TRUE(row.outcome == Outcome::kOk || row.outcome == Outcome::kFell) << row.message;
+    EXPECT_EQ(row.perturbation, perturbation.name);
+    EXPECT_TRUE(by_hash.emplace(row.state_hash, perturbation.name).second)
+        << perturbation.name << " changes nothing: as " << by_hash[row.state_hash];
+    if (!perturbation.push) continue;
+    EXPECT_EQ(run_episode(spec, suite, "hash", robot).state_hash, row.state_hash);
+  }
 }
 
 TEST(Parallel, EveryIndexOnceAndTheFirstExceptionComesBack) {

@@ -121,10 +121,45 @@ TEST(Suite, BrokenDocumentsAreRefused) {
   EXPECT_THAT(test::thrown_message<InputError>([] { load_suite("nowhere.yaml"); }), HasSubstr("nowhere.yaml"));
 }
 
+std::string with_controllers(const std::string& list) {
+  std::string yaml = kMinimal;
+  return yaml.replace(yaml.find("[pd]"), 4, list);
+}
+
+TEST(Suite, ControllersHaveNamesOfTheirOwn) {
+  const Suite suite = parse_suite(with_controllers("[vmc, {name: plain, use: pd}]"), "s.yaml");
+  ASSERT_EQ(suite.controllers.size(), 2U);
+  EXPECT_EQ(suite.controllers[0].name, "vmc");
+  EXPECT_EQ(suite.controllers[0].use, "vmc");
+  EXPECT_EQ(suite.controllers[1].name, "plain");
+  EXPECT_EQ(suite.controllers[1].use, "pd");
+  EXPECT_EQ(resolved_yaml(parse_suite(resolved_yaml(suite), "again.yaml")), resolved_yaml(suite));
+  EXPECT_THAT(resolved_yaml(parse_suite(kMinimal, "s.yaml")), HasSubstr("controllers: [pd]\n"));
+  EXPECT_EQ(controller_of(suite, "plain").use, "pd");
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { controller_of(suite, "plian"); }),
+              HasSubstr("did you mean 'plain'"));
+}
+
+TEST(Suite, ControllersThatAreNotOnesAreRefused) {
+  EXPECT_THAT(refusal("", with_controllers("[{name: x, use: vcm}]")), AllOf(HasSubstr("s.yaml:6"), HasSubstr("vmc")));
+  EXPECT_THAT(refusal("", with_controllers("[{nmae: pd}]")), HasSubstr("name"));
+  EXPECT_THAT(refusal("", with_controllers("[{use: pd}]")), HasSubstr("name"));
+  EXPECT_THAT(refusal("", with_controllers("[pd, {name: pd, use: vmc}]")), HasSubstr("'pd' is there twice"));
+  EXPECT_THAT(refusal("", with_controllers("[{name: 'a/b', use: pd}]")), HasSubstr("letters, digits"));
+  EXPECT_THAT(refusal("", with_controllers("[{name: pd, options: {waist: locked}}]")), HasSubstr("waist"));
+  EXPECT_THAT(refusal("", with_controllers("[{name: pd, options: [1]}]")), HasSubstr("expected a mapping"));
+  EXPECT_THAT(refusal("", with_controllers("[]")), HasSubstr("at least one controller"));
+  Suite suite = parse_suite(kMinimal, "s.yaml");
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { set_controller_option(suite, "pd", "network", "x"); }),
+              HasSubstr("controller 'pd': expected no option, found 'network'"));
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { set_controller_option(suite, "vmc", "network", "x"); }),
+              HasSubstr("unknown controller 'vmc'"));
+}
+
 TEST(Suite, ShippedSuitesLoad) {
-  for (const char* name : {"demo", "core"}) {
+  for (const char* name : {"demo", "core", "controllers"}) {
     const Suite suite = load_suite(std::string(DUET_SOURCE_DIR) + "/suites/" + name + ".yaml");
-    EXPECT_EQ(suite.tasks.size(), kTasks.size()) << name;
+    EXPECT_EQ(suite.tasks.size(), std::string(name) == "controllers" ? 3U : kTasks.size()) << name;
   }
 }
 

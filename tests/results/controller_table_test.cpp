@@ -53,6 +53,14 @@ TEST(ControllerTable, MeansAreOverEpisodesWithTheirInterval) {
   EXPECT_DOUBLE_EQ(table.entries[1].figures.at("hf_ratio").interval.high, 0.5);  // all the same: no width
 }
 
+TEST(ControllerTable, OneClipHasNoInterval) {
+  const ControllerTable table =
+      controller_table({controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)});
+  EXPECT_DOUBLE_EQ(table.entries[0].figures.at("hf_ratio").mean, 0.375);
+  EXPECT_TRUE(std::isnan(table.entries[0].figures.at("hf_ratio").interval.low));
+  EXPECT_THAT(controller_table_markdown(table), HasSubstr("| 0.375 |"));
+}
+
 TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
   std::vector<EpisodeRow> rows = two_controllers();
   rows[0].outcome = Outcome::kFell;

@@ -1,0 +1,75 @@
+#include "bench/bodies.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/require.h"
+#include "core/share.h"
+
+namespace duet {
+namespace {
+
+std::string card_of(const Suite& suite, const SuiteController& controller) {
+  if (!suite.robot.empty()) return suite.robot;
+  const std::string robot = controller_info(controller.use).robot;
+  return robot.empty() ? default_card_path() : share_file("robot card", fmt::format("robots/g1/{}.yaml", robot));
+}
+
+}  // namespace
+
+RobotMotion on_body(const RobotMotion& motion, const RobotModel& body) {
+  if (motion.joint_names == body.joint_names()) return motion;
+  RobotMotion moved = motion;
+  moved.joint_names = body.joint_names();
+  moved.q = body.neutral.replicate(1, motion.q.cols());
+  for (int j = 0; j < body.dof(); ++j) {
+    const auto found = std::find(motion.joint_names.begin(), motion.joint_names.end(), moved.joint_names[j]);
+    if (found != motion.joint_names.end()) moved.q.row(j) = motion.q.row(found - motion.joint_names.begin());
+  }
+  return moved;
+}
+
+Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped) {
+  add(suite.robot.empty() ? default_card_path() : suite.robot);
+  for (const SuiteController& controller : suite.controllers) {
+    if (std::find(skipped.begin(), skipped.end(), controller.name) != skipped.end()) continue;
+    try {
+      const std::size_t place = add(card_of(suite, controller));
+      static_cast<void>(make_controller(controller.use, bodies_[place].robot, controller.options));
+      for (const Perturbation& perturbation : suite.perturbations)
+        check_perturbation(perturbation, *bodies_[place].robot);
+      place_[controller.name] = place;
+    } catch (const MissingError& error) {
+      absent_[controller.name] = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
+    }
+  }
+}
+
+std::size_t Bodies::add(const std::string& card) {
+  const auto found = std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.card == card; });
+  if (found != bodies_.end()) return static_cast<std::size_t>(found - bodies_.begin());
+  bodies_.push_back({card, load_shared_robot(card), {}});
+  return bodies_.size() - 1;
+}
+
+void Bodies::take_clips(std::vector<PairedMotion> clips) {
+  for (std::size_t i = 1; i < bodies_.size(); ++i) {
+    bodies_[i].clips = clips;
+    for (PairedMotion& clip : bodies_[i].clips) clip.robot = on_body(clip.robot, *bodies_[i].robot);
+  }
+  bodies_.front().clips = std::move(clips);
+}
+
+const Bodies::Body& Bodies::body(const std::string& controller) const {
+  const auto found = place_.find(controller);
+  return found == place_.end() ? bodies_.front() : bodies_[found->second];
+}
+
+const std::shared_ptr<const RobotModel>& Bodies::robot(const std::string& controller) const {
+  return body(controller).robot;
+}
+
+const std::vector<PairedMotion>& Bodies::clips(const std::string& controller) const { return body(controller).clips; }
+
+}  // namespace duet

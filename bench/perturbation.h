@@ -1,0 +1,69 @@
+// What disturbs an episode beside the clean arm: the controller's view of the state, its way to the joints, pushes, the
+// ground, the robot's mass. A named value of a suite; strict YAML (docs/file-formats.md, "Perturbations").
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "robots/robot_model.h"
+#include "robots/yaml_section.h"
+
+namespace duet {
+
+inline constexpr const char* kCleanName = "clean";
+
+// Standard deviations of what the controller sees, drawn anew every tick.
+struct StateNoise {
+  double q = 0.01;        // [rad]
+  double v = 0.5;         // [rad/s]
+  double w = 0.2;         // of the base, each axis of B [rad/s]
+  double gravity = 0.05;  // turn of the base about its x and y, which is what gravity in B shows of it [rad]
+};
+
+// A force at a link's centre of mass, level, in a direction drawn for each push. The first begins after every / 2.
+struct PushPlan {
+  double force = 60.0;    // [N]
+  double duration = 1.0;  // [s]
+  double every = 4.0;     // from begin to begin [s]
+  std::string link = "torso_link";
+};
+
+// At the link's centre of mass; the controller keeps the nominal model.
+struct AddedMass {
+  std::string link = "torso_link";
+  double add = 3.0;  // [kg]; below 0: taken away
+};
+
+struct Perturbation {
+  std::string name = kCleanName;
+  int delay_ticks = 0;      // the controller sees the state of so many ticks ago
+  double latency_ms = 0.0;  // from a command to its effect, to the nearest physics step
+  std::optional<StateNoise> noise;
+  std::optional<PushPlan> push;
+  std::optional<double> friction;  // of the robot and the ground
+  std::optional<AddedMass> mass;
+};
+
+// The kinds that may be named alone, with their defaults: "delay", "latency", "noise", "push", "friction", "mass".
+const std::vector<std::string>& perturbation_kinds();
+
+// Throws std::invalid_argument for another name, with the nearest; "clean" is one.
+Perturbation default_perturbation(const std::string& kind);
+
+// The list under `perturbations` of a suite; [clean] where it is absent. Throws InputError: file, line, expected,
+// found.
+std::vector<Perturbation> read_perturbations(const YamlSection& suite, const std::string& file);
+
+// One item of that list with every value written out, on one line.
+std::string to_yaml(const Perturbation& perturbation);
+
+// Throws std::invalid_argument where the robot lacks a link that the perturbation names, or would lose all its mass.
+void check_perturbation(const Perturbation& perturbation, const RobotModel& robot);
+
+// The robot that is simulated: with the added mass, or `robot` itself.
+std::shared_ptr<const RobotModel> perturbed_robot(const Perturbation& perturbation,
+                                                  const std::shared_ptr<const RobotModel>& robot);
+
+}  // namespace duet

@@ -1,0 +1,108 @@
+#include "bench/bodies.h"
+
+#include <gmock/gmock.h>
+
+#include "bench/episode.h"
+#include "bench/runner.h"
+#include "bench/scoring.h"
+#include "core/require.h"
+#include "tests/bench/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+// The G1 without its waist roll and with its first two joints exchanged.
+RobotModel other_body(const RobotModel& g1) {
+  RobotModel body = g1;
+  std::swap(body.joints[0], body.joints[1]);
+  body.joints.back().name = "tail_joint";
+  body.neutral = Eigen::VectorXd::LinSpaced(body.dof(), 1.0, 2.0);
+  return body;
+}
+
+TEST(OnBody, SameJointsAreTheMotionToTheBit) {
+  const auto robot = test::g1();
+  const PairedMotion clip = test::paired(Task::kWave, *robot);
+  const RobotMotion same = on_body(clip.robot, *robot);
+  EXPECT_EQ(same.q, clip.robot.q);
+  EXPECT_EQ(same.joint_names, clip.robot.joint_names);
+}
+
+TEST(OnBody, JointsGoByNameOthersStayAtNeutral) {
+  const auto robot = test::g1();
+  const RobotMotion motion = test::paired(Task::kWave, *robot).robot;
+  const RobotModel body = other_body(*robot);
+  const RobotMotion moved = on_body(motion, body);
+  EXPECT_EQ(moved.joint_names, body.joint_names());
+  EXPECT_EQ(moved.q.row(0), motion.q.row(1));
+  EXPECT_EQ(moved.q.row(1), motion.q.row(0));
+  EXPECT_EQ(moved.q.row(7), motion.q.row(7));
+  EXPECT_EQ(moved.q.bottomRows(1), Eigen::RowVectorXd::Constant(motion.frames(), body.neutral.tail(1)[0]));
+  EXPECT_EQ(moved.root.size(), motion.root.size());
+}
+
+TEST(Bodies, ControllersOfOneBodyShareItAndItsClips) {
+  Suite suite = test::playback_suite();
+  suite.controllers = {SuiteController{"pd"}, SuiteController{"vmc"}};
+  Bodies bodies(suite);
+  EXPECT_EQ(bodies.robot("pd"), bodies.robot("vmc"));
+  EXPECT_EQ(bodies.robot("pd"), bodies.nominal());
+  bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
+  EXPECT_EQ(&bodies.clips("pd"), &bodies.clips("vmc"));
+  EXPECT_EQ(bodies.clips("pd").size(), 1U);
+  EXPECT_TRUE(bodies.absent().empty());
+}
+
+TEST(Bodies, PerturbationsAreCheckedOnEveryBody) {
+  Suite suite = test::playback_suite();
+  suite.perturbations = {default_perturbation("push")};
+  suite.perturbations[0].push->link = "nowhere";
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { const Bodies bodies(suite); }), HasSubstr("nowhere"));
+}
+
+TEST(Plan, PerturbationsAreAnAxisOfEnginesAndNotOfPlayback) {
+  Suite suite = test::playback_suite();
+  suite.engines = {"playback", "mujoco"};
+  suite.perturbations = {Perturbation{}, default_perturbation("push"), default_perturbation("delay")};
+  Bodies bodies(suite);
+  bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
+  std::map<std::string, int> count;
+  std::set<std::string> keys;
+  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
+    ++count[spec.engine + " " + spec.perturbation + " " + spec.arm];
+    keys.insert(row_for(spec, suite, "hash", *bodies.nominal()).key);
+    EXPECT_NE(spec.seed, spec.perturbation_seed);
+  }
+  EXPECT_EQ(count, (std::map<std::string, int>{{"playback clean main", 1},
+                                               {"playback clean null", 1},
+                                               {"mujoco clean main", 1},
+                                               {"mujoco clean null", 1},
+                                               {"mujoco push main", 1},
+                                               {"mujoco push null", 1},
+                                               {"mujoco delay main", 1},
+                                               {"mujoco delay null", 1}}));
+  EXPECT_EQ(keys.size(), 8U);
+}
+
+TEST(FootTrace, HeightsAreOfTheSolesLowestPoints) {
+  const auto robot = test::g1();
+  Recording recording;
+  for (int t = 0; t < 5; ++t) {
+    recording.robot.push_back(robot->standing_state());
+    recording.robot.back().X_WB.p.z() += 0.1 * t;
+  }
+  const FootTrace trace = foot_trace(recording, *robot);
+  EXPECT_EQ(trace.left_mm, (std::vector<int>{0, 200, 400}));  // every second frame, standing on the ground at first
+  EXPECT_EQ(trace.right_mm, trace.left_mm);
+  // The right hip bent forward lifts the right foot alone.
+  recording.robot[2].q[robot->joint_index("right_hip_pitch_joint")] -= 0.8;
+  const FootTrace lifted = foot_trace(recording, *robot);
+  EXPECT_EQ(lifted.left_mm, trace.left_mm);
+  EXPECT_GT(lifted.right_mm[1], trace.right_mm[1] + 50);
+}
+
+}  // namespace
+}  // namespace duet
