@@ -14,8 +14,8 @@ namespace {
 constexpr std::int64_t kExactInteger = 1 << 24;
 
 const OnnxOperator* find_operator(std::string_view name) {
-  for (const auto table : {elementwise_operators(), movement_operators(), linear_operators(), reduction_operators(),
-                           recurrent_operators()})
+  for (const auto table : {elementwise_operators(), movement_operators(), shape_operators(), linear_operators(),
+                           reduction_operators(), recurrent_operators()})
     for (const OnnxOperator& found : table)
       if (found.name == name) return &found;
   return nullptr;

@@ -111,6 +111,9 @@ class OnnxBuilder {
   const OnnxNode& node_;
 };
 
+// Which of `rank` axes are among `axes`, each at most once.
+std::vector<bool> marked_axes(const OnnxBuilder& builder, const std::vector<std::int64_t>& axes, int rank);
+
 struct OnnxOperator {
   std::string_view name;
   int least_inputs, most_inputs, most_outputs;
@@ -120,6 +123,7 @@ struct OnnxOperator {
 // The tables of the operator files.
 std::span<const OnnxOperator> elementwise_operators();
 std::span<const OnnxOperator> movement_operators();
+std::span<const OnnxOperator> shape_operators();
 std::span<const OnnxOperator> linear_operators();
 std::span<const OnnxOperator> reduction_operators();
 std::span<const OnnxOperator> recurrent_operators();
