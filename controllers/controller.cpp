@@ -4,9 +4,12 @@
 
 #include <algorithm>
 
+#include "controllers/descriptor_controller.h"
 #include "controllers/guard.h"
 #include "controllers/pd.h"
+#include "controllers/published.h"
 #include "controllers/vmc.h"
+#include "controllers/wbc_sim/wbc_sim.h"
 #include "core/names.h"
 #include "core/require.h"
 
@@ -37,9 +40,27 @@ std::unique_ptr<Controller> make_vmc(const std::string&, Robot robot, const Cont
   return make_vmc_controller(std::move(robot));
 }
 
-constexpr Entry kControllers[] = {{"pd", pd_info, make_pd}, {"vmc", vmc_info, make_vmc}};
+ControllerInfo wbc_sim_entry(const std::string&) { return wbc_sim_info(); }
+std::unique_ptr<Controller> make_wbc_sim(const std::string&, Robot robot, const ControllerOptions& options) {
+  return make_wbc_sim_controller(std::move(robot), options);
+}
+
+ControllerInfo published_info(const std::string& name) { return descriptor_info(load_descriptor(name)); }
+
+constexpr Entry kControllers[] = {{"pd", pd_info, make_pd},
+                                  {"vmc", vmc_info, make_vmc},
+                                  {"wbc_sim", wbc_sim_entry, make_wbc_sim},
+                                  {"homie", published_info, make_published},
+                                  {"twist2", published_info, make_published},
+                                  {"playground", published_info, make_published},
+                                  {"rl_gym", published_info, make_published},
+                                  {"gmt", published_info, make_published},
+                                  {"beyond_mimic", published_info, make_published}};
+// A name that is the path of an IO descriptor.
+constexpr Entry kDescriptor = {"", published_info, make_published};
 
 const Entry& find_entry(const std::string& name) {
+  if (name.ends_with(".yaml")) return kDescriptor;
   for (const Entry& entry : kControllers)
     if (name == entry.name) return entry;
   throw std::invalid_argument(unknown_name_message("controller", name, controller_names()));

@@ -1,8 +1,9 @@
-// Body of one level of DenseKernels. Each kernel_*.cpp defines DUET_KERNEL (the table's name) and DUET_LEVEL and compiles
-// it with its own -march. Eigen's name is changed by level: the linker would otherwise keep one of the three copies of
-// each of its inline functions, possibly one that the machine cannot run.
+// Body of one level of DenseKernels. Each kernel_*.cpp defines DUET_KERNEL (the table's name) and DUET_LEVEL and
+// compiles it with its own -march. Eigen's name is changed by level: the linker would otherwise keep one of the three
+// copies of each of its inline functions, possibly one that the machine cannot run.
 #define Eigen DUET_EIGEN
 #include <Eigen/Core>
+#include <cstring>
 
 #include "nn/dense_kernels.h"
 
@@ -11,7 +12,6 @@ namespace {
 
 using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
 using RowMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-using Array = Eigen::Array<float, Eigen::Dynamic, 1>;
 using Vector = Eigen::Matrix<float, Eigen::Dynamic, 1>;
 
 template <typename A, typename B>
@@ -46,34 +46,59 @@ void gemv(int rows, int cols, const float* W, const float* x, const float* b, fl
   out.noalias() += Eigen::Map<const RowMatrix>(W, rows, cols) * Eigen::Map<const Vector>(x, cols);
 }
 
+// Element by element in blocks that are copied to aligned places. Eigen treats the ends of an unaligned array with
+// other instructions than its middle, so that the bits would depend on where memory happened to lie.
+constexpr int kBlock = 64;
+using Block = Eigen::Array<float, kBlock, 1>;
+
+Block load(const float* from, int n) {
+  Block block = Block::Zero();
+  std::memcpy(block.data(), from, static_cast<std::size_t>(n) * sizeof(float));
+  return block;
+}
+
+void store(const Block& block, float* to, int n) {
+  std::memcpy(to, block.data(), static_cast<std::size_t>(n) * sizeof(float));
+}
+
+template <typename F>
+void in_blocks(int n, const F& f) {
+  for (int i = 0; i < n; i += kBlock) f(i, n - i < kBlock ? n - i : kBlock);
+}
+
 void elu(int n, float* x) {
-  Eigen::Map<Array> a(x, n);
-  a = (a > 0.0F).select(a, a.min(0.0F).exp() - 1.0F);
+  in_blocks(n, [x](int at, int count) {
+    const Block a = load(x + at, count);
+    // The positive and the negative part; a selection would not be vectorised. What is not a number stays so.
+    const Block value = 0.5F * (a + a.abs()) + (a.min(0.0F).exp() - 1.0F);
+    store(value, x + at, count);
+  });
 }
 
 void elu_backward(int n, const float* a, float* d) {
-  const Eigen::Map<const Array> value(a, n);
-  Eigen::Map<Array> gradient(d, n);
-  gradient *= (value.min(0.0F) + 1.0F);
+  in_blocks(n, [a, d](int at, int count) {
+    const Block gradient = load(d + at, count) * (load(a + at, count).min(0.0F) + 1.0F);
+    store(gradient, d + at, count);
+  });
 }
 
 void adam(int n, const float* g, float scale, float step, float correction, float* m, float* v, float* p) {
   constexpr float kBeta1 = 0.9F, kBeta2 = 0.999F, kEpsilon = 1e-8F;
-  const Eigen::Map<const Array> gradient(g, n);
-  Eigen::Map<Array> first(m, n), second(v, n), value(p, n);
-  first = kBeta1 * first + (1.0F - kBeta1) * scale * gradient;
-  second = kBeta2 * second + (1.0F - kBeta2) * (scale * gradient).square();
-  value -= step * first / ((second / correction).sqrt() + kEpsilon);
+  in_blocks(n, [=](int at, int count) {
+    const Block gradient = scale * load(g + at, count);
+    const Block first = kBeta1 * load(m + at, count) + (1.0F - kBeta1) * gradient;
+    const Block second = kBeta2 * load(v + at, count) + (1.0F - kBeta2) * gradient.square();
+    const Block value = load(p + at, count) - step * first / ((second / correction).sqrt() + kEpsilon);
+    store(first, m + at, count);
+    store(second, v + at, count);
+    store(value, p + at, count);
+  });
 }
 
 }  // namespace
 
 extern const DenseKernels DUET_KERNEL;
-const DenseKernels DUET_KERNEL = {.level = DUET_LEVEL,
-                                  .gemm = gemm,
-                                  .gemv = gemv,
-                                  .elu = elu,
-                                  .elu_backward = elu_backward,
-                                  .adam = adam};
+const DenseKernels DUET_KERNEL = {
+    .level = DUET_LEVEL, .gemm = gemm, .gemv = gemv, .elu = elu, .elu_backward = elu_backward, .adam = adam};
 
 }  // namespace duet

@@ -12,7 +12,9 @@ const std::vector<Benchmark>& benchmarks() {
     add_metrics_benchmarks(all);
     add_kinematics_benchmarks(all);
     add_backend_benchmarks(all);
+    add_nn_benchmarks(all);
     add_runner_benchmarks(all);
+    add_wbc_benchmarks(all);
     return all;
   }();
   return list;

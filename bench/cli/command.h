@@ -56,5 +56,6 @@ void add_bless(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
+void add_train(CLI::App& app, Session& session);
 
 }  // namespace duet::cli

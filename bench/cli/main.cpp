@@ -62,5 +62,6 @@ int main(int argc, char** argv) {
   add_validate(app, session);
   add_verify(app, session);
   add_bench(app, session);
+  add_train(app, session);
   return run_command(app, argc, argv, session);
 }

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <vector>
 
 #include "core/random.h"
 
@@ -77,6 +78,20 @@ TEST(DenseKernels, EluAndItsDerivativeAreTheClosedForms) {
       kernels->elu_backward(1, &a, &d);
       EXPECT_NEAR(d, x > 0 ? 3.0 : 3.0 * std::exp(x), 1e-6) << x;
     }
+}
+
+TEST(DenseKernels, BitsDoNotDependOnWhereTheArrayLies) {
+  const VectorXf x = random_matrix(300, 1, 7);
+  for (const DenseKernels* kernels : levels()) {
+    VectorXf expected = x;
+    kernels->elu(300, expected.data());
+    for (int offset = 0; offset < 16; ++offset) {
+      std::vector<float> room(316);
+      std::copy(x.begin(), x.end(), room.begin() + offset);
+      kernels->elu(300, room.data() + offset);
+      for (int i = 0; i < 300; ++i) ASSERT_EQ(room[offset + i], expected[i]) << kernels->level << " " << offset;
+    }
+  }
 }
 
 TEST(DenseKernels, AdamsFirstStepHasTheLengthOfTheRate) {

@@ -1,0 +1,148 @@
+// duet train: this project's own trainers. `duet train wbc` makes WBC-Sim.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <thread>
+
+#include "bench/cli/command.h"
+#include "bench/interrupt.h"
+#include "bench/training_motions.h"
+#include "core/require.h"
+#include "robots/robot_model.h"
+#include "training/train_wbc.h"
+
+namespace duet::cli {
+namespace {
+
+struct TrainArguments {
+  WbcRun run;
+  std::string stage = "all", card;
+  bool smoke = false;
+};
+
+constexpr int kMotionsPerTask = 6;
+
+std::string line(const WbcProgress& progress) {
+  const TrackingStatistics& t = progress.tracking;
+  const double ticks = static_cast<double>(std::max(1L, t.ticks));
+  std::string text =
+      fmt::format("{:<8} {:>6.2f} M of {:.2f} M steps, {:>5.0f}/s, {} left", progress.stage,
+                  static_cast<double>(progress.steps) * 1e-6, static_cast<double>(progress.steps_wanted) * 1e-6,
+                  progress.steps_per_second, format_duration(std::max(0.0, progress.seconds_left)));
+  text += progress.stage == "student" ? fmt::format("; loss {:.4f}", progress.loss)
+                                      : fmt::format("; return {:.1f}", progress.episode_return);
+  return text + fmt::format(", falls {:.0f} %, root {:.1f} cm, upper body {:.1f} cm, action rate {:.2f}",
+                            100.0 * progress.fall_share, 100.0 * t.root_xy / ticks, 100.0 * t.upper_body / ticks,
+                            t.action_rate / ticks);
+}
+
+nlohmann::json json_of(const WbcProgress& progress) {
+  return {{"stage", progress.stage},
+          {"steps", progress.steps},
+          {"steps_per_second", progress.steps_per_second},
+          {"return", progress.episode_return},
+          {"falls", progress.fall_share},
+          {"loss", progress.loss}};
+}
+
+struct StageEnd {
+  bool complete = false;
+  WbcProgress first, last;
+};
+
+StageEnd train_stage(const Session& session, const std::shared_ptr<const RobotModel>& robot, const WbcRun& run) {
+  StageEnd end;
+  bool any = false;
+  end.complete = train_wbc(
+      robot, run,
+      [&](const WbcProgress& progress) {
+        if (!any) end.first = progress;
+        any = true;
+        end.last = progress;
+        note(session, line(progress));
+      },
+      [] { return interrupt() != Interrupt::kNone; });
+  return end;
+}
+
+std::vector<std::string> stages_of(const TrainArguments& arguments) {
+  if (arguments.smoke) return {"stand", "student"};
+  if (arguments.stage != "all") return {arguments.stage};
+  std::vector<std::string> stages;
+  for (const WbcStage& stage : wbc_plan()) stages.push_back(stage.name);
+  return stages;
+}
+
+// A small training whose outcome can be checked: the return of the oracle rises, and a student can be distilled from
+// it.
+WbcRun smoke_run(const TrainArguments& arguments, const std::string& stage) {
+  WbcRun run = arguments.run;
+  run.stage = stage;
+  run.environments = 32;
+  const long scale = arguments.run.steps > 0 ? arguments.run.steps : 600'000;
+  run.steps = stage == "student" ? scale / 4 : scale;
+  if (stage == "student") run.from = wbc_checkpoint(run.folder, "stand");
+  return run;
+}
+
+void train(Session& session, TrainArguments& arguments) {
+  catch_interrupts();
+  const auto robot = load_shared_robot(arguments.card);
+  const std::vector<std::string> stages = stages_of(arguments);
+  nlohmann::json json = nlohmann::json::array();
+  for (const std::string& stage : stages) {
+    WbcRun run = arguments.smoke ? smoke_run(arguments, stage) : arguments.run;
+    run.stage = stage;
+    if (!arguments.smoke && (stage == "interact" || stage == "student")) {
+      Progress progress(session.progress());
+      run.motions = std::make_shared<const std::vector<RobotMotion>>(
+          training_motions(*robot, kMotionsPerTask, run.threads, progress));
+    }
+    const StageEnd end = train_stage(session, robot, run);
+    json.push_back(json_of(end.last));
+    if (!end.complete) {
+      note(session, fmt::format("stopped; the same command goes on from '{}'", wbc_checkpoint(run.folder, stage)));
+      session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
+      return;
+    }
+    note(session, fmt::format("stage '{}' is complete: {}", stage, wbc_network_file(run.folder, stage)));
+    if (arguments.smoke && stage == "stand" && end.last.episode_return <= end.first.episode_return) {
+      note(session, fmt::format("smoke test failed: the return went from {:.2f} to {:.2f}, expected it to rise",
+                                end.first.episode_return, end.last.episode_return));
+      session.exit_code = kExitGate;
+      return;
+    }
+  }
+  const std::string network = wbc_network_file(arguments.run.folder, stages.back());
+  const WbcNetwork made = load_wbc_network(network, *robot);
+  print(session, fmt::format("{}: {} inputs, {} outputs\n", network, made.mlp.inputs(), made.mlp.outputs()),
+        {{"network", network}, {"stages", json}});
+}
+
+}  // namespace
+
+void add_train(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("train", "Train a controller of this project");
+  command->require_subcommand(1);
+  auto arguments = std::make_shared<TrainArguments>();
+  arguments->run.folder = "runs/wbc";
+  arguments->run.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App* wbc =
+      add_command(*command, session, "wbc",
+                  "WBC-Sim (supplement A.3.2): an oracle by PPO in stages, then a student by distillation.\n"
+                  "Killed or stopped, the same command goes on from the last checkpoint",
+                  "duet train wbc --smoke -o runs/wbc-smoke");
+  wbc->add_option("--stage", arguments->stage, "stand, walk, interact, student, or all in turn")->capture_default_str();
+  wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
+  wbc->add_option("--from", arguments->run.from, "checkpoint to begin with (default: the stage before in the folder)");
+  wbc->add_option("--steps", arguments->run.steps, "of the environment, in all (default: the stage's)");
+  wbc->add_option("--seed", arguments->run.seed, "of weights, commands and noise")->capture_default_str();
+  wbc->add_option("--threads", arguments->run.threads, "the result depends on it")->capture_default_str();
+  wbc->add_option("--environments", arguments->run.environments, "a multiple of the threads")->capture_default_str();
+  wbc->add_option("--card", arguments->card, "robot card (default: the G1 that ships with duet)");
+  wbc->add_flag("--smoke", arguments->smoke,
+                "a small stand and student stage in minutes; fails (exit 1) where the return does not rise");
+  wbc->callback([&session, arguments] { train(session, *arguments); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,17 @@
+// Motions for a controller to learn on: synthesised clips of the six tasks through PAIR, with the approach of A.4.4.
+// The seeds are none that a suite uses: what is tested on is never learnt.
+#pragma once
+
+#include <vector>
+
+#include "bench/progress.h"
+#include "core/robot_motion.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+inline constexpr std::uint64_t kTrainingSeed = 770001;
+
+std::vector<RobotMotion> training_motions(const RobotModel& robot, int per_task, int threads, Progress& progress);
+
+}  // namespace duet

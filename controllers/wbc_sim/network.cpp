@@ -1,0 +1,203 @@
+#include "controllers/wbc_sim/network.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "core/require.h"
+#include "nn/mlp_file.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kFormat = "duet.wbc-network/1";
+
+std::string name_of(WbcKind kind) { return kind == WbcKind::kOracle ? "oracle" : "student"; }
+
+int input_size(WbcKind kind, const WbcLayout& layout) {
+  return kind == WbcKind::kOracle ? layout.oracle() : layout.student();
+}
+
+nlohmann::json channels_of(WbcKind kind, int joints) {
+  const WbcLayout layout(joints);
+  nlohmann::json json = nlohmann::json::array();
+  for (const ChannelSpan& channel : kind == WbcKind::kOracle ? layout.oracle_channels() : layout.student_channels())
+    json.push_back({{"name", channel.name}, {"size", channel.size}});
+  return json;
+}
+
+// Any input does, as long as each of its numbers matters: about one deviation to either side of the mean.
+Eigen::VectorXf golden_input(const WbcNetwork& network) {
+  Eigen::VectorXf input = network.mean;
+  for (Eigen::Index i = 0; i < input.size(); ++i)
+    input[i] += network.deviation[i] * std::sin(0.7F * static_cast<float>(i) + 0.1F);
+  return input;
+}
+
+template <typename Vector>
+Tensor tensor_of(const Vector& values) {
+  Tensor tensor{.shape = {values.size()}, .values = {}};
+  for (const auto value : values) tensor.values.push_back(static_cast<float>(value));
+  return tensor;
+}
+
+// Reading, with every message in one form.
+class Reader {
+ public:
+  Reader(const SafeTensors& tensors, const std::string& file) : tensors_(tensors), file_(file) {}
+
+  [[nodiscard]] std::string text(const std::string& key) const {
+    const auto found = tensors_.metadata.find(key);
+    if (found == tensors_.metadata.end())
+      throw InputError(fmt::format("{}: no '{}' in the header: not a network of WBC-Sim", file_, key));
+    return found->second;
+  }
+  void expect(const std::string& what, const std::string& expected, const std::string& found) const {
+    if (expected != found) throw InputError(fmt::format("{}: {} is '{}', expected '{}'", file_, what, found, expected));
+  }
+  [[nodiscard]] Eigen::VectorXf vector(const std::string& name, Eigen::Index size) const {
+    const auto found = tensors_.tensors.find(name);
+    if (found == tensors_.tensors.end()) throw InputError(fmt::format("{}: no tensor '{}'", file_, name));
+    const std::vector<float>& values = found->second.values;
+    if (static_cast<Eigen::Index>(values.size()) != size)
+      throw InputError(fmt::format("{}: tensor '{}' has {} values, expected {}", file_, name, values.size(), size));
+    const Eigen::VectorXf vector = Eigen::Map<const Eigen::VectorXf>(values.data(), size);
+    if (!vector.allFinite())
+      throw InputError(fmt::format("{}: tensor '{}' has values that are not finite", file_, name));
+    return vector;
+  }
+
+ private:
+  const SafeTensors& tensors_;
+  const std::string& file_;
+};
+
+nlohmann::json parse_list(const Reader& reader, const std::string& key, const std::string& file) {
+  const nlohmann::json json = nlohmann::json::parse(reader.text(key), nullptr, false);
+  if (!json.is_array()) throw InputError(fmt::format("{}: '{}' in the header is not a list", file, key));
+  return json;
+}
+
+void check_joints(const Reader& reader, const RobotModel& robot, const std::string& file) {
+  const nlohmann::json joints = parse_list(reader, "joints", file);
+  if (joints.size() != robot.joints.size())
+    throw InputError(
+        fmt::format("{}: made for {} joints, robot '{}' has {}", file, joints.size(), robot.name, robot.dof()));
+  for (int i = 0; i < robot.dof(); ++i) {
+    const std::string found = joints[i].is_string() ? joints[i].get<std::string>() : joints[i].dump();
+    reader.expect(fmt::format("joint {}", i), robot.joints[i].name, found);
+  }
+}
+
+void check_channels(const Reader& reader, WbcKind kind, int joints, const std::string& file) {
+  const nlohmann::json found = parse_list(reader, "observation", file), expected = channels_of(kind, joints);
+  for (size_t i = 0; i < std::max(found.size(), expected.size()); ++i)
+    reader.expect(fmt::format("observation channel {}", i), i < expected.size() ? expected[i].dump() : "nothing",
+                  i < found.size() ? found[i].dump() : "nothing");
+}
+
+void check_golden(const Reader& reader, const WbcNetwork& network, const std::string& file) {
+  const Eigen::VectorXf input = reader.vector("golden.input", network.mean.size());
+  const Eigen::VectorXf output = reader.vector("golden.output", network.mlp.outputs());
+  WbcPolicy policy(network);
+  const double error = (policy.act({input.data(), static_cast<size_t>(input.size())}) - output).cwiseAbs().maxCoeff();
+  if (!(error <= kGoldenError))
+    throw InputError(
+        fmt::format("{}: the golden output is missed by {:.2g}, expected at most {:g}: weights and output "
+                    "are not of one network",
+                    file, error, kGoldenError));
+}
+
+long whole_number(const Reader& reader, const std::string& key, const std::string& file) {
+  const std::string text = reader.text(key);
+  try {
+    return std::stol(text);
+  } catch (const std::exception&) {
+    throw InputError(fmt::format("{}: '{}' in the header is '{}', expected a whole number", file, key, text));
+  }
+}
+
+}  // namespace
+
+WbcPolicy::WbcPolicy(const WbcNetwork& network)
+    : network_(network), runner_(network.mlp), input_(network.mean.size()), action_(network.mlp.outputs()) {}
+
+const Eigen::VectorXf& WbcPolicy::act(std::span<const float> observation) {
+  input_ = ((Eigen::Map<const Eigen::ArrayXf>(observation.data(), input_.size()) - network_.mean.array()) /
+            network_.deviation.array())
+               .cwiseMax(-kNormalClip)
+               .cwiseMin(kNormalClip);
+  const std::span<const float> output = runner_.run({input_.data(), static_cast<size_t>(input_.size())});
+  const auto bound = static_cast<float>(kActionBound);
+  // Written so that what is not a number stays so.
+  for (Eigen::Index i = 0; i < action_.size(); ++i)
+    action_[i] = output[i] > bound ? bound : (output[i] < -bound ? -bound : output[i]);
+  return action_;
+}
+
+void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type) {
+  require(network.mlp.inputs() == input_size(network.kind, WbcLayout(network.mlp.outputs())) &&
+              network.mean.size() == network.mlp.inputs() && network.deviation.size() == network.mlp.inputs(),
+          fmt::format("save_wbc_network: {} inputs and a normaliser of {} for {} joints", network.mlp.inputs(),
+                      network.mean.size(), network.mlp.outputs()));
+  SafeTensors tensors;
+  add_mlp(tensors, "mlp", network.mlp);
+  tensors.tensors["input.mean"] = tensor_of(network.mean);
+  tensors.tensors["input.deviation"] = tensor_of(network.deviation);
+  tensors.tensors["action.scale"] = tensor_of(network.action_scale);
+  tensors.tensors["joint.neutral"] = tensor_of(network.neutral);
+  tensors.tensors["joint.kp"] = tensor_of(network.kp);
+  tensors.tensors["joint.kd"] = tensor_of(network.kd);
+  tensors.metadata = {{"format", kFormat},
+                      {"kind", name_of(network.kind)},
+                      {"robot", network.robot},
+                      {"joints", nlohmann::json(network.joints).dump()},
+                      {"observation", channels_of(network.kind, network.mlp.outputs()).dump()},
+                      {"rate_hz", "50"},
+                      {"action", "target = base + scale * clip(action, 4); base: legs of the gait, upper body of u_t"},
+                      {"seed", std::to_string(network.seed)},
+                      {"steps", std::to_string(network.steps)},
+                      {"note", network.note}};
+  const Eigen::VectorXf input = golden_input(network);
+  WbcPolicy policy(network);
+  tensors.tensors["golden.input"] = tensor_of(input);
+  tensors.tensors["golden.output"] = tensor_of(policy.act({input.data(), static_cast<size_t>(input.size())}));
+  write_safetensors(path, tensors, type);
+}
+
+WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
+  const SafeTensors tensors = read_safetensors(path);
+  const Reader reader(tensors, path);
+  reader.expect("the format", kFormat, reader.text("format"));
+  WbcNetwork network;
+  const std::string kind = reader.text("kind");
+  if (kind != "oracle" && kind != "student")
+    throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, kind));
+  network.kind = kind == "oracle" ? WbcKind::kOracle : WbcKind::kStudent;
+  reader.expect("the robot", robot.name, reader.text("robot"));
+  check_joints(reader, robot, path);
+  check_channels(reader, network.kind, robot.dof(), path);
+  network.robot = robot.name;
+  network.joints = robot.joint_names();
+  network.mlp = read_mlp(tensors, "mlp", path);
+  const int inputs = input_size(network.kind, WbcLayout(robot.dof()));
+  if (network.mlp.inputs() != inputs || network.mlp.outputs() != robot.dof())
+    throw InputError(fmt::format("{}: a network of {} inputs and {} outputs, expected {} and {}", path,
+                                 network.mlp.inputs(), network.mlp.outputs(), inputs, robot.dof()));
+  network.mean = reader.vector("input.mean", inputs);
+  network.deviation = reader.vector("input.deviation", inputs);
+  if ((network.deviation.array() <= 0.0F).any())
+    throw InputError(fmt::format("{}: tensor 'input.deviation' has values that are not positive", path));
+  network.action_scale = reader.vector("action.scale", robot.dof()).cast<double>();
+  network.neutral = reader.vector("joint.neutral", robot.dof()).cast<double>();
+  network.kp = reader.vector("joint.kp", robot.dof()).cast<double>();
+  network.kd = reader.vector("joint.kd", robot.dof()).cast<double>();
+  network.seed = static_cast<std::uint64_t>(whole_number(reader, "seed", path));
+  network.steps = whole_number(reader, "steps", path);
+  network.note = reader.text("note");
+  check_golden(reader, network, path);
+  return network;
+}
+
+}  // namespace duet

@@ -1,0 +1,59 @@
+// WBC-Sim's network as it ships: a normaliser and a multilayer perceptron with everything a robot must know to run it,
+// in one safetensors file. Names, not indices: joints and observation channels are written out and checked at load, and
+// a golden pair of input and output is evaluated.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controllers/wbc_sim/observation.h"
+#include "core/robot_state.h"
+#include "nn/mlp.h"
+#include "nn/safetensors.h"
+#include "robots/robot_model.h"
+
+namespace duet {
+
+inline constexpr float kNormalClip = 5.0F;    // of a normalised input
+inline constexpr double kActionBound = 4.0;   // of an action, in both directions
+inline constexpr double kGoldenError = 1e-4;  // of an output at load; with weights in F16 the pair is made from those
+
+enum class WbcKind { kOracle, kStudent };  // 163-D with base velocity; 1090-D with history
+
+struct WbcNetwork {
+  WbcKind kind = WbcKind::kStudent;
+  std::string robot;                // name of the card
+  std::vector<std::string> joints;  // order of every joint vector
+  Eigen::VectorXf mean, deviation;  // input' = clip((input - mean) / deviation, +-5)
+  Mlp mlp;
+  Eigen::VectorXd action_scale;  // target = base + scale a [rad]
+  Eigen::VectorXd neutral;       // that joint angles are relative to [rad]
+  Eigen::VectorXd kp, kd;        // sent with the targets [N m/rad], [N m s/rad]
+  std::uint64_t seed = 0;
+  long steps = 0;    // of the environment, in training
+  std::string note;  // stages, git revision: for people
+};
+
+// Evaluates it; keeps a reference. No allocation after construction.
+class WbcPolicy {
+ public:
+  explicit WbcPolicy(const WbcNetwork& network);
+  // The action, clipped, for an unscaled observation. Valid until the next call.
+  const Eigen::VectorXf& act(std::span<const float> observation);
+
+ private:
+  const WbcNetwork& network_;
+  MlpRunner runner_;
+  Eigen::VectorXf input_, action_;
+};
+
+// Throws std::runtime_error where the file cannot be written, std::invalid_argument for sizes that do not fit.
+void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type);
+
+// Throws InputError (file, what, expected, found): not a WBC-Sim network, a robot of another name, joints of other
+// names or in another order, observation channels other than this program's, shapes that do not fit, numbers that are
+// not finite, a golden output that is missed by more than kGoldenError.
+WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot);
+
+}  // namespace duet

@@ -1,0 +1,105 @@
+#include "controllers/wbc_sim/wbc_sim.h"
+
+#include <algorithm>
+
+#include "core/require.h"
+#include "core/share.h"
+
+namespace duet {
+namespace {
+
+class WbcSim final : public Controller {
+ public:
+  WbcSim(const std::shared_ptr<const RobotModel>& robot, std::shared_ptr<const WbcNetwork> network)
+      : robot_(robot),
+        network_(std::move(network)),
+        policy_(*network_),
+        tracker_(robot),
+        layout_(robot->dof()),
+        history_(layout_),
+        observation_(network_->mlp.inputs()) {
+    action_.setZero(robot->dof());
+  }
+
+  [[nodiscard]] std::string_view name() const override { return "wbc_sim"; }
+  [[nodiscard]] bool walks() const override { return true; }
+
+  void reset(const RobotState&) override {
+    action_.setZero();
+    started_ = false;
+  }
+
+  void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
+    if (started_)
+      tracker_.update(state, reference);
+    else
+      tracker_.reset(reference);
+    read_sensors(state, tracker_, sensors_);
+    if (network_->kind == WbcKind::kOracle)
+      write_oracle(sensors_, action_, observation_);
+    else
+      observe_as_student();
+    started_ = true;
+    action_ = policy_.act(observation_);
+    fill(command);
+  }
+
+ private:
+  void observe_as_student() {
+    if (!started_) history_.fill(sensors_, action_);
+    write_student(sensors_, action_, history_, observation_);
+    history_.add(sensors_, action_);
+  }
+
+  void fill(JointCommand& command) const {
+    command.q_target.resize(robot_->dof());
+    for (int i = 0; i < robot_->dof(); ++i)
+      command.q_target[i] = std::clamp(tracker_.q()[i] + network_->action_scale[i] * static_cast<double>(action_[i]),
+                                       robot_->joints[i].lower, robot_->joints[i].upper);
+    command.kp = network_->kp;
+    command.kd = network_->kd;
+    command.tau_ff.setZero(robot_->dof());
+  }
+
+  std::shared_ptr<const RobotModel> robot_;
+  std::shared_ptr<const WbcNetwork> network_;  // shared: many episodes run one network
+  WbcPolicy policy_;
+  WbcTracker tracker_;
+  WbcLayout layout_;
+  WbcHistory history_;
+  WbcSensors sensors_;
+  std::vector<float> observation_;
+  Eigen::VectorXf action_;
+  bool started_ = false;
+};
+
+std::string network_path(const ControllerOptions& options) {
+  const auto found = options.find("network");
+  const std::string network = found == options.end() ? "student" : found->second;
+  if (network != "student" && network != "oracle") return network;
+  return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
+}
+
+}  // namespace
+
+std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
+                                                    std::shared_ptr<const WbcNetwork> network) {
+  require(network->joints == robot->joint_names(), "wbc_sim: the network was made for other joints than the robot's");
+  return std::make_unique<WbcSim>(robot, std::move(network));
+}
+
+ControllerInfo wbc_sim_info() {
+  return {"wbc_sim",
+          "WBC-Sim of the supplement, trained by `duet train wbc`: stands, steps and tracks the whole reference",
+          "g1",
+          true,
+          {{"network", "student", "student, oracle (sees the base velocity), or the path of a network"}}};
+}
+
+std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
+                                                    const ControllerOptions& options) {
+  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(network_path(options), *robot));
+  return make_wbc_sim_controller(std::move(robot), std::move(network));
+}
+
+}  // namespace duet

@@ -1,0 +1,324 @@
+#include "controllers/wbc_sim/wbc_sim.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "controllers/wbc_sim/leg_chain.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "robots/kinematics.h"
+
+namespace duet {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+
+std::shared_ptr<const RobotModel> g1() {
+  static const auto robot = load_shared_robot();
+  return robot;
+}
+
+Reference standing_reference(double x = 0.0, double y = 0.0, double yaw = 0.0) {
+  return {.X_WB = {yaw_rotation(yaw), {x, y, g1()->standing_height}}, .q = g1()->neutral};
+}
+
+Vector6 leg_angles(const LegChain& leg, const Eigen::VectorXd& q) {
+  Vector6 angles;
+  for (int i = 0; i < 6; ++i) angles[i] = q[leg.joints()[i]];
+  return angles;
+}
+
+// A network of random weights that does little: enough for all but the quality.
+WbcNetwork small_network(WbcKind kind) {
+  const WbcLayout layout(g1()->dof());
+  const int inputs = kind == WbcKind::kOracle ? layout.oracle() : layout.student();
+  Random random(5, 6);
+  WbcNetwork network;
+  network.kind = kind;
+  network.robot = g1()->name;
+  network.joints = g1()->joint_names();
+  network.mlp = random_mlp({inputs, 16, g1()->dof()}, 0.1F, random);
+  network.mean.setZero(inputs);
+  network.deviation.setOnes(inputs);
+  network.action_scale.setConstant(g1()->dof(), 0.25);
+  network.neutral = g1()->neutral;
+  const JointCommand command = g1()->default_command(g1()->neutral);
+  network.kp = command.kp;
+  network.kd = command.kd;
+  network.note = "test";
+  return network;
+}
+
+std::string temporary(const std::string& name) {
+  return (std::filesystem::temp_directory_path() / ("duet-wbc-" + name + ".safetensors")).string();
+}
+
+TEST(LegChain, FootPoseIsThatOfTheKinematics) {
+  const Stance stance(*g1());
+  Kinematics kinematics(*g1());
+  Eigen::VectorXd q = g1()->neutral;
+  for (int i = 0; i < g1()->dof(); ++i) q[i] += 0.1 * std::sin(i);
+  kinematics.update({}, q);
+  for (const Leg& leg : stance.legs()) {
+    const LegChain chain(*g1(), leg);
+    const Pose foot = chain.foot_pose(leg_angles(chain, q));
+    EXPECT_LT((foot.p - kinematics.p_WL(leg.link)).norm(), 1e-12);
+    EXPECT_LT((foot.R.toRotationMatrix() - kinematics.R_WL(leg.link)).norm(), 1e-12);
+  }
+}
+
+TEST(LegChain, FindsTheAnglesOfAPoseNearTheStart) {
+  const Stance stance(*g1());
+  for (const Leg& leg : stance.legs()) {
+    const LegChain chain(*g1(), leg);
+    const Vector6 start = leg_angles(chain, g1()->neutral);
+    Vector6 wanted = start, q = start;
+    wanted += Vector6(0.1, 0.05, -0.08, 0.15, -0.05, 0.04);
+    const Pose target = chain.foot_pose(wanted);
+    for (int i = 0; i < 4; ++i) chain.solve(target, q);
+    const Pose found = chain.foot_pose(q);
+    EXPECT_LT((found.p - target.p).norm(), 1e-5);
+    EXPECT_LT(found.R.angularDistance(target.R), 1e-4);
+  }
+}
+
+TEST(LegChain, APoseOutOfReachKeepsWithinTheLimits) {
+  const LegChain chain(*g1(), Stance(*g1()).legs()[0]);
+  Vector6 q = leg_angles(chain, g1()->neutral);
+  for (int i = 0; i < 50; ++i) chain.solve({Eigen::Quaterniond::Identity(), {2.0, 1.0, -3.0}}, q);
+  for (int i = 0; i < 6; ++i) {
+    const RobotJoint& joint = g1()->joints[chain.joints()[i]];
+    EXPECT_TRUE(std::isfinite(q[i]));
+    EXPECT_GE(q[i], joint.lower);
+    EXPECT_LE(q[i], joint.upper);
+  }
+}
+
+TEST(Gait, StandsWhileTheReferenceAndTheRobotRest) {
+  Gait gait;
+  for (int i = 0; i < 200; ++i) gait.update(Eigen::Vector3d::Zero(), {0.05, -0.05, 0.1});
+  EXPECT_FALSE(gait.stepping());
+  EXPECT_EQ(gait.feet()[0].lift, 0.0);
+  EXPECT_NEAR(gait.feet()[0].y, 0.1185, 1e-12);
+  EXPECT_NEAR(gait.feet()[1].y, -0.1185, 1e-12);
+}
+
+TEST(Gait, AFootOnTheGroundStaysWhereItIs) {
+  const Eigen::Vector3d velocity(0.3, -0.1, 0.0);
+  Gait gait;
+  for (int i = 0; i < 300; ++i) gait.update(velocity, Eigen::Vector3d::Zero());  // the filter has settled
+  double root_x = 0.0, root_y = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const int stance = 1 - gait.swing_foot();
+    const FootPlace before = gait.feet()[stance];
+    gait.update(velocity, Eigen::Vector3d::Zero());
+    root_x += 0.02 * velocity.x();
+    root_y += 0.02 * velocity.y();
+    if (stance != 1 - gait.swing_foot()) continue;
+    const FootPlace after = gait.feet()[stance];
+    EXPECT_NEAR(after.x + 0.02 * velocity.x(), before.x, 1e-9);
+    EXPECT_NEAR(after.y + 0.02 * velocity.y(), before.y, 1e-9);
+    EXPECT_EQ(after.lift, 0.0);
+  }
+}
+
+TEST(Gait, EachFootSwingsOncePerCycleAndAsHighAsAsked) {
+  Gait gait;
+  double top[2] = {0.0, 0.0};
+  for (int i = 0; i < 500; ++i) {
+    gait.update({0.2, 0.0, 0.0}, Eigen::Vector3d::Zero());
+    for (int side = 0; side < 2; ++side) top[side] = std::max(top[side], gait.feet()[side].lift);
+  }
+  for (const double height : top) EXPECT_NEAR(height, 0.08, 0.001);
+}
+
+TEST(Gait, StepsOnForTwoHalfCyclesAndThenStands) {
+  Gait gait;
+  for (int i = 0; i < 100; ++i) gait.update({0.3, 0.0, 0.0}, Eigen::Vector3d::Zero());
+  ASSERT_TRUE(gait.stepping());
+  int ticks = 0;
+  while (gait.stepping() && ticks < 500) {
+    gait.update(Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero());
+    ++ticks;
+  }
+  EXPECT_GT(ticks, 2 * 17);
+  EXPECT_LT(ticks, 4 * 18 + 20);
+  EXPECT_LT(std::abs(gait.velocity().x()), 0.02);
+}
+
+TEST(Gait, TheFootOfTheSideItGoesToLeavesFirst) {
+  for (const double side : {1.0, -1.0}) {
+    Gait gait;
+    while (!gait.stepping()) gait.update({0.0, side * 0.2, 0.0}, Eigen::Vector3d::Zero());
+    EXPECT_EQ(gait.swing_foot(), side > 0 ? 0 : 1);
+  }
+}
+
+TEST(WbcTracker, AtRestTheLegsAreTheStandingOnes) {
+  WbcTracker tracker(g1());
+  tracker.reset(standing_reference(1.0, 2.0, 0.7));
+  for (int i = 0; i < 10; ++i)
+    tracker.update(g1()->standing_state(standing_reference(1.0, 2.0, 0.7).X_WB), standing_reference(1.0, 2.0, 0.7));
+  EXPECT_LT((tracker.q() - g1()->neutral).cwiseAbs().maxCoeff(), 2e-3);
+  EXPECT_LT(tracker.v().cwiseAbs().maxCoeff(), 1e-3);
+}
+
+TEST(WbcTracker, TheUpperBodyIsTheReferencesWithinTheLimits) {
+  WbcTracker tracker(g1());
+  Reference reference = standing_reference();
+  const int elbow = g1()->joint_index("left_elbow_joint"), knee = g1()->joint_index("left_knee_joint");
+  reference.q[elbow] = 99.0;
+  reference.q[knee] = 2.0;  // a human's leg angles are not tracked
+  tracker.reset(reference);
+  EXPECT_EQ(tracker.q()[elbow], g1()->joints[elbow].upper);
+  EXPECT_LT(tracker.q()[knee], 1.0);
+}
+
+TEST(WbcTracker, ALowerRootBendsTheKnees) {
+  WbcTracker tracker(g1());
+  Reference low = standing_reference();
+  low.X_WB.p.z() = 0.3;
+  tracker.reset(low);
+  EXPECT_EQ(tracker.root().p.z(), RootBounds{}.lowest);
+  EXPECT_GT(tracker.q()[g1()->joint_index("left_knee_joint")],
+            g1()->neutral[g1()->joint_index("left_knee_joint")] + 0.2);
+}
+
+TEST(WbcLayout, SizesAreThePrintedTotals) {
+  const WbcLayout layout(29);
+  EXPECT_EQ(layout.oracle(), 163);
+  EXPECT_EQ(layout.student(), 1090);
+  EXPECT_EQ(layout.critic(22), 361);
+  EXPECT_EQ(critic_links(*g1()).size(), 22U);
+  int sum = 0;
+  for (const ChannelSpan& channel : layout.student_channels()) sum += channel.size;
+  EXPECT_EQ(sum, 1090);
+}
+
+TEST(WbcObservation, EveryChannelIsAtItsPlace) {
+  WbcTracker tracker(g1());
+  RobotState state = g1()->standing_state();
+  state.q[3] += 0.5;
+  state.v[4] = 2.0;
+  state.w_WB_B = {1.0, 2.0, 3.0};
+  state.v_WB = {4.0, 5.0, 6.0};
+  Eigen::VectorXf action = Eigen::VectorXf::Zero(29);
+  action[7] = 0.25F;
+  tracker.reset(standing_reference(0.1, -0.2));
+  WbcSensors sensors;
+  read_sensors(state, tracker, sensors);
+  std::vector<float> o(163);
+  write_oracle(sensors, action, o);
+  EXPECT_FLOAT_EQ(o[3], 0.5F);
+  EXPECT_FLOAT_EQ(o[29 + 4], 2.0F);
+  EXPECT_FLOAT_EQ(o[58 + 1], 2.0F);
+  EXPECT_FLOAT_EQ(o[61 + 2], 6.0F);
+  EXPECT_FLOAT_EQ(o[64 + 2], -1.0F);
+  EXPECT_FLOAT_EQ(o[67 + 7], 0.25F);
+  EXPECT_NEAR(o[154], 0.1F, 1e-6);
+  EXPECT_NEAR(o[155], -0.2F, 1e-6);
+  EXPECT_FLOAT_EQ(o[157], 1.0F);  // first column of the identity
+  EXPECT_FLOAT_EQ(o[161], 1.0F);  // second column
+}
+
+TEST(WbcObservation, HistoryIsOldestFirstWithoutTheCurrentFrame) {
+  const WbcLayout layout(29);
+  WbcHistory history(layout);
+  WbcTracker tracker(g1());
+  tracker.reset(standing_reference());
+  WbcSensors sensors;
+  read_sensors(g1()->standing_state(), tracker, sensors);
+  Eigen::VectorXf action = Eigen::VectorXf::Zero(29);
+  history.fill(sensors, action);
+  for (int i = 1; i <= 3; ++i) {
+    action[0] = static_cast<float>(i);
+    history.add(sensors, action);
+  }
+  const int at = 29 + 29 + 3 + 3;
+  EXPECT_EQ(history.values()[9 * 93 + at], 3.0F);
+  EXPECT_EQ(history.values()[7 * 93 + at], 1.0F);
+  EXPECT_EQ(history.values()[6 * 93 + at], 0.0F);
+}
+
+TEST(WbcNetwork, IsTheSameAfterSavingAndLoading) {
+  const std::string path = temporary("round-trip");
+  for (const TensorType type : {TensorType::kF32, TensorType::kF16}) {
+    const WbcNetwork network = small_network(WbcKind::kStudent);
+    save_wbc_network(path, network, type);
+    const WbcNetwork read = load_wbc_network(path, *g1());
+    EXPECT_EQ(read.kind, WbcKind::kStudent);
+    EXPECT_LT((read.mlp.layers[0].W - network.mlp.layers[0].W).cwiseAbs().maxCoeff(),
+              type == TensorType::kF32 ? 0.0F + 1e-9F : 1e-3F);
+    EXPECT_LT((read.kp - network.kp).cwiseAbs().maxCoeff(), 0.1);
+  }
+  std::filesystem::remove(path);
+}
+
+// Each edit of a good file, and what the message must say.
+TEST(WbcNetwork, BadFilesAreRefusedByWhatIsWrong) {
+  const std::string path = temporary("bad");
+  save_wbc_network(path, small_network(WbcKind::kOracle), TensorType::kF32);
+  const SafeTensors good = read_safetensors(path);
+  const auto refused = [&](const std::function<void(SafeTensors&)>& edit, const std::string& message) {
+    SafeTensors bad = good;
+    edit(bad);
+    write_safetensors(path, bad);
+    EXPECT_THAT([&] { load_wbc_network(path, *g1()); }, ThrowsMessage<InputError>(HasSubstr(message)));
+  };
+  refused([](SafeTensors& t) { t.metadata.erase("format"); }, "no 'format' in the header");
+  refused([](SafeTensors& t) { t.metadata["robot"] = "h1"; }, "the robot is 'h1', expected 'g1'");
+  refused([](SafeTensors& t) { t.metadata["joints"] = R"(["a", "b"])"; }, "made for 2 joints, robot 'g1' has 29");
+  refused([](SafeTensors& t) { t.metadata["joints"].replace(t.metadata["joints"].find("left_knee"), 9, "left_elbo"); },
+          "joint 3 is 'left_elbo_joint', expected 'left_knee_joint'");
+  refused([](SafeTensors& t) { t.metadata["observation"] = "[]"; }, "observation channel 0");
+  refused([](SafeTensors& t) { t.tensors.erase("mlp.1.bias"); }, "no tensor 'mlp.1.bias'");
+  refused([](SafeTensors& t) { t.tensors["mlp.1.weight"].shape = {16, 29}; }, "'mlp.1.weight' has shape");
+  refused([](SafeTensors& t) { t.tensors["input.deviation"].values[5] = 0.0F; }, "values that are not positive");
+  refused([](SafeTensors& t) { t.tensors["mlp.0.weight"].values[5] += 5.0F; }, "the golden output is missed by");
+  refused([](SafeTensors& t) { t.metadata["steps"] = "many"; }, "'steps' in the header is 'many'");
+  std::filesystem::remove(path);
+}
+
+TEST(WbcNetwork, ATruncatedFileIsRefused) {
+  const std::string path = temporary("short");
+  save_wbc_network(path, small_network(WbcKind::kOracle), TensorType::kF32);
+  const std::string bytes = read_file(path);
+  write_file(path, std::string_view(bytes).substr(0, bytes.size() - 100));
+  EXPECT_THROW(load_wbc_network(path, *g1()), InputError);
+  std::filesystem::remove(path);
+}
+
+TEST(WbcSim, TargetsKeepWithinTheLimitsAndTheGainsAreTheNetworks) {
+  for (const WbcKind kind : {WbcKind::kOracle, WbcKind::kStudent}) {
+    WbcNetwork network = small_network(kind);
+    network.mlp.layers.back().b.setConstant(100.0F);  // every action at its bound
+    const auto controller = make_wbc_sim_controller(g1(), std::make_shared<const WbcNetwork>(network));
+    JointCommand command;
+    controller->reset(g1()->standing_state());
+    for (int i = 0; i < 5; ++i) controller->act(g1()->standing_state(), standing_reference(), command);
+    EXPECT_TRUE((command.q_target.array() <= g1()->upper().array()).all());
+    EXPECT_EQ(command.kp, network.kp);
+    EXPECT_TRUE(controller->walks());
+  }
+}
+
+TEST(WbcSim, AnEpisodeDoesNotDependOnTheOneBefore) {
+  const auto network = std::make_shared<const WbcNetwork>(small_network(WbcKind::kStudent));
+  const auto controller = make_wbc_sim_controller(g1(), network);
+  const auto run = [&] {
+    JointCommand command;
+    controller->reset(g1()->standing_state());
+    for (int i = 0; i < 20; ++i) controller->act(g1()->standing_state(), standing_reference(0.01 * i), command);
+    return command.q_target;
+  };
+  const Eigen::VectorXd first = run();
+  EXPECT_EQ(first, run());
+}
+
+}  // namespace
+}  // namespace duet

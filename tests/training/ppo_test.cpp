@@ -1,0 +1,124 @@
+#include "training/ppo.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "backends/factory.h"
+#include "core/require.h"
+#include "training/distill.h"
+
+namespace duet {
+namespace {
+
+std::shared_ptr<const RobotModel> g1() {
+  static const auto robot = load_shared_robot();
+  return robot;
+}
+
+bool mujoco_is_absent() {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco") return !engine.available;
+  return true;
+}
+
+#define NEEDS_MUJOCO() \
+  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
+
+PpoOptions small() {
+  PpoOptions options;
+  options.environments = 4;
+  options.horizon = 16;
+  options.epochs = 2;
+  options.minibatches = 2;
+  return options;
+}
+
+TrainingState fresh(std::uint64_t seed = 1) {
+  TrainingState state;
+  state.agent = make_agent(163, 361, 29, 0.5, seed);
+  state.seed = seed;
+  state.stage = "stand";
+  state.robot_digest = g1()->digest;
+  return state;
+}
+
+TEST(Ppo, TheSeedDecidesEveryWeight) {
+  NEEDS_MUJOCO();
+  Ppo a(g1(), wbc_stage("stand"), small(), fresh()), b(g1(), wbc_stage("stand"), small(), fresh());
+  Ppo c(g1(), wbc_stage("stand"), small(), fresh(2));
+  for (int i = 0; i < 2; ++i) {
+    a.iterate();
+    b.iterate();
+    c.iterate();
+  }
+  EXPECT_EQ(a.state().agent.actor.layers[1].W, b.state().agent.actor.layers[1].W);
+  EXPECT_EQ(a.state().agent.log_std, b.state().agent.log_std);
+  EXPECT_NE(a.state().agent.actor.layers[1].W, c.state().agent.actor.layers[1].W);
+}
+
+TEST(Ppo, AnIterationCountsItsStepsAndMovesTheWeights) {
+  NEEDS_MUJOCO();
+  Ppo ppo(g1(), wbc_stage("stand"), small(), fresh());
+  const Mlp before = ppo.state().agent.actor;
+  const IterationReport report = ppo.iterate();
+  EXPECT_EQ(report.steps, 64);
+  EXPECT_EQ(report.iteration, 1);
+  EXPECT_GT(report.divergence, 0.0);
+  EXPECT_NE(before.layers[0].W, ppo.state().agent.actor.layers[0].W);
+}
+
+TEST(Ppo, OptionsThatDoNotDivideAreRefused) {
+  PpoOptions options = small();
+  options.environments = 5;
+  EXPECT_THAT([&] { Ppo(g1(), wbc_stage("stand"), options, fresh()); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("5 environments on 2 threads")));
+}
+
+TEST(TrainingState, IsTheSameAfterTheFile) {
+  NEEDS_MUJOCO();
+  Ppo ppo(g1(), wbc_stage("stand"), small(), fresh());
+  ppo.iterate();
+  const TrainingState& state = ppo.state();
+  const TrainingState read = training_state(to_tensors(state), "x");
+  EXPECT_EQ(read.agent.actor.layers[2].W, state.agent.actor.layers[2].W);
+  EXPECT_EQ(read.agent.critic_input.variance, state.agent.critic_input.variance);
+  EXPECT_EQ(read.adam.m.back(), state.adam.m.back());
+  EXPECT_EQ(read.adam.steps, state.adam.steps);
+  EXPECT_EQ(read.steps, state.steps);
+  EXPECT_EQ(read.robot_digest, state.robot_digest);
+}
+
+TEST(TrainingState, WhatIsMissingIsNamed) {
+  SafeTensors tensors = to_tensors(fresh());
+  tensors.tensors.erase("critic_input.mean");
+  EXPECT_THAT([&] { training_state(tensors, "a.safetensors"); },
+              testing::ThrowsMessage<InputError>(
+                  testing::AllOf(testing::HasSubstr("a.safetensors"), testing::HasSubstr("'critic_input.mean'"))));
+  tensors = to_tensors(fresh());
+  tensors.metadata["format"] = "other";
+  EXPECT_THAT([&] { training_state(tensors, "a"); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("the format is 'other'")));
+}
+
+TEST(Distillation, TheLossFallsAndTheSeedDecides) {
+  NEEDS_MUJOCO();
+  DistillOptions options;
+  options.environments = 4;
+  options.buffer = 256;
+  options.batch = 64;
+  options.warm_rounds = 100;  // the oracle acts: the same states for both students
+  WbcTask task = wbc_stage("stand");
+  Distillation a(g1(), task, options, fresh().agent, make_student(29, 1), 40);
+  Distillation b(g1(), task, options, fresh().agent, make_student(29, 1), 40);
+  double first = 0.0, last = 0.0;
+  for (int i = 0; i < 20; ++i) {
+    const double loss = a.round().loss;
+    EXPECT_EQ(loss, b.round().loss);
+    if (i == 0) first = loss;
+    last = loss;
+  }
+  EXPECT_LT(last, 0.7 * first);
+}
+
+}  // namespace
+}  // namespace duet

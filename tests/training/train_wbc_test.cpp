@@ -1,0 +1,109 @@
+#include "training/train_wbc.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "backends/factory.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+std::shared_ptr<const RobotModel> g1() {
+  static const auto robot = load_shared_robot();
+  return robot;
+}
+
+bool mujoco_is_absent() {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco") return !engine.available;
+  return true;
+}
+
+#define NEEDS_MUJOCO() \
+  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
+
+WbcRun small_run(const std::string& folder, const std::string& stage) {
+  WbcRun run;
+  run.stage = stage;
+  run.folder = folder;
+  run.environments = 8;
+  run.steps = 1024;
+  return run;
+}
+
+bool train(
+    const WbcRun& run, const std::function<bool()>& stop = [] { return false; }) {
+  return train_wbc(
+      g1(), run, [](const WbcProgress&) {}, stop);
+}
+
+TEST(TrainWbc, AStageLeavesACheckpointANetworkAndCurves) {
+  NEEDS_MUJOCO();
+  const test::ScratchFolder scratch;
+  EXPECT_TRUE(train(small_run(scratch / "wbc", "stand")));
+  EXPECT_EQ(load_wbc_network(wbc_network_file(scratch / "wbc", "stand"), *g1()).kind, WbcKind::kOracle);
+  const std::string curves = read_file(wbc_curves(scratch / "wbc", "stand"));
+  EXPECT_THAT(curves, HasSubstr("steps,minutes,return"));
+  EXPECT_THAT(curves, HasSubstr("\n1024,"));
+  EXPECT_TRUE(train(small_run(scratch / "wbc", "walk")));
+  WbcRun student = small_run(scratch / "wbc", "student");
+  student.from = wbc_checkpoint(scratch / "wbc", "walk");
+  EXPECT_TRUE(train(student));
+  EXPECT_EQ(load_wbc_network(wbc_network_file(scratch / "wbc", "student"), *g1()).kind, WbcKind::kStudent);
+}
+
+TEST(TrainWbc, AStoppedStageGoesOnWhereItWas) {
+  NEEDS_MUJOCO();
+  const test::ScratchFolder scratch;
+  int asked = 0;
+  EXPECT_FALSE(train(small_run(scratch / "wbc", "stand"), [&] { return ++asked > 1; }));
+  const std::string file = wbc_checkpoint(scratch / "wbc", "stand");
+  EXPECT_EQ(training_state(read_safetensors(file), file).steps, 512);
+  EXPECT_TRUE(train(small_run(scratch / "wbc", "stand")));
+  EXPECT_EQ(training_state(read_safetensors(file), file).steps, 1024);
+}
+
+TEST(TrainWbc, ABrokenCheckpointStopsTheTrainingAndStays) {
+  NEEDS_MUJOCO();
+  const test::ScratchFolder scratch;
+  train(small_run(scratch / "wbc", "stand"));
+  const std::string file = wbc_checkpoint(scratch / "wbc", "stand");
+  const std::string half = read_file(file).substr(0, 5000);
+  write_file(file, half);
+  EXPECT_THROW(train(small_run(scratch / "wbc", "stand")), InputError);
+  EXPECT_EQ(read_file(file), half);
+}
+
+TEST(TrainWbc, ACheckpointOfAnotherRobotOrSeedIsRefused) {
+  NEEDS_MUJOCO();
+  const test::ScratchFolder scratch;
+  train(small_run(scratch / "wbc", "stand"));
+  const std::string file = wbc_checkpoint(scratch / "wbc", "stand");
+  WbcRun other = small_run(scratch / "wbc", "stand");
+  other.seed = 9;
+  EXPECT_THAT([&] { train(other); }, ThrowsMessage<InputError>(HasSubstr("of seed 1, asked for is 9")));
+  SafeTensors tensors = read_safetensors(file);
+  tensors.metadata["robot_digest"] = "abc";
+  write_safetensors(file, tensors);
+  EXPECT_THAT([&] { train(small_run(scratch / "wbc", "stand")); },
+              ThrowsMessage<InputError>(HasSubstr("another robot")));
+}
+
+TEST(TrainWbc, AStageWithoutItsPredecessorSaysWhatToDo) {
+  const test::ScratchFolder scratch;
+  EXPECT_THAT([&] { train(small_run(scratch / "wbc", "walk")); },
+              ThrowsMessage<InputError>(testing::AllOf(HasSubstr("stage 'stand' first"), HasSubstr("--from"))));
+  EXPECT_THAT([&] { train(small_run(scratch / "wbc", "wlk")); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'wlk'")));
+}
+
+}  // namespace
+}  // namespace duet

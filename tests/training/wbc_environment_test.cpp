@@ -1,0 +1,91 @@
+#include "training/wbc_environment.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "backends/factory.h"
+
+namespace duet {
+namespace {
+
+std::shared_ptr<const RobotModel> g1() {
+  static const auto robot = load_shared_robot();
+  return robot;
+}
+
+bool mujoco_is_absent() {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco") return !engine.available;
+  return true;
+}
+
+#define NEEDS_MUJOCO() \
+  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
+
+TEST(WbcEnvironment, SizesAreTheSupplements) {
+  NEEDS_MUJOCO();
+  const WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
+  EXPECT_EQ(environment.actor_size(), 163);
+  EXPECT_EQ(environment.critic_size(), 361);
+  EXPECT_EQ(environment.actions(), 29);
+}
+
+TEST(WbcEnvironment, SeedAndIndexDecideEverything) {
+  NEEDS_MUJOCO();
+  WbcTask task = wbc_stage("interact");
+  task.stream.motions = 0.0;
+  WbcEnvironment a(g1(), task, 1, 3), b(g1(), task, 1, 3), c(g1(), task, 1, 4);
+  const std::vector<float> action(29, 0.1F);
+  std::vector<float> oa(163), ob(163), oc(163), critic(361);
+  for (int t = 0; t < 60; ++t) {
+    const Transition ta = a.step(action), tb = b.step(action);
+    c.step(action);
+    ASSERT_EQ(ta.reward, tb.reward);
+    if (ta.end != EpisodeEnd::kNone) {
+      a.reset();
+      b.reset();
+      c.reset();
+    }
+  }
+  a.observe(oa, critic);
+  b.observe(ob, critic);
+  c.observe(oc, critic);
+  EXPECT_EQ(oa, ob);
+  EXPECT_NE(oa, oc);
+}
+
+TEST(WbcEnvironment, WithoutAControllerItFallsWithinTwoSeconds) {
+  NEEDS_MUJOCO();
+  WbcTask task = wbc_stage("stand");
+  task.domain.kick = 0.0;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  const std::vector<float> nothing(29, 0.0F);
+  Transition transition;
+  while (transition.end == EpisodeEnd::kNone) transition = environment.step(nothing);
+  EXPECT_EQ(transition.end, EpisodeEnd::kFell);
+  EXPECT_LT(environment.tick(), 100);
+  EXPECT_LT(transition.reward, -1.0);  // -100 per second over one tick, and what it had earned
+}
+
+TEST(WbcEnvironment, AnActionThatIsNotANumberIsNoAction) {
+  NEEDS_MUJOCO();
+  WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
+  const std::vector<float> action(29, std::nanf(""));
+  const Transition transition = environment.step(action);
+  EXPECT_TRUE(std::isfinite(transition.reward));
+  EXPECT_EQ(environment.action().squaredNorm(), 0.0F);
+}
+
+TEST(WbcEnvironment, TimeEndsAnEpisodeOfFiveHundredTicks) {
+  NEEDS_MUJOCO();
+  WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
+  environment.skip_to(499);
+  EXPECT_EQ(environment.step(std::vector<float>(29, 0.0F)).end, EpisodeEnd::kTimeUp);
+}
+
+TEST(WbcTask, AnUnknownStageIsRefusedWithTheKnownOnes) {
+  EXPECT_THAT([] { wbc_stage("run"); }, testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("interact")));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,60 @@
+#include "training/wbc_gates.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "backends/factory.h"
+
+namespace duet {
+namespace {
+
+std::shared_ptr<const RobotModel> g1() {
+  static const auto robot = load_shared_robot();
+  return robot;
+}
+
+bool absent(const std::string& name) {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == name) return !engine.available;
+  return true;
+}
+
+TEST(WbcGates, CoverEveryDirectionOnceByName) {
+  std::set<std::string> names;
+  for (const WbcGate& gate : wbc_gates()) names.insert(gate.name);
+  EXPECT_EQ(names.size(), wbc_gates().size());
+  for (const char* name : {"stand/kick_1.0", "walk/forward_0.3", "walk/back_0.15", "walk/left_0.15", "walk/right_0.15",
+                           "walk/turn_left_0.3", "walk/stop_and_go", "push/torso"})
+    EXPECT_TRUE(names.contains(name)) << name;
+}
+
+TEST(WbcGates, ACommandLastsSixSeconds) {
+  for (const WbcGate& gate : wbc_gates())
+    if (gate.stream.script) {
+      EXPECT_DOUBLE_EQ(gate.stream.script->end - gate.stream.script->begin, 6.0) << gate.name;
+    }
+}
+
+// Joint targets alone do not balance: no gate may be passed by them.
+TEST(WbcGates, PlainPdSurvivesNone) {
+  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+  for (const WbcGate& gate : wbc_gates()) {
+    const GateResult result = run_gate(
+        gate, "mujoco", g1(), [] { return make_controller("pd", g1()); }, 1, 1);
+    EXPECT_EQ(result.survived, 0) << gate.name;
+  }
+}
+
+TEST(WbcGates, TheResultDoesNotDependOnTheThreads) {
+  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+  const WbcGate gate = wbc_gates().front();
+  const auto make = [] { return make_controller("vmc", g1()); };
+  const GateResult one = run_gate(gate, "mujoco", g1(), make, 2, 1), two = run_gate(gate, "mujoco", g1(), make, 2, 2);
+  EXPECT_EQ(one.survived, two.survived);
+  EXPECT_EQ(one.mean.root_error, two.mean.root_error);
+  EXPECT_EQ(one.mean.dof_jerk, two.mean.dof_jerk);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,86 @@
+#include "training/mirror.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+std::string other_side(const std::string& name) {
+  if (name.starts_with("left_")) return "right_" + name.substr(5);
+  if (name.starts_with("right_")) return "left_" + name.substr(6);
+  return name;
+}
+
+// Mirrored at the xz plane, a turn about y stays and one about x or z changes its sign.
+float turn_sign(const RobotModel& robot, int joint) {
+  const Eigen::Vector3d& axis = robot.links[joint + 1].axis;
+  return std::abs(axis.y()) > 0.9 ? 1.0F : -1.0F;
+}
+
+Mirror vector_mirror() { return {.from = {0, 1, 2}, .sign = {1.0F, -1.0F, 1.0F}}; }  // a position or velocity
+Mirror axial_mirror() { return {.from = {0, 1, 2}, .sign = {-1.0F, 1.0F, -1.0F}}; }  // an angular velocity
+Mirror columns_mirror() {                                                            // two columns of a rotation
+  return {.from = {0, 1, 2, 3, 4, 5}, .sign = {1.0F, -1.0F, 1.0F, -1.0F, 1.0F, -1.0F}};
+}
+
+void add(Mirror& mirror, const Mirror& block) { mirror.append(block, mirror.size()); }
+
+}  // namespace
+
+void Mirror::append(const Mirror& block, int offset) {
+  for (int i = 0; i < block.size(); ++i) {
+    from.push_back(offset + block.from[i]);
+    sign.push_back(block.sign[i]);
+  }
+}
+
+void Mirror::apply(std::span<const float> x, std::span<float> y) const {
+  for (size_t i = 0; i < from.size(); ++i) y[i] = sign[i] * x[from[i]];
+}
+
+Mirror mirror_joints(const RobotModel& robot) {
+  Mirror mirror;
+  for (int joint = 0; joint < robot.dof(); ++joint) {
+    mirror.from.push_back(robot.joint_index(other_side(robot.joints[joint].name)));
+    mirror.sign.push_back(turn_sign(robot, joint));
+  }
+  return mirror;
+}
+
+Mirror mirror_actor(const RobotModel& robot) {
+  const Mirror joints = mirror_joints(robot);
+  Mirror mirror;
+  add(mirror, joints);            // q
+  add(mirror, joints);            // v
+  add(mirror, axial_mirror());    // w
+  add(mirror, vector_mirror());   // base velocity
+  add(mirror, vector_mirror());   // gravity
+  add(mirror, joints);            // action
+  add(mirror, joints);            // q_ref
+  add(mirror, joints);            // v_ref
+  add(mirror, vector_mirror());   // root error
+  add(mirror, columns_mirror());  // root turn
+  return mirror;
+}
+
+Mirror mirror_critic(const RobotModel& robot, const std::vector<int>& links) {
+  Mirror mirror = mirror_actor(robot);
+  const int begin = mirror.size();
+  Mirror body = vector_mirror();
+  body.append(columns_mirror(), 3);
+  for (const int link : links) {
+    const std::string wanted = other_side(robot.links[link].name);
+    const auto other = std::ranges::find_if(links, [&](int l) { return robot.links[l].name == wanted; });
+    require(other != links.end(),
+            fmt::format("mirror: link '{}' has no counterpart '{}'", robot.links[link].name, wanted));
+    mirror.append(body, begin + 9 * static_cast<int>(other - links.begin()));
+  }
+  return mirror;
+}
+
+}  // namespace duet

@@ -1,0 +1,350 @@
+#include "training/ppo.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "core/require.h"
+#include "training/threads.h"
+
+namespace duet {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Eigen::MatrixXf;
+using Eigen::VectorXf;
+
+double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+// Log-probability of z standard deviations, up to a constant.
+float log_probability(const VectorXf& inverse_std, float sum_log_std, const float* action, const float* mean) {
+  float sum = -sum_log_std;
+  for (Eigen::Index k = 0; k < inverse_std.size(); ++k) {
+    const float z = (action[k] - mean[k]) * inverse_std[k];
+    sum -= 0.5F * z * z;
+  }
+  return sum;
+}
+
+void mirror_columns(const Mirror& mirror, const MatrixXf& x, MatrixXf& y) {
+  y.resize(x.rows(), x.cols());
+  const auto rows = static_cast<size_t>(x.rows());
+  for (Eigen::Index c = 0; c < x.cols(); ++c) mirror.apply({x.col(c).data(), rows}, {y.col(c).data(), rows});
+}
+
+}  // namespace
+
+// Columns: (tick * threads + thread) * environments of a thread + environment. The second of a pair is the mirrored
+// one.
+struct Ppo::Batch {
+  std::array<MatrixXf, 2> actor, critic, action, mean;
+  std::array<VectorXf, 2> log_probability;
+  VectorXf value, reward, advantage, target;
+  std::vector<EpisodeEnd> end;
+
+  Batch(int actor_size, int critic_size, int actions, int samples) {
+    for (int m = 0; m < 2; ++m) {
+      actor[m].resize(actor_size, samples);
+      critic[m].resize(critic_size, samples);
+      action[m].resize(actions, samples);
+      mean[m].resize(actions, samples);
+      log_probability[m].resize(samples);
+    }
+    for (VectorXf* values : {&value, &reward, &advantage, &target}) values->resize(samples);
+    end.resize(samples);
+  }
+};
+
+struct Ppo::Worker {
+  std::vector<WbcEnvironment> environments;
+  std::vector<double> returns;
+  BatchMlp actor, critic;
+  Normaliser actor_seen, critic_seen;
+  Random noise;
+  VectorXf log_std_gradient;
+  double asymmetry = 0.0;
+  IterationReport sums;
+  MatrixXf actor_raw, critic_raw, actor_input, critic_input, mirrored;
+  MatrixXf actor_batch, critic_batch, mean_gradient, value_gradient;
+
+  Worker(const WbcAgent& agent, std::uint64_t seed, int thread, long iteration)
+      : actor(agent.actor),
+        critic(agent.critic),
+        noise(seed, stream_key({"ppo noise", std::to_string(thread), std::to_string(iteration)})) {}
+};
+
+Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, const PpoOptions& options,
+         TrainingState state)
+    : options_(options),
+      state_(std::move(state)),
+      actor_mirror_(mirror_actor(*robot)),
+      critic_mirror_(mirror_critic(*robot, critic_links(*robot))),
+      action_mirror_(mirror_joints(*robot)) {
+  require(
+      options.threads >= 1 && options.environments % options.threads == 0,
+      fmt::format("ppo: {} environments on {} threads, expected a multiple", options.environments, options.threads));
+  const int samples = options.environments * options.horizon;
+  require(samples % (options.minibatches * options.threads) == 0,
+          fmt::format("ppo: {} samples in {} minibatches on {} threads, expected a multiple", samples,
+                      options.minibatches, options.threads));
+  require(state_.agent.actor.inputs() == actor_mirror_.size() &&
+              state_.agent.critic.inputs() == critic_mirror_.size() && state_.agent.actor.outputs() == robot->dof(),
+          fmt::format("ppo: networks of {} and {} inputs for a robot that needs {} and {}", state_.agent.actor.inputs(),
+                      state_.agent.critic.inputs(), actor_mirror_.size(), critic_mirror_.size()));
+  batch_ = std::make_shared<Batch>(actor_mirror_.size(), critic_mirror_.size(), robot->dof(), samples);
+  const int each = options.environments / options.threads;
+  for (int t = 0; t < options.threads; ++t)
+    workers_.push_back(std::make_shared<Worker>(state_.agent, state_.seed, t, state_.iteration));
+  on_threads(options.threads, [&](int t) {
+    Worker& worker = *workers_[t];
+    Random start(state_.seed, stream_key({"ppo start", std::to_string(t)}));
+    for (int i = 0; i < each; ++i) {
+      // Of a continued training the environments are new ones: their streams carry the iteration.
+      worker.environments.emplace_back(
+          robot, task, state_.seed + 1000003ULL * static_cast<std::uint64_t>(state_.iteration), t * each + i);
+      worker.environments.back().skip_to(start.below(task.episode_ticks));
+    }
+    worker.returns.assign(each, 0.0);
+    worker.actor_raw.resize(actor_mirror_.size(), each);
+    worker.critic_raw.resize(critic_mirror_.size(), each);
+  });
+}
+
+IterationReport Ppo::iterate() {
+  const Clock::time_point begin = Clock::now();
+  Batch& batch = *batch_;
+  on_threads(options_.threads, [&](int t) {
+    collect(t, batch);
+    advantages(t, batch);
+  });
+  const double rollout_seconds = seconds_since(begin);
+  const auto samples = static_cast<int>(batch.value.size());
+  const float mean = batch.advantage.mean();
+  const float deviation = std::sqrt((batch.advantage.array() - mean).square().mean()) + 1e-6F;
+  batch.advantage = (batch.advantage.array() - mean) / deviation;
+
+  Random shuffle(state_.seed, stream_key({"ppo shuffle", std::to_string(state_.iteration)}));
+  std::vector<int> order(samples);
+  std::iota(order.begin(), order.end(), 0);
+  std::vector<char> mirrored(samples);
+  double divergence = 0.0;
+  const int size = samples / options_.minibatches;
+  for (int epoch = 0; epoch < options_.epochs; ++epoch) {
+    for (int i = samples - 1; i > 0; --i) std::swap(order[i], order[shuffle.below(i + 1)]);
+    for (char& flag : mirrored) flag = shuffle.chance(0.5) ? 1 : 0;
+    for (int m = 0; m < options_.minibatches; ++m) divergence = minibatch(order, mirrored, m * size, size, batch);
+  }
+  steer(divergence);
+
+  IterationReport report;
+  double asymmetry = 0.0;
+  for (const auto& worker : workers_) {
+    state_.agent.actor_input.merge(worker->actor_seen);
+    state_.agent.critic_input.merge(worker->critic_seen);
+    report.episodes += worker->sums.episodes;
+    report.falls += worker->sums.falls;
+    report.episode_seconds += worker->sums.episode_seconds;
+    report.episode_return += worker->sums.episode_return;
+    asymmetry += worker->asymmetry;
+    worker->asymmetry = 0.0;
+    for (WbcEnvironment& environment : worker->environments) report.tracking.add(environment.take_statistics());
+  }
+  // What the first poses looked like must not weigh for ever.
+  for (Normaliser* input : {&state_.agent.actor_input, &state_.agent.critic_input})
+    input->count = std::min(input->count, 4e6);
+  const double episodes = std::max(1, report.episodes);
+  report.episode_seconds /= episodes;
+  report.episode_return /= episodes;
+  report.asymmetry = std::sqrt(asymmetry / (static_cast<double>(samples) * options_.epochs * action_mirror_.size()));
+  report.divergence = divergence;
+  report.rate = state_.rate;
+  report.std = state_.agent.log_std.array().exp().mean();
+  report.iteration = ++state_.iteration;
+  report.steps = state_.steps += samples;
+  report.rollout_seconds = rollout_seconds;
+  report.seconds = seconds_since(begin);
+  state_.minutes += report.seconds / 60.0;
+  return report;
+}
+
+void Ppo::collect(int thread, Batch& batch) {
+  Worker& worker = *workers_[thread];
+  const WbcAgent& agent = state_.agent;
+  const int each = static_cast<int>(worker.environments.size());
+  const VectorXf std = agent.log_std.array().exp(), inverse_std = std.cwiseInverse();
+  const float sum_log_std = agent.log_std.sum();
+  worker.actor_seen = Normaliser(agent.actor.inputs());
+  worker.critic_seen = Normaliser(agent.critic.inputs());
+  worker.actor_seen.count = worker.critic_seen.count = 0.0;
+  worker.sums = {};
+  const auto column = [](MatrixXf& m, int c) {
+    return std::span<float>(m.col(c).data(), static_cast<size_t>(m.rows()));
+  };
+  for (int h = 0; h < options_.horizon; ++h) {
+    const int first = (h * options_.threads + thread) * each;
+    for (int i = 0; i < each; ++i)
+      worker.environments[i].observe(column(worker.actor_raw, i), column(worker.critic_raw, i));
+    for (int m = 0; m < 2; ++m) {
+      if (m == 0)
+        worker.actor_input = worker.actor_raw;
+      else
+        mirror_columns(actor_mirror_, worker.actor_raw, worker.actor_input);
+      worker.actor_seen.update(worker.actor_input);
+      agent.actor_input.apply(worker.actor_input);
+      batch.actor[m].middleCols(first, each) = worker.actor_input;
+      batch.mean[m].middleCols(first, each) = worker.actor.forward(worker.actor_input);
+      if (m == 0)
+        worker.critic_input = worker.critic_raw;
+      else
+        mirror_columns(critic_mirror_, worker.critic_raw, worker.critic_input);
+      worker.critic_seen.update(worker.critic_input);
+      agent.critic_input.apply(worker.critic_input);
+      batch.critic[m].middleCols(first, each) = worker.critic_input;
+      if (m == 0) batch.value.segment(first, each) = worker.critic.forward(worker.critic_input).row(0).transpose();
+    }
+    for (int i = 0; i < each; ++i) {
+      const int c = first + i;
+      for (Eigen::Index k = 0; k < std.size(); ++k)
+        batch.action[0](k, c) = batch.mean[0](k, c) + std[k] * static_cast<float>(worker.noise.normal());
+      action_mirror_.apply(column(batch.action[0], c), column(batch.action[1], c));
+      for (int m = 0; m < 2; ++m)
+        batch.log_probability[m][c] =
+            log_probability(inverse_std, sum_log_std, batch.action[m].col(c).data(), batch.mean[m].col(c).data());
+      WbcEnvironment& environment = worker.environments[i];
+      const Transition transition = environment.step(column(batch.action[0], c));
+      worker.returns[i] += transition.reward;
+      batch.end[c] = transition.end;
+      batch.reward[c] = static_cast<float>(transition.reward);
+      // An episode that ends by the clock is worth what would have followed.
+      if (transition.end == EpisodeEnd::kTimeUp)
+        batch.reward[c] += static_cast<float>(options_.discount) * batch.value[c];
+      if (transition.end == EpisodeEnd::kNone) continue;
+      ++worker.sums.episodes;
+      worker.sums.falls += transition.end == EpisodeEnd::kFell ? 1 : 0;
+      worker.sums.episode_seconds += 0.02 * environment.tick();
+      worker.sums.episode_return += worker.returns[i];
+      worker.returns[i] = 0.0;
+      environment.reset();
+    }
+  }
+}
+
+void Ppo::advantages(int thread, Batch& batch) {
+  Worker& worker = *workers_[thread];
+  const int each = static_cast<int>(worker.environments.size());
+  const auto column = [](MatrixXf& m, int c) {
+    return std::span<float>(m.col(c).data(), static_cast<size_t>(m.rows()));
+  };
+  for (int i = 0; i < each; ++i)
+    worker.environments[i].observe(column(worker.actor_raw, i), column(worker.critic_raw, i));
+  worker.critic_input = worker.critic_raw;
+  state_.agent.critic_input.apply(worker.critic_input);
+  const VectorXf last = worker.critic.forward(worker.critic_input).row(0).transpose();
+  const auto discount = static_cast<float>(options_.discount),
+             decay = static_cast<float>(options_.discount * options_.lambda);
+  for (int i = 0; i < each; ++i) {
+    float advantage = 0.0F, next = last[i];
+    for (int h = options_.horizon - 1; h >= 0; --h) {
+      const int c = (h * options_.threads + thread) * each + i;
+      const float goes_on = batch.end[c] == EpisodeEnd::kNone ? 1.0F : 0.0F;
+      advantage = batch.reward[c] + discount * next * goes_on - batch.value[c] + decay * goes_on * advantage;
+      batch.advantage[c] = advantage;
+      batch.target[c] = advantage + batch.value[c];
+      next = batch.value[c];
+    }
+  }
+}
+
+double Ppo::minibatch(const std::vector<int>& order, const std::vector<char>& mirrored, int begin, int size,
+                      Batch& batch) {
+  const int share = size / options_.threads;
+  std::vector<double> divergence(options_.threads);
+  on_threads(options_.threads, [&](int t) {
+    const std::span<const int> samples(order.data() + begin + t * share, static_cast<size_t>(share));
+    divergence[t] = gradients(t, samples, mirrored, size, batch);
+  });
+  apply_gradients();
+  return std::accumulate(divergence.begin(), divergence.end(), 0.0) / options_.threads;
+}
+
+// Of the clipped objective, the entropy and the pull to symmetry by the mean; of the squared error by the value.
+double Ppo::gradients(int thread, std::span<const int> samples, const std::vector<char>& mirrored, int size,
+                      Batch& batch) {
+  Worker& worker = *workers_[thread];
+  const int n = static_cast<int>(samples.size()), actions = action_mirror_.size();
+  const VectorXf& log_std = state_.agent.log_std;
+  const VectorXf inverse_std = (-log_std.array()).exp();
+  const float share = 1.0F / static_cast<float>(size), sum_log_std = log_std.sum();
+  worker.actor_batch.resize(batch.actor[0].rows(), n);
+  worker.critic_batch.resize(batch.critic[0].rows(), n);
+  for (int i = 0; i < n; ++i) {
+    worker.actor_batch.col(i) = batch.actor[mirrored[samples[i]]].col(samples[i]);
+    worker.critic_batch.col(i) = batch.critic[mirrored[samples[i]]].col(samples[i]);
+  }
+  const MatrixXf& mean = worker.actor.forward(worker.actor_batch);
+  worker.mean_gradient.resize(actions, n);
+  worker.log_std_gradient =
+      VectorXf::Constant(actions, -static_cast<float>(options_.entropy) * share * static_cast<float>(n));
+  double divergence = 0.0;
+  for (int i = 0; i < n; ++i) {
+    const int c = samples[i], m = mirrored[c];
+    const float* action = batch.action[m].col(c).data();
+    const float* old_mean = batch.mean[m].col(c).data();
+    const float* other_mean = batch.mean[1 - m].col(c).data();
+    const float log_ratio =
+        log_probability(inverse_std, sum_log_std, action, mean.col(i).data()) - batch.log_probability[m][c];
+    const float ratio = std::exp(std::clamp(log_ratio, -10.0F, 10.0F)), advantage = batch.advantage[c];
+    const auto clip = static_cast<float>(options_.clip);
+    const bool clipped = (advantage > 0.0F && ratio > 1.0F + clip) || (advantage < 0.0F && ratio < 1.0F - clip);
+    const float weight = clipped ? 0.0F : -advantage * ratio * share;
+    for (int k = 0; k < actions; ++k) {
+      const float z = std::clamp((action[k] - mean(k, i)) * inverse_std[k], -4.0F, 4.0F);
+      const float moved = (mean(k, i) - old_mean[k]) * inverse_std[k];
+      divergence += 0.5 * static_cast<double>(moved) * moved;
+      const float apart = mean(k, i) - action_mirror_.sign[k] * other_mean[action_mirror_.from[k]];
+      worker.asymmetry += static_cast<double>(apart) * apart;
+      worker.mean_gradient(k, i) = weight * z * inverse_std[k] + static_cast<float>(options_.mirror_pull) * share *
+                                                                     apart * inverse_std[k] * inverse_std[k];
+      if (m == 0) worker.log_std_gradient[k] += weight * (z * z - 1.0F);
+    }
+  }
+  worker.actor.backward(worker.mean_gradient);
+  const MatrixXf& value = worker.critic.forward(worker.critic_batch);
+  worker.value_gradient.resize(1, n);
+  for (int i = 0; i < n; ++i) worker.value_gradient(0, i) = 2.0F * share * (value(0, i) - batch.target[samples[i]]);
+  worker.critic.backward(worker.value_gradient);
+  return divergence / n;
+}
+
+void Ppo::apply_gradients() {
+  Worker& first = *workers_[0];
+  auto gradients = flat_views(first.actor.gradient());
+  auto critic = flat_views(first.critic.gradient());
+  gradients.insert(gradients.end(), critic.begin(), critic.end());
+  gradients.emplace_back(first.log_std_gradient.data(), first.log_std_gradient.size());
+  for (size_t t = 1; t < workers_.size(); ++t) {
+    auto others = flat_views(workers_[t]->actor.gradient());
+    auto others_critic = flat_views(workers_[t]->critic.gradient());
+    others.insert(others.end(), others_critic.begin(), others_critic.end());
+    for (size_t i = 0; i < others.size(); ++i) gradients[i] += others[i];
+    gradients.back() += workers_[t]->log_std_gradient;
+  }
+  auto parameters = flat_views(state_.agent.actor.layers);
+  auto critic_parameters = flat_views(state_.agent.critic.layers);
+  parameters.insert(parameters.end(), critic_parameters.begin(), critic_parameters.end());
+  parameters.emplace_back(state_.agent.log_std.data(), state_.agent.log_std.size());
+  state_.adam.step(parameters, gradients, state_.rate, 1.0);
+  state_.agent.log_std = state_.agent.log_std.array()
+                             .max(static_cast<float>(std::log(options_.least_std)))
+                             .min(static_cast<float>(std::log(options_.largest_std)));
+}
+
+void Ppo::steer(double divergence) {
+  if (divergence > options_.divergence_high) state_.rate = std::max(options_.rate_low, state_.rate / 1.3);
+  if (divergence < options_.divergence_low) state_.rate = std::min(options_.rate_high, state_.rate * 1.3);
+}
+
+}  // namespace duet

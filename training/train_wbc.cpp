@@ -1,0 +1,292 @@
+#include "training/train_wbc.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+
+#include "controllers/stance.h"
+#include "core/file.h"
+#include "core/names.h"
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kReportEvery = 10.0, kCheckpointEvery = 60.0;  // [s]
+constexpr const char* kColumns =
+    "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
+    "action_rate,clock,lift_m,rate,std,loss\n";
+
+std::vector<std::string> stage_names() {
+  std::vector<std::string> names;
+  for (const WbcStage& stage : wbc_plan()) names.push_back(stage.name);
+  return names;
+}
+
+const WbcStage& find_stage(const std::string& name) {
+  for (const WbcStage& stage : wbc_plan())
+    if (stage.name == name) return stage;
+  throw std::invalid_argument(unknown_name_message("stage", name, stage_names()));
+}
+
+std::string file_of(const std::string& folder, const std::string& stage, const char* name) {
+  return (fs::path(folder) / stage / name).string();
+}
+
+// The checkpoint that a stage begins with; empty: new weights.
+std::string beginning(const WbcRun& run) {
+  if (!run.from.empty()) return run.from;
+  const std::vector<std::string> names = stage_names();
+  const auto here = std::ranges::find(names, run.stage);
+  if (here == names.begin()) return "";
+  const std::string before = wbc_checkpoint(run.folder, *(here - 1));
+  if (!fs::exists(before))
+    throw InputError(
+        fmt::format("stage '{}' begins with '{}', which is not there: run stage '{}' first, or name a "
+                    "checkpoint with --from",
+                    run.stage, before, *(here - 1)));
+  return before;
+}
+
+void check_robot(const TrainingState& state, const RobotModel& robot, const std::string& file) {
+  if (state.robot_digest != robot.digest)
+    throw InputError(fmt::format("{}: a checkpoint of another robot (digest {}..., '{}' has {}...)", file,
+                                 state.robot_digest.substr(0, 12), robot.name, robot.digest.substr(0, 12)));
+}
+
+TrainingState load_state(const std::string& file, const RobotModel& robot) {
+  TrainingState state = training_state(read_safetensors(file), file);
+  check_robot(state, robot, file);
+  return state;
+}
+
+TrainingState first_state(const WbcRun& run, const RobotModel& robot) {
+  const std::string here = wbc_checkpoint(run.folder, run.stage);
+  if (fs::exists(here)) {
+    TrainingState state = load_state(here, robot);
+    if (state.seed != run.seed)
+      throw InputError(fmt::format("{}: a checkpoint of seed {}, asked for is {}: choose another folder", here,
+                                   state.seed, run.seed));
+    return state;
+  }
+  const std::string from = beginning(run);
+  TrainingState state;
+  if (from.empty()) {
+    const WbcLayout layout(robot.dof());
+    const int critic = layout.critic(static_cast<int>(critic_links(robot).size()));
+    state.agent = make_agent(layout.oracle(), critic, robot.dof(), 0.6, run.seed);
+  } else {
+    state = load_state(from, robot);
+    state.adam = {};
+  }
+  state.iteration = state.steps = 0;
+  state.minutes = 0.0;
+  state.stage = run.stage;
+  state.robot_digest = robot.digest;
+  state.seed = run.seed;
+  return state;
+}
+
+// Sums what iterations report, and says when it is time to print and to save.
+class Log {
+ public:
+  Log(const WbcRun& run, long steps_before, long steps_wanted)
+      : path_(wbc_curves(run.folder, run.stage)), steps_before_(steps_before), begin_(Clock::now()) {
+    progress_.stage = run.stage;
+    progress_.steps_wanted = steps_wanted;
+    fs::create_directories(fs::path(path_).parent_path());
+    if (steps_before == 0 || !fs::exists(path_)) write_file(path_, kColumns);
+  }
+
+  void add(int episodes, int falls, double returns, double seconds, const TrackingStatistics& tracking) {
+    episodes_ += episodes;
+    falls_ += falls;
+    returns_ += returns * episodes;
+    seconds_ += seconds * episodes;
+    progress_.tracking.add(tracking);
+  }
+
+  [[nodiscard]] bool report_due() const { return since(reported_) > kReportEvery; }
+  [[nodiscard]] bool save_due() const { return since(saved_) > kCheckpointEvery; }
+  void saved() { saved_ = Clock::now(); }
+
+  const WbcProgress& report(long steps, double minutes, double rate, double std, double loss) {
+    const double n = std::max(1, episodes_), elapsed = since(begin_);
+    progress_.steps = steps;
+    progress_.steps_per_second = static_cast<double>(steps - steps_before_) / std::max(1e-9, elapsed);
+    progress_.seconds_left =
+        static_cast<double>(progress_.steps_wanted - steps) / std::max(1e-9, progress_.steps_per_second);
+    progress_.episode_return = returns_ / n;
+    progress_.fall_share = falls_ / n;
+    progress_.episode_seconds = seconds_ / n;
+    progress_.loss = loss;
+    append(minutes, rate, std);
+    last_ = progress_;
+    progress_.tracking = {};
+    episodes_ = falls_ = 0;
+    returns_ = seconds_ = 0.0;
+    reported_ = Clock::now();
+    return last_;
+  }
+
+ private:
+  static double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+  void append(double minutes, double rate, double std) const {
+    const TrackingStatistics& t = progress_.tracking;
+    const double ticks = static_cast<double>(std::max(1L, t.ticks)),
+                 stepping = static_cast<double>(std::max(1L, t.stepping_ticks));
+    std::ofstream(path_, std::ios::app) << fmt::format(
+        "{},{:.3f},{:.3f},{:.4f},{:.3f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f},{:.3f},{:.4f},{:.2e},{:.3f},{:.5f}\n",
+        progress_.steps, minutes, progress_.episode_return, progress_.fall_share, progress_.episode_seconds,
+        t.root_xy / ticks, t.heading / ticks, t.upper_body / ticks, t.joints / ticks, t.action_rate / ticks,
+        t.clock / stepping, t.swing_lift / static_cast<double>(std::max(1L, t.swings)), rate, std, progress_.loss);
+  }
+
+  std::string path_;
+  long steps_before_;
+  Clock::time_point begin_, reported_ = begin_, saved_ = begin_;
+  WbcProgress progress_, last_;
+  int episodes_ = 0, falls_ = 0;
+  double returns_ = 0.0, seconds_ = 0.0;
+};
+
+WbcTask task_of(const std::string& stage, const WbcRun& run) {
+  WbcTask task = wbc_stage(stage == "student" ? "interact" : stage);
+  task.stream.data = run.motions;
+  if (!run.motions || run.motions->empty()) task.stream.motions = 0.0;
+  return task;
+}
+
+bool train_oracle(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run, long steps_wanted,
+                  const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
+  PpoOptions options;
+  options.threads = run.threads;
+  options.environments = run.environments;
+  Ppo ppo(robot, task_of(run.stage, run), options, first_state(run, *robot));
+  Log log(run, ppo.state().steps, steps_wanted);
+  const auto save = [&] {
+    write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(ppo.state()));
+    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(*robot, ppo.state()), TensorType::kF32);
+    log.saved();
+  };
+  bool stopped = false;
+  while (ppo.state().steps < steps_wanted && !(stopped = stop())) {
+    const IterationReport iteration = ppo.iterate();
+    log.add(iteration.episodes, iteration.falls, iteration.episode_return, iteration.episode_seconds,
+            iteration.tracking);
+    if (log.save_due()) save();
+    if (log.report_due() || ppo.state().steps >= steps_wanted)
+      report(log.report(iteration.steps, ppo.state().minutes, iteration.rate, iteration.std, 0.0));
+  }
+  save();
+  return !stopped;
+}
+
+StudentState first_student(const WbcRun& run, const RobotModel& robot) {
+  const std::string here = wbc_checkpoint(run.folder, run.stage);
+  if (!fs::exists(here)) return make_student(robot.dof(), run.seed);
+  StudentState state = student_state(read_safetensors(here), here);
+  if (state.seed != run.seed)
+    throw InputError(
+        fmt::format("{}: a checkpoint of seed {}, asked for is {}: choose another folder", here, state.seed, run.seed));
+  return state;
+}
+
+bool train_student(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run, long steps_wanted,
+                   const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
+  DistillOptions options;
+  options.threads = run.threads;
+  options.environments = run.environments;
+  const long rounds = steps_wanted / (static_cast<long>(options.environments) * options.horizon);
+  const TrainingState teacher = load_state(beginning(run), *robot);
+  Distillation distillation(robot, task_of(run.stage, run), options, teacher.agent, first_student(run, *robot), rounds);
+  Log log(run, distillation.state().steps, steps_wanted);
+  const auto save = [&] {
+    write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(distillation.state()));
+    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(*robot, distillation.state()),
+                     TensorType::kF32);
+    log.saved();
+  };
+  bool stopped = false;
+  while (distillation.state().steps < steps_wanted && !(stopped = stop())) {
+    const DistillReport round = distillation.round();
+    log.add(round.episodes, round.falls, 0.0, 0.0, round.tracking);
+    if (log.save_due()) save();
+    if (log.report_due() || distillation.state().steps >= steps_wanted)
+      report(log.report(round.steps, distillation.state().minutes, round.rate, 0.0, round.loss));
+  }
+  save();
+  return !stopped;
+}
+
+WbcNetwork named(const RobotModel& robot) {
+  WbcNetwork network;
+  network.robot = robot.name;
+  network.joints = robot.joint_names();
+  network.neutral = robot.neutral;
+  const JointCommand command = robot.default_command(robot.neutral);
+  network.kp = command.kp;
+  network.kd = command.kd;
+  network.action_scale = action_scale(robot);
+  return network;
+}
+
+}  // namespace
+
+const std::vector<WbcStage>& wbc_plan() {
+  static const std::vector<WbcStage> plan = {
+      {"stand", 5'500'000}, {"walk", 10'000'000}, {"interact", 8'000'000}, {"student", 4'000'000}};
+  return plan;
+}
+
+std::string wbc_checkpoint(const std::string& folder, const std::string& stage) {
+  return file_of(folder, stage, "checkpoint.safetensors");
+}
+std::string wbc_network_file(const std::string& folder, const std::string& stage) {
+  return file_of(folder, stage, "network.safetensors");
+}
+std::string wbc_curves(const std::string& folder, const std::string& stage) {
+  return file_of(folder, stage, "curves.csv");
+}
+
+WbcNetwork network_of(const RobotModel& robot, const TrainingState& state) {
+  WbcNetwork network = named(robot);
+  network.kind = WbcKind::kOracle;
+  network.mlp = state.agent.actor;
+  network.mean = state.agent.actor_input.mean;
+  network.deviation = state.agent.actor_input.deviation();
+  network.seed = state.seed;
+  network.steps = state.steps;
+  network.note = fmt::format("oracle, stage {}", state.stage);
+  return network;
+}
+
+WbcNetwork network_of(const RobotModel& robot, const StudentState& state) {
+  WbcNetwork network = named(robot);
+  network.kind = WbcKind::kStudent;
+  network.mlp = state.student;
+  network.mean = state.input.mean;
+  network.deviation = state.input.deviation();
+  network.seed = state.seed;
+  network.steps = state.steps;
+  network.note = "student";
+  return network;
+}
+
+bool train_wbc(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run,
+               const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
+  const WbcStage& stage = find_stage(run.stage);
+  require(run.steps >= 0, fmt::format("train wbc: {} steps, expected a positive number", run.steps));
+  const long steps = run.steps > 0 ? run.steps : stage.steps;
+  return run.stage == "student" ? train_student(robot, run, steps, report, stop)
+                                : train_oracle(robot, run, steps, report, stop);
+}
+
+}  // namespace duet

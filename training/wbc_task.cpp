@@ -1,0 +1,69 @@
+#include "training/wbc_task.h"
+
+#include <stdexcept>
+
+#include "controllers/stance.h"
+#include "core/names.h"
+
+namespace duet {
+namespace {
+
+WbcTask stand() {
+  WbcTask task;
+  task.name = "stand";
+  return task;
+}
+
+WbcTask walk() {
+  WbcTask task;
+  task.name = "walk";
+  task.stream.moving = 0.75;
+  task.stream.crouch = 0.2;
+  task.stream.bow = 0.1;
+  task.domain.kick = 0.6;
+  return task;
+}
+
+WbcTask interact() {
+  WbcTask task = walk();
+  task.name = "interact";
+  task.stream.motions = 0.3;
+  task.stream.moving = 0.65;
+  task.domain.kick = 1.0;
+  task.domain.push = 60.0;
+  task.domain.latency = 2;
+  task.reward.action_rate = 0.06;
+  task.reward.action_jerk = 0.02;
+  return task;
+}
+
+struct Entry {
+  const char* name;
+  WbcTask (*make)();
+};
+
+constexpr Entry kStages[] = {{"stand", stand}, {"walk", walk}, {"interact", interact}};
+
+}  // namespace
+
+std::vector<std::string> wbc_stages() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kStages) names.emplace_back(entry.name);
+  return names;
+}
+
+WbcTask wbc_stage(const std::string& name) {
+  for (const Entry& entry : kStages)
+    if (name == entry.name) return entry.make();
+  throw std::invalid_argument(unknown_name_message("stage", name, wbc_stages()));
+}
+
+Eigen::VectorXd action_scale(const RobotModel& robot) {
+  Eigen::VectorXd scale = Eigen::VectorXd::Constant(robot.dof(), kUpperScale);
+  const Stance stance(robot);
+  for (const Leg& leg : stance.legs())
+    for (const int joint : leg.joints) scale[joint] = kLegScale;
+  return scale;
+}
+
+}  // namespace duet

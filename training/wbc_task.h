@@ -1,0 +1,70 @@
+// What WBC-Sim is trained on: commands, rewards (supplement A.3.2), domain randomisation, and the stages that the
+// training goes through. Plain data.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "backends/scene.h"
+#include "training/reference_stream.h"
+
+namespace duet {
+
+// Weights of the reward; each is multiplied by the tick (0.02 s). Kernels are exp(-error^2 / width^2).
+struct RewardWeights {
+  double root_xy = 3.0, root_xy_width = 0.25;      // A.3.2: root_position_xy
+  double root_near = 2.0, root_near_width = 0.06;  // the same, where it counts
+  double upper_body = 4.0,
+         upper_body_width = 0.2;            // A.3.2: body position, upper body; root mean square of keypoints [m]
+  double hands = 5.0, hands_width = 0.6;    // A.3.2: hands' orientation [rad]
+  double joints = 2.0, joints_width = 0.2;  // root mean square of the upper body's joints [rad]
+  double height = 1.0, height_width = 0.06;
+  double attitude = 2.0, attitude_width = 0.25;  // angle between the pelvis and its reference [rad]
+  double velocity = 2.0, velocity_width = 0.25;  // of the root, while stepping [m/s]
+  double clock = 2.0;                            // per foot that is where the clock has it
+  double lift = 120.0;                           // per (height of the swinging foot - wanted)^2 [1/m^2]
+  double foothold = 2.0, foothold_width = 0.1;
+  double both_feet = 1.0;                                 // while standing
+  double stance = 15.0, narrowest = 0.19, widest = 0.28;  // per metre outside [m]
+  double action_rate = 0.03, action_jerk = 0.01, action = 0.01;
+  double torque = 2e-5, limits = 5.0, slip = 0.5, spin = 0.05;
+  double joint_speed = 2e-4;  // per (rad/s)^2 of the legs
+  double self_contact = 1.0;  // per tick with any
+  double fall = 100.0;        // A.3.2: termination
+};
+
+struct DomainOptions {
+  bool randomise = true;
+  double torso_mass_low = -1.0, torso_mass_high = 3.0;  // [kg]
+  double torso_com = 0.025;                             // [m]
+  double mass_scale = 0.05;
+  double friction_low = 0.4, friction_high = 1.25;
+  double gain_scale = 0.1;
+  int steps_per_body = 1500;              // a new body at the first reset after so many
+  double kick = 1.0;                      // largest change of the velocity [m/s]
+  double kick_from = 3.0, kick_to = 6.0;  // time between kicks [s]
+  double push = 0.0;                      // largest force on hands or torso, held for a second [N]
+  int latency = 0;                        // physics steps by which a command may come late, at most
+};
+
+struct WbcTask {
+  std::string name;
+  StreamOptions stream;
+  RewardWeights reward;
+  DomainOptions domain;
+  double dt = 0.005;  // physics [s]
+  // Of MuJoCo: half the time of its defaults; what was learnt is tested with those.
+  EngineOptions engine = {{"solver", "cg"}, {"iterations", "8"}, {"cone", "pyramidal"}};
+  int episode_ticks = 500;  // A.3.2: 500 steps
+};
+
+// "stand", "walk", "interact". Throws std::invalid_argument naming them.
+WbcTask wbc_stage(const std::string& name);
+std::vector<std::string> wbc_stages();
+
+// Action: joint target = base + scale a, |a| <= kActionBound; base is the tracker's q.
+inline constexpr double kLegScale = 0.35, kUpperScale = 0.25;  // [rad]
+Eigen::VectorXd action_scale(const RobotModel& robot);
+
+}  // namespace duet
