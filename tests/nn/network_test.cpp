@@ -37,6 +37,14 @@ const std::vector<float> kPlayground = {
     0.3307241F,   -0.07400152F, -0.1267114F,  -0.2700883F, -0.0780508F, -0.08273568F, -0.1306079F, 0.01864804F,
     -0.06357676F, -0.1335106F,  -0.08789083F, 0.2637823F,  0.4697124F,  0.09000928F,  -0.1730191F, -0.1029268F,
     -0.1036182F,  0.0215461F,   -0.33997F,    0.04942394F, 0.3366146F};
+// unitree_rl_gym's policy over three steps: its weights in an ONNX LSTM.
+const std::vector<std::vector<float>> kMotion = {
+    {2.171534F, -0.02116936F, 1.009734F, 0.08146754F, 2.721016F, -0.5885162F, -3.014837F, 0.4727393F, -0.3247981F,
+     1.188251F, 0.5802138F, -0.9928402F},
+    {2.572863F, -0.1273744F, 1.156013F, 0.6880231F, 4.761365F, -1.010299F, -3.071687F, 0.5444020F, -0.4132211F,
+     1.266765F, 0.1035468F, -1.207956F},
+    {2.688841F, -0.4426731F, 1.239259F, 0.4060141F, 4.619983F, -1.540201F, -2.951133F, 0.9070728F, -0.6674466F,
+     1.163718F, -0.4837467F, -1.377234F}};
 
 void expect_reference(const std::string& name, const std::vector<float>& reference) {
   const std::string path = test::shared_file("models/" + name);
@@ -50,6 +58,18 @@ void expect_reference(const std::string& name, const std::vector<float>& referen
 TEST(Network, HomieEqualsOnnxRuntime) { expect_reference("homie_deploy.onnx", kHomie); }
 TEST(Network, Twist2EqualsOnnxRuntime) { expect_reference("twist2_1017_20k.onnx", kTwist2); }
 TEST(Network, PlaygroundEqualsOnnxRuntime) { expect_reference("playground_g1_policy.onnx", kPlayground); }
+
+TEST(Network, UnitreeEqualsOnnxRuntimeOverThreeStepsAndAfterReset) {
+  const std::string path = test::shared_file("models/unitree_rl_gym_g1_motion.pt");
+  if (path.empty()) GTEST_SKIP() << "not run: unitree_rl_gym_g1_motion.pt absent";
+  for (const std::string& engine : network_engines()) {
+    if (engine == "onnxruntime") continue;  // reads no TorchScript
+    const auto network = load_network(path, engine);
+    for (int episode = 0; episode < 2; ++episode, network->reset())
+      for (const std::vector<float>& step : kMotion)
+        EXPECT_THAT(test::evaluate(*network, {test::wave(47)})[0], Pointwise(FloatNear(kTolerance), step)) << engine;
+  }
+}
 
 TEST(Network, PublishedPoliciesAllocateNothingInRun) {
   if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: a counting malloc is absent";
