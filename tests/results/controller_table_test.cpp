@@ -58,7 +58,7 @@ TEST(ControllerTable, OneClipHasNoInterval) {
       controller_table({controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)});
   EXPECT_DOUBLE_EQ(table.entries[0].figures.at("hf_ratio").mean, 0.375);
   EXPECT_TRUE(std::isnan(table.entries[0].figures.at("hf_ratio").interval.low));
-  EXPECT_THAT(controller_table_markdown(table), HasSubstr("| 0.375 |"));
+  EXPECT_THAT(controller_table_markdown(table), HasSubstr("    0.375 |"));
 }
 
 TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
