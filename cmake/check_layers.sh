@@ -15,6 +15,7 @@ declare -A may=(
   [controllers]="core robots nn controllers"
   [policies]="core motion robots nn policies"
   [metrics]="core motion robots metrics"
+  [training]="core motion robots nn backends controllers policies metrics training"
   [results]="core results"
 )
 bad=0
@@ -30,7 +31,7 @@ for room in "${!may[@]}"; do
 done
 vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
-  hits=$(grep -rnE "^#include [<\"]($2)" core motion robots nn retarget backends controllers policies metrics results bench \
+  hits=$(grep -rnE "^#include [<\"]($2)" core motion robots nn retarget backends controllers policies metrics results training bench \
     --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)
   if [ -n "$hits" ]; then echo "$hits"; echo "only $1/ may include $2"; bad=1; fi
 }
@@ -41,5 +42,6 @@ vendor backends/simbody 'Simbody|SimTK|simbody'
 vendor backends/dart 'dart/'
 vendor results 'sqlite3\.h'
 vendor robots 'urdf_'
+vendor nn 'onnx/|google/protobuf|onnxruntime'
 [ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms"
 exit "$bad"

@@ -169,7 +169,9 @@ bool train_oracle(const std::shared_ptr<const RobotModel>& robot, const WbcRun& 
   PpoOptions options;
   options.threads = run.threads;
   options.environments = run.environments;
-  Ppo ppo(robot, task_of(run.stage, run), options, first_state(run, *robot));
+  const WbcTask task = task_of(run.stage, run);
+  options.entropy = task.entropy;
+  Ppo ppo(robot, task, options, first_state(run, *robot));
   Log log(run, ppo.state().steps, steps_wanted);
   const auto save = [&] {
     write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(ppo.state()));

@@ -152,13 +152,13 @@ void WbcEnvironment::disturb() {
   }
 }
 
-// A force on a hand or the torso for a second, about every third second.
+// A force on a hand or the torso for a second, about every fifth second.
 void WbcEnvironment::push() {
   if (pushed_ >= 0 && --push_ticks_ <= 0) {
     backend_->push(pushed_, Eigen::Vector3d::Zero(), actual_.p_WL(pushed_));
     pushed_ = -1;
   }
-  if (pushed_ >= 0 || !random_.chance(kTick / 2.0)) return;
+  if (pushed_ >= 0 || !random_.chance(kTick / 4.0)) return;
   pushed_ = push_links_[random_.below(static_cast<int>(push_links_.size()))];
   push_ticks_ = 50;
   const double direction = random_.uniform(-std::numbers::pi, std::numbers::pi);

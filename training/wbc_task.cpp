@@ -32,8 +32,14 @@ WbcTask interact() {
   task.domain.kick = 1.0;
   task.domain.push = 60.0;
   task.domain.latency = 2;
-  task.reward.action_rate = 0.06;
-  task.reward.action_jerk = 0.02;
+  task.reward.root_near = 4.0;
+  task.reward.root_near_width = 0.08;
+  task.reward.clock = 2.5;
+  task.reward.lift = 300.0;
+  task.entropy = 0.0;
+  task.reward.height_width = 0.03;
+  task.reward.action_rate = 0.1;
+  task.reward.action_jerk = 0.03;
   return task;
 }
 

@@ -56,6 +56,7 @@ struct WbcTask {
   double dt = 0.005;  // physics [s]
   // Of MuJoCo: half the time of its defaults; what was learnt is tested with those.
   EngineOptions engine = {{"solver", "cg"}, {"iterations", "8"}, {"cone", "pyramidal"}};
+  double entropy = 0.002;   // weight of the policy's entropy
   int episode_ticks = 500;  // A.3.2: 500 steps
 };
 

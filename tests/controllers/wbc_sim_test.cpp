@@ -164,7 +164,8 @@ TEST(WbcTracker, AtRestTheLegsAreTheStandingOnes) {
   tracker.reset(standing_reference(1.0, 2.0, 0.7));
   for (int i = 0; i < 10; ++i)
     tracker.update(g1()->standing_state(standing_reference(1.0, 2.0, 0.7).X_WB), standing_reference(1.0, 2.0, 0.7));
-  EXPECT_LT((tracker.q() - g1()->neutral).cwiseAbs().maxCoeff(), 2e-3);
+  // The stance is wider than the neutral pose's by less than 2 mm a side, over a leg of 0.6 m.
+  EXPECT_LT((tracker.q() - g1()->neutral).cwiseAbs().maxCoeff(), 1e-2);
   EXPECT_LT(tracker.v().cwiseAbs().maxCoeff(), 1e-3);
 }
 
