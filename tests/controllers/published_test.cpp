@@ -2,14 +2,13 @@
 // (section 7). The networks do not ship: without them nothing here runs.
 #include <gmock/gmock.h>
 
-#include "motion/pickle.h"
 #include "tests/backends/engine_names.h"
-#include "tests/controllers/walk.h"
-#include "tests/support.h"
+#include "tests/controllers/published_cases.h"
 
 namespace duet {
 namespace {
 
+using test::homie;
 using test::thrown_message;
 using test::walk;
 using test::Walk;
@@ -20,10 +19,6 @@ using ::testing::HasSubstr;
 #define NEEDS(model)                                                      \
   if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent"; \
   if (test::shared_file("models/" model).empty()) GTEST_SKIP() << "not run: models/" model " absent"
-
-WalkSetup homie(const std::string& command) {
-  return {.controller = "homie", .options = {{"command", command}}, .start = test::arms_down(*test::body("g1_27dof"))};
-}
 
 TEST(Homie, WalksAtTheCommandedSpeed) {
   NEEDS("homie_deploy.onnx");
@@ -47,19 +42,11 @@ TEST(Homie, StandsAtTheCommandedHeight) {
 TEST(Homie, WalksWithBothArmsRaisedByTheReference) {
   NEEDS("homie_deploy.onnx");
   const auto robot = test::body("g1_27dof");
-  const int left = robot->joint_index("left_shoulder_pitch_joint");
-  const int right = robot->joint_index("right_shoulder_pitch_joint");
-  WalkSetup setup = homie("0.3,0,0");
-  setup.reference = [=](int tick, const Reference& neutral) {
-    Reference reference = neutral;
-    reference.q[left] = reference.q[right] = -1.5 * std::clamp((tick - 150) / 50.0, 0.0, 1.0);
-    return reference;
-  };
-  const Walk result = walk(setup);
+  const Walk result = walk(test::homie_with_raised_arms());
   EXPECT_TRUE(result.upright);
   EXPECT_GT(result.forward, 0.25);
-  EXPECT_NEAR(result.last.q[left], -1.5, 0.06);
-  EXPECT_NEAR(result.last.q[right], -1.5, 0.06);
+  EXPECT_NEAR(result.last.q[robot->joint_index("left_shoulder_pitch_joint")], -1.5, 0.06);
+  EXPECT_NEAR(result.last.q[robot->joint_index("right_shoulder_pitch_joint")], -1.5, 0.06);
 }
 
 TEST(Homie, ReachesAGoalAMetreAwayAndStaysThere) {
@@ -82,17 +69,7 @@ TEST(Homie, ReachesAGoalAMetreAwayAndStaysThere) {
 
 TEST(Twist2, StandsWithoutDrifting) {
   NEEDS("twist2_1017_20k.onnx");
-  WalkSetup setup{.controller = "twist2"};
-  Eigen::VectorXd idle = test::body("g1_twist2")->neutral;
-  for (const DescriptorJoint& joint : load_descriptor("twist2").joints)
-    idle[test::body("g1_twist2")->joint_index(joint.name)] = joint.neutral;
-  setup.start = idle;
-  setup.reference = [](int, const Reference& neutral) {
-    Reference reference = neutral;
-    reference.X_WB.p.z() = 0.8;
-    return reference;
-  };
-  const Walk result = walk(setup);
+  const Walk result = walk(test::twist2_idle());
   EXPECT_TRUE(result.upright);
   EXPECT_LE(result.drift, 0.03);
   EXPECT_LE(result.joint_rms, 0.06);
@@ -100,26 +77,34 @@ TEST(Twist2, StandsWithoutDrifting) {
 
 TEST(Twist2, TracksARecordedWalk) {
   NEEDS("twist2_1017_20k.onnx");
-  const std::string path = test::shared_file("data/g1_motions/twist2/walk_001.pkl");
-  if (path.empty()) GTEST_SKIP() << "not run: data/g1_motions/twist2 absent";
-  const RobotMotion motion = resample(read_motion_pickle(path).motion, 50.0);
-  WalkSetup setup{.controller = "twist2", .seconds = (motion.frames() - 1) / 50.0};
-  setup.reference = [&](int tick, const Reference&) { return motion.reference(tick); };
-  const Walk result = walk(setup);
+  if (test::shared_file(test::kRecordedWalk).empty()) GTEST_SKIP() << "not run: data/g1_motions/twist2 absent";
+  const Walk result = walk(test::twist2_recorded_walk());
   EXPECT_TRUE(result.upright);
   EXPECT_LE(result.joint_rms, 0.09);
 }
 
 TEST(Playground, WalksAtTheCommandedSpeed) {
   NEEDS("playground_g1_policy.onnx");
-  const Walk result = walk({.controller = "playground", .options = {{"command", "0.8,0,0"}}});
+  const Walk result = walk(test::on_soft_ground(test::playground()));
   EXPECT_TRUE(result.upright);
   EXPECT_NEAR(result.forward, 0.81, 0.03);
 }
 
+// Why duet's own ground gives another speed than the reference measurements (docs/controllers.md). Starts that differ
+// by millimetres spread by 0.004 m/s.
+TEST(Playground, WalksFasterOnHarderGround) {
+  NEEDS("playground_g1_policy.onnx");
+  WalkSetup hard = test::playground();
+  hard.seconds = 6.0;
+  const Walk soft_walk = walk(test::on_soft_ground(hard));
+  const Walk hard_walk = walk(hard);
+  EXPECT_TRUE(hard_walk.upright);
+  EXPECT_NEAR(hard_walk.forward - soft_walk.forward, 0.03, 0.01);
+}
+
 TEST(RlGym, WalksAtTheCommandedSpeed) {
   NEEDS("unitree_rl_gym_g1_motion.pt");
-  const Walk result = walk({.controller = "rl_gym", .options = {{"command", "0.3,0,0"}}});
+  const Walk result = walk(test::rl_gym());
   EXPECT_TRUE(result.upright);
   EXPECT_NEAR(result.forward, 0.29, 0.02);
 }
@@ -148,30 +133,6 @@ TEST(Published, SaysWhichBodyItWasMadeForAndWhetherItWalks) {
   EXPECT_EQ(controller_info("rl_gym").robot, "g1_12dof");
   EXPECT_TRUE(controller_info("twist2").walks);
   EXPECT_THAT(controller_info("homie").about, HasSubstr("CC BY-NC"));
-}
-
-// Run by hand: duet_controllers_test --gtest_also_run_disabled_tests --gtest_filter='*InAllEngines*'.
-TEST(DISABLED_Published, InAllEngines) {
-  struct Case {
-    const char* name;
-    const char* command;
-    double seconds;
-  };
-  const Case cases[] = {
-      {"homie", "0.3,0,0", 10},  {"homie", "0,0,0,0.5", 10}, {"homie", "0.3,0,0", 60}, {"playground", "0.8,0,0", 10},
-      {"rl_gym", "0.3,0,0", 10}, {"rl_gym", "0.3,0,0", 60},  {"twist2", "", 10}};
-  for (const std::string& engine : test::engine_names()) {
-    if (!test::is_here(engine)) continue;
-    for (const Case& each : cases) {
-      WalkSetup setup{.controller = each.name, .engine = engine, .seconds = each.seconds};
-      if (*each.command != '\0') setup.options = {{"command", each.command}};
-      if (setup.controller == "homie") setup.start = test::arms_down(*test::body("g1_27dof"));
-      const Walk r = walk(setup);
-      printf("| %s | %s %s, %g s | %s %.2f s; %.3f m/s, height %.3f m, drift %.3f m |\n", engine.c_str(), each.name,
-             each.command, each.seconds, r.upright ? "upright" : "falls", r.seconds, r.forward, r.height, r.drift);
-      fflush(stdout);
-    }
-  }
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ struct WalkSetup {
   std::string controller = {};
   ControllerOptions options = {};
   std::string engine = "mujoco";
+  EngineOptions engine_options = {};
   std::string card = {};  // "": the controller's own
   double seconds = 10.0;
   double friction = 0.8;
@@ -43,6 +44,7 @@ inline Walk walk(const WalkSetup& setup) {
   scene.robot = body(setup.card.empty() ? controller_info(setup.controller).robot : setup.card);
   scene.partner = PartnerMode::kNone;
   scene.friction.robot_ground = setup.friction;
+  scene.options = setup.engine_options;
   const auto backend = make_backend(setup.engine, scene);
   const auto controller = make_controller(setup.controller, scene.robot, setup.options);
   RobotState state = scene.robot->standing_state();

@@ -1,0 +1,113 @@
+// Prints the rows of docs/controllers.md. By hand:
+//   controllers_test --gtest_also_run_disabled_tests --gtest_filter='*PublishedTable*'
+#include <fmt/format.h>
+
+#include <cstdio>
+
+#include "tests/backends/engine_names.h"
+#include "tests/controllers/published_cases.h"
+
+namespace duet {
+namespace {
+
+using test::walk;
+using test::Walk;
+using test::WalkSetup;
+
+struct Row {
+  std::string controller, what, asked;
+  WalkSetup setup;
+  std::function<std::string(const Walk&)> say;
+};
+
+std::string speed(const Walk& r) { return fmt::format("{:.3f} m/s", r.forward); }
+std::string height(const Walk& r) { return fmt::format("{:.3f} m", r.height); }
+std::string speed_and_height(const Walk& r) { return fmt::format("{}, pelvis {}", speed(r), height(r)); }
+std::string drift_and_rms(const Walk& r) { return fmt::format("{:.3f} m; {:.3f} rad", r.drift, r.joint_rms); }
+std::string rms(const Walk& r) { return fmt::format("{:.3f} rad", r.joint_rms); }
+
+std::string speed_and_arms(const Walk& r) {
+  const auto robot = test::body("g1_27dof");
+  return fmt::format("{}; arms {:.3f}, {:.3f} rad", speed(r), r.last.q[robot->joint_index("left_shoulder_pitch_joint")],
+                     r.last.q[robot->joint_index("right_shoulder_pitch_joint")]);
+}
+
+WalkSetup lasting(WalkSetup setup, double seconds) {
+  setup.seconds = seconds;
+  return setup;
+}
+
+WalkSetup on_free_waist() {
+  WalkSetup setup = test::homie("0.3,0,0");
+  setup.card = "g1";
+  setup.start = test::arms_down(*test::body("g1"));
+  return setup;
+}
+
+std::vector<Row> rows() {
+  std::vector<Row> all = {
+      {"homie", "0.3 m/s, 10 s", "0.28 .. 0.32 m/s", test::homie("0.3,0,0"), speed_and_height},
+      {"homie", "0.3 m/s, 60 s", "upright", lasting(test::homie("0.3,0,0"), 60.0), speed_and_height},
+      {"homie", "0.3 m/s, both arms raised", "upright, -1.5 +- 0.06 rad", test::homie_with_raised_arms(),
+       speed_and_arms},
+      {"homie", "0.3 m/s on `g1`", "upright", on_free_waist(), speed}};
+  for (const char* wanted : {"0.3", "0.5", "0.74"})
+    all.push_back({"homie", fmt::format("standing, 5 s, height {} m", wanted), fmt::format("{} +- 0.025 m", wanted),
+                   lasting(test::homie(fmt::format("0,0,0,{}", wanted)), 5.0), height});
+  all.push_back({"rl_gym", "0.3 m/s, 10 s", "0.27 .. 0.31 m/s", test::rl_gym(), speed});
+  all.push_back({"playground", "0.8 m/s, 10 s", "upright", test::playground(), speed});
+  all.push_back({"playground", "0.8 m/s, 10 s, ground 0.02 s", "0.78 .. 0.84 m/s",
+                 test::on_soft_ground(test::playground()), speed});
+  all.push_back(
+      {"twist2", "idle, 10 s: drift; joint RMS", "<= 0.03 m; <= 0.06 rad", test::twist2_idle(), drift_and_rms});
+  if (!test::shared_file(test::kRecordedWalk).empty())
+    all.push_back({"twist2", "`walk_001`, 13.9 s: joint RMS", "<= 0.09 rad", test::twist2_recorded_walk(), rms});
+  return all;
+}
+
+std::string verdict(const Walk& r, const std::string& said) {
+  return r.upright ? fmt::format("upright; {}", said) : fmt::format("falls at {:.2f} s; {}", r.seconds, said);
+}
+
+void print(const std::string& row) {
+  fmt::print("{}\n", row);
+  std::fflush(stdout);
+}
+
+bool networks_are_here() {
+  for (const char* name : {"homie", "playground", "rl_gym", "twist2"})
+    if (test::shared_file(fmt::format("models/{}", load_descriptor(name).network)).empty()) return false;
+  return true;
+}
+
+TEST(DISABLED_PublishedTable, OfTheControllersInMujoco) {
+  if (!test::is_here("mujoco") || !networks_are_here()) GTEST_SKIP() << "not run: mujoco or models/ absent";
+  print("| controller | case | asked | measured |\n|---|---|---|---|");
+  for (const Row& row : rows()) {
+    const Walk result = walk(row.setup);
+    const std::string said = verdict(result, row.say(result));
+    print(fmt::format("| `{}` | {} | {} | {} |", row.controller, row.what, row.asked, said));
+    EXPECT_TRUE(result.upright) << row.controller << ": " << row.what;
+  }
+}
+
+TEST(DISABLED_PublishedTable, OfTheEngines) {
+  if (!networks_are_here()) GTEST_SKIP() << "not run: models/ absent";
+  print("| engine | `homie` 0.3 m/s | `rl_gym` 0.3 m/s | `playground` 0.8 m/s | `twist2` idle, drift |");
+  print("|---|---|---|---|---|");
+  for (const std::string& engine : test::engine_names()) {
+    if (!test::is_here(engine)) continue;
+    std::string line = fmt::format("| {} |", engine);
+    for (WalkSetup setup : {test::homie("0.3,0,0"), test::rl_gym(), test::playground(), test::twist2_idle()}) {
+      setup.engine = engine;
+      const Walk result = walk(setup);
+      const std::string said = setup.controller == "twist2" ? fmt::format("{:.3f} m", result.drift) : speed(result);
+      line += fmt::format(" {} |", verdict(result, said));
+      EXPECT_TRUE(result.upright) << engine << ": " << setup.controller;
+    }
+    print(line);
+  }
+}
+
+}  // namespace
+}  // namespace duet
