@@ -29,6 +29,8 @@ float log_probability(const VectorXf& inverse_std, float sum_log_std, const floa
   return sum;
 }
 
+std::span<float> column(MatrixXf& m, int c) { return {m.col(c).data(), static_cast<size_t>(m.rows())}; }
+
 void mirror_columns(const Mirror& mirror, const MatrixXf& x, MatrixXf& y) {
   y.resize(x.rows(), x.cols());
   const auto rows = static_cast<size_t>(x.rows());
@@ -67,7 +69,8 @@ struct Ppo::Worker {
   VectorXf log_std_gradient;
   double asymmetry = 0.0;
   IterationReport sums;
-  MatrixXf actor_raw, critic_raw, actor_input, critic_input, mirrored;
+  std::array<MatrixXf, 2> actor_raw, critic_raw;  // as it is, mirrored
+  MatrixXf actor_input, critic_input;
   MatrixXf actor_batch, critic_batch, mean_gradient, value_gradient;
 
   Worker(const WbcAgent& agent, std::uint64_t seed, int thread, long iteration)
@@ -108,8 +111,8 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
       worker.environments.back().skip_to(start.below(task.episode_ticks));
     }
     worker.returns.assign(each, 0.0);
-    worker.actor_raw.resize(actor_mirror_.size(), each);
-    worker.critic_raw.resize(critic_mirror_.size(), each);
+    worker.actor_raw[0].resize(actor_mirror_.size(), each);
+    worker.critic_raw[0].resize(critic_mirror_.size(), each);
   });
 }
 
@@ -121,6 +124,19 @@ IterationReport Ppo::iterate() {
     advantages(t, batch);
   });
   const double rollout_seconds = seconds_since(begin);
+  const double divergence = learn(batch);
+  steer(divergence);
+  IterationReport report = summary();
+  report.divergence = divergence;
+  report.iteration = ++state_.iteration;
+  report.steps = state_.steps += batch.value.size();
+  report.rollout_seconds = rollout_seconds;
+  report.seconds = seconds_since(begin);
+  state_.minutes += report.seconds / 60.0;
+  return report;
+}
+
+double Ppo::learn(Batch& batch) {
   const auto samples = static_cast<int>(batch.value.size());
   const float mean = batch.advantage.mean();
   const float deviation = std::sqrt((batch.advantage.array() - mean).square().mean()) + 1e-6F;
@@ -137,8 +153,11 @@ IterationReport Ppo::iterate() {
     for (char& flag : mirrored) flag = shuffle.chance(0.5) ? 1 : 0;
     for (int m = 0; m < options_.minibatches; ++m) divergence = minibatch(order, mirrored, m * size, size, batch);
   }
-  steer(divergence);
+  return divergence;
+}
 
+// What the threads counted; their moments go into the normalisers.
+IterationReport Ppo::summary() {
   IterationReport report;
   double asymmetry = 0.0;
   for (const auto& worker : workers_) {
@@ -158,89 +177,89 @@ IterationReport Ppo::iterate() {
   const double episodes = std::max(1, report.episodes);
   report.episode_seconds /= episodes;
   report.episode_return /= episodes;
-  report.asymmetry = std::sqrt(asymmetry / (static_cast<double>(samples) * options_.epochs * action_mirror_.size()));
-  report.divergence = divergence;
+  const double numbers = static_cast<double>(batch_->value.size()) * options_.epochs * action_mirror_.size();
+  report.asymmetry = std::sqrt(asymmetry / numbers);
   report.rate = state_.rate;
   report.std = state_.agent.log_std.array().exp().mean();
-  report.iteration = ++state_.iteration;
-  report.steps = state_.steps += samples;
-  report.rollout_seconds = rollout_seconds;
-  report.seconds = seconds_since(begin);
-  state_.minutes += report.seconds / 60.0;
   return report;
 }
 
 void Ppo::collect(int thread, Batch& batch) {
   Worker& worker = *workers_[thread];
+  const int each = static_cast<int>(worker.environments.size());
+  worker.actor_seen = Normaliser(state_.agent.actor.inputs());
+  worker.critic_seen = Normaliser(state_.agent.critic.inputs());
+  worker.actor_seen.count = worker.critic_seen.count = 0.0;
+  worker.sums = {};
+  for (int h = 0; h < options_.horizon; ++h) {
+    const int first = (h * options_.threads + thread) * each;
+    look(worker);
+    decide(worker, first, batch);
+    step(worker, first, batch);
+  }
+}
+
+void Ppo::look(Worker& worker) const {
+  for (size_t i = 0; i < worker.environments.size(); ++i)
+    worker.environments[i].observe(column(worker.actor_raw[0], static_cast<int>(i)),
+                                   column(worker.critic_raw[0], static_cast<int>(i)));
+  mirror_columns(actor_mirror_, worker.actor_raw[0], worker.actor_raw[1]);
+  mirror_columns(critic_mirror_, worker.critic_raw[0], worker.critic_raw[1]);
+}
+
+void Ppo::decide(Worker& worker, int first, Batch& batch) const {
   const WbcAgent& agent = state_.agent;
   const int each = static_cast<int>(worker.environments.size());
   const VectorXf std = agent.log_std.array().exp(), inverse_std = std.cwiseInverse();
   const float sum_log_std = agent.log_std.sum();
-  worker.actor_seen = Normaliser(agent.actor.inputs());
-  worker.critic_seen = Normaliser(agent.critic.inputs());
-  worker.actor_seen.count = worker.critic_seen.count = 0.0;
-  worker.sums = {};
-  const auto column = [](MatrixXf& m, int c) {
-    return std::span<float>(m.col(c).data(), static_cast<size_t>(m.rows()));
-  };
-  for (int h = 0; h < options_.horizon; ++h) {
-    const int first = (h * options_.threads + thread) * each;
-    for (int i = 0; i < each; ++i)
-      worker.environments[i].observe(column(worker.actor_raw, i), column(worker.critic_raw, i));
-    for (int m = 0; m < 2; ++m) {
-      if (m == 0)
-        worker.actor_input = worker.actor_raw;
-      else
-        mirror_columns(actor_mirror_, worker.actor_raw, worker.actor_input);
-      worker.actor_seen.update(worker.actor_input);
-      agent.actor_input.apply(worker.actor_input);
-      batch.actor[m].middleCols(first, each) = worker.actor_input;
-      batch.mean[m].middleCols(first, each) = worker.actor.forward(worker.actor_input);
-      if (m == 0)
-        worker.critic_input = worker.critic_raw;
-      else
-        mirror_columns(critic_mirror_, worker.critic_raw, worker.critic_input);
-      worker.critic_seen.update(worker.critic_input);
-      agent.critic_input.apply(worker.critic_input);
-      batch.critic[m].middleCols(first, each) = worker.critic_input;
-      if (m == 0) batch.value.segment(first, each) = worker.critic.forward(worker.critic_input).row(0).transpose();
-    }
-    for (int i = 0; i < each; ++i) {
-      const int c = first + i;
-      for (Eigen::Index k = 0; k < std.size(); ++k)
-        batch.action[0](k, c) = batch.mean[0](k, c) + std[k] * static_cast<float>(worker.noise.normal());
-      action_mirror_.apply(column(batch.action[0], c), column(batch.action[1], c));
-      for (int m = 0; m < 2; ++m)
-        batch.log_probability[m][c] =
-            log_probability(inverse_std, sum_log_std, batch.action[m].col(c).data(), batch.mean[m].col(c).data());
-      WbcEnvironment& environment = worker.environments[i];
-      const Transition transition = environment.step(column(batch.action[0], c));
-      worker.returns[i] += transition.reward;
-      batch.end[c] = transition.end;
-      batch.reward[c] = static_cast<float>(transition.reward);
-      // An episode that ends by the clock is worth what would have followed.
-      if (transition.end == EpisodeEnd::kTimeUp)
-        batch.reward[c] += static_cast<float>(options_.discount) * batch.value[c];
-      if (transition.end == EpisodeEnd::kNone) continue;
-      ++worker.sums.episodes;
-      worker.sums.falls += transition.end == EpisodeEnd::kFell ? 1 : 0;
-      worker.sums.episode_seconds += 0.02 * environment.tick();
-      worker.sums.episode_return += worker.returns[i];
-      worker.returns[i] = 0.0;
-      environment.reset();
-    }
+  for (int m = 0; m < 2; ++m) {
+    worker.actor_seen.update(worker.actor_raw[m]);
+    worker.critic_seen.update(worker.critic_raw[m]);
+    worker.actor_input = worker.actor_raw[m];
+    worker.critic_input = worker.critic_raw[m];
+    agent.actor_input.apply(worker.actor_input);
+    agent.critic_input.apply(worker.critic_input);
+    batch.actor[m].middleCols(first, each) = worker.actor_input;
+    batch.critic[m].middleCols(first, each) = worker.critic_input;
+    batch.mean[m].middleCols(first, each) = worker.actor.forward(worker.actor_input);
+    if (m == 0) batch.value.segment(first, each) = worker.critic.forward(worker.critic_input).row(0).transpose();
+  }
+  for (int c = first; c < first + each; ++c) {
+    for (Eigen::Index k = 0; k < std.size(); ++k)
+      batch.action[0](k, c) = batch.mean[0](k, c) + std[k] * static_cast<float>(worker.noise.normal());
+    action_mirror_.apply(column(batch.action[0], c), column(batch.action[1], c));
+    for (int m = 0; m < 2; ++m)
+      batch.log_probability[m][c] =
+          log_probability(inverse_std, sum_log_std, batch.action[m].col(c).data(), batch.mean[m].col(c).data());
+  }
+}
+
+void Ppo::step(Worker& worker, int first, Batch& batch) const {
+  for (size_t i = 0; i < worker.environments.size(); ++i) {
+    const int c = first + static_cast<int>(i);
+    WbcEnvironment& environment = worker.environments[i];
+    const Transition transition = environment.step(column(batch.action[0], c));
+    worker.returns[i] += transition.reward;
+    batch.end[c] = transition.end;
+    batch.reward[c] = static_cast<float>(transition.reward);
+    // An episode that ends by the clock is worth what would have followed.
+    if (transition.end == EpisodeEnd::kTimeUp)
+      batch.reward[c] += static_cast<float>(options_.discount) * batch.value[c];
+    if (transition.end == EpisodeEnd::kNone) continue;
+    ++worker.sums.episodes;
+    worker.sums.falls += transition.end == EpisodeEnd::kFell ? 1 : 0;
+    worker.sums.episode_seconds += 0.02 * environment.tick();
+    worker.sums.episode_return += worker.returns[i];
+    worker.returns[i] = 0.0;
+    environment.reset();
   }
 }
 
 void Ppo::advantages(int thread, Batch& batch) {
   Worker& worker = *workers_[thread];
   const int each = static_cast<int>(worker.environments.size());
-  const auto column = [](MatrixXf& m, int c) {
-    return std::span<float>(m.col(c).data(), static_cast<size_t>(m.rows()));
-  };
-  for (int i = 0; i < each; ++i)
-    worker.environments[i].observe(column(worker.actor_raw, i), column(worker.critic_raw, i));
-  worker.critic_input = worker.critic_raw;
+  look(worker);
+  worker.critic_input = worker.critic_raw[0];
   state_.agent.critic_input.apply(worker.critic_input);
   const VectorXf last = worker.critic.forward(worker.critic_input).row(0).transpose();
   const auto discount = static_cast<float>(options_.discount),
@@ -274,49 +293,57 @@ double Ppo::minibatch(const std::vector<int>& order, const std::vector<char>& mi
 double Ppo::gradients(int thread, std::span<const int> samples, const std::vector<char>& mirrored, int size,
                       Batch& batch) {
   Worker& worker = *workers_[thread];
-  const int n = static_cast<int>(samples.size()), actions = action_mirror_.size();
-  const VectorXf& log_std = state_.agent.log_std;
-  const VectorXf inverse_std = (-log_std.array()).exp();
-  const float share = 1.0F / static_cast<float>(size), sum_log_std = log_std.sum();
+  const int n = static_cast<int>(samples.size());
+  const float share = 1.0F / static_cast<float>(size);
   worker.actor_batch.resize(batch.actor[0].rows(), n);
   worker.critic_batch.resize(batch.critic[0].rows(), n);
   for (int i = 0; i < n; ++i) {
     worker.actor_batch.col(i) = batch.actor[mirrored[samples[i]]].col(samples[i]);
     worker.critic_batch.col(i) = batch.critic[mirrored[samples[i]]].col(samples[i]);
   }
-  const MatrixXf& mean = worker.actor.forward(worker.actor_batch);
-  worker.mean_gradient.resize(actions, n);
-  worker.log_std_gradient =
-      VectorXf::Constant(actions, -static_cast<float>(options_.entropy) * share * static_cast<float>(n));
-  double divergence = 0.0;
-  for (int i = 0; i < n; ++i) {
-    const int c = samples[i], m = mirrored[c];
-    const float* action = batch.action[m].col(c).data();
-    const float* old_mean = batch.mean[m].col(c).data();
-    const float* other_mean = batch.mean[1 - m].col(c).data();
-    const float log_ratio =
-        log_probability(inverse_std, sum_log_std, action, mean.col(i).data()) - batch.log_probability[m][c];
-    const float ratio = std::exp(std::clamp(log_ratio, -10.0F, 10.0F)), advantage = batch.advantage[c];
-    const auto clip = static_cast<float>(options_.clip);
-    const bool clipped = (advantage > 0.0F && ratio > 1.0F + clip) || (advantage < 0.0F && ratio < 1.0F - clip);
-    const float weight = clipped ? 0.0F : -advantage * ratio * share;
-    for (int k = 0; k < actions; ++k) {
-      const float z = std::clamp((action[k] - mean(k, i)) * inverse_std[k], -4.0F, 4.0F);
-      const float moved = (mean(k, i) - old_mean[k]) * inverse_std[k];
-      divergence += 0.5 * static_cast<double>(moved) * moved;
-      const float apart = mean(k, i) - action_mirror_.sign[k] * other_mean[action_mirror_.from[k]];
-      worker.asymmetry += static_cast<double>(apart) * apart;
-      worker.mean_gradient(k, i) = weight * z * inverse_std[k] + static_cast<float>(options_.mirror_pull) * share *
-                                                                     apart * inverse_std[k] * inverse_std[k];
-      if (m == 0) worker.log_std_gradient[k] += weight * (z * z - 1.0F);
-    }
-  }
+  const double divergence = differentiate_policy(worker, samples, mirrored, share, batch);
   worker.actor.backward(worker.mean_gradient);
   const MatrixXf& value = worker.critic.forward(worker.critic_batch);
   worker.value_gradient.resize(1, n);
   for (int i = 0; i < n; ++i) worker.value_gradient(0, i) = 2.0F * share * (value(0, i) - batch.target[samples[i]]);
   worker.critic.backward(worker.value_gradient);
   return divergence / n;
+}
+
+// The objective's derivative by a sample's ratio of probabilities; 0 where it is clipped.
+float Ppo::ratio_gradient(float log_ratio, float advantage) const {
+  const float ratio = std::exp(std::clamp(log_ratio, -10.0F, 10.0F));
+  const auto clip = static_cast<float>(options_.clip);
+  const bool clipped = (advantage > 0.0F && ratio > 1.0F + clip) || (advantage < 0.0F && ratio < 1.0F - clip);
+  return clipped ? 0.0F : -advantage * ratio;
+}
+
+double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<char>& mirrored,
+                                 float share, Batch& batch) const {
+  const int n = static_cast<int>(samples.size()), actions = action_mirror_.size();
+  const VectorXf inverse_std = (-state_.agent.log_std.array()).exp();
+  const float sum_log_std = state_.agent.log_std.sum(), pull = static_cast<float>(options_.mirror_pull) * share;
+  const MatrixXf& mean = worker.actor.forward(worker.actor_batch);
+  worker.mean_gradient.resize(actions, n);
+  worker.log_std_gradient.setConstant(actions, -static_cast<float>(options_.entropy) * share * static_cast<float>(n));
+  double divergence = 0.0;
+  for (int i = 0; i < n; ++i) {
+    const int c = samples[i], m = mirrored[c];
+    const auto action = batch.action[m].col(c), old_mean = batch.mean[m].col(c), other_mean = batch.mean[1 - m].col(c);
+    const float log_ratio =
+        log_probability(inverse_std, sum_log_std, action.data(), mean.col(i).data()) - batch.log_probability[m][c];
+    const float weight = share * ratio_gradient(log_ratio, batch.advantage[c]);
+    for (int k = 0; k < actions; ++k) {
+      const float z = std::clamp((action[k] - mean(k, i)) * inverse_std[k], -4.0F, 4.0F);
+      const float moved = (mean(k, i) - old_mean[k]) * inverse_std[k];
+      const float apart = mean(k, i) - action_mirror_.sign[k] * other_mean[action_mirror_.from[k]];
+      divergence += 0.5 * static_cast<double>(moved) * moved;
+      worker.asymmetry += static_cast<double>(apart) * apart;
+      worker.mean_gradient(k, i) = weight * z * inverse_std[k] + pull * apart * inverse_std[k] * inverse_std[k];
+      if (m == 0) worker.log_std_gradient[k] += weight * (z * z - 1.0F);
+    }
+  }
+  return divergence;
 }
 
 void Ppo::apply_gradients() {

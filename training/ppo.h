@@ -46,9 +46,17 @@ class Ppo {
   struct Batch;   // samples of one iteration
   struct Worker;  // a thread's networks, environments and sums
   void collect(int thread, Batch& batch);
+  void look(Worker& worker) const;                             // at all environments, as they are and mirrored
+  void decide(Worker& worker, int first, Batch& batch) const;  // actions of a tick from column `first` on
+  void step(Worker& worker, int first, Batch& batch) const;
   void advantages(int thread, Batch& batch);
+  double learn(Batch& batch);  // the divergence of the last minibatch
+  IterationReport summary();
   double minibatch(const std::vector<int>& order, const std::vector<char>& mirrored, int begin, int size, Batch& batch);
   double gradients(int thread, std::span<const int> samples, const std::vector<char>& mirrored, int size, Batch& batch);
+  double differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<char>& mirrored,
+                              float share, Batch& batch) const;
+  [[nodiscard]] float ratio_gradient(float log_ratio, float advantage) const;
   void apply_gradients();
   void steer(double divergence);
 

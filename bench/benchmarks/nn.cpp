@@ -73,6 +73,7 @@ double network_seconds(Network& network, double seconds) {
 double bare_seconds(const std::vector<Layer>& layers, double seconds) {
   constexpr int kWidest = 2048;
   std::vector<std::vector<float>> weights;
+  weights.reserve(layers.size());
   for (const Layer& layer : layers) weights.emplace_back(static_cast<size_t>(layer.inputs) * layer.outputs, 1e-3F);
   const std::vector<float> x(kWidest, 0.1F);
   std::vector<float> y(kWidest);
