@@ -145,12 +145,12 @@ double Ppo::learn(Batch& batch) {
   Random shuffle(state_.seed, stream_key({"ppo shuffle", std::to_string(state_.iteration)}));
   std::vector<int> order(samples);
   std::iota(order.begin(), order.end(), 0);
-  std::vector<char> mirrored(samples);
+  std::vector<std::uint8_t> mirrored(samples);
   double divergence = 0.0;
   const int size = samples / options_.minibatches;
   for (int epoch = 0; epoch < options_.epochs; ++epoch) {
     for (int i = samples - 1; i > 0; --i) std::swap(order[i], order[shuffle.below(i + 1)]);
-    for (char& flag : mirrored) flag = shuffle.chance(0.5) ? 1 : 0;
+    for (std::uint8_t& flag : mirrored) flag = shuffle.chance(0.5) ? 1 : 0;
     for (int m = 0; m < options_.minibatches; ++m) divergence = minibatch(order, mirrored, m * size, size, batch);
   }
   return divergence;
@@ -277,7 +277,7 @@ void Ppo::advantages(int thread, Batch& batch) {
   }
 }
 
-double Ppo::minibatch(const std::vector<int>& order, const std::vector<char>& mirrored, int begin, int size,
+double Ppo::minibatch(const std::vector<int>& order, const std::vector<std::uint8_t>& mirrored, int begin, int size,
                       Batch& batch) {
   const int share = size / options_.threads;
   std::vector<double> divergence(options_.threads);
@@ -290,7 +290,7 @@ double Ppo::minibatch(const std::vector<int>& order, const std::vector<char>& mi
 }
 
 // Of the clipped objective, the entropy and the pull to symmetry by the mean; of the squared error by the value.
-double Ppo::gradients(int thread, std::span<const int> samples, const std::vector<char>& mirrored, int size,
+double Ppo::gradients(int thread, std::span<const int> samples, const std::vector<std::uint8_t>& mirrored, int size,
                       Batch& batch) {
   Worker& worker = *workers_[thread];
   const int n = static_cast<int>(samples.size());
@@ -318,8 +318,8 @@ float Ppo::ratio_gradient(float log_ratio, float advantage) const {
   return clipped ? 0.0F : -advantage * ratio;
 }
 
-double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<char>& mirrored,
-                                 float share, Batch& batch) const {
+double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples,
+                                 const std::vector<std::uint8_t>& mirrored, float share, Batch& batch) const {
   const int n = static_cast<int>(samples.size()), actions = action_mirror_.size();
   const VectorXf inverse_std = (-state_.agent.log_std.array()).exp();
   const float sum_log_std = state_.agent.log_std.sum(), pull = static_cast<float>(options_.mirror_pull) * share;

@@ -52,9 +52,11 @@ class Ppo {
   void advantages(int thread, Batch& batch);
   double learn(Batch& batch);  // the divergence of the last minibatch
   IterationReport summary();
-  double minibatch(const std::vector<int>& order, const std::vector<char>& mirrored, int begin, int size, Batch& batch);
-  double gradients(int thread, std::span<const int> samples, const std::vector<char>& mirrored, int size, Batch& batch);
-  double differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<char>& mirrored,
+  double minibatch(const std::vector<int>& order, const std::vector<std::uint8_t>& mirrored, int begin, int size,
+                   Batch& batch);
+  double gradients(int thread, std::span<const int> samples, const std::vector<std::uint8_t>& mirrored, int size,
+                   Batch& batch);
+  double differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<std::uint8_t>& mirrored,
                               float share, Batch& batch) const;
   [[nodiscard]] float ratio_gradient(float log_ratio, float advantage) const;
   void apply_gradients();

@@ -45,7 +45,7 @@ std::string beginning(const WbcRun& run) {
   const std::vector<std::string> names = stage_names();
   const auto here = std::ranges::find(names, run.stage);
   if (here == names.begin()) return "";
-  const std::string before = wbc_checkpoint(run.folder, *(here - 1));
+  std::string before = wbc_checkpoint(run.folder, *(here - 1));
   if (!fs::exists(before))
     throw InputError(
         fmt::format("stage '{}' begins with '{}', which is not there: run stage '{}' first, or name a "

@@ -20,7 +20,15 @@ WbcTask walk() {
   task.stream.moving = 0.75;
   task.stream.crouch = 0.2;
   task.stream.bow = 0.1;
-  task.domain.kick = 0.6;
+  task.domain.kick = 0.8;
+  task.reward.root_near = 4.0;
+  task.reward.root_near_width = 0.08;
+  task.reward.height_width = 0.03;
+  task.reward.clock = 2.5;
+  task.reward.lift = 300.0;
+  task.reward.action_rate = 0.05;
+  task.reward.action_jerk = 0.02;
+  task.entropy = 0.0005;
   return task;
 }
 
@@ -32,12 +40,7 @@ WbcTask interact() {
   task.domain.kick = 1.0;
   task.domain.push = 60.0;
   task.domain.latency = 2;
-  task.reward.root_near = 4.0;
-  task.reward.root_near_width = 0.08;
-  task.reward.clock = 2.5;
-  task.reward.lift = 300.0;
   task.entropy = 0.0;
-  task.reward.height_width = 0.03;
   task.reward.action_rate = 0.1;
   task.reward.action_jerk = 0.03;
   return task;

@@ -79,7 +79,7 @@ WbcRun smoke_run(const TrainArguments& arguments, const std::string& stage) {
   WbcRun run = arguments.run;
   run.stage = stage;
   run.environments = 32;
-  const long scale = arguments.run.steps > 0 ? arguments.run.steps : 600'000;
+  const long scale = arguments.run.steps > 0 ? arguments.run.steps : 400'000;
   run.steps = stage == "student" ? scale / 4 : scale;
   if (stage == "student") run.from = wbc_checkpoint(run.folder, "stand");
   return run;

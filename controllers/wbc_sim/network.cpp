@@ -62,7 +62,7 @@ class Reader {
     const std::vector<float>& values = found->second.values;
     if (static_cast<Eigen::Index>(values.size()) != size)
       throw InputError(fmt::format("{}: tensor '{}' has {} values, expected {}", file_, name, values.size(), size));
-    const Eigen::VectorXf vector = Eigen::Map<const Eigen::VectorXf>(values.data(), size);
+    Eigen::VectorXf vector = Eigen::Map<const Eigen::VectorXf>(values.data(), size);
     if (!vector.allFinite())
       throw InputError(fmt::format("{}: tensor '{}' has values that are not finite", file_, name));
     return vector;
@@ -74,7 +74,7 @@ class Reader {
 };
 
 nlohmann::json parse_list(const Reader& reader, const std::string& key, const std::string& file) {
-  const nlohmann::json json = nlohmann::json::parse(reader.text(key), nullptr, false);
+  nlohmann::json json = nlohmann::json::parse(reader.text(key), nullptr, false);
   if (!json.is_array()) throw InputError(fmt::format("{}: '{}' in the header is not a list", file, key));
   return json;
 }

@@ -10,15 +10,15 @@ namespace {
 
 class WbcSim final : public Controller {
  public:
-  WbcSim(const std::shared_ptr<const RobotModel>& robot, std::shared_ptr<const WbcNetwork> network)
-      : robot_(robot),
+  WbcSim(std::shared_ptr<const RobotModel> robot, std::shared_ptr<const WbcNetwork> network)
+      : robot_(std::move(robot)),
         network_(std::move(network)),
         policy_(*network_),
-        tracker_(robot),
-        layout_(robot->dof()),
+        tracker_(robot_),
+        layout_(robot_->dof()),
         history_(layout_),
         observation_(network_->mlp.inputs()) {
-    action_.setZero(robot->dof());
+    action_.setZero(robot_->dof());
   }
 
   [[nodiscard]] std::string_view name() const override { return "wbc_sim"; }
@@ -75,7 +75,7 @@ class WbcSim final : public Controller {
 
 std::string network_path(const ControllerOptions& options) {
   const auto found = options.find("network");
-  const std::string network = found == options.end() ? "student" : found->second;
+  std::string network = found == options.end() ? "student" : found->second;
   if (network != "student" && network != "oracle") return network;
   return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
 }
@@ -85,7 +85,7 @@ std::string network_path(const ControllerOptions& options) {
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
                                                     std::shared_ptr<const WbcNetwork> network) {
   require(network->joints == robot->joint_names(), "wbc_sim: the network was made for other joints than the robot's");
-  return std::make_unique<WbcSim>(robot, std::move(network));
+  return std::make_unique<WbcSim>(std::move(robot), std::move(network));
 }
 
 ControllerInfo wbc_sim_info() {
