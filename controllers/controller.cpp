@@ -93,7 +93,7 @@ std::vector<std::string> controller_names() {
 
 ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
 
-std::unique_ptr<Controller> make_controller(const std::string& name, std::shared_ptr<const RobotModel> robot,
+std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options) {
   require(robot != nullptr, "make_controller: no robot");
   const Entry& entry = find_entry(name);

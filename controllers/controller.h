@@ -56,7 +56,7 @@ ControllerInfo controller_info(const std::string& name);
 // Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot whose joints
 // are not those it was made for (by name); MissingError where its network is not on this machine (naming the places
 // looked at and the option that sets it); InputError for a network that is broken or of another kind.
-std::unique_ptr<Controller> make_controller(const std::string& name, std::shared_ptr<const RobotModel> robot,
+std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options = {});
 
 }  // namespace duet

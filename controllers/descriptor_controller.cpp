@@ -92,16 +92,17 @@ class DescriptorController final : public Controller {
   DescriptorController(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot,
                        std::unique_ptr<Network> network, const std::string& network_path,
                        const ControllerOptions& options)
-      : name_(descriptor.name),
+      : robot_(std::move(robot)),
+        name_(descriptor.name),
         walks_(descriptor.walks),
         clip_(static_cast<float>(descriptor.action_clip)),
         around_reference_(descriptor.around_reference),
-        joints_(bind_joints(descriptor, *robot, waist_is_locked(descriptor, options))),
+        joints_(bind_joints(descriptor, *robot_, waist_is_locked(descriptor, options))),
         network_(std::move(network)),
-        observer_(with_yaw_scale(descriptor, options), robot, first_joints(descriptor.joints.size())),
-        rates_(robot->dof(), kTick),
+        observer_(with_yaw_scale(descriptor, options), robot_, first_joints(descriptor.joints.size())),
+        rates_(robot_->dof(), kTick),
         action_(descriptor.actions()),
-        gains_(robot->default_command(robot->neutral)) {
+        gains_(robot_->default_command(robot_->neutral)) {
     for (const BoundJoint& joint : joints_) {
       gains_.kp[joint.robot] = joint.kp;
       gains_.kd[joint.robot] = joint.kd;
@@ -241,6 +242,7 @@ class DescriptorController final : public Controller {
       command_ = parse_velocity_command(fixed, interface.height.upper);
   }
 
+  std::shared_ptr<const RobotModel> robot_;
   std::string name_;
   bool walks_;
   float clip_;

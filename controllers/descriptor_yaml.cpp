@@ -71,7 +71,7 @@ int whole_number(const YamlSection& section, const char* key, double value, int 
 std::string one_of(const YamlSection& section, const char* key, const std::string& fallback,
                    const std::vector<std::string>& known) {
   if (!section.has(key)) return fallback;
-  const std::string value = section.text(key);
+  std::string value = section.text(key);
   if (std::find(known.begin(), known.end(), value) == known.end())
     section.fail(section.line(key), unknown_name_message(key, value, known));
   return value;

@@ -102,7 +102,7 @@ class Guard final : public Controller {
 }  // namespace
 
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
-                                         std::shared_ptr<const RobotModel> robot) {
+                                         const std::shared_ptr<const RobotModel>& robot) {
   require(controller != nullptr && robot != nullptr, "make_guarded: expected a controller and a robot, found none");
   return std::make_unique<Guard>(std::move(controller), robot);
 }

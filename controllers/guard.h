@@ -19,6 +19,6 @@ inline constexpr int kGuardRampTicks = 25;
 // falling to 0 over kGuardRampTicks, the card's kd. reset() clears all of it. Throws std::invalid_argument in act() for
 // a state or a reference of another robot's size, and in reset() for a state that is not finite.
 std::unique_ptr<Controller> make_guarded(std::unique_ptr<Controller> controller,
-                                         std::shared_ptr<const RobotModel> robot);
+                                         const std::shared_ptr<const RobotModel>& robot);
 
 }  // namespace duet

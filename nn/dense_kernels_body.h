@@ -70,7 +70,7 @@ void elu(int n, float* x) {
   in_blocks(n, [x](int at, int count) {
     const Block a = load(x + at, count);
     // The positive and the negative part; a selection would not be vectorised. What is not a number stays so.
-    const Block value = 0.5F * (a + a.abs()) + (a.min(0.0F).exp() - 1.0F);
+    const Block value = a.max(0.0F) + (a.min(0.0F).exp() - 1.0F);
     store(value, x + at, count);
   });
 }

@@ -152,7 +152,7 @@ struct Operands {
 };
 
 Shape result_shape(const OnnxBuilder& builder, const Shape& a, const Shape& b) {
-  const Shape shape = broadcast_shape(builder, a, b);
+  Shape shape = broadcast_shape(builder, a, b);
   builder.require(count_of(shape) <= kMostOrdered, fmt::format("gives too many numbers: {}", shape_text(shape)));
   return shape;
 }

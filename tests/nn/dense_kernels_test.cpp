@@ -108,6 +108,11 @@ TEST(DenseKernels, NanComesOutAsNan) {
     float y = 0.0F;
     kernels->gemv(1, 2, W, x, nullptr, &y);
     EXPECT_TRUE(std::isnan(y)) << kernels->level;
+    float a[4] = {std::nanf(""), -INFINITY, INFINITY, -1.0F};
+    kernels->elu(4, a);
+    EXPECT_TRUE(std::isnan(a[0])) << kernels->level;
+    EXPECT_EQ(a[1], -1.0F) << kernels->level;
+    EXPECT_EQ(a[2], INFINITY) << kernels->level;
   }
 }
 

@@ -56,5 +56,18 @@ TEST(WbcGates, TheResultDoesNotDependOnTheThreads) {
   EXPECT_EQ(one.mean.dof_jerk, two.mean.dof_jerk);
 }
 
+// The whole set of gates is `duet bench wbc`; these three would notice a network that does not fit the program.
+TEST(WbcGates, TheShippedNetworksStandAndWalk) {
+  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+  for (const char* network : {"student", "oracle"})
+    for (const WbcGate& gate : wbc_gates()) {
+      if (gate.name != "stand/kick_0.0" && gate.name != "walk/forward_0.3" && gate.name != "walk/left_0.15") continue;
+      const auto make = [&] { return make_controller("wbc_sim", g1(), {{"network", network}}); };
+      const GateResult result = run_gate(gate, "mujoco", g1(), make, 1, 1);
+      EXPECT_EQ(result.survived, 1) << network << " " << gate.name;
+      EXPECT_LT(result.mean.joint_error, 0.10) << network << " " << gate.name;
+    }
+}
+
 }  // namespace
 }  // namespace duet
