@@ -116,7 +116,7 @@ class Log {
   [[nodiscard]] bool save_due() const { return since(saved_) > kCheckpointEvery; }
   void saved() { saved_ = Clock::now(); }
 
-  const WbcProgress& report(long steps, double minutes, double rate, double std, double loss) {
+  WbcProgress report(long steps, double minutes, double rate, double std, double loss) {
     const double n = std::max(1, episodes_), elapsed = since(begin_);
     progress_.steps = steps;
     progress_.steps_per_second = static_cast<double>(steps - steps_before_) / std::max(1e-9, elapsed);
@@ -127,12 +127,12 @@ class Log {
     progress_.episode_seconds = seconds_ / n;
     progress_.loss = loss;
     append(minutes, rate, std);
-    last_ = progress_;
+    WbcProgress reported = progress_;
     progress_.tracking = {};
     episodes_ = falls_ = 0;
     returns_ = seconds_ = 0.0;
     reported_ = Clock::now();
-    return last_;
+    return reported;
   }
 
  private:
@@ -152,7 +152,7 @@ class Log {
   std::string path_;
   long steps_before_;
   Clock::time_point begin_, reported_ = begin_, saved_ = begin_;
-  WbcProgress progress_, last_;
+  WbcProgress progress_;
   int episodes_ = 0, falls_ = 0;
   double returns_ = 0.0, seconds_ = 0.0;
 };

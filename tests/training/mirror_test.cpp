@@ -4,14 +4,12 @@
 
 #include "controllers/wbc_sim/observation.h"
 #include "core/random.h"
+#include "tests/training/fixtures.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
 // The whole situation mirrored at the xz plane.
 RobotState mirrored(const RobotState& state) {

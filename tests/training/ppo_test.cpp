@@ -3,26 +3,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "backends/factory.h"
 #include "core/require.h"
+#include "tests/training/fixtures.h"
 #include "training/distill.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
-bool mujoco_is_absent() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return !engine.available;
-  return true;
-}
-
-#define NEEDS_MUJOCO() \
-  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
+class DistillationInMujoco : public test::InMujoco {};
+class PpoInMujoco : public test::InMujoco {};
+class TrainingStateInMujoco : public test::InMujoco {};
 
 PpoOptions small() {
   PpoOptions options;
@@ -42,8 +34,7 @@ TrainingState fresh(std::uint64_t seed = 1) {
   return state;
 }
 
-TEST(Ppo, TheSeedDecidesEveryWeight) {
-  NEEDS_MUJOCO();
+TEST_F(PpoInMujoco, TheSeedDecidesEveryWeight) {
   Ppo a(g1(), wbc_stage("stand"), small(), fresh()), b(g1(), wbc_stage("stand"), small(), fresh());
   Ppo c(g1(), wbc_stage("stand"), small(), fresh(2));
   for (int i = 0; i < 2; ++i) {
@@ -56,8 +47,7 @@ TEST(Ppo, TheSeedDecidesEveryWeight) {
   EXPECT_NE(a.state().agent.actor.layers[1].W, c.state().agent.actor.layers[1].W);
 }
 
-TEST(Ppo, AnIterationCountsItsStepsAndMovesTheWeights) {
-  NEEDS_MUJOCO();
+TEST_F(PpoInMujoco, AnIterationCountsItsStepsAndMovesTheWeights) {
   Ppo ppo(g1(), wbc_stage("stand"), small(), fresh());
   const Mlp before = ppo.state().agent.actor;
   const IterationReport report = ppo.iterate();
@@ -74,8 +64,7 @@ TEST(Ppo, OptionsThatDoNotDivideAreRefused) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("5 environments on 2 threads")));
 }
 
-TEST(TrainingState, IsTheSameAfterTheFile) {
-  NEEDS_MUJOCO();
+TEST_F(TrainingStateInMujoco, IsTheSameAfterTheFile) {
   Ppo ppo(g1(), wbc_stage("stand"), small(), fresh());
   ppo.iterate();
   const TrainingState& state = ppo.state();
@@ -100,8 +89,7 @@ TEST(TrainingState, WhatIsMissingIsNamed) {
               testing::ThrowsMessage<InputError>(testing::HasSubstr("the format is 'other'")));
 }
 
-TEST(Distillation, TheLossFallsAndTheSeedDecides) {
-  NEEDS_MUJOCO();
+TEST_F(DistillationInMujoco, TheLossFallsAndTheSeedDecides) {
   DistillOptions options;
   options.environments = 4;
   options.buffer = 256;

@@ -3,15 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/training/fixtures.h"
 #include "training/wbc_task.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
 TEST(ReferenceStream, IsSmoothAndWithinTheLimits) {
   ReferenceStream stream(g1(), wbc_stage("walk").stream);

@@ -5,10 +5,9 @@
 
 #include <filesystem>
 
-#include "backends/factory.h"
 #include "core/file.h"
 #include "core/require.h"
-#include "tests/support.h"
+#include "tests/training/fixtures.h"
 
 namespace duet {
 namespace {
@@ -16,19 +15,9 @@ namespace {
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
-bool mujoco_is_absent() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return !engine.available;
-  return true;
-}
-
-#define NEEDS_MUJOCO() \
-  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
+class TrainWbcInMujoco : public test::InMujoco {};
 
 WbcRun small_run(const std::string& folder, const std::string& stage) {
   WbcRun run;
@@ -45,8 +34,7 @@ bool train(
       g1(), run, [](const WbcProgress&) {}, stop);
 }
 
-TEST(TrainWbc, AStageLeavesACheckpointANetworkAndCurves) {
-  NEEDS_MUJOCO();
+TEST_F(TrainWbcInMujoco, AStageLeavesACheckpointANetworkAndCurves) {
   const test::ScratchFolder scratch;
   EXPECT_TRUE(train(small_run(scratch / "wbc", "stand")));
   EXPECT_EQ(load_wbc_network(wbc_network_file(scratch / "wbc", "stand"), *g1()).kind, WbcKind::kOracle);
@@ -60,8 +48,7 @@ TEST(TrainWbc, AStageLeavesACheckpointANetworkAndCurves) {
   EXPECT_EQ(load_wbc_network(wbc_network_file(scratch / "wbc", "student"), *g1()).kind, WbcKind::kStudent);
 }
 
-TEST(TrainWbc, AStoppedStageGoesOnWhereItWas) {
-  NEEDS_MUJOCO();
+TEST_F(TrainWbcInMujoco, AStoppedStageGoesOnWhereItWas) {
   const test::ScratchFolder scratch;
   int asked = 0;
   EXPECT_FALSE(train(small_run(scratch / "wbc", "stand"), [&] { return ++asked > 1; }));
@@ -71,8 +58,7 @@ TEST(TrainWbc, AStoppedStageGoesOnWhereItWas) {
   EXPECT_EQ(training_state(read_safetensors(file), file).steps, 1024);
 }
 
-TEST(TrainWbc, ABrokenCheckpointStopsTheTrainingAndStays) {
-  NEEDS_MUJOCO();
+TEST_F(TrainWbcInMujoco, ABrokenCheckpointStopsTheTrainingAndStays) {
   const test::ScratchFolder scratch;
   train(small_run(scratch / "wbc", "stand"));
   const std::string file = wbc_checkpoint(scratch / "wbc", "stand");
@@ -82,8 +68,7 @@ TEST(TrainWbc, ABrokenCheckpointStopsTheTrainingAndStays) {
   EXPECT_EQ(read_file(file), half);
 }
 
-TEST(TrainWbc, ACheckpointOfAnotherRobotOrSeedIsRefused) {
-  NEEDS_MUJOCO();
+TEST_F(TrainWbcInMujoco, ACheckpointOfAnotherRobotOrSeedIsRefused) {
   const test::ScratchFolder scratch;
   train(small_run(scratch / "wbc", "stand"));
   const std::string file = wbc_checkpoint(scratch / "wbc", "stand");

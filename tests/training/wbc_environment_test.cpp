@@ -3,35 +3,23 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "backends/factory.h"
+#include "tests/training/fixtures.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
-bool mujoco_is_absent() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return !engine.available;
-  return true;
-}
+class WbcEnvironmentInMujoco : public test::InMujoco {};
 
-#define NEEDS_MUJOCO() \
-  if (mujoco_is_absent()) GTEST_SKIP() << "not run: engine mujoco absent"
-
-TEST(WbcEnvironment, SizesAreTheSupplements) {
-  NEEDS_MUJOCO();
+TEST_F(WbcEnvironmentInMujoco, SizesAreTheSupplements) {
   const WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
   EXPECT_EQ(environment.actor_size(), 163);
   EXPECT_EQ(environment.critic_size(), 361);
   EXPECT_EQ(environment.actions(), 29);
 }
 
-TEST(WbcEnvironment, SeedAndIndexDecideEverything) {
-  NEEDS_MUJOCO();
+TEST_F(WbcEnvironmentInMujoco, SeedAndIndexDecideEverything) {
   WbcTask task = wbc_stage("interact");
   task.stream.motions = 0.0;
   WbcEnvironment a(g1(), task, 1, 3), b(g1(), task, 1, 3), c(g1(), task, 1, 4);
@@ -54,8 +42,7 @@ TEST(WbcEnvironment, SeedAndIndexDecideEverything) {
   EXPECT_NE(oa, oc);
 }
 
-TEST(WbcEnvironment, WithoutAControllerItFallsWithinTwoSeconds) {
-  NEEDS_MUJOCO();
+TEST_F(WbcEnvironmentInMujoco, WithoutAControllerItFallsWithinTwoSeconds) {
   WbcTask task = wbc_stage("stand");
   task.domain.kick = 0.0;
   WbcEnvironment environment(g1(), task, 1, 0);
@@ -67,8 +54,7 @@ TEST(WbcEnvironment, WithoutAControllerItFallsWithinTwoSeconds) {
   EXPECT_LT(transition.reward, -1.0);  // -100 per second over one tick, and what it had earned
 }
 
-TEST(WbcEnvironment, AnActionThatIsNotANumberIsNoAction) {
-  NEEDS_MUJOCO();
+TEST_F(WbcEnvironmentInMujoco, AnActionThatIsNotANumberIsNoAction) {
   WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
   const std::vector<float> action(29, std::nanf(""));
   const Transition transition = environment.step(action);
@@ -76,8 +62,7 @@ TEST(WbcEnvironment, AnActionThatIsNotANumberIsNoAction) {
   EXPECT_EQ(environment.action().squaredNorm(), 0.0F);
 }
 
-TEST(WbcEnvironment, TimeEndsAnEpisodeOfFiveHundredTicks) {
-  NEEDS_MUJOCO();
+TEST_F(WbcEnvironmentInMujoco, TimeEndsAnEpisodeOfFiveHundredTicks) {
   WbcEnvironment environment(g1(), wbc_stage("stand"), 1, 0);
   environment.skip_to(499);
   EXPECT_EQ(environment.step(std::vector<float>(29, 0.0F)).end, EpisodeEnd::kTimeUp);

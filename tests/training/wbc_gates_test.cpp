@@ -4,21 +4,14 @@
 
 #include <set>
 
-#include "backends/factory.h"
+#include "tests/training/fixtures.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
+using test::g1;
 
-bool absent(const std::string& name) {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == name) return !engine.available;
-  return true;
-}
+class WbcGatesInMujoco : public test::InMujoco {};
 
 TEST(WbcGates, CoverEveryDirectionOnceByName) {
   std::set<std::string> names;
@@ -37,8 +30,7 @@ TEST(WbcGates, ACommandLastsSixSeconds) {
 }
 
 // Joint targets alone do not balance: no gate may be passed by them.
-TEST(WbcGates, PlainPdSurvivesNone) {
-  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+TEST_F(WbcGatesInMujoco, PlainPdSurvivesNone) {
   for (const WbcGate& gate : wbc_gates()) {
     const GateResult result = run_gate(
         gate, "mujoco", g1(), [] { return make_controller("pd", g1()); }, 1, 1);
@@ -46,8 +38,7 @@ TEST(WbcGates, PlainPdSurvivesNone) {
   }
 }
 
-TEST(WbcGates, TheResultDoesNotDependOnTheThreads) {
-  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+TEST_F(WbcGatesInMujoco, TheResultDoesNotDependOnTheThreads) {
   const WbcGate gate = wbc_gates().front();
   const auto make = [] { return make_controller("vmc", g1()); };
   const GateResult one = run_gate(gate, "mujoco", g1(), make, 2, 1), two = run_gate(gate, "mujoco", g1(), make, 2, 2);
@@ -57,8 +48,7 @@ TEST(WbcGates, TheResultDoesNotDependOnTheThreads) {
 }
 
 // The whole set of gates is `duet bench wbc`; these three would notice a network that does not fit the program.
-TEST(WbcGates, TheShippedNetworksStandAndWalk) {
-  if (absent("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+TEST_F(WbcGatesInMujoco, TheShippedNetworksStandAndWalk) {
   for (const char* network : {"student", "oracle"})
     for (const WbcGate& gate : wbc_gates()) {
       if (gate.name != "stand/kick_0.0" && gate.name != "walk/forward_0.3" && gate.name != "walk/left_0.15") continue;
