@@ -67,7 +67,6 @@ struct Ppo::Worker {
   Normaliser actor_seen, critic_seen;
   Random noise;
   VectorXf log_std_gradient;
-  double asymmetry = 0.0;
   IterationReport sums;
   std::array<MatrixXf, 2> actor_raw, critic_raw;  // as it is, mirrored
   MatrixXf actor_input, critic_input;
@@ -123,16 +122,13 @@ IterationReport Ppo::iterate() {
     collect(t, batch);
     advantages(t, batch);
   });
-  const double rollout_seconds = seconds_since(begin);
   const double divergence = learn(batch);
   steer(divergence);
   IterationReport report = summary();
   report.divergence = divergence;
   report.iteration = ++state_.iteration;
   report.steps = state_.steps += batch.value.size();
-  report.rollout_seconds = rollout_seconds;
-  report.seconds = seconds_since(begin);
-  state_.minutes += report.seconds / 60.0;
+  state_.minutes += seconds_since(begin) / 60.0;
   return report;
 }
 
@@ -159,7 +155,6 @@ double Ppo::learn(Batch& batch) {
 // What the threads counted; their moments go into the normalisers.
 IterationReport Ppo::summary() {
   IterationReport report;
-  double asymmetry = 0.0;
   for (const auto& worker : workers_) {
     state_.agent.actor_input.merge(worker->actor_seen);
     state_.agent.critic_input.merge(worker->critic_seen);
@@ -167,8 +162,6 @@ IterationReport Ppo::summary() {
     report.falls += worker->sums.falls;
     report.episode_seconds += worker->sums.episode_seconds;
     report.episode_return += worker->sums.episode_return;
-    asymmetry += worker->asymmetry;
-    worker->asymmetry = 0.0;
     for (WbcEnvironment& environment : worker->environments) report.tracking.add(environment.take_statistics());
   }
   // What the first poses looked like must not weigh for ever.
@@ -177,8 +170,6 @@ IterationReport Ppo::summary() {
   const double episodes = std::max(1, report.episodes);
   report.episode_seconds /= episodes;
   report.episode_return /= episodes;
-  const double numbers = static_cast<double>(batch_->value.size()) * options_.epochs * action_mirror_.size();
-  report.asymmetry = std::sqrt(asymmetry / numbers);
   report.rate = state_.rate;
   report.std = state_.agent.log_std.array().exp().mean();
   return report;
@@ -338,7 +329,6 @@ double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples,
       const float moved = (mean(k, i) - old_mean[k]) * inverse_std[k];
       const float apart = mean(k, i) - action_mirror_.sign[k] * other_mean[action_mirror_.from[k]];
       divergence += 0.5 * static_cast<double>(moved) * moved;
-      worker.asymmetry += static_cast<double>(apart) * apart;
       worker.mean_gradient(k, i) = weight * z * inverse_std[k] + pull * apart * inverse_std[k] * inverse_std[k];
       if (m == 0) worker.log_std_gradient[k] += weight * (z * z - 1.0F);
     }

@@ -29,8 +29,7 @@ struct IterationReport {
   long iteration = 0, steps = 0;
   int episodes = 0, falls = 0;
   double episode_seconds = 0.0, episode_return = 0.0;  // mean over the episodes that ended
-  double divergence = 0.0, rate = 0.0, std = 0.0, asymmetry = 0.0;
-  double seconds = 0.0, rollout_seconds = 0.0;  // wall time
+  double divergence = 0.0, rate = 0.0, std = 0.0;
   TrackingStatistics tracking;
 };
 

@@ -55,7 +55,7 @@ class ReferenceStream {
 
   std::shared_ptr<const RobotModel> robot_;
   StreamOptions options_;
-  std::vector<int> upper_, waist_;
+  std::vector<int> upper_;
   Reference reference_;
   Eigen::VectorXd from_, to_;  // poses that the upper body moves between
   double segment_ = 0.0, segment_length_ = 1.0;

@@ -29,14 +29,11 @@ void TrackingStatistics::add(const TrackingStatistics& other) {
   heading += other.heading;
   upper_body += other.upper_body;
   joints += other.joints;
-  hands += other.hands;
   action_rate += other.action_rate;
-  feet_distance += other.feet_distance;
   clock += other.clock;
   swing_lift += other.swing_lift;
   stepping_ticks += other.stepping_ticks;
   swings += other.swings;
-  self_contacts += other.self_contacts;
 }
 
 WbcEnvironment::WbcEnvironment(std::shared_ptr<const RobotModel> robot, const WbcTask& task, std::uint64_t seed,
@@ -238,10 +235,7 @@ double WbcEnvironment::reward() {
   ++statistics_.ticks;
   double sum = tracking_reward() - effort() - stance_penalty();
   sum += tracker_.gait().stepping() ? stepping_reward() : standing_reward();
-  if (touches_itself_) {
-    sum -= task_.reward.self_contact;
-    ++statistics_.self_contacts;
-  }
+  if (touches_itself_) sum -= task_.reward.self_contact;
   return kTick * std::max(sum, -task_.reward.fall);
 }
 
@@ -268,7 +262,6 @@ double WbcEnvironment::tracking_reward() {
   statistics_.root_xy += xy;
   statistics_.heading += attitude;
   statistics_.upper_body += points;
-  statistics_.hands += turn;
   statistics_.joints += mean / upper;
   return w.root_xy * kernel(xy, w.root_xy_width) + w.root_near * kernel(xy, w.root_near_width) +
          w.upper_body * kernel(points, w.upper_body_width) + w.hands * kernel(turn, w.hands_width) +
@@ -323,12 +316,11 @@ Eigen::Vector2d WbcEnvironment::foothold(int side) const {
          then * Eigen::Vector2d(tracker_.foot_x(), sign * gait.options().half_width);
 }
 
-double WbcEnvironment::stance_penalty() {
+double WbcEnvironment::stance_penalty() const {
   const RewardWeights& w = task_.reward;
   const double yaw = yaw_of(backend_->state().X_WB.R);
   const Eigen::Vector3d d = actual_.p_WL(feet_[0]) - actual_.p_WL(feet_[1]);
   const double width = -std::sin(yaw) * d.x() + std::cos(yaw) * d.y();
-  statistics_.feet_distance += width;
   const double widest = w.widest + (tracker_.gait().stepping() ? 0.06 : 0.0);
   const double outside = std::max(0.0, w.narrowest - width) + std::max(0.0, width - widest);
   return w.stance * std::min(outside, 0.25);

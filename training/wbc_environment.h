@@ -25,12 +25,10 @@ struct TrackingStatistics {
   double heading = 0.0;     // angle of the pelvis to its reference [rad]
   double upper_body = 0.0;  // rms over keypoints [m]
   double joints = 0.0;      // mean |q - ref| of the upper body [rad]
-  double hands = 0.0;       // [rad]
   double action_rate = 0.0;
-  double feet_distance = 0.0;  // sideways [m]
-  double clock = 0.0;          // share of feet where the clock has them, while stepping
-  double swing_lift = 0.0;     // highest point of each swing, summed [m]
-  long stepping_ticks = 0, swings = 0, self_contacts = 0;
+  double clock = 0.0;       // share of feet where the clock has them, while stepping
+  double swing_lift = 0.0;  // highest point of each swing, summed [m]
+  long stepping_ticks = 0, swings = 0;
   void add(const TrackingStatistics& other);
 };
 
@@ -55,8 +53,6 @@ class WbcEnvironment {
 
   [[nodiscard]] const WbcSensors& sensors() const { return sensors_; }
   [[nodiscard]] const Eigen::VectorXf& action() const { return action_; }  // the last one
-  [[nodiscard]] const RobotState& state() const { return backend_->state(); }
-  [[nodiscard]] const WbcTracker& tracker() const { return tracker_; }
   [[nodiscard]] int tick() const { return tick_; }
   void skip_to(int tick) { tick_ = tick; }  // so that episodes of a batch do not end together
   TrackingStatistics take_statistics();
@@ -76,7 +72,7 @@ class WbcEnvironment {
   double stepping_reward();
   double standing_reward() const;
   double effort();
-  [[nodiscard]] double stance_penalty();
+  [[nodiscard]] double stance_penalty() const;
   [[nodiscard]] Eigen::Vector2d foothold(int side) const;
 
   std::shared_ptr<const RobotModel> nominal_;
