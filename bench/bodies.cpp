@@ -13,7 +13,7 @@ namespace {
 std::string card_of(const Suite& suite, const SuiteController& controller) {
   if (!suite.robot.empty()) return suite.robot;
   const std::string robot = controller_info(controller.use).robot;
-  return robot.empty() ? default_card_path() : share_file("robot card", fmt::format("robots/g1/{}.yaml", robot));
+  return robot.empty() ? default_card_path() : card_path(robot);
 }
 
 }  // namespace

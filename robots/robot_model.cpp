@@ -78,7 +78,9 @@ JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const 
   return command;
 }
 
-std::string default_card_path() { return share_file("robot card", "robots/g1/g1.yaml"); }
+std::string default_card_path() { return card_path("g1"); }
+
+std::string card_path(const std::string& name) { return share_file("robot card", "robots/g1/" + name + ".yaml"); }
 
 std::shared_ptr<const RobotModel> load_shared_robot(const std::string& card_path) {
   return std::make_shared<const RobotModel>(load_robot(card_path.empty() ? default_card_path() : card_path));

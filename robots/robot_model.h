@@ -112,6 +112,8 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
 // The card that ships with duet: robots/g1/g1.yaml in the source tree or $DUET_SHARE/robots/g1/g1.yaml or beside the
 // program. Throws MissingError naming the places looked at.
 std::string default_card_path();
+// The same of another card that ships with duet, by its name without the ending ("g1_27dof").
+std::string card_path(const std::string& name);
 
 // The robot of a card, or where the path is empty of the one that ships with duet, to be shared by episodes and
 // threads.

@@ -37,7 +37,7 @@ Finding robot_finding() {
 // Whether it can be made here: its card is there, its network is found and can be read.
 Finding controller_finding(const ControllerInfo& info) {
   try {
-    const auto robot = load_shared_robot(share_file("robot card", fmt::format("robots/g1/{}.yaml", info.robot)));
+    const auto robot = load_shared_robot(card_path(info.robot));
     static_cast<void>(make_controller(info.name, robot));
     const bool network = std::any_of(info.options.begin(), info.options.end(),
                                      [](const ControllerOption& option) { return option.name == "network"; });
