@@ -74,12 +74,9 @@ std::vector<std::string> perturbation_names_of(const Suite& suite) { return name
 
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
                            const std::string& value) {
-  const ControllerInfo info = controller_info(controller_of(suite, controller).use);
-  std::vector<std::string> known = names_of(info.options);
-  require(std::find(known.begin(), known.end(), option) != known.end(),
-          fmt::format("controller '{}': {}", controller,
-                      known.empty() ? fmt::format("expected no option, found '{}'", option)
-                                    : unknown_name_message("option", option, known)));
+  ControllerInfo info = controller_info(controller_of(suite, controller).use);
+  info.name = controller;
+  check_controller_options(info, {{option, value}});
   for (SuiteController& entry : suite.controllers)
     if (entry.name == controller) entry.options[option] = value;
 }

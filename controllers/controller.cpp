@@ -66,17 +66,6 @@ const Entry& find_entry(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("controller", name, controller_names()));
 }
 
-void check_options(const ControllerInfo& info, const ControllerOptions& options) {
-  std::vector<std::string> known;
-  for (const ControllerOption& option : info.options) known.push_back(option.name);
-  for (const auto& [name, value] : options) {
-    require(!known.empty(), fmt::format("controller '{}': expected no option, found '{}'", info.name, name));
-    if (std::find(known.begin(), known.end(), name) == known.end())
-      throw std::invalid_argument(
-          fmt::format("controller '{}': {}", info.name, unknown_name_message("option", name, known)));
-  }
-}
-
 }  // namespace
 
 std::vector<ControllerInfo> controllers() {
@@ -93,11 +82,17 @@ std::vector<std::string> controller_names() {
 
 ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
 
+void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {
+  std::vector<std::string> known;
+  for (const ControllerOption& option : info.options) known.push_back(option.name);
+  check_options("controller", info.name, options, known);
+}
+
 std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options) {
   require(robot != nullptr, "make_controller: no robot");
   const Entry& entry = find_entry(name);
-  check_options(entry.info(name), options);
+  check_controller_options(entry.info(name), options);
   return make_guarded(entry.make(name, robot, options), robot);
 }
 

@@ -52,6 +52,8 @@ struct ControllerInfo {
 std::vector<ControllerInfo> controllers();
 std::vector<std::string> controller_names();
 ControllerInfo controller_info(const std::string& name);
+// Throws std::invalid_argument for an option that it does not have, with the nearest and all known.
+void check_controller_options(const ControllerInfo& info, const ControllerOptions& options);
 
 // Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot whose joints
 // are not those it was made for (by name); MissingError where its network is not on this machine (naming the places

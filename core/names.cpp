@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <numeric>
+#include <stdexcept>
 
 namespace duet {
 namespace {
@@ -56,6 +57,17 @@ std::string unknown_name_message(std::string_view kind, std::string_view name,
   const std::string question = closest.empty() ? "." : fmt::format(": did you mean '{}'?", closest);
   const std::string known = candidates.empty() ? "none" : fmt::format("{}", fmt::join(candidates, ", "));
   return fmt::format("unknown {} '{}'{} Known: {}", kind, name, question, known);
+}
+
+void check_options(std::string_view kind, std::string_view name, const std::map<std::string, std::string>& options,
+                   std::span<const std::string> known) {
+  for (const auto& [option, value] : options) {
+    if (known.empty())
+      throw std::invalid_argument(fmt::format("{} '{}': expected no option, found '{}'", kind, name, option));
+    if (std::find(known.begin(), known.end(), option) == known.end())
+      throw std::invalid_argument(
+          fmt::format("{} '{}': {}", kind, name, unknown_name_message("option", option, known)));
+  }
 }
 
 }  // namespace duet

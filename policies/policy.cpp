@@ -1,6 +1,7 @@
 #include "policies/policy.h"
 
-#include <array>
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "core/names.h"
@@ -14,18 +15,34 @@ namespace {
 
 using Robot = std::shared_ptr<const RobotModel>;
 
-template <typename T>
-std::unique_ptr<Policy> make(Robot robot) {
-  return std::make_unique<T>(std::move(robot));
-}
-
-struct PolicyEntry {
-  std::string_view name;
-  std::unique_ptr<Policy> (*make)(Robot robot);
+// A policy by name: what is said of it, and how it is made once its options are known to be its own.
+struct Entry {
+  const char* name;
+  PolicyInfo (*info)(const std::string& name);
+  PolicyMaker (*maker)(const std::string& name, Robot robot, const PolicyOptions& options);
 };
 
-constexpr std::array<PolicyEntry, 3> kPolicies = {
-    {{"replay", make<ReplayPolicy>}, {"replay_dense", make<DenseReplayPolicy>}, {"null", make<NullPolicy>}}};
+template <typename T>
+PolicyMaker of(const std::string& name, Robot robot, const PolicyOptions&) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  return [robot] { return std::make_unique<T>(robot); };
+}
+
+PolicyInfo replay_info(const std::string& name) {
+  return {name, "The retargeted motion with hindsight, as anchors", {}};
+}
+PolicyInfo dense_info(const std::string& name) { return {name, "The same at 50 Hz, past the anchors", {}}; }
+PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral pose where it stands", {}}; }
+
+constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>},
+                               {"replay_dense", dense_info, of<DenseReplayPolicy>},
+                               {"null", null_info, of<NullPolicy>}};
+
+const Entry& find_entry(const std::string& name) {
+  for (const Entry& entry : kPolicies)
+    if (name == entry.name) return entry;
+  throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
+}
 
 }  // namespace
 
@@ -43,17 +60,31 @@ Eigen::VectorXd to_vector(const ObservationFrame& frame, const Eigen::Vector3d& 
 
 std::vector<Reference> Policy::plan(const Observation& observation) { return densify(act(observation)); }
 
+std::vector<PolicyInfo> policies() {
+  std::vector<PolicyInfo> infos;
+  for (const Entry& entry : kPolicies) infos.push_back(entry.info(entry.name));
+  return infos;
+}
+
 std::vector<std::string> policy_names() {
   std::vector<std::string> names;
-  names.reserve(kPolicies.size());
-  for (const PolicyEntry& entry : kPolicies) names.emplace_back(entry.name);
+  for (const Entry& entry : kPolicies) names.emplace_back(entry.name);
   return names;
 }
 
-std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot) {
-  for (const PolicyEntry& entry : kPolicies)
-    if (entry.name == name) return entry.make(std::move(robot));
-  throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
+PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }
+
+PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
+  const Entry& entry = find_entry(name);
+  const PolicyInfo info = entry.info(name);
+  std::vector<std::string> known;
+  for (const PolicyOption& option : info.options) known.push_back(option.name);
+  check_options("policy", name, options, known);
+  return entry.maker(name, std::move(robot), options);
+}
+
+std::unique_ptr<Policy> make_policy(const std::string& name, Robot robot, const PolicyOptions& options) {
+  return policy_maker(name, std::move(robot), options)();
 }
 
 }  // namespace duet

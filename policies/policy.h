@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -51,6 +53,16 @@ struct EpisodeContext {
   std::uint64_t seed = 0;
 };
 
+// What went wrong since reset, of policies that can fail: a process that is late or dies, a network whose numbers are
+// not finite. A plan that fails is left out; the scheduler then holds the last one (F).
+struct PolicyFaults {
+  int late = 0;         // no plan in time
+  int invalid = 0;      // not finite, of the wrong size, not unit
+  bool dead = false;    // gives no plan any more
+  std::string message;  // of the first fault
+  [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
+};
+
 class Policy {
  public:
   virtual ~Policy() = default;
@@ -60,14 +72,39 @@ class Policy {
   virtual Anchors act(const Observation& observation) = 0;
   // What the scheduler gets: references at observation.tick + {0, 1, ...} ticks. Algorithm 8 on act(), unless a policy
   // knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 % of one
-  // of 1 Hz (docs/deviations.md).
+  // of 1 Hz (docs/deviations.md). Empty: no plan this time (see PolicyFaults).
   virtual std::vector<Reference> plan(const Observation& observation);
+  [[nodiscard]] virtual PolicyFaults faults() const { return {}; }
 };
 
-// "replay" (the retargeted motion with hindsight, as anchors), "replay_dense" (the same at 50 Hz past the anchors: the
-// upper bound of controller and engine), "null" (holds the neutral pose where it stands).
-// Throws std::invalid_argument for an unknown name (with the nearest and all known).
+// What a suite may set of one policy, by name ("network", "prompt", ...); values as written there.
+using PolicyOptions = std::map<std::string, std::string>;
+
+struct PolicyOption {
+  std::string name, fallback, about;  // fallback: the value that holds where none is given
+};
+
+struct PolicyInfo {
+  std::string name;
+  std::string about;  // one sentence for `duet list policies`
+  std::vector<PolicyOption> options;
+};
+
+// Those that ship with duet: "replay" (the retargeted motion with hindsight, as anchors), "replay_dense" (the same at
+// 50 Hz past the anchors: the upper bound of controller and engine), "null" (holds the neutral pose where it stands),
+// "dstar", "dp", ... A name that ends in ".yaml" is the path of a policy descriptor and as good as one of them.
+std::vector<PolicyInfo> policies();
 std::vector<std::string> policy_names();
-std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot);
+PolicyInfo policy_info(const std::string& name);
+
+// Makes one policy per episode of what it has loaded once. Thread-safe.
+using PolicyMaker = std::function<std::unique_ptr<Policy>()>;
+
+// Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot that does not
+// fit; MissingError where a file is not on this machine; InputError for one that is broken or of another kind.
+PolicyMaker policy_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                         const PolicyOptions& options = {});
+std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                    const PolicyOptions& options = {});
 
 }  // namespace duet

@@ -18,7 +18,7 @@ struct WbcStage {
   std::string name;
   long steps = 0;  // of the environment
 };
-const std::vector<WbcStage>& wbc_plan();  // stand, walk, interact, student
+const std::vector<WbcStage>& wbc_plan();  // stand, walk, brace, interact, student
 
 struct WbcRun {
   std::string stage;   // of wbc_plan()

@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kTick = 0.02;
 constexpr double kLowest = 0.5, kLeastUpright = 0.6, kFarthest = 1.0;  // ends: pelvis [m], cosine of tilt, root [m]
+constexpr double kPendulumTime = 0.27;                                 // sqrt(height of the centre of mass / g) [s]
+constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;            // share, [m]
 
 double kernel(double error, double width) { return std::exp(-error * error / (width * width)); }
 
@@ -159,7 +161,7 @@ void WbcEnvironment::push() {
   pushed_ = push_links_[random_.below(static_cast<int>(push_links_.size()))];
   push_ticks_ = 50;
   const double direction = random_.uniform(-std::numbers::pi, std::numbers::pi);
-  const double force = random_.uniform(0.0, task_.domain.push);
+  const double force = random_.uniform(0.2, 1.0) * task_.domain.push;
   const Eigen::Vector3d f_W(force * std::cos(direction), force * std::sin(direction),
                             random_.uniform(-0.3, 0.3) * force);
   backend_->push(pushed_, f_W, actual_.p_WL(pushed_));
@@ -304,6 +306,17 @@ double WbcEnvironment::standing_reward() const {
   return task_.reward.both_feet * (still == 1.0 ? 1.0 : 0.0);
 }
 
+// By how much the robot's capture point is off the reference's (linear inverted pendulum), in W [m]. Feet that are to
+// catch a robot go there and a little further.
+Eigen::Vector2d WbcEnvironment::carried() const {
+  const RobotState& state = backend_->state();
+  const Eigen::Vector2d v_ref =
+      Eigen::Rotation2Dd(yaw_of(tracker_.root().R)) * Eigen::Vector2d(tracker_.gait().velocity().head<2>());
+  Eigen::Vector2d d = (state.X_WB.p - tracker_.root().p).head<2>() + kPendulumTime * (state.v_WB.head<2>() - v_ref);
+  d *= kCaptureMargin;
+  return d.norm() > kFarthestStep ? Eigen::Vector2d(d * (kFarthestStep / d.norm())) : d;
+}
+
 // Where the swinging foot is to come down: half a step ahead of where the root will be then. In W, of the ankle.
 Eigen::Vector2d WbcEnvironment::foothold(int side) const {
   const Gait& gait = tracker_.gait();
@@ -312,7 +325,7 @@ Eigen::Vector2d WbcEnvironment::foothold(int side) const {
   const Eigen::Vector3d& v = gait.velocity();
   const Eigen::Rotation2Dd heading(yaw), then(yaw + v.z() * ahead);
   const double sign = side == 0 ? 1.0 : -1.0;
-  return tracker_.root().p.head<2>() + heading * Eigen::Vector2d(ahead * v.head<2>()) +
+  return tracker_.root().p.head<2>() + carried() + heading * Eigen::Vector2d(ahead * v.head<2>()) +
          then * Eigen::Vector2d(tracker_.foot_x(), sign * gait.options().half_width);
 }
 
@@ -321,7 +334,7 @@ double WbcEnvironment::stance_penalty() const {
   const double yaw = yaw_of(backend_->state().X_WB.R);
   const Eigen::Vector3d d = actual_.p_WL(feet_[0]) - actual_.p_WL(feet_[1]);
   const double width = -std::sin(yaw) * d.x() + std::cos(yaw) * d.y();
-  const double widest = w.widest + (tracker_.gait().stepping() ? 0.06 : 0.0);
+  const double widest = w.widest + (tracker_.gait().stepping() ? 0.06 + carried().norm() : 0.0);
   const double outside = std::max(0.0, w.narrowest - width) + std::max(0.0, width - widest);
   return w.stance * std::min(outside, 0.25);
 }

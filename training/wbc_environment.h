@@ -73,6 +73,7 @@ class WbcEnvironment {
   double standing_reward() const;
   double effort();
   [[nodiscard]] double stance_penalty() const;
+  [[nodiscard]] Eigen::Vector2d carried() const;
   [[nodiscard]] Eigen::Vector2d foothold(int side) const;
 
   std::shared_ptr<const RobotModel> nominal_;

@@ -32,13 +32,23 @@ WbcTask walk() {
   return task;
 }
 
-WbcTask interact() {
+// Half the pushes of `interact`: what is pushed hard at once learns slowly.
+WbcTask brace() {
   WbcTask task = walk();
+  task.name = "brace";
+  task.stream.moving = 0.5;
+  task.domain.push = 55.0;
+  task.domain.latency = 1;
+  return task;
+}
+
+WbcTask interact() {
+  WbcTask task = brace();
   task.name = "interact";
   task.stream.motions = 0.3;
-  task.stream.moving = 0.65;
+  task.stream.moving = 0.6;
   task.domain.kick = 1.0;
-  task.domain.push = 60.0;
+  task.domain.push = 75.0;
   task.domain.latency = 2;
   task.entropy = 0.0;
   task.reward.action_rate = 0.1;
@@ -51,7 +61,7 @@ struct Entry {
   WbcTask (*make)();
 };
 
-constexpr Entry kStages[] = {{"stand", stand}, {"walk", walk}, {"interact", interact}};
+constexpr Entry kStages[] = {{"stand", stand}, {"walk", walk}, {"brace", brace}, {"interact", interact}};
 
 }  // namespace
 

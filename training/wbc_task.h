@@ -60,7 +60,7 @@ struct WbcTask {
   int episode_ticks = 500;  // A.3.2: 500 steps
 };
 
-// "stand", "walk", "interact". Throws std::invalid_argument naming them.
+// "stand", "walk", "brace", "interact". Throws std::invalid_argument naming them.
 WbcTask wbc_stage(const std::string& name);
 std::vector<std::string> wbc_stages();
 

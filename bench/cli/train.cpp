@@ -142,7 +142,7 @@ void add_train(CLI::App& app, Session& session) {
                   "WBC-Sim (supplement A.3.2): an oracle by PPO in stages, then a student by distillation.\n"
                   "Killed or stopped, the same command goes on from the last checkpoint",
                   "duet train wbc --smoke -o runs/wbc-smoke");
-  wbc->add_option("--stage", arguments->stage, "stand, walk, interact, student, or all in turn")->capture_default_str();
+  wbc->add_option("--stage", arguments->stage, "stand, walk, brace, interact, student, or all in turn")->capture_default_str();
   wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
   wbc->add_option("--from", arguments->run.from, "checkpoint to begin with (default: the stage before in the folder)");
   wbc->add_option("--steps", arguments->run.steps, "of the environment, in all (default: the stage's)");

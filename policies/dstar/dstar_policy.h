@@ -1,0 +1,30 @@
+// D-STAR as a policy: observation and prompt -> five anchors at 5 Hz. Also what its ablations and the plain Diffusion
+// Policy are: networks of other configurations in the same class.
+#pragma once
+
+#include <memory>
+
+#include "policies/dstar/network.h"
+#include "policies/language.h"
+#include "policies/policy.h"
+
+namespace duet {
+
+enum class NoiseMode {
+  kEpisode,  // x_T drawn once per episode: successive plans are of one mode
+  kCall,     // drawn anew at each call
+};
+
+// `name`: as rows and tables show it. The network and the encoder are shared between episodes and threads.
+std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                          std::shared_ptr<const DstarNetwork> network,
+                                          std::shared_ptr<const LanguageEncoder> language,
+                                          NoiseMode noise = NoiseMode::kEpisode);
+
+// Of "dstar" and "dp": options `network` (file; default: the one that ships in policies/dstar/), `language` (NPZ table;
+// default: built in), `noise` (episode | call). Throws what load_dstar_network and load_language_table throw;
+// MissingError where the file is not there.
+PolicyInfo dstar_info(const std::string& name);
+PolicyMaker dstar_maker(const std::string& name, std::shared_ptr<const RobotModel> robot, const PolicyOptions& options);
+
+}  // namespace duet
