@@ -1,0 +1,137 @@
+#include "policies/dstar/features.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/require.h"
+#include "core/skeleton.h"
+
+namespace duet {
+namespace {
+
+constexpr double kLongestWave = 4.0;  // [m]; each band halves it
+
+Eigen::Vector4f wxyz_of(const Eigen::Quaterniond& R) {
+  const double sign = R.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one orientation
+  return (sign * Eigen::Vector4d(R.w(), R.x(), R.y(), R.z())).cast<float>();
+}
+
+// Where the person looks: level, at right angles to the line of the hips.
+double heading_of(const Eigen::Matrix<double, 3, kSmplJoints>& joints) {
+  const Eigen::Vector3d left = joints.col(kLeftHip) - joints.col(kRightHip);
+  return std::atan2(-left.x(), left.y());
+}
+
+void write_waves(const Eigen::Vector3d& vector, float* out) {
+  for (int axis = 0; axis < 3; ++axis) {
+    double wave = kLongestWave;
+    for (int band = 0; band < kPositionBands; ++band, wave *= 0.5) {
+      const double angle = 2.0 * std::numbers::pi * vector[axis] / wave;
+      *out++ = static_cast<float>(std::sin(angle));
+      *out++ = static_cast<float>(std::cos(angle));
+    }
+  }
+}
+
+void write_harmonics(double angle, float* out) {
+  for (int order = 1; order <= 3; ++order) {
+    *out++ = static_cast<float>(std::sin(order * angle));
+    *out++ = static_cast<float>(std::cos(order * angle));
+  }
+}
+
+void write_frame(const ObservationFrame& frame, const Pose& X_EW, const Eigen::VectorXd& neutral,
+                 Eigen::Ref<Eigen::Matrix<float, kFrameSize, 1>> out) {
+  const RobotState& robot = frame.robot;
+  const Pose X_EB = X_EW * robot.X_WB;
+  const Eigen::Matrix3d R_BW = robot.X_WB.R.conjugate().toRotationMatrix();
+  const Eigen::Matrix3d R_EW = X_EW.R.toRotationMatrix();
+  const Eigen::Matrix<double, 3, kSmplJoints> joints = R_EW * (frame.partner.colwise() - frame.partner.col(0));
+  out << (X_EW * Eigen::Vector3d(frame.partner.col(0))).cast<float>(), joints.reshaped().cast<float>(),
+      (R_BW * robot.v_WB).cast<float>(), robot.w_WB_B.cast<float>(), (-R_BW.col(2)).cast<float>(),
+      (robot.q - neutral).cast<float>(), robot.v.cast<float>(), X_EB.p.cast<float>(), wxyz_of(X_EB.R);
+}
+
+void add_axes(const std::string& name, std::vector<std::string>& names) {
+  for (const char* axis : {".x", ".y", ".z"}) names.push_back(name + axis);
+}
+
+}  // namespace
+
+std::vector<std::string> channel_names(const RobotModel& robot) {
+  std::vector<std::string> names;
+  names.reserve(kFrameSize);
+  add_axes("partner_root", names);
+  for (const std::string_view joint : kSmplNames) add_axes(fmt::format("partner_joint.{}", joint), names);
+  for (const char* channel : {"base_linear_velocity", "base_angular_velocity", "gravity"}) add_axes(channel, names);
+  for (const std::string& joint : robot.joint_names()) names.push_back("joint_position." + joint);
+  for (const std::string& joint : robot.joint_names()) names.push_back("joint_velocity." + joint);
+  add_axes("root_translation", names);
+  for (const char* part : {".w", ".x", ".y", ".z"}) names.push_back(std::string("root_orientation") + part);
+  return names;
+}
+
+Pose ego_frame(const RobotState& state) {
+  return {yaw_rotation(yaw_of(state.X_WB.R)), {state.X_WB.p.x(), state.X_WB.p.y(), 0.0}};
+}
+
+FeatureMaker::FeatureMaker(std::shared_ptr<const RobotModel> robot)
+    : robot_(std::move(robot)),
+      kinematics_(*robot_),
+      head_(robot_->track_frame("head")),
+      left_hand_(robot_->track_frame("lhand")),
+      right_hand_(robot_->track_frame("rhand")) {
+  const std::size_t channels = channel_names(*robot_).size();
+  require(channels == kFrameSize, fmt::format("robot '{}' gives {} channels of observation, expected {} (29 joints)",
+                                              robot_->name, channels, kFrameSize));
+}
+
+void FeatureMaker::make(const Observation& observation, DstarFeatures& features) {
+  const ObservationFrame& now = observation.now();
+  const Pose X_WE = ego_frame(now.robot), X_EW = X_WE.inverse();
+  for (int i = 0; i < kHistoryFrames; ++i)
+    write_frame(observation.history[i], X_EW, robot_->neutral, features.frames.col(i));
+
+  kinematics_.update(now.robot.X_WB, now.robot.q);
+  const Eigen::Vector3d head = kinematics_.frame_position(head_), left = kinematics_.frame_position(left_hand_),
+                        right = kinematics_.frame_position(right_hand_);
+  const auto& person = now.partner;
+  const std::array<Eigen::Vector3d, kRelations> relations = {
+      person.col(kPelvis) - now.robot.X_WB.p, person.col(kHead) - head,      person.col(kLeftHand) - left,
+      person.col(kRightHand) - left,          person.col(kLeftHand) - right, person.col(kRightHand) - right};
+  for (int i = 0; i < kRelations; ++i) {
+    write_waves(X_EW.R * relations[i], features.position.data() + 6 * kPositionBands * i);
+    features.distance[i] = static_cast<float>(relations[i].norm());
+  }
+  const Eigen::Vector3d to_partner = X_EW.R * relations[0];
+  write_harmonics(std::atan2(to_partner.y(), to_partner.x()), features.orientation.data());
+  write_harmonics(heading_of(person) - yaw_of(now.robot.X_WB.R), features.orientation.data() + 6);
+}
+
+void encode_plan(const Anchors& anchors, const Pose& X_WE, const RobotModel& robot, std::span<float> plan) {
+  const Pose X_EW = X_WE.inverse();
+  for (int k = 0; k < kAnchors; ++k) {
+    const Pose X_EB = X_EW * anchors[k].X_WB;
+    Eigen::Map<Eigen::Matrix<float, kAnchorSize, 1>> out(plan.data() + kAnchorSize * k);
+    out << X_EB.p.cast<float>(), wxyz_of(X_EB.R), (anchors[k].q - robot.neutral).cast<float>();
+  }
+}
+
+Anchors decode_plan(std::span<const float> plan, const Pose& X_WE, const RobotModel& robot) {
+  Anchors anchors;
+  for (int k = 0; k < kAnchors; ++k) {
+    const Eigen::Map<const Eigen::Matrix<float, kAnchorSize, 1>> in(plan.data() + kAnchorSize * k);
+    const Pose X_EB{Eigen::Quaterniond(in[3], in[4], in[5], in[6]).normalized(), in.head<3>().cast<double>()};
+    anchors[k].X_WB = X_WE * X_EB;
+    anchors[k].q = robot.neutral + in.tail(kAnchorSize - 7).cast<double>();
+    for (int i = 0; i < robot.dof(); ++i)
+      anchors[k].q[i] = std::clamp(anchors[k].q[i], robot.joints[i].lower, robot.joints[i].upper);
+  }
+  return anchors;
+}
+
+}  // namespace duet
