@@ -1,14 +1,17 @@
-// Who is on stage: the robot that each controller of a suite was made for, the clips on that robot, and which
-// controllers this machine cannot run. Each card is loaded once. Immutable once the clips are there; shared by threads.
+// Who is on stage: the robot that each controller of a suite was made for, the clips and the policies on that robot,
+// and what this machine cannot run. Each card is loaded once, and what a policy loads once per body. Immutable once the
+// clips are there; shared by threads.
 #pragma once
 
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bench/suite.h"
 #include "motion/paired_motion.h"
+#include "policies/policy.h"
 #include "robots/robot_model.h"
 
 namespace duet {
@@ -17,11 +20,19 @@ namespace duet {
 // lacks stay at neutral. Of the same joints in the same order: the motion to the bit.
 RobotMotion on_body(const RobotMotion& motion, const RobotModel& body);
 
+// A policy on a body: what makes it, or why it cannot be there.
+struct PolicyOnBody {
+  PolicyMaker make;
+  std::string refusal;  // empty where it can
+};
+
 class Bodies {
  public:
-  // Throws as load_robot for the suite's own card and for a card that is broken. A controller whose card or network is
-  // not on this machine is absent, not an error; of those in `skipped` only the name is taken.
-  explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped = {});
+  // Throws as load_robot for the suite's own card and for a card that is broken, and as policy_maker where a policy
+  // does not fit nominal() or its files are broken. A controller or policy whose files are not on this machine is
+  // absent, not an error; those in `skipped` are not looked at.
+  explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
+                  const std::vector<std::string>& skipped_policies = {});
 
   // Puts the clips, retargeted to nominal(), on every body. Once.
   void take_clips(std::vector<PairedMotion> clips);
@@ -33,6 +44,10 @@ class Bodies {
   [[nodiscard]] const std::vector<PairedMotion>& clips(const std::string& controller) const;
   // Controllers of the suite that cannot run here, with the reason.
   [[nodiscard]] const std::map<std::string, std::string>& absent() const { return absent_; }
+  // Likewise policies. One that only does not fit some body is not among them.
+  [[nodiscard]] const std::map<std::string, std::string>& absent_policies() const { return absent_policies_; }
+  // On the body of a controller. Throws std::out_of_range for a policy that was skipped.
+  [[nodiscard]] const PolicyOnBody& policy(const std::string& controller, const std::string& policy) const;
 
  private:
   struct Body {
@@ -41,11 +56,13 @@ class Bodies {
     std::vector<PairedMotion> clips;
   };
   std::size_t add(const std::string& card);
-  [[nodiscard]] const Body& body(const std::string& controller) const;
+  void add_policy(const SuitePolicy& policy);
+  [[nodiscard]] std::size_t place(const std::string& controller) const;
 
   std::vector<Body> bodies_;                  // the nominal first
   std::map<std::string, std::size_t> place_;  // of a controller's body
-  std::map<std::string, std::string> absent_;
+  std::map<std::string, std::string> absent_, absent_policies_;
+  std::map<std::pair<std::string, std::size_t>, PolicyOnBody> policies_;  // by name and body
 };
 
 }  // namespace duet

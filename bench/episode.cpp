@@ -1,8 +1,12 @@
 #include "bench/episode.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
+#include "bench/suite_names.h"
 #include "core/random.h"
+#include "core/require.h"
 
 namespace duet {
 namespace {
@@ -20,6 +24,18 @@ bool one_playback(const Suite& suite) {
   });
 }
 
+const PairedMotion& next_of_task(const std::vector<PairedMotion>& clips, const PairedMotion& clip,
+                                 const std::string& policy) {
+  const auto own = static_cast<std::size_t>(&clip - clips.data());
+  for (std::size_t i = 1; i < clips.size(); ++i) {
+    const PairedMotion& other = clips[(own + i) % clips.size()];
+    if (other.task == clip.task) return other;
+  }
+  throw InputError(
+      fmt::format("policy '{}' sees the partner of another clip: expected two clips of {} or more, found one", policy,
+                  to_string(clip.task)));
+}
+
 // The episodes of one engine, controller and perturbation.
 class Planner {
  public:
@@ -27,19 +43,20 @@ class Planner {
       : suite_(suite), suite_id_(suite.name + "@" + suite.version), plan_(plan) {}
 
   void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips) {
-    for (const std::string& policy : suite_.policies)
-      if (policy != "null") add(combination, clips, policy, "main");
-    if (suite_.null_arm) add(combination, clips, "null", "null");
+    for (const SuitePolicy& policy : suite_.policies)
+      if (policy.name != kNullPolicy) add(combination, clips, policy, policy.shuffled_partner ? "shuffled" : "main");
+    if (suite_.null_arm) add(combination, clips, SuitePolicy{kNullPolicy}, "null");
   }
 
  private:
-  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips, const std::string& policy,
-           const std::string& arm) {
+  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips, const SuitePolicy& policy,
+           const char* arm) {
     for (const PairedMotion& clip : clips) {
       for (int episode = 0; episode < suite_.episodes_per_clip; ++episode) {
         EpisodeSpec spec = combination;
         spec.clip = &clip;
-        spec.policy = policy;
+        spec.seen = policy.shuffled_partner ? &next_of_task(clips, clip, policy.name) : nullptr;
+        spec.policy = policy.name;
         spec.arm = arm;
         spec.episode = episode;
         spec.seed = seed(clip, episode, "episode");

@@ -9,6 +9,7 @@
 #include "bench/disturbance.h"
 #include "core/digest.h"
 #include "core/require.h"
+#include "policies/language.h"
 #include "policies/observation_history.h"
 
 namespace duet {
@@ -110,6 +111,18 @@ HumanJoints partner_velocities(const PointTracks& joints, int frame, double rate
   return (partner_joints(joints, frame + 1) - partner_joints(joints, frame)) * rate_hz;
 }
 
+PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotion& theirs, const AdaptedMotion& ours) {
+  const Pose &from = theirs.motion.root.front(), &to = ours.motion.root.front();
+  const Eigen::Quaterniond turn = yaw_rotation(yaw_of(to.R) - yaw_of(from.R));
+  const Eigen::Vector3d level(1.0, 1.0, 0.0);
+  const PointTracks& joints = other.partner.joints;
+  PointTracks seen = joints.slice(std::min(theirs.clip_frame, joints.frames() - 1), joints.frames());
+  for (int t = 0; t < seen.frames(); ++t)
+    for (int j = 0; j < seen.points(); ++j)
+      seen.at(t, j) = (turn * (seen.at(t, j) - from.p.cwiseProduct(level)) + to.p.cwiseProduct(level)).eval();
+  return seen;
+}
+
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy) {
   const PointTracks& people = setup.clip->partner.joints;
   const int ticks = setup.reference.motion.frames();
@@ -125,8 +138,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
 
   backend.reset(setup.start);
   controller.reset(setup.start);
-  policy.reset(
-      {setup.clip->task, std::string(to_string(setup.clip->task)), setup.start, &setup.reference.motion, setup.seed});
+  policy.reset({setup.clip->task, setup.prompt.empty() ? std::string(task_prompt(setup.clip->task)) : setup.prompt,
+                setup.start, &setup.reference.motion, setup.seed});
   Scheduler scheduler;
   scheduler.reset({setup.start.X_WB, setup.start.q});
   ObservationHistory history;
@@ -140,7 +153,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
     const HumanJoints partner = partner_joints(people, setup.reference.clip_frame + tick);
     const HumanJoints velocities = partner_velocities(people, setup.reference.clip_frame + tick, kControlRate);
-    history.add({partner, backend.state()});
+    history.add({setup.seen_partner.empty() ? partner : partner_joints(setup.seen_partner, tick), backend.state()});
     if (tick % kTicksPerPlan == 0) scheduler.push(policy.plan(history.at(tick)), tick);
     const Reference& reference = scheduler.at(tick);
     controller.act(disturbance.seen(backend.state()), reference, command);

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "backends/backend.h"
 #include "bench/perturbation.h"
@@ -31,6 +32,10 @@ struct RolloutSetup {
   const PairedMotion* clip = nullptr;
   AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
   RobotState start;
+  std::string prompt;  // the policy's language command; empty: the task's own
+  // What the policy sees of a partner in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
+  // none.
+  PointTracks seen_partner;
   std::uint64_t seed = 0;
   Perturbation perturbation;  // but its friction and mass, which are the scene's
   std::uint64_t perturbation_seed = 0;
@@ -59,6 +64,10 @@ HumanJoints partner_joints(const PointTracks& joints, int frame);
 HumanJoints partner_velocities(const PointTracks& joints, int frame, double rate_hz);
 
 bool has_fallen(const RobotState& state);
+
+// The partner of another clip as it would stand to the robot there: moved on the ground and turned about z so that the
+// first frame of `theirs` (that clip's reference) comes to lie on the first frame of `ours`. Frame 0 is tick 0.
+PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotion& theirs, const AdaptedMotion& ours);
 
 // Plays a robot motion in the playback backend: a Recording without physics.
 Recording play_back(const RobotMotion& motion, const PointTracks& partner, Task task, const Phases& phases,

@@ -49,7 +49,7 @@ void check_filters(const RunOptions& options, const Suite& suite) {
   for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
   check_filter(options.engines, suite.engines, "engine");
   check_filter(options.controllers, controller_names_of(suite), "controller");
-  check_filter(options.policies, suite.policies, "policy");
+  check_filter(options.policies, policy_names_of(suite), "policy");
   check_filter(options.tasks, tasks, "task");
   check_filter(options.perturbations, perturbation_names_of(suite), "perturbation");
 }
@@ -70,17 +70,21 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
   return absent;
 }
 
-// Controllers that the filters leave out need not be there.
-std::vector<std::string> left_out(const Suite& suite, const RunOptions& options) {
+// What the filters leave out need not be there.
+std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known) {
   std::vector<std::string> names;
-  for (const std::string& name : controller_names_of(suite))
-    if (!chosen(options.controllers, name)) names.push_back(name);
+  for (const std::string& name : known)
+    if (!chosen(filter, name)) names.push_back(name);
   return names;
 }
 
-// Throws MissingError where all controllers are absent and nothing is left that runs without one.
-void check_controllers(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
-  const std::size_t wanted = suite.controllers.size() - left_out(suite, options).size();
+// Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
+void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
+  const std::size_t policies = suite.policies.size() - left_out(options.policies, policy_names_of(suite)).size();
+  if (!bodies.absent_policies().empty() && bodies.absent_policies().size() == policies)
+    throw MissingError(bodies.absent_policies().begin()->second);
+  const std::size_t wanted =
+      suite.controllers.size() - left_out(options.controllers, controller_names_of(suite)).size();
   const bool playback = std::find(suite.engines.begin(), suite.engines.end(), kPlayback) != suite.engines.end() &&
                         chosen(options.engines, kPlayback);
   if (!bodies.absent().empty() && bodies.absent().size() == wanted && !playback)
@@ -113,11 +117,17 @@ std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Su
   return make_controller(controller.use, robot, controller.options);
 }
 
+std::unique_ptr<Policy> episode_policy(const EpisodeSpec& spec, const Suite& suite,
+                                       const std::shared_ptr<const RobotModel>& robot) {
+  const SuitePolicy policy = policy_of(suite, spec.policy);
+  return make_policy(policy.use, robot, policy.options);
+}
+
 void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-              const std::string& trajectory_folder, EpisodeRow& row) {
+              const std::string& trajectory_folder, const PolicyMaker& make, EpisodeRow& row) {
   const std::unique_ptr<Backend> backend = make_backend(spec.engine, episode_scene(spec, suite, robot));
   const std::unique_ptr<Controller> controller = episode_controller(spec, suite, robot);
-  const std::unique_ptr<Policy> policy = make_policy(spec.policy, robot);
+  const std::unique_ptr<Policy> policy = make ? make() : episode_policy(spec, suite, robot);
   row.engine_version = backend->version();
   const RolloutSetup setup = episode_setup(spec, suite, *robot);
   const Rollout rollout = roll_out(setup, *backend, *controller, *policy);
@@ -172,6 +182,10 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
   RolloutSetup setup;
   setup.clip = spec.clip;
   setup.reference = adapt_by_phase(spec.clip->robot, spec.clip->phases, robot, options, spec.seed);
+  setup.prompt = policy_of(suite, spec.policy).prompt;
+  if (spec.seen != nullptr)
+    setup.seen_partner = partner_from_elsewhere(
+        *spec.seen, adapt_by_phase(spec.seen->robot, spec.seen->phases, robot, options, spec.seed), setup.reference);
   setup.start = robot.standing_state(setup.reference.motion.root.front());
   setup.seed = spec.seed;
   setup.perturbation = perturbation_of(suite, spec.perturbation);
@@ -186,12 +200,13 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
 }
 
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
-                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder) {
+                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder,
+                       const PolicyMaker& policy) {
   EpisodeRow row = row_for(spec, suite, hash, *robot);
   row.started_at = utc_now();
   const Clock::time_point begin = Clock::now();
   try {
-    simulate(spec, suite, robot, trajectory_folder, row);
+    simulate(spec, suite, robot, trajectory_folder, policy, row);
   } catch (const MissingError& error) {
     row.outcome = Outcome::kUnsupported;
     row.message = error.what();
@@ -213,7 +228,9 @@ EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const std:
   const auto absent = bodies.absent().find(spec.controller);
   if (absent != bodies.absent().end() && spec.engine != kPlayback)
     return unsupported_row(row_for(spec, suite, hash, *robot), absent->second);
-  return run_episode(spec, suite, hash, robot, trajectory_folder);
+  const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
+  if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, hash, *robot), policy.refusal);
+  return run_episode(spec, suite, hash, robot, trajectory_folder, policy.make);
 }
 
 // Those that are asked for and not in the run yet; counts all and those that are.
@@ -239,9 +256,11 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   RunSummary summary;
   summary.absent_engines = absent_engines(suite, options);
   const std::string hash = suite_hash(suite);
-  Bodies bodies(suite, left_out(suite, options));
-  check_controllers(bodies, suite, options);
+  Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
+                left_out(options.policies, policy_names_of(suite)));
+  check_actors(bodies, suite, options);
   summary.absent_controllers = bodies.absent();
+  summary.absent_policies = bodies.absent_policies();
   RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
                                                     utc_now(), capture_environment(), options.certificate});
   bodies.take_clips(prepare_clips(suite, *bodies.nominal(), options.threads, progress));

@@ -29,21 +29,23 @@ struct RunSummary {
   int planned = 0, already_there = 0, run = 0;
   std::map<std::string, int> outcomes;  // of those run now
   // Name -> reason; their episodes are rows with `unsupported`.
-  std::map<std::string, std::string> absent_engines, absent_controllers;
+  std::map<std::string, std::string> absent_engines, absent_controllers, absent_policies;
   RunEnd end = RunEnd::kComplete;
 };
 
-// Throws InputError (suite, clips, run directory, a full disk), MissingError (none of its engines or, but for
-// playback, of its controllers is there), std::invalid_argument.
+// Throws InputError (suite, clips, run directory, a full disk), MissingError (none of its engines, of its policies or,
+// but for playback, of its controllers is there), std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 // The scene with the perturbation's ground and robot; `robot` is the controller's nominal one.
 Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot);
 
-// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`.
+// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`. Without `policy` the
+// suite's own is loaded for this episode alone.
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot);
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
-                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "");
+                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "",
+                       const PolicyMaker& policy = {});
 
 // Thrown by run_episode when the user stopped the run: the episode leaves no row and runs again on resume.
 struct EpisodeInterrupted {};

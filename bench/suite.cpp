@@ -28,20 +28,39 @@ const Item& find_named(const std::vector<Item>& items, const char* kind, const s
   return *found;
 }
 
-// A plain controller is its name.
-std::string to_yaml(const SuiteController& controller) {
-  if (controller.use == controller.name && controller.options.empty()) return controller.name;
-  std::string text = fmt::format("{{name: {}, use: \"{}\"", controller.name, controller.use);
-  if (controller.options.empty()) return text + "}";
-  std::vector<std::string> options;
-  for (const auto& [name, value] : controller.options) options.push_back(fmt::format("{}: \"{}\"", name, value));
-  return text + fmt::format(", options: {{{}}}}}", fmt::join(options, ", "));
+std::string quoted(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) escaped += c == '"' || c == '\\' ? std::string{'\\', c} : std::string{c};
+  return '"' + escaped + '"';
 }
 
-std::string controllers_yaml(const Suite& suite) {
+std::string options_yaml(const std::map<std::string, std::string>& options) {
   std::vector<std::string> texts;
-  for (const SuiteController& controller : suite.controllers) texts.push_back(to_yaml(controller));
-  return fmt::format("controllers: [{}]\n", fmt::join(texts, ", "));
+  for (const auto& [name, value] : options) texts.push_back(fmt::format("{}: {}", name, quoted(value)));
+  return fmt::format(", options: {{{}}}", fmt::join(texts, ", "));
+}
+
+// A plain controller or policy is its name.
+std::string to_yaml(const SuiteController& controller) {
+  if (controller.use == controller.name && controller.options.empty()) return controller.name;
+  return fmt::format("{{name: {}, use: {}{}}}", controller.name, quoted(controller.use),
+                     controller.options.empty() ? "" : options_yaml(controller.options));
+}
+
+std::string to_yaml(const SuitePolicy& policy) {
+  const bool plain = policy.options.empty() && policy.prompt.empty() && !policy.shuffled_partner;
+  if (policy.use == policy.name && plain) return policy.name;
+  return fmt::format("{{name: {}, use: {}{}{}{}}}", policy.name, quoted(policy.use),
+                     policy.options.empty() ? "" : options_yaml(policy.options),
+                     policy.prompt.empty() ? "" : ", prompt: " + quoted(policy.prompt),
+                     policy.shuffled_partner ? ", partner: shuffled" : "");
+}
+
+template <typename Item>
+std::string list_yaml(const char* key, const std::vector<Item>& items) {
+  std::vector<std::string> texts;
+  for (const Item& item : items) texts.push_back(to_yaml(item));
+  return fmt::format("{}: [{}]\n", key, fmt::join(texts, ", "));
 }
 
 // A suite with nothing but the clean arm says nothing of perturbations.
@@ -52,7 +71,16 @@ std::string perturbations_yaml(const Suite& suite) {
   return text;
 }
 
+// Puts the content of files in the place of their paths: a descriptor's, and those that options name.
+void use_contents(std::string& use, std::map<std::string, std::string>& options) {
+  if (use.ends_with(".yaml")) use = sha256_file(use);
+  for (auto& [name, value] : options)
+    if (is_path_option(name) && std::filesystem::is_regular_file(value)) value = sha256_file(value);
+}
+
 }  // namespace
+
+bool is_path_option(std::string_view option) { return option == "network" || option == "language"; }
 
 bool is_plain_name(std::string_view name) {
   constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
@@ -66,10 +94,14 @@ std::string plain_name_message(std::string_view name) {
 const SuiteController& controller_of(const Suite& suite, const std::string& name) {
   return find_named(suite.controllers, "controller", name);
 }
+SuitePolicy policy_of(const Suite& suite, const std::string& name) {
+  return name == kNullPolicy ? SuitePolicy{name} : find_named(suite.policies, "policy", name);
+}
 Perturbation perturbation_of(const Suite& suite, const std::string& name) {
   return name == kCleanName ? Perturbation{} : find_named(suite.perturbations, "perturbation", name);
 }
 std::vector<std::string> controller_names_of(const Suite& suite) { return names_of(suite.controllers); }
+std::vector<std::string> policy_names_of(const Suite& suite) { return names_of(suite.policies); }
 std::vector<std::string> perturbation_names_of(const Suite& suite) { return names_of(suite.perturbations); }
 
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
@@ -79,6 +111,13 @@ void set_controller_option(Suite& suite, const std::string& controller, const st
   check_controller_options(info, {{option, value}});
   for (SuiteController& entry : suite.controllers)
     if (entry.name == controller) entry.options[option] = value;
+}
+
+void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value) {
+  require(policy != kNullPolicy, "policy 'null': expected no option of the control arm");
+  check_options("policy", policy, {{option, value}}, names_of(policy_info(policy_of(suite, policy).use).options));
+  for (SuitePolicy& entry : suite.policies)
+    if (entry.name == policy) entry.options[option] = value;
 }
 
 const NameTable<SuiteStart>& start_names() {
@@ -128,8 +167,8 @@ std::string resolved_yaml(const Suite& suite) {
     text += "clips:\n  files:\n";
     for (const std::string& file : suite.clips.files) text += fmt::format("    - \"{}\"\n", file);
   }
-  text += fmt::format("tasks: [{}]\nengines: [{}]\n{}policies: [{}]\n{}", fmt::join(tasks, ", "),
-                      fmt::join(suite.engines, ", "), controllers_yaml(suite), fmt::join(suite.policies, ", "),
+  text += fmt::format("tasks: [{}]\nengines: [{}]\n{}{}{}", fmt::join(tasks, ", "), fmt::join(suite.engines, ", "),
+                      list_yaml("controllers", suite.controllers), list_yaml("policies", suite.policies),
                       perturbations_yaml(suite));
   text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\n", suite.episodes_per_clip,
                       to_string(suite.start), suite.start_radius, to_string(suite.partner));
@@ -160,12 +199,8 @@ std::string suite_hash(const Suite& suite) {
   Suite by_content = suite;  // where a file lies does not matter, what is in it does
   for (std::string& file : by_content.clips.files) file = sha256_file(file);
   if (!suite.contact_limits.empty()) by_content.contact_limits = sha256_file(suite.contact_limits);
-  for (SuiteController& controller : by_content.controllers) {
-    if (controller.use.ends_with(".yaml")) controller.use = sha256_file(controller.use);
-    const auto network = controller.options.find("network");
-    if (network != controller.options.end() && std::filesystem::is_regular_file(network->second))
-      network->second = sha256_file(network->second);
-  }
+  for (SuiteController& controller : by_content.controllers) use_contents(controller.use, controller.options);
+  for (SuitePolicy& policy : by_content.policies) use_contents(policy.use, policy.options);
   return sha256_hex(resolved_yaml(by_content));
 }
 

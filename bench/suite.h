@@ -15,6 +15,7 @@
 #include "core/task.h"
 #include "metrics/detector.h"
 #include "policies/phase_adaptation.h"
+#include "policies/policy.h"
 
 namespace duet {
 
@@ -34,14 +35,24 @@ struct SuiteController {
   ControllerOptions options = {};
 };
 
+// A policy as a suite names it, likewise.
+struct SuitePolicy {
+  std::string name;        // in rows and tables; once per suite
+  std::string use = name;  // for policy_maker
+  PolicyOptions options = {};
+  std::string prompt = {};        // the language command; empty: the task's own (task_prompt)
+  bool shuffled_partner = false;  // sees the partner of another clip of the task: whether it looks at its partner
+};
+
 struct Suite {
   std::string name, version;
   std::string file;  // where it came from, for messages
   std::uint64_t seed = 10000;
   SuiteClips clips;
   std::vector<Task> tasks;
-  std::vector<std::string> engines, policies;
+  std::vector<std::string> engines;
   std::vector<SuiteController> controllers;
+  std::vector<SuitePolicy> policies;
   std::vector<Perturbation> perturbations = {Perturbation{}};  // of engines; playback has none
   int episodes_per_clip = 1;
   SuiteStart start = SuiteStart::kAuto;
@@ -65,14 +76,18 @@ using Overrides =
 // Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it is
 // playback's.
 const SuiteController& controller_of(const Suite& suite, const std::string& name);
+// The null arm's policy always is, too.
+SuitePolicy policy_of(const Suite& suite, const std::string& name);
 Perturbation perturbation_of(const Suite& suite, const std::string& name);
 std::vector<std::string> controller_names_of(const Suite& suite);
+std::vector<std::string> policy_names_of(const Suite& suite);
 std::vector<std::string> perturbation_names_of(const Suite& suite);
 
-// Sets one option of one of the suite's controllers. Throws std::invalid_argument for a name or an option that is not
-// known, with those that are.
+// Sets one option of one of the suite's controllers or policies. Throws std::invalid_argument for a name or an option
+// that is not known, with those that are.
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
                            const std::string& value);
+void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value);
 
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});

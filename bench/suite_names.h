@@ -17,6 +17,10 @@ using NameTable = std::vector<std::pair<std::string, E>>;
 bool is_plain_name(std::string_view name);
 std::string plain_name_message(std::string_view name);  // the sentence for one that is not
 
+inline constexpr const char* kNullPolicy = "null";  // of the control arm
+// Whether the value of an option of that name is a file.
+bool is_path_option(std::string_view option);
+
 const NameTable<SuiteStart>& start_names();
 const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();

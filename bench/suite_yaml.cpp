@@ -9,13 +9,12 @@
 
 #include "backends/factory.h"
 #include "bench/suite.h"
+#include "bench/suite_actors.h"
 #include "bench/suite_names.h"
-#include "controllers/controller.h"
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
 #include "metrics/readings.h"
-#include "policies/policy.h"
 #include "retarget/options.h"
 #include "robots/yaml_section.h"
 
@@ -98,11 +97,6 @@ std::vector<std::string> engine_names() {
   return names;
 }
 
-std::string from_folder_of(const Suite& suite, const std::string& file) {
-  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
-  return std::filesystem::absolute(folder / file).lexically_normal().string();
-}
-
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = below(top, suite.file, "clips", {"synth", "files"});
   const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed"});
@@ -114,63 +108,6 @@ void read_clips(const YamlSection& top, Suite& suite) {
     clips.fail(clips.line(),
                fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
   for (std::string& file : suite.clips.files) file = from_folder_of(suite, file);
-}
-
-// The options of one controller; values as written.
-ControllerOptions read_options(const YamlSection& item, const Suite& suite) {
-  ControllerOptions options;
-  if (!item.has("options")) return options;
-  const YAML::Node node = item.node("options");
-  if (!node.IsMap())
-    item.fail(item.line("options"), fmt::format("options: expected a mapping, found {}", describe(node)));
-  for (const auto& entry : node) {
-    if (!entry.second.IsScalar())
-      item.fail(entry.first.Mark().line + 1, fmt::format("options.{}: expected one value, found {}",
-                                                         entry.first.as<std::string>(), describe(entry.second)));
-    options[entry.first.as<std::string>()] = entry.second.Scalar();
-  }
-  if (const auto network = options.find("network"); network != options.end())
-    network->second = from_folder_of(suite, network->second);
-  return options;
-}
-
-// A name, a descriptor's path, or {name, use, options}.
-SuiteController read_controller(const YAML::Node& node, const Suite& suite) {
-  const std::string file_ending = ".yaml";
-  SuiteController controller;
-  if (node.IsScalar()) {
-    controller.name = controller.use = node.Scalar();
-  } else {
-    const YamlSection item(suite.file, node, "controller", {"name", "use", "options"});
-    controller.name = item.text("name");
-    controller.use = item.has("use") ? item.text("use") : controller.name;
-    controller.options = read_options(item, suite);
-  }
-  if (controller.use.ends_with(file_ending)) controller.use = from_folder_of(suite, controller.use);
-  if (controller.name.ends_with(file_ending)) controller.name = std::filesystem::path(controller.name).stem().string();
-  require(is_plain_name(controller.name), plain_name_message(controller.name));
-  return controller;
-}
-
-void read_controllers(const YamlSection& top, Suite& suite) {
-  for (const YAML::Node& node : top.items("controllers")) {
-    try {
-      SuiteController controller = read_controller(node, suite);
-      const std::vector<std::string> names = controller_names_of(suite);
-      require(std::find(names.begin(), names.end(), controller.name) == names.end(),
-              fmt::format("'{}' is there twice; names tell rows apart", controller.name));
-      const ControllerOptions options = std::exchange(controller.options, {});
-      static_cast<void>(controller_info(controller.use));
-      const std::string name = controller.name;
-      suite.controllers.push_back(std::move(controller));
-      for (const auto& [option, value] : options) set_controller_option(suite, name, option, value);
-    } catch (const std::invalid_argument& error) {
-      top.fail(std::max(node.Mark().line, 0) + 1, fmt::format("controllers: {}", error.what()));
-    }
-  }
-  if (suite.controllers.empty())
-    top.fail(top.has("controllers") ? top.line("controllers") : top.line(),
-             "controllers: expected at least one controller, found none");
 }
 
 // `all`: playback and every engine that this machine has.
@@ -194,7 +131,7 @@ void read_lists(const YamlSection& top, Suite& suite) {
   }
   read_engines(top, suite);
   read_controllers(top, suite);
-  get_names(top, "policies", "policy", policy_names(), suite.policies);
+  read_policies(top, suite);
   suite.perturbations = read_perturbations(top, suite.file);
 }
 

@@ -120,11 +120,8 @@ Outcome outcome_from(const std::string& name) {
 }
 
 std::string arm_from(const std::string& name) {
-  static constexpr std::array<std::string_view, 3> kArms = {"main", "null", "oracle"};
-  for (const std::string_view arm : kArms) {
-    if (name == arm) return name;
-  }
-  const std::array<std::string, 3> known = {"main", "null", "oracle"};
+  const std::array<std::string, 4> known = {"main", "null", "oracle", "shuffled"};
+  if (std::find(known.begin(), known.end(), name) != known.end()) return name;
   throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", name, known)));
 }
 

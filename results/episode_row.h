@@ -69,7 +69,7 @@ struct EpisodeRow {
   std::string engine, engine_version;
   std::string engine_profile, profile_digest;  // "parity"; SHA-256 of the engine's resolved profile
   std::string controller, policy, perturbation = "clean", robot_digest;
-  std::string arm = "main";  // "main", "null", "oracle"
+  std::string arm = "main";  // "main", "null", "oracle", "shuffled"
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
   std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok and fell

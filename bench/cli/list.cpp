@@ -68,13 +68,6 @@ std::vector<Listed> list_engine_options() {
   return list;
 }
 
-std::vector<Listed> named(const std::vector<std::string>& names) {
-  std::vector<Listed> list;
-  list.reserve(names.size());
-  for (const std::string& name : names) list.push_back({name, ""});
-  return list;
-}
-
 std::vector<Listed> list_metrics() {
   std::vector<Listed> list;
   for (const MetricInfo& metric : metric_catalogue()) {
@@ -101,17 +94,27 @@ std::vector<Listed> list_pair_options() {
   return list;
 }
 
+template <typename Option>
+std::vector<std::string> option_lines(const std::vector<Option>& options) {
+  std::vector<std::string> lines;
+  for (const Option& option : options)
+    lines.push_back(fmt::format("{} ({}): {}", option.name,
+                                option.fallback.empty() ? "no default" : "default " + option.fallback, option.about));
+  return lines;
+}
+
+std::vector<Listed> list_policies() {
+  std::vector<Listed> list;
+  for (const PolicyInfo& info : policies()) list.push_back({info.name, info.about, option_lines(info.options)});
+  return list;
+}
+
 std::vector<Listed> list_controllers() {
   std::vector<Listed> list;
-  for (const ControllerInfo& info : controllers()) {
-    Listed listed{info.name,
-                  fmt::format("body {}, {}; {}", info.robot, info.walks ? "walks" : "does not walk", info.about)};
-    for (const ControllerOption& option : info.options)
-      listed.options.push_back(fmt::format("{} ({}): {}", option.name,
-                                           option.fallback.empty() ? "no default" : "default " + option.fallback,
-                                           option.about));
-    list.push_back(std::move(listed));
-  }
+  for (const ControllerInfo& info : controllers())
+    list.push_back({info.name,
+                    fmt::format("body {}, {}; {}", info.robot, info.walks ? "walks" : "does not walk", info.about),
+                    option_lines(info.options)});
   return list;
 }
 
@@ -149,7 +152,7 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
       {"profiles", list_profiles},
       {"controllers", list_controllers},
       {"perturbations", list_perturbations},
-      {"policies", [] { return named(policy_names()); }},
+      {"policies", list_policies},
       {"metrics", list_metrics},
       {"readings", list_readings},
       {"pair-options", list_pair_options},

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "bench/certificate.h"
@@ -11,6 +12,7 @@
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
 #include "bench/runner.h"
+#include "core/names.h"
 #include "core/require.h"
 
 namespace duet::cli {
@@ -31,6 +33,20 @@ void use_clips(const std::vector<std::string>& paths, Suite& suite) {
     suite.clips.files.push_back(std::filesystem::absolute(file).string());
 }
 
+// Of a controller or a policy; a name that is neither is refused with both.
+void set_network(Suite& suite, const std::string& actor, const std::string& path) {
+  const std::vector<std::string> policies = policy_names_of(suite);
+  std::vector<std::string> known = controller_names_of(suite);
+  if (std::find(known.begin(), known.end(), actor) != known.end()) {
+    set_controller_option(suite, actor, "network", path);
+  } else if (std::find(policies.begin(), policies.end(), actor) != policies.end()) {
+    set_policy_option(suite, actor, "network", path);
+  } else {
+    known.insert(known.end(), policies.begin(), policies.end());
+    throw std::invalid_argument(unknown_name_message("controller or policy", actor, known));
+  }
+}
+
 Suite read_suite(const RunArguments& arguments) {
   Overrides overrides;
   for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));
@@ -40,8 +56,8 @@ Suite read_suite(const RunArguments& arguments) {
   Suite suite = load_suite(arguments.suite, overrides);
   use_clips(arguments.clips, suite);
   for (const std::string& text : arguments.networks) {
-    const auto [controller, path] = split_assignment(text);
-    set_controller_option(suite, controller, "network", std::filesystem::absolute(path).lexically_normal().string());
+    const auto [actor, path] = split_assignment(text);
+    set_network(suite, actor, std::filesystem::absolute(path).lexically_normal().string());
   }
   return suite;
 }
@@ -67,7 +83,7 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
                                  summary.already_there + summary.run, summary.planned, output, summary.already_there,
                                  summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "),
                                  to_string(suite.start), to_string(suite.partner));
-  for (const auto* absent : {&summary.absent_engines, &summary.absent_controllers})
+  for (const auto* absent : {&summary.absent_engines, &summary.absent_controllers, &summary.absent_policies})
     for (const auto& [name, reason] : *absent)
       text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
   if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
@@ -100,6 +116,7 @@ void run_run(Session& session, RunArguments arguments) {
                          {"outcomes", summary.outcomes},
                          {"absent_engines", summary.absent_engines},
                          {"absent_controllers", summary.absent_controllers},
+                         {"absent_policies", summary.absent_policies},
                          {"complete", summary.end == RunEnd::kComplete}};
   add_tables(tables, json);
   print(session, tables_text(tables), json);
@@ -123,7 +140,7 @@ void add_run(CLI::App& app, Session& session) {
                       "clips or paired motions (NPZ, folders) in the place of the suite's");
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
   command->add_option("--network", arguments->networks,
-                      "NAME=PATH: the network of one of the suite's controllers (repeatable)");
+                      "NAME=PATH: the network of one of the suite's controllers or policies (repeatable)");
   command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
   command->add_option("--partner", arguments->partner, "none, ghost or solid");
   command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");

@@ -53,7 +53,8 @@ std::vector<Check> run_again(const Run& run, const VerifyArguments& arguments, P
     for (const EpisodeSpec& spec : plan) {
       const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
       if (row_for(spec, suite, run.info.suite_hash, *robot).key != checks[i].before.key) continue;
-      checks[i].now = run_episode(spec, suite, run.info.suite_hash, robot).state_hash;
+      const PolicyMaker& policy = bodies.policy(spec.controller, spec.policy).make;
+      checks[i].now = run_episode(spec, suite, run.info.suite_hash, robot, "", policy).state_hash;
     }
     progress.advance();
   });

@@ -1,0 +1,142 @@
+#include "bench/suite_actors.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <utility>
+
+#include "bench/suite_names.h"
+#include "core/names.h"
+#include "core/require.h"
+
+namespace duet {
+namespace {
+
+using Options = std::map<std::string, std::string>;
+
+constexpr const char* kDescriptor = ".yaml";
+
+// Values as written, but paths from the suite's folder.
+Options read_options(const YamlSection& item, const Suite& suite) {
+  Options options;
+  if (!item.has("options")) return options;
+  const YAML::Node node = item.node("options");
+  if (!node.IsMap())
+    item.fail(item.line("options"), fmt::format("options: expected a mapping, found {}", describe(node)));
+  for (const auto& entry : node) {
+    const auto name = entry.first.as<std::string>();
+    if (!entry.second.IsScalar())
+      item.fail(entry.first.Mark().line + 1,
+                fmt::format("options.{}: expected one value, found {}", name, describe(entry.second)));
+    options[name] = is_path_option(name) ? from_folder_of(suite, entry.second.Scalar()) : entry.second.Scalar();
+  }
+  return options;
+}
+
+// What controllers and policies share: a name, a descriptor's path, or a mapping with name, use and options.
+template <typename Actor>
+void finish_names(const Suite& suite, Actor& actor) {
+  if (actor.use.ends_with(kDescriptor)) actor.use = from_folder_of(suite, actor.use);
+  if (actor.name.ends_with(kDescriptor)) actor.name = std::filesystem::path(actor.name).stem().string();
+  require(is_plain_name(actor.name), plain_name_message(actor.name));
+}
+
+SuiteController read_controller(const YAML::Node& node, const Suite& suite) {
+  SuiteController controller;
+  if (node.IsScalar()) {
+    controller.name = controller.use = node.Scalar();
+  } else {
+    const YamlSection item(suite.file, node, "controller", {"name", "use", "options"});
+    controller.name = item.text("name");
+    controller.use = item.has("use") ? item.text("use") : controller.name;
+    controller.options = read_options(item, suite);
+  }
+  finish_names(suite, controller);
+  return controller;
+}
+
+bool reads_shuffled(const YamlSection& item) {
+  if (!item.has("partner")) return false;
+  const std::string partner = item.text("partner");
+  if (partner != "own" && partner != "shuffled")
+    item.fail(item.line("partner"), fmt::format("partner: expected 'own' or 'shuffled', found '{}'", partner));
+  return partner == "shuffled";
+}
+
+SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
+  SuitePolicy policy;
+  if (node.IsScalar()) {
+    policy.name = policy.use = node.Scalar();
+  } else {
+    const YamlSection item(suite.file, node, "policy", {"name", "use", "options", "network", "prompt", "partner"});
+    policy.name = item.text("name");
+    policy.use = item.has("use") ? item.text("use") : policy.name;
+    policy.options = read_options(item, suite);
+    if (item.has("network")) {
+      require(!policy.options.contains("network"), "expected the network once, found it in options too");
+      policy.options["network"] = from_folder_of(suite, item.text("network"));
+    }
+    if (item.has("prompt")) policy.prompt = item.text("prompt");
+    policy.shuffled_partner = reads_shuffled(item);
+  }
+  finish_names(suite, policy);
+  return policy;
+}
+
+template <typename Actor>
+void require_new_name(const std::vector<Actor>& actors, const std::string& name) {
+  require(std::none_of(actors.begin(), actors.end(), [&](const Actor& other) { return other.name == name; }),
+          fmt::format("'{}' is there twice; names tell rows apart", name));
+}
+
+// Runs `add` on each item of a list that must not be empty; a std::invalid_argument becomes file and line.
+void read_list(const YamlSection& top, const char* key, const char* kind,
+               const std::function<void(const YAML::Node&)>& add) {
+  const std::vector<YAML::Node> items = top.items(key);
+  for (const YAML::Node& node : items) {
+    try {
+      add(node);
+    } catch (const std::invalid_argument& error) {
+      top.fail(std::max(node.Mark().line, 0) + 1, fmt::format("{}: {}", key, error.what()));
+    }
+  }
+  if (items.empty())
+    top.fail(top.has(key) ? top.line(key) : top.line(),
+             fmt::format("{}: expected at least one {}, found none", key, kind));
+}
+
+}  // namespace
+
+std::string from_folder_of(const Suite& suite, const std::string& file) {
+  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
+  return std::filesystem::absolute(folder / file).lexically_normal().string();
+}
+
+void read_controllers(const YamlSection& top, Suite& suite) {
+  read_list(top, "controllers", "controller", [&](const YAML::Node& node) {
+    SuiteController controller = read_controller(node, suite);
+    require_new_name(suite.controllers, controller.name);
+    const Options options = std::exchange(controller.options, {});
+    static_cast<void>(controller_info(controller.use));
+    const std::string name = controller.name;
+    suite.controllers.push_back(std::move(controller));
+    for (const auto& [option, value] : options) set_controller_option(suite, name, option, value);
+  });
+}
+
+void read_policies(const YamlSection& top, Suite& suite) {
+  read_list(top, "policies", "policy", [&](const YAML::Node& node) {
+    SuitePolicy policy = read_policy(node, suite);
+    require_new_name(suite.policies, policy.name);
+    require(policy.name != kNullPolicy || policy.use == kNullPolicy, "'null' is the name of the control arm");
+    const Options options = std::exchange(policy.options, {});
+    static_cast<void>(policy_info(policy.use));
+    const std::string name = policy.name;
+    suite.policies.push_back(std::move(policy));
+    for (const auto& [option, value] : options) set_policy_option(suite, name, option, value);
+  });
+}
+
+}  // namespace duet

@@ -1,0 +1,18 @@
+// The part of a suite file that says who acts: controllers and policies, by name or with options.
+#pragma once
+
+#include <string>
+
+#include "bench/suite.h"
+#include "robots/yaml_section.h"
+
+namespace duet {
+
+// Fill suite.controllers and suite.policies; suite.file is set. Throw InputError (file, line, expected, found).
+void read_controllers(const YamlSection& top, Suite& suite);
+void read_policies(const YamlSection& top, Suite& suite);
+
+// A path of a suite file as an absolute one: relative ones start at the file's folder.
+std::string from_folder_of(const Suite& suite, const std::string& file);
+
+}  // namespace duet
