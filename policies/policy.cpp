@@ -6,6 +6,7 @@
 
 #include "core/names.h"
 #include "core/require.h"
+#include "policies/dstar/dstar_policy.h"
 #include "policies/null_policy.h"
 #include "policies/replay_policy.h"
 #include "policies/scheduler.h"
@@ -36,7 +37,9 @@ PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral
 
 constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>},
                                {"replay_dense", dense_info, of<DenseReplayPolicy>},
-                               {"null", null_info, of<NullPolicy>}};
+                               {"null", null_info, of<NullPolicy>},
+                               {"dstar", dstar_info, dstar_maker},
+                               {"dp", dstar_info, dstar_maker}};
 
 const Entry& find_entry(const std::string& name) {
   for (const Entry& entry : kPolicies)

@@ -46,5 +46,7 @@ inline constexpr int kPlanSize = kAnchors * kAnchorSize;  // row-major (anchor, 
 // field by fusion_heads, channels by groups).
 std::string to_json_text(const DstarConfig& config);
 DstarConfig parse_dstar_config(const std::string& text, const std::string& file);
+// The first of those that is wrong with a configuration made otherwise; "" where nothing is.
+std::string config_problem(const DstarConfig& config);
 
 }  // namespace duet

@@ -1,0 +1,169 @@
+#include "policies/dstar/dstar_policy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/names.h"
+#include "core/random.h"
+#include "core/require.h"
+#include "core/share.h"
+#include "policies/scheduler.h"
+
+namespace duet {
+namespace {
+
+using Robot = std::shared_ptr<const RobotModel>;
+
+// What the scheduler takes: finite, its quaternion unit.
+bool is_reference(const Reference& reference) {
+  constexpr double kUnit = 1e-6;
+  return reference.X_WB.p.allFinite() && std::abs(reference.X_WB.R.norm() - 1.0) < kUnit && reference.q.allFinite();
+}
+
+bool is_finite(const ObservationFrame& frame) {
+  const RobotState& robot = frame.robot;
+  return frame.partner.allFinite() && robot.X_WB.p.allFinite() && robot.X_WB.R.coeffs().allFinite() &&
+         robot.v_WB.allFinite() && robot.w_WB_B.allFinite() && robot.q.allFinite() && robot.v.allFinite();
+}
+
+class DstarPolicy final : public Policy {
+ public:
+  DstarPolicy(std::string name, Robot robot, std::shared_ptr<const DstarNetwork> network,
+              std::shared_ptr<const LanguageEncoder> language, NoiseMode noise)
+      : name_(std::move(name)),
+        robot_(std::move(robot)),
+        network_(std::move(network)),
+        language_(std::move(language)),
+        mode_(noise),
+        maker_(robot_),
+        runner_(network_) {}
+
+  [[nodiscard]] std::string_view name() const override { return name_; }
+
+  void reset(const EpisodeContext& context) override {
+    if (network_->config.language_on)
+      embedding_ = language_->embed(context.prompt.empty() ? task_prompt(context.task) : context.prompt);
+    random_ = Random(context.seed, stream_key({"policy", "noise"}));
+    draw();
+    drawn_ = true;
+    faults_ = {};
+  }
+
+  Anchors act(const Observation& observation) override {
+    require(drawn_, fmt::format("policy '{}': reset comes first", name_));
+    if (mode_ == NoiseMode::kCall) draw();
+    maker_.make(observation, features_);
+    const std::span<const float> plan = runner_.run({.features = &features_, .language = embedding_, .noise = noise_});
+    return decode_plan(plan, ego_frame(observation.now().robot), *robot_);
+  }
+
+  std::vector<Reference> plan(const Observation& observation) override {
+    // A frame that is not finite may be clipped into one that is.
+    if (!std::ranges::all_of(observation.history, is_finite))
+      return leave_out(observation.tick, "the observation is not finite");
+    const Anchors anchors = act(observation);
+    if (!std::ranges::all_of(anchors, is_reference))
+      return leave_out(observation.tick, "the network's plan is not finite");
+    return densify(anchors);
+  }
+
+  [[nodiscard]] PolicyFaults faults() const override { return faults_; }
+
+ private:
+  void draw() {
+    for (float& value : noise_) value = static_cast<float>(random_.normal());
+  }
+
+  std::vector<Reference> leave_out(int tick, const char* problem) {
+    ++faults_.invalid;
+    if (faults_.message.empty()) faults_.message = fmt::format("policy '{}': tick {}: {}", name_, tick, problem);
+    return {};
+  }
+
+  std::string name_;
+  Robot robot_;                                      // shared with the backend and the controller of the same episode
+  std::shared_ptr<const DstarNetwork> network_;      // shared: many episodes run one
+  std::shared_ptr<const LanguageEncoder> language_;  // likewise
+  NoiseMode mode_;
+  FeatureMaker maker_;
+  DstarRunner runner_;
+  DstarFeatures features_;
+  std::vector<float> embedding_, noise_ = std::vector<float>(kPlanSize);
+  Random random_{0, 0};
+  PolicyFaults faults_;
+  bool drawn_ = false;
+};
+
+std::string option(const PolicyOptions& options, const std::string& name) {
+  const auto found = options.find(name);
+  return found == options.end() ? "" : found->second;
+}
+
+std::string network_path(const std::string& name, const PolicyOptions& options) {
+  const std::string given = option(options, "network");
+  if (!given.empty()) return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {given});
+  return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
+                    fmt::format("policies/dstar/{}.safetensors", name));
+}
+
+std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const PolicyOptions& options) {
+  const std::string given = option(options, "language");
+  if (given.empty()) return built_in_language();
+  return load_language_table(
+      first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {given}));
+}
+
+NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
+  const std::string given = option(options, "noise");
+  if (given.empty() || given == "episode") return NoiseMode::kEpisode;
+  const std::vector<std::string> known = {"episode", "call"};
+  require(given == "call", fmt::format("policy '{}': {}", name, unknown_name_message("noise", given, known)));
+  return NoiseMode::kCall;
+}
+
+void check_language(const std::string& name, const DstarNetwork& network, const LanguageEncoder* language) {
+  if (!network.config.language_on) return;
+  require(language != nullptr, fmt::format("policy '{}': its network needs a language encoder", name));
+  require(
+      network.language == language->name() && network.config.language == language->size(),
+      fmt::format("policy '{}': expected the language encoder of its network ('{}', {} numbers), found '{}' with {}",
+                  name, network.language, network.config.language, language->name(), language->size()));
+}
+
+}  // namespace
+
+std::unique_ptr<Policy> make_dstar_policy(const std::string& name, Robot robot,
+                                          std::shared_ptr<const DstarNetwork> network,
+                                          std::shared_ptr<const LanguageEncoder> language, NoiseMode noise) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  require(network != nullptr, fmt::format("policy '{}' needs a network", name));
+  require(
+      network->joints == robot->joint_names(),
+      fmt::format("policy '{}': its network was made for other joints than those of robot '{}'", name, robot->name));
+  check_language(name, *network, language.get());
+  return std::make_unique<DstarPolicy>(name, std::move(robot), std::move(network), std::move(language), noise);
+}
+
+PolicyInfo dstar_info(const std::string& name) {
+  const bool baseline = name == "dp";
+  return {name,
+          baseline ? "Diffusion Policy: D-STAR's head on one stream of frames and the command, without its reasoning"
+                   : "D-STAR of the supplement: phase attention, spatial reasoning and language, by diffusion",
+          {{"network", name, "path of a network; the one that ships where none is given"},
+           {"language", std::string(kBuiltInLanguage), "path of an NPZ table of prompts and their embeddings"},
+           {"noise", "episode", "episode: x_T drawn once an episode; call: anew for each plan"}}};
+}
+
+PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  const NoiseMode noise = noise_of(name, options);
+  const std::shared_ptr<const LanguageEncoder> language = language_of(name, options);
+  const std::shared_ptr<const DstarNetwork> network = load_dstar_network(network_path(name, options), *robot);
+  check_language(name, *network, language.get());
+  return [=] { return make_dstar_policy(name, robot, network, language, noise); };
+}
+
+}  // namespace duet
