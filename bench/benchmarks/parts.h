@@ -13,6 +13,7 @@ void add_metrics_benchmarks(std::vector<Benchmark>& list);
 void add_kinematics_benchmarks(std::vector<Benchmark>& list);
 void add_backend_benchmarks(std::vector<Benchmark>& list);
 void add_nn_benchmarks(std::vector<Benchmark>& list);
+void add_policy_benchmarks(std::vector<Benchmark>& list);
 void add_runner_benchmarks(std::vector<Benchmark>& list);
 void add_wbc_benchmarks(std::vector<Benchmark>& list);
 

@@ -13,6 +13,7 @@ const std::vector<Benchmark>& benchmarks() {
     add_kinematics_benchmarks(all);
     add_backend_benchmarks(all);
     add_nn_benchmarks(all);
+    add_policy_benchmarks(all);
     add_runner_benchmarks(all);
     add_wbc_benchmarks(all);
     return all;
