@@ -57,5 +57,6 @@ void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
 void add_train(CLI::App& app, Session& session);
+void add_train_dstar(CLI::App& train, Session& session);  // below `train`: one command per policy, and `split`
 
 }  // namespace duet::cli

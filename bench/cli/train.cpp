@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <thread>
 
 #include "bench/cli/command.h"
 #include "bench/interrupt.h"
+#include "bench/parallel.h"
 #include "bench/training_motions.h"
 #include "core/require.h"
 #include "robots/robot_model.h"
@@ -25,8 +25,8 @@ constexpr int kMotionsPerTask = 6;
 constexpr int kSmokeEnvironments = 32;
 
 // As many as the machine has cores, but a number that divides the environments.
-int default_threads() {
-  int threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kSmokeEnvironments);
+int dividing_threads() {
+  int threads = std::min(default_threads(), kSmokeEnvironments);
   while (kSmokeEnvironments % threads != 0) --threads;
   return threads;
 }
@@ -132,17 +132,18 @@ void train(Session& session, TrainArguments& arguments) {
 }  // namespace
 
 void add_train(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand("train", "Train a controller of this project");
+  CLI::App* command = app.add_subcommand("train", "Train a controller or a policy of this project");
   command->require_subcommand(1);
   auto arguments = std::make_shared<TrainArguments>();
   arguments->run.folder = "runs/wbc";
-  arguments->run.threads = default_threads();
+  arguments->run.threads = dividing_threads();
   CLI::App* wbc =
       add_command(*command, session, "wbc",
                   "WBC-Sim (supplement A.3.2): an oracle by PPO in stages, then a student by distillation.\n"
                   "Killed or stopped, the same command goes on from the last checkpoint",
                   "duet train wbc --smoke -o runs/wbc-smoke");
-  wbc->add_option("--stage", arguments->stage, "stand, walk, brace, interact, student, or all in turn")->capture_default_str();
+  wbc->add_option("--stage", arguments->stage, "stand, walk, brace, interact, student, or all in turn")
+      ->capture_default_str();
   wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
   wbc->add_option("--from", arguments->run.from, "checkpoint to begin with (default: the stage before in the folder)");
   wbc->add_option("--steps", arguments->run.steps, "of the environment, in all (default: the stage's)");
@@ -153,6 +154,7 @@ void add_train(CLI::App& app, Session& session) {
   wbc->add_flag("--smoke", arguments->smoke,
                 "a small stand and student stage in minutes; fails (exit 1) where the return does not rise");
   wbc->callback([&session, arguments] { train(session, *arguments); });
+  add_train_dstar(*command, session);
 }
 
 }  // namespace duet::cli

@@ -99,8 +99,8 @@ class Reader {
     const auto found = content_.tensors.find(name);
     if (found == content_.tensors.end()) refuse(fmt::format("expected a tensor '{}', found none", name));
     if (found->second.shape != shape)
-      refuse(fmt::format("tensor '{}': expected shape {}, found {}", name, shape_text(shape),
-                         shape_text(found->second.shape)));
+      refuse(fmt::format("tensor '{}': expected shape {}, found {}", name, shape_words(shape),
+                         shape_words(found->second.shape)));
     return std::move(content_.tensors.extract(found).mapped().values);
   }
   Eigen::VectorXf take_vector(const std::string& name, const std::vector<std::int64_t>& shape) {

@@ -108,7 +108,7 @@ std::string weights_problem(const DstarNetwork& network) {
     for (const std::int64_t size : expected.shape) count *= static_cast<std::size_t>(size);
     if (found->second.shape != expected.shape || found->second.values.size() != count)
       return fmt::format("tensor '{}': expected shape {}, found {} with {} values", expected.name,
-                         shape_text(expected.shape), shape_text(found->second.shape), found->second.values.size());
+                         shape_words(expected.shape), shape_words(found->second.shape), found->second.values.size());
   }
   for (const auto& [name, tensor] : network.weights)
     if (!known.contains(name)) return fmt::format("tensor '{}' is not one of this configuration", name);
@@ -143,6 +143,6 @@ std::string network_problem(const DstarNetwork& network) {
   return problem.empty() ? weights_problem(network) : problem;
 }
 
-std::string shape_text(const std::vector<std::int64_t>& shape) { return fmt::format("({})", fmt::join(shape, ", ")); }
+std::string shape_words(const std::vector<std::int64_t>& shape) { return fmt::format("({})", fmt::join(shape, ", ")); }
 
 }  // namespace duet

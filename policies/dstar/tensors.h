@@ -11,6 +11,6 @@ namespace duet {
 // found (4)"); "" where it can be evaluated.
 std::string network_problem(const DstarNetwork& network);
 
-std::string shape_text(const std::vector<std::int64_t>& shape);
+std::string shape_words(const std::vector<std::int64_t>& shape);
 
 }  // namespace duet

@@ -1,0 +1,181 @@
+// duet train dstar | dp | <ablation>: the learnt policies, and the split of clips that they never see.
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "bench/cli/command.h"
+#include "bench/demonstrations.h"
+#include "bench/interrupt.h"
+#include "bench/parallel.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "core/share.h"
+#include "policies/dstar/network.h"
+#include "training/dstar/trainer.h"
+
+namespace duet::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TrainArguments {
+  DstarRun run;
+  DemonstrationOptions data;
+  std::string config, language, split;
+  bool smoke = false;
+};
+
+constexpr int kValidationPerTask = 6, kGoldenWindows = 8;
+constexpr double kAgreement = 1e-4;  // between libtorch's plans and those of inference
+
+std::string line(const DstarProgress& progress) {
+  return fmt::format(
+      "step {:>6} of {}, {:>4.0f} windows/s, {} left; loss {:.4f} (action {:.4f}, phase {:.4f}, auxiliary {:.4f}), "
+      "validation {:.4f}, phase accuracy {:.1f} %",
+      progress.step, progress.steps, progress.windows_per_second, format_duration(std::max(0.0, progress.seconds_left)),
+      progress.loss, progress.action, progress.phase, progress.auxiliary, progress.validation,
+      100.0 * progress.phase_accuracy);
+}
+
+// Made once per folder and kept there: hours of frames take minutes.
+std::shared_ptr<const DemonstrationSet> demonstrations(Session& session, const std::shared_ptr<const RobotModel>& robot,
+                                                       const DemonstrationOptions& options, const std::string& file) {
+  if (!fs::exists(file)) {
+    Progress progress(session.progress());
+    const DemonstrationSet made = make_demonstrations(robot, options, progress);
+    fs::create_directories(fs::path(file).parent_path());
+    save_demonstrations(made, file);
+  }
+  return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest));
+}
+
+DstarData data_of(Session& session, const TrainArguments& arguments) {
+  DstarData data;
+  data.robot = load_shared_robot();
+  data.language = arguments.language.empty() ? built_in_language() : load_language_table(arguments.language);
+  const fs::path folder = fs::path(arguments.run.folder) / "data";
+  data.train = demonstrations(session, data.robot, arguments.data, (folder / "train.safetensors").string());
+  DemonstrationOptions held = arguments.data;
+  held.seed = kValidationSeed;
+  held.per_task = std::min(arguments.data.per_task, kValidationPerTask);
+  held.starts = 1;
+  data.validation = demonstrations(session, data.robot, held, (folder / "validation.safetensors").string());
+  const std::string split =
+      arguments.split.empty() ? share_file("test split", "policies/dstar/test_split.txt") : arguments.split;
+  const std::vector<std::string> digests = load_split(split);
+  check_held_out(*data.train, digests, split);
+  check_held_out(*data.validation, digests, split);
+  return data;
+}
+
+// A small training whose outcome can be checked in minutes.
+void make_small(TrainArguments& arguments) {
+  arguments.data.per_task = 2;
+  arguments.data.starts = 1;
+  arguments.data.engine = "";
+  DstarRun& run = arguments.run;
+  run.config.width = 64;
+  run.config.layers = 1;
+  run.config.channels = 64;
+  run.batch = 64;
+  if (run.steps == DstarRun{}.steps) run.steps = 300;
+  run.validate_every = static_cast<int>(std::max(1L, run.steps / 3));
+  run.patience = 0;
+}
+
+// What was learnt, as the program will run it.
+void check_network(const Session& session, const DstarData& data, const DstarRun& run) {
+  const std::string file = dstar_network_file(run);
+  const double difference = runner_difference(data, run, file, kGoldenWindows);
+  require(difference <= kAgreement, fmt::format("{}: plans of inference and of libtorch differ by {:.2e}, expected at "
+                                                "most {:.0e}",
+                                                file, difference, kAgreement));
+  note(session, fmt::format("{}: inference agrees with libtorch within {:.1e}", file, difference));
+}
+
+void train(Session& session, TrainArguments& arguments, const std::string& name) {
+  catch_interrupts();
+  if (!can_train_dstar()) train_dstar({}, {}, {}, {});  // says how to get it
+  set_variant(arguments.run, name);
+  if (!arguments.config.empty())
+    arguments.run.config = parse_dstar_config(read_file(arguments.config), arguments.config);
+  if (arguments.smoke) make_small(arguments);
+  const DstarData data = data_of(session, arguments);
+  double first = -1.0, last = 0.0, accuracy = 0.0, speed = 0.0;
+  const DstarEnd end = train_dstar(
+      data, arguments.run,
+      [&](const DstarProgress& progress) {
+        if (first < 0.0 && progress.validation > 0.0) first = progress.validation;
+        last = progress.validation;
+        accuracy = progress.phase_accuracy;
+        speed = progress.windows_per_second;
+        note(session, line(progress));
+      },
+      [] { return interrupt() != Interrupt::kNone; });
+  if (end == DstarEnd::kStopped) {
+    note(session, fmt::format("stopped; the same command goes on from '{}'", dstar_checkpoint(arguments.run)));
+    session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
+    return;
+  }
+  check_network(session, data, arguments.run);
+  if (arguments.smoke && last >= first) {
+    note(session, fmt::format("smoke test failed: the validation loss went from {:.4f} to {:.4f}, expected it to fall",
+                              first, last));
+    session.exit_code = kExitGate;
+  }
+  const std::string file = dstar_network_file(arguments.run);
+  print(session, fmt::format("{}\n", file),
+        {{"network", file}, {"validation", last}, {"phase_accuracy", accuracy}, {"windows_per_second", speed}});
+}
+
+void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
+  auto arguments = std::make_shared<TrainArguments>();
+  arguments->run.folder = "runs/policies";
+  arguments->run.threads = arguments->data.threads = default_threads();
+  const std::string about =
+      name == "dstar" ? "D-STAR (supplement A.2, A.3.1): demonstrations made here, then supervised training.\n"
+                        "Killed or stopped, the same command goes on from the last checkpoint"
+                      : fmt::format("The variant '{}' of D-STAR, on the same demonstrations", name);
+  CLI::App* command =
+      add_command(train_command, session, name, about, fmt::format("duet train {} --smoke -o runs/smoke", name));
+  DstarRun& run = arguments->run;
+  command->add_option("-o,--output", run.folder, "folder: demonstrations in data/, one subfolder per policy")
+      ->capture_default_str();
+  command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
+  command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
+  command->add_option("--engine", arguments->data.engine, "that the clips are followed in; '' for none")
+      ->capture_default_str();
+  command->add_option("--steps", run.steps, "of Adam")->capture_default_str();
+  command->add_option("--batch", run.batch, "windows, a multiple of the threads")->capture_default_str();
+  command->add_option("--rate", run.rate, "of Adam")->capture_default_str();
+  command->add_option("--seed", run.seed, "of weights, windows and noise")->capture_default_str();
+  command->add_option("--threads", run.threads, "the result depends on it")->capture_default_str();
+  command->add_option("--config", arguments->config, "JSON of the network's shape (default: the one that ships)");
+  command->add_option("--language", arguments->language, "NPZ of prompts and embeddings (default: built in)");
+  command->add_option("--split", arguments->split, "test split that may not be learnt (default: the one that ships)");
+  command->add_flag("--smoke", arguments->smoke,
+                    "a small training in minutes; fails (exit 1) where the validation loss does not fall");
+  command->callback([&session, arguments, name] { train(session, *arguments, name); });
+}
+
+void add_split(CLI::App& train_command, Session& session) {
+  auto file = std::make_shared<std::string>();
+  CLI::App* command =
+      add_command(train_command, session, "split", "Print the test split of a suite: a digest and a name per clip",
+                  "duet train split suites/core.yaml > policies/dstar/test_split.txt");
+  command->add_option("suite", *file, "suite file")->required();
+  command->callback([&session, file] {
+    Progress progress(session.progress());
+    const std::string text = split_text(load_suite(*file), default_threads(), progress);
+    print(session, text, {{"split", text}});
+  });
+}
+
+}  // namespace
+
+void add_train_dstar(CLI::App& train_command, Session& session) {
+  for (const std::string& name : dstar_variants()) add_policy(train_command, session, name);
+  add_split(train_command, session);
+}
+
+}  // namespace duet::cli

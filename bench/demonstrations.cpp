@@ -1,0 +1,99 @@
+#include "bench/demonstrations.h"
+
+#include <fmt/format.h>
+
+#include <mutex>
+#include <optional>
+
+#include "backends/factory.h"
+#include "bench/clips.h"
+#include "bench/parallel.h"
+#include "bench/rollout.h"
+#include "controllers/controller.h"
+#include "motion/clip_digest.h"
+#include "policies/phase_adaptation.h"
+
+namespace duet {
+namespace {
+
+Suite synthetic(int per_task, std::uint64_t seed) {
+  Suite suite = parse_suite(
+      "schema: duet.suite/1\nname: demonstrations\nversion: 1.0.0\nengines: [playback]\n"
+      "controllers: [pd]\npolicies: [replay]\n"
+      "tasks: [hug, handshake, high_five, wave, bend, fly_kiss]\nclips: {synth: {per_task: 1}}\n",
+      "demonstrations");
+  suite.clips.synth_per_task = per_task;
+  suite.clips.synth_seed = seed;
+  return suite;
+}
+
+// One motion to be followed, beside its partner.
+struct Take {
+  const PairedMotion* clip = nullptr;
+  AdaptedMotion adapted;
+  PointTracks partner;
+  std::optional<std::vector<RobotState>> followed;  // in the engine, where it stayed upright
+};
+
+Take take_of(const PairedMotion& clip, const RobotModel& robot, std::uint64_t seed) {
+  Take take{&clip, adapt_by_phase(clip.robot, clip.phases, robot, {.start = StartMode::kApproach}, seed), {}, {}};
+  const int begin = take.adapted.clip_frame, frames = take.adapted.motion.frames();
+  take.partner = clip.partner.joints.slice(begin, begin + frames);
+  return take;
+}
+
+void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options) {
+  Scene scene;
+  scene.robot = robot;
+  scene.human = make_human_body(bone_lengths(take.clip->partner));
+  const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
+  const std::unique_ptr<Controller> controller = make_controller(options.controller, robot);
+  const std::unique_ptr<Policy> policy = make_policy("replay", robot);
+  RolloutSetup setup;
+  setup.clip = take.clip;
+  setup.reference = take.adapted;
+  setup.start = robot->standing_state(take.adapted.motion.root.front());
+  Rollout rollout = roll_out(setup, *backend, *controller, *policy);
+  if (rollout.recording.outcome == Outcome::kOk) take.followed = std::move(rollout.recording.robot);
+}
+
+void add(const Take& take, DemonstrationSet& set) {
+  const Demonstration entry{take.clip->clip_id, clip_digest(*take.clip), take.clip->task, take.adapted.phases};
+  set.add(entry, states_of(take.adapted.motion), take.adapted.motion, take.partner);
+  if (take.followed && static_cast<int>(take.followed->size()) == take.adapted.motion.frames())
+    set.add(entry, *take.followed, take.adapted.motion, take.partner);
+}
+
+}  // namespace
+
+DemonstrationSet make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                     const DemonstrationOptions& options, Progress& progress) {
+  const std::vector<PairedMotion> clips =
+      prepare_clips(synthetic(options.per_task, options.seed), *robot, options.threads, progress);
+  const int takes = static_cast<int>(clips.size()) * options.starts;
+  std::vector<std::optional<Take>> made(takes);
+  progress.start("demonstrating", takes, "takes");
+  parallel_for_each(takes, options.threads, [&](int i) {
+    made[i] = take_of(clips[i / options.starts], *robot, options.seed + static_cast<std::uint64_t>(i));
+    if (!options.engine.empty()) follow(*made[i], robot, options);
+    progress.advance();
+  });
+  progress.finish();
+  DemonstrationSet set;
+  set.robot_digest = robot->digest;
+  for (std::optional<Take>& take : made) {
+    add(*take, set);
+    take.reset();
+  }
+  return set;
+}
+
+std::string split_text(const Suite& suite, int threads, Progress& progress) {
+  const auto robot = load_shared_robot(suite.robot);
+  std::string text = fmt::format("# The clips of {} {}: never learnt from.\n", suite.name, suite.version);
+  for (const PairedMotion& clip : prepare_clips(suite, *robot, threads, progress))
+    text += fmt::format("{}  {}\n", clip_digest(clip), clip.clip_id);
+  return text;
+}
+
+}  // namespace duet

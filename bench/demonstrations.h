@@ -1,0 +1,33 @@
+// Demonstrations for D-STAR: synthesised clips through PAIR and A.4.4, seen as the robot would follow them exactly and
+// as it followed them in an engine. The seeds are none that a suite uses: what is tested on is never learnt.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "bench/progress.h"
+#include "bench/suite.h"
+#include "training/dstar/demonstrations.h"
+
+namespace duet {
+
+struct DemonstrationOptions {
+  int per_task = 80;  // clips of each task
+  std::uint64_t seed = 880001;
+  int starts = 2;                                         // of each clip, drawn as A.4.4 has it
+  std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
+  int threads = 1;
+};
+
+inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
+
+// Demonstrations in which the robot fell are left out. Throws what prepare_clips and make_controller throw, and
+// MissingError for an engine that is not there.
+DemonstrationSet make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                     const DemonstrationOptions& options, Progress& progress);
+
+// "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
+std::string split_text(const Suite& suite, int threads, Progress& progress);
+
+}  // namespace duet

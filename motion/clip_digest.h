@@ -1,0 +1,13 @@
+// What tells whether two motions come from one clip, whatever they were called: for data splits.
+#pragma once
+
+#include <string>
+
+#include "motion/paired_motion.h"
+
+namespace duet {
+
+// SHA-256 over task, phases and both people's joints as they were before retargeting, to a tenth of a millimetre.
+std::string clip_digest(const PairedMotion& motion);
+
+}  // namespace duet

@@ -1,0 +1,196 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "core/skeleton.h"
+#include "policies/language.h"
+#include "tests/support.h"
+#include "tests/training/fixtures.h"
+#include "training/dstar/demonstrations.h"
+#include "training/dstar/trainer.h"
+#include "training/dstar/windows.h"
+
+namespace duet {
+namespace {
+
+// A robot that walks along x and lifts an arm beside a partner that stands ahead.
+RobotMotion made_motion(const RobotModel& robot, int frames) {
+  RobotMotion motion;
+  motion.joint_names = robot.joint_names();
+  motion.q = Eigen::MatrixXd::Zero(robot.dof(), frames);
+  for (int t = 0; t < frames; ++t) {
+    motion.root.push_back({yaw_rotation(0.3), {0.004 * t, 1.0, 0.76}});
+    motion.q.col(t) = robot.neutral;
+    motion.q(15, t) += 0.002 * t;
+  }
+  return motion;
+}
+
+PointTracks made_partner(int frames) {
+  PointTracks partner(frames, kSmplJoints);
+  for (int t = 0; t < frames; ++t)
+    for (int j = 0; j < kSmplJoints; ++j) partner.at(t, j) = Eigen::Vector3d(2.0 + 0.001 * t, 1.0 + 0.01 * j, 0.05 * j);
+  return partner;
+}
+
+Demonstration entry(const std::string& id) { return {id, std::string(64, id.back()), Task::kHandshake, {50, 100}}; }
+
+DemonstrationSet made_set(const RobotModel& robot) {
+  DemonstrationSet set;
+  set.robot_digest = robot.digest;
+  for (const char* id : {"clip-a", "clip-b", "clip-c"}) {
+    const RobotMotion motion = made_motion(robot, 150);
+    set.add(entry(id), states_of(motion), motion, made_partner(150));
+  }
+  return set;
+}
+
+TEST(Demonstrations, StatesOfAMotionHaveItsVelocities) {
+  const std::vector<RobotState> states = states_of(made_motion(*test::g1(), 50));
+  EXPECT_NEAR(states[20].v_WB.x(), 0.2, 1e-9);
+  EXPECT_NEAR(states[20].v[15], 0.1, 1e-9);
+  EXPECT_NEAR(states[20].w_WB_B.norm(), 0.0, 1e-9);
+}
+
+TEST(Demonstrations, SurviveAFile) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "set.safetensors";
+  const DemonstrationSet set = made_set(*test::g1());
+  save_demonstrations(set, path);
+  const DemonstrationSet read = load_demonstrations(path, test::g1()->digest);
+  ASSERT_EQ(read.list.size(), 3U);
+  EXPECT_EQ(read.list[1].clip_id, "clip-b");
+  EXPECT_EQ(read.list[1].begin, 150);
+  EXPECT_EQ(read.list[2].phases, (Phases{50, 100}));
+  EXPECT_EQ(read.frames(), 450);
+  EXPECT_EQ(read.reference(449).q, set.reference(449).q);
+  EXPECT_NEAR((read.state(200).X_WB.p - Eigen::Vector3d(0.2, 1.0, 0.76)).norm(), 0.0, 1e-6);
+}
+
+TEST(Demonstrations, OfAnotherRobotAreRefused) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "set.safetensors";
+  save_demonstrations(made_set(*test::g1()), path);
+  EXPECT_THAT([&] { load_demonstrations(path, std::string(64, '0')); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("demonstrations of another robot")));
+}
+
+TEST(Demonstrations, OfDifferentLengthsAreRefused) {
+  DemonstrationSet set;
+  const RobotMotion motion = made_motion(*test::g1(), 20);
+  EXPECT_THAT([&] { set.add(entry("x"), states_of(motion), motion, made_partner(19)); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("19 frames of the partner")));
+}
+
+TEST(Demonstrations, AClipOfTheTestSplitIsRefusedByName) {
+  const DemonstrationSet set = made_set(*test::g1());
+  EXPECT_NO_THROW(check_held_out(set, {std::string(64, 'd')}, "split.txt"));
+  EXPECT_THAT([&] { check_held_out(set, {std::string(64, 'b')}, "split.txt"); },
+              testing::ThrowsMessage<InputError>(
+                  testing::AllOf(testing::HasSubstr("clip 'clip-b' (handshake)"), testing::HasSubstr("split.txt"))));
+}
+
+TEST(Demonstrations, ASplitWithABrokenLineIsRefusedWithItsNumber) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "split.txt";
+  write_file(path, "# comment\n" + std::string(64, 'a') + "  clip-a\nabc  clip-b\n");
+  EXPECT_THAT([&] { load_split(path); },
+              testing::ThrowsMessage<InputError>(
+                  testing::AllOf(testing::HasSubstr("split.txt:3"), testing::HasSubstr("found 'abc  clip-b'"))));
+}
+
+struct Made {
+  explicit Made(const WindowOptions& options, std::uint64_t seed = 1)
+      : set(made_set(*test::g1())), maker(test::g1(), set, options) {
+    Random random(seed, 7);
+    batch.resize(2);
+    maker.make({0, 25}, random, batch, 0);
+    maker.make({1, 75}, random, batch, 1);
+  }
+  DemonstrationSet set;
+  WindowMaker maker;
+  WindowBatch batch;
+};
+
+TEST(Windows, OfASetStartEveryStride) {
+  const DemonstrationSet set = made_set(*test::g1());
+  const std::vector<Window> windows = list_windows(set, {});
+  EXPECT_EQ(windows.size(), 18U);
+  EXPECT_EQ(windows[7].demonstration, 1);
+  EXPECT_EQ(windows[7].frame, 25);
+}
+
+TEST(Windows, WithoutAugmentationAreTheDemonstrationInTheRobotsFrame) {
+  const Made made({.augment = false});
+  const auto plan = made.batch.plan.col(0);
+  EXPECT_NEAR(plan[0], 0.0F, 1e-5F);  // the first anchor is where the robot is
+  EXPECT_NEAR(plan[2], 0.76F, 1e-5F);
+  EXPECT_NEAR(plan[3], 1.0F, 1e-5F);  // its heading is the frame's
+  EXPECT_NEAR(plan[36], 0.1F * std::cos(0.3F), 1e-5F);
+  EXPECT_NEAR(plan[37], -0.1F * std::sin(0.3F), 1e-5F);
+  EXPECT_NEAR(plan[4 * 36 + 7 + 15], 0.002F * 125, 1e-5F);
+  EXPECT_EQ(made.batch.phase[0], 0);
+  EXPECT_EQ(made.batch.phase[1], 1);
+  EXPECT_EQ(made.batch.prompt[0], -1);
+}
+
+TEST(Windows, TellWhereThePartnerWillBe) {
+  const Made made({.augment = false});
+  const int hand = kLossPoints - 1, joint = kRightHand;
+  const Eigen::Vector3f later = made.batch.partner.col(0).segment<3>(3 * (kLossPoints * 4 + hand));
+  const Eigen::Vector3d p_W(2.0 + 0.125, 1.0 + 0.01 * joint, 0.05 * joint);
+  const Eigen::Vector3d p_E = yaw_rotation(-0.3) * Eigen::Vector3d(p_W - Eigen::Vector3d(0.1, 1.0, 0.0));
+  EXPECT_LT((later.cast<double>() - p_E).norm(), 1e-5);
+}
+
+TEST(Windows, WithTheSameRandomNumbersAreTheSameBits) {
+  const Made one({}, 3), two({}, 3), other({}, 4);
+  EXPECT_EQ(one.batch.frames, two.batch.frames);
+  EXPECT_EQ(one.batch.plan, two.batch.plan);
+  EXPECT_NE(one.batch.frames, other.batch.frames);
+}
+
+TEST(Windows, OfADisplacedRobotLeadBackToTheDemonstration) {
+  WindowOptions options;
+  options.stride = 1;  // no shift in time
+  options.jitter = options.dropout = 0.0;
+  const DemonstrationSet set = made_set(*test::g1());
+  WindowMaker maker(test::g1(), set, options);
+  WindowBatch batch;
+  batch.resize(200);
+  Random random(1, 9);
+  double largest = 0.0;
+  for (int i = 0; i < batch.size; ++i) {
+    maker.make({0, 60}, random, batch, i);
+    largest = std::max<double>(largest, batch.plan.col(i).head<2>().norm());
+  }
+  EXPECT_GT(largest, 0.1);  // the first anchor is not where the displaced robot is
+  EXPECT_LT(largest, 0.4);
+}
+
+TEST(Windows, StatisticsNormaliseTheirOwnSample) {
+  const DemonstrationSet set = made_set(*test::g1());
+  WindowMaker maker(test::g1(), set, {});
+  const WindowStatistics statistics = window_statistics(maker, list_windows(set, {}), 1);
+  EXPECT_EQ(statistics.frame_mean.size(), kFrameSize);
+  EXPECT_EQ(statistics.plan_mean.size(), kPlanSize);
+  EXPECT_GE(statistics.plan_deviation.minCoeff(), 0.01F);
+  EXPECT_NEAR(statistics.plan_mean[2], 0.76F, 0.01F);
+}
+
+TEST(DstarVariants, SwitchOffWhatTheirNamesSay) {
+  DstarRun run;
+  set_variant(run, "dp");
+  EXPECT_FALSE(run.config.phase_attention);
+  EXPECT_FALSE(run.config.spatial_reasoning);
+  EXPECT_EQ(run.loss.lambda_auxiliary, 0.0);
+  EXPECT_EQ(run.name, "dp");
+  EXPECT_THAT([&] { set_variant(run, "dstr"); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("did you mean 'dstar'")));
+}
+
+}  // namespace
+}  // namespace duet

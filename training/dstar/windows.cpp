@@ -1,0 +1,166 @@
+#include "training/dstar/windows.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/skeleton.h"
+#include "policies/language.h"
+
+namespace duet {
+namespace {
+
+constexpr int kAnchorTicks = 25;  // 0.5 s
+constexpr int kStatisticsWindows = 4000;
+constexpr float kLeastDeviation = 0.01F;
+
+int clamped(const Demonstration& entry, int frame) { return entry.begin + std::clamp(frame, 0, entry.frames - 1); }
+
+// Moves a state about a point on the ground.
+void move(RobotState& state, const Eigen::Vector3d& centre, const Eigen::Vector3d& shift,
+          const Eigen::Quaterniond& turn) {
+  state.X_WB.p = centre + turn * (state.X_WB.p - centre) + shift;
+  state.X_WB.R = turn * state.X_WB.R;
+  state.v_WB = turn * state.v_WB;
+}
+
+}  // namespace
+
+std::vector<int> loss_frames(const RobotModel& robot) {
+  std::vector<int> frames;
+  for (const int joint : loss_joints()) {
+    const auto found = std::find_if(robot.keypoints.begin(), robot.keypoints.end(),
+                                    [&](const Keypoint& keypoint) { return keypoint.smpl == joint; });
+    if (found == robot.keypoints.end())
+      throw std::invalid_argument("robot '" + robot.name + "' has no keypoint for '" + std::string(kSmplNames[joint]) +
+                                  "', which the losses need");
+    frames.push_back(found->frame);
+  }
+  return frames;
+}
+
+const std::array<int, kLossPoints>& loss_joints() {
+  static constexpr std::array<int, kLossPoints> joints = {kHead,       kLeftShoulder, kRightShoulder, kLeftElbow,
+                                                          kRightElbow, kLeftHand,     kRightHand};
+  return joints;
+}
+
+void WindowBatch::resize(int windows) {
+  size = windows;
+  frames.resize(kFrameSize * kHistoryFrames, windows);
+  position.resize(kPositionSize, windows);
+  distance.resize(kRelations, windows);
+  orientation.resize(kOrientationSize, windows);
+  plan.resize(kPlanSize, windows);
+  partner.resize(kAnchors * kLossPoints * 3, windows);
+  phase.assign(windows, 0);
+  task.assign(windows, 0);
+  prompt.assign(windows, -1);
+}
+
+std::vector<Window> list_windows(const DemonstrationSet& set, const WindowOptions& options) {
+  std::vector<Window> windows;
+  for (std::size_t i = 0; i < set.list.size(); ++i)
+    for (int frame = 0; frame < set.list[i].frames; frame += options.stride)
+      windows.push_back({static_cast<int>(i), frame});
+  return windows;
+}
+
+WindowMaker::WindowMaker(std::shared_ptr<const RobotModel> robot, const DemonstrationSet& set,
+                         const WindowOptions& options)
+    : robot_(std::move(robot)), set_(set), options_(options), features_(robot_) {}
+
+void WindowMaker::look(const Demonstration& entry, int frame, Random& random) {
+  for (int i = 0; i < kHistoryFrames; ++i) {
+    const int column = clamped(entry, frame - (kHistoryFrames - 1 - i));
+    history_[i].robot = set_.state(column);
+    history_[i].partner = set_.partner.col(column).cast<double>().reshaped(3, kSmplJoints);
+  }
+  if (!options_.augment) return;
+  blur(random);
+  displace(random);
+}
+
+// The partner through a camera: joints that jitter, joints that keep their last place.
+void WindowMaker::blur(Random& random) {
+  const double sigma = random.chance(0.5) ? random.uniform(0.0, options_.jitter) : 0.0;
+  const double lost = random.chance(1.0 / 3.0) ? random.uniform(0.0, options_.dropout) : 0.0;
+  for (int i = 0; i < kHistoryFrames; ++i) {
+    for (int joint = 0; joint < kSmplJoints; ++joint) {
+      auto place = history_[i].partner.col(joint);
+      if (sigma > 0.0) place += sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      if (lost > 0.0 && i > 0 && random.chance(lost)) place = history_[i - 1].partner.col(joint);
+    }
+  }
+}
+
+// The robot beside the place and the posture that it is meant to have.
+void WindowMaker::displace(Random& random) {
+  const bool moved = random.chance(2.0 / 3.0);
+  const Eigen::Vector3d centre = history_.back().robot.X_WB.p;
+  const Eigen::Vector3d shift =
+      (moved ? options_.root : 0.0) * Eigen::Vector3d(random.normal(), random.normal(), 0.1 * random.normal());
+  const Eigen::Quaterniond turn = yaw_rotation(moved ? options_.heading * random.normal() : 0.0);
+  Eigen::VectorXd offset(robot_->dof());
+  for (double& value : offset) value = options_.joints * random.normal();
+  for (ObservationFrame& frame : history_) {
+    move(frame.robot, centre, shift, turn);
+    frame.robot.q += offset;
+    for (int i = 0; i < robot_->dof(); ++i) {
+      frame.robot.q[i] += 0.2 * options_.joints * random.normal();
+      frame.robot.v[i] += options_.rates * random.normal();
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      frame.robot.v_WB[axis] += options_.root * random.normal();
+      frame.robot.w_WB_B[axis] += options_.heading * random.normal();
+    }
+  }
+}
+
+void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch, int column) {
+  const Demonstration& entry = set_.list[window.demonstration];
+  const int frame = std::min(entry.frames - 1, window.frame + (options_.augment ? random.below(options_.stride) : 0));
+  look(entry, frame, random);
+  features_.make({history_, frame}, made_);
+  batch.frames.col(column) = made_.frames.reshaped();
+  batch.position.col(column) = made_.position;
+  batch.distance.col(column) = made_.distance;
+  batch.orientation.col(column) = made_.orientation;
+
+  const Pose X_WE = ego_frame(history_.back().robot), X_EW = X_WE.inverse();
+  Anchors anchors;
+  for (int k = 0; k < kAnchors; ++k) {
+    const int then = clamped(entry, frame + k * kAnchorTicks);
+    anchors[k] = set_.reference(then);
+    for (int point = 0; point < kLossPoints; ++point) {
+      const Eigen::Vector3d p_W = set_.partner.col(then).segment<3>(3 * loss_joints()[point]).cast<double>();
+      batch.partner.col(column).segment<3>(3 * (kLossPoints * k + point)) = (X_EW * p_W).cast<float>();
+    }
+  }
+  encode_plan(anchors, X_WE, *robot_, {batch.plan.col(column).data(), kPlanSize});
+  batch.phase[column] = static_cast<int>(entry.phases.at(frame));
+  batch.task[column] = static_cast<int>(entry.task);
+  const int paraphrases = static_cast<int>(task_paraphrases(entry.task).size());
+  batch.prompt[column] = options_.augment && random.chance(0.5) ? random.below(paraphrases) : -1;
+}
+
+WindowStatistics window_statistics(WindowMaker& maker, const std::vector<Window>& windows, std::uint64_t seed) {
+  Random random(seed, stream_key({"window statistics"}));
+  WindowBatch batch;
+  batch.resize(kStatisticsWindows);
+  for (int i = 0; i < kStatisticsWindows; ++i)
+    maker.make(windows[random.below(static_cast<int>(windows.size()))], random, batch, i);
+  const auto frames = batch.frames.reshaped(kFrameSize, Eigen::Index{kHistoryFrames} * kStatisticsWindows);
+  WindowStatistics statistics;
+  statistics.frame_mean = frames.rowwise().mean();
+  statistics.frame_deviation =
+      (frames.colwise() - statistics.frame_mean).rowwise().norm() / std::sqrt(static_cast<float>(frames.cols()));
+  statistics.plan_mean = batch.plan.rowwise().mean();
+  statistics.plan_deviation = (batch.plan.colwise() - statistics.plan_mean).rowwise().norm() /
+                              std::sqrt(static_cast<float>(kStatisticsWindows));
+  statistics.frame_deviation = statistics.frame_deviation.cwiseMax(kLeastDeviation);
+  statistics.plan_deviation = statistics.plan_deviation.cwiseMax(kLeastDeviation);
+  return statistics;
+}
+
+}  // namespace duet

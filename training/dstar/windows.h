@@ -1,0 +1,78 @@
+// Windows of D-STAR's training (A.3.1): 12 frames of observation, five anchors, the phase, what the partner will do;
+// with the disturbances that make a policy robust: the robot is not where the demonstration has it, the partner is seen
+// through noise.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "policies/dstar/features.h"
+#include "training/dstar/demonstrations.h"
+
+namespace duet {
+
+struct WindowOptions {
+  int stride = 25;        // of windows in an epoch; each is moved by up to it at random
+  double root = 0.06;     // deviation of the robot's place [m]; of two windows in three
+  double heading = 0.08;  // [rad]
+  double joints = 0.03;   // of all joints at once, and a fifth of it per frame [rad]
+  double rates = 0.15;    // of joint rates [rad/s]
+  double jitter = 0.04;   // largest deviation of the partner's joints [m]; of every second window
+  double dropout = 0.2;   // largest share of joints that are not seen; of every third window
+  bool augment = true;
+};
+
+// Keypoints whose places L_pos and L_spatial compare: of the robot and of the partner.
+inline constexpr int kLossPoints = 7;  // head, shoulders, elbows, hands
+std::vector<int> loss_frames(const RobotModel& robot);
+const std::array<int, kLossPoints>& loss_joints();  // of SMPL
+
+struct Window {
+  int demonstration = 0, frame = 0;  // frame of the demonstration
+};
+
+// Plain arrays, a window per column, ready for a trainer.
+struct WindowBatch {
+  int size = 0;
+  Eigen::MatrixXf frames;  // (149 * 12, size): oldest first
+  Eigen::MatrixXf position, distance, orientation;
+  Eigen::MatrixXf plan;           // (180, size): encode_plan
+  Eigen::MatrixXf partner;        // (kAnchors * kLossPoints * 3, size): where the partner's points will be, in E
+  std::vector<int> phase;         // 0, 1, 2
+  std::vector<int> task, prompt;  // prompt: index into task_paraphrases, -1 for task_prompt
+  void resize(int windows);
+};
+
+// Every window of a set at the options' stride.
+std::vector<Window> list_windows(const DemonstrationSet& set, const WindowOptions& options);
+
+// Fills batches; keeps buffers. One owner, not thread-safe.
+class WindowMaker {
+ public:
+  WindowMaker(std::shared_ptr<const RobotModel> robot, const DemonstrationSet& set, const WindowOptions& options);
+  // Column `column` of the batch; the same random numbers give the same bits.
+  void make(const Window& window, Random& random, WindowBatch& batch, int column);
+
+ private:
+  void look(const Demonstration& entry, int frame, Random& random);
+  void blur(Random& random);
+  void displace(Random& random);
+
+  std::shared_ptr<const RobotModel> robot_;
+  const DemonstrationSet& set_;
+  WindowOptions options_;
+  FeatureMaker features_;
+  std::array<ObservationFrame, kHistoryFrames> history_;
+  DstarFeatures made_;
+};
+
+// Mean and deviation per channel of frames and plans over a sample of windows, as a network keeps them. Deviations are
+// at least `floor`.
+struct WindowStatistics {
+  Eigen::VectorXf frame_mean, frame_deviation, plan_mean, plan_deviation;
+};
+WindowStatistics window_statistics(WindowMaker& maker, const std::vector<Window>& windows, std::uint64_t seed);
+
+}  // namespace duet
