@@ -1,0 +1,226 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "policies/dstar/network.h"
+#include "tests/policies/dstar_fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::g1;
+using test::random_network;
+using test::small_config;
+using test::thrown_message;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+void expect_same_but_for_rounding(const DstarNetwork& found, const DstarNetwork& expected, float relative) {
+  EXPECT_EQ(found.config, expected.config);
+  EXPECT_EQ(found.robot, expected.robot);
+  EXPECT_EQ(found.joints, expected.joints);
+  EXPECT_EQ(found.channels, expected.channels);
+  EXPECT_EQ(found.language, expected.language);
+  EXPECT_EQ(found.notes, expected.notes);
+  EXPECT_LE((found.frame_mean - expected.frame_mean).cwiseAbs().maxCoeff(), relative);
+  EXPECT_LE((found.frame_deviation - expected.frame_deviation).cwiseAbs().maxCoeff(), 2.0F * relative);
+  EXPECT_LE((found.plan_mean - expected.plan_mean).cwiseAbs().maxCoeff(), relative);
+  EXPECT_LE((found.plan_deviation - expected.plan_deviation).cwiseAbs().maxCoeff(), 2.0F * relative);
+  ASSERT_EQ(found.weights.size(), expected.weights.size());
+  for (const auto& [name, tensor] : expected.weights) {
+    EXPECT_EQ(found.weights.at(name).shape, tensor.shape) << name;
+    for (std::size_t i = 0; i < tensor.values.size(); ++i)
+      ASSERT_NEAR(found.weights.at(name).values[i], tensor.values[i], relative * (1.0F + std::abs(tensor.values[i])));
+  }
+}
+
+TEST(DstarFile, IsReadBackAsWritten) {
+  const test::ScratchFolder folder;
+  const auto network = random_network(small_config());
+  save_dstar_network(folder / "a.safetensors", *network, TensorType::kF32);
+  const auto read = load_dstar_network(folder / "a.safetensors", *g1());
+  expect_same_but_for_rounding(*read, *network, 0.0F);
+  save_dstar_network(folder / "b.safetensors", *read, TensorType::kF32);
+  EXPECT_TRUE(read_file(folder / "a.safetensors") == read_file(folder / "b.safetensors"));
+}
+
+TEST(DstarFile, OfHalfPrecisionHoldsThePlanOfItsRoundedWeights) {
+  const test::ScratchFolder folder;
+  const auto network = random_network(small_config());
+  save_dstar_network(folder / "a.safetensors", *network, TensorType::kF16);
+  const auto read = load_dstar_network(folder / "a.safetensors", *g1());
+  expect_same_but_for_rounding(*read, *network, 0x1p-11F);
+  save_dstar_network(folder / "b.safetensors", *read, TensorType::kF16);
+  expect_same_but_for_rounding(*load_dstar_network(folder / "b.safetensors", *g1()), *read, 0.0F);
+}
+
+TEST(DstarFile, HoldsNothingOfWhatIsOff) {
+  const test::ScratchFolder folder;
+  DstarConfig config = small_config();
+  config.phase_attention = config.spatial_reasoning = config.short_stream = config.language_on = false;
+  save_dstar_network(folder / "a.safetensors", *random_network(config), TensorType::kF32);
+  for (const auto& [name, tensor] : read_safetensors(folder / "a.safetensors").tensors)
+    for (const char* part : {"phase", "spatial", "short", "language", "distance"})
+      EXPECT_EQ(name.find(part), std::string::npos) << name;
+  EXPECT_EQ(load_dstar_network(folder / "a.safetensors", *g1())->config, config);
+}
+
+TEST(DstarTensors, AreNamedOnceAndStandInThePapersSizes) {
+  std::set<std::string> names;
+  std::int64_t count = 0;
+  for (const TensorShape& tensor : dstar_tensors({})) {
+    EXPECT_TRUE(names.insert(tensor.name).second) << tensor.name;
+    std::int64_t values = 1;
+    for (const std::int64_t size : tensor.shape) values *= size;
+    count += values;
+    if (tensor.name == "temporal.weight") {
+      EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{256, 1536}));
+    }
+    if (tensor.name == "condition.1.weight") {
+      EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{256, 1408}));
+    }
+    if (tensor.name == "denoise.0.film_step.weight") {
+      EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{384, 256}));
+    }
+    EXPECT_NE(tensor.name, "denoise.0.film_step.bias");
+  }
+  EXPECT_GT(count, 3'000'000);
+  EXPECT_LT(count, 10'000'000);
+}
+
+SafeTensors good_content() {
+  const test::ScratchFolder folder;
+  save_dstar_network(folder / "net", *random_network(small_config()), TensorType::kF32);
+  return read_safetensors(folder / "net");
+}
+
+// The refusal of a good file after `change`.
+std::string refusal(const std::function<void(SafeTensors&)>& change) {
+  static const SafeTensors good = good_content();
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net.safetensors";
+  SafeTensors content = good;
+  change(content);
+  write_safetensors(path, content);
+  const std::string message = thrown_message<InputError>([&] { load_dstar_network(path, *g1()); });
+  return message.starts_with(path + ": ") ? message.substr(path.size() + 2) : message;
+}
+
+std::string header_refusal(const std::string& key, const std::string& value) {
+  return refusal([&](SafeTensors& content) { content.metadata[key] = value; });
+}
+
+TEST(DstarFile, RefusesHeadersThatAreNotOfThisNetworkAndRobot) {
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.metadata.erase("format"); }),
+            "expected 'format' in the header, found none: not a network of D-STAR");
+  EXPECT_EQ(header_refusal("format", "duet.wbc-network/1"),
+            "the format: expected 'duet.dstar-network/1', found 'duet.wbc-network/1'");
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.metadata.erase("config"); }),
+            "expected 'config' in the header, found none: not a network of D-STAR");
+  EXPECT_EQ(header_refusal("config", "{}"), "configuration of D-STAR: expected a field 'long_frames', found none");
+  EXPECT_EQ(header_refusal("robot", "h1"), "the robot: expected '" + g1()->name + "', found 'h1'");
+  EXPECT_EQ(header_refusal("joints", "3"),
+            "'joints' in the header: expected a JSON list of texts, found something else");
+  EXPECT_EQ(header_refusal("channels", "[1]"),
+            "'channels' in the header: expected a JSON list of texts, found something else");
+  EXPECT_EQ(header_refusal("joints", R"(["left_knee_joint"])"), "joints: expected 29 values, found 1");
+  EXPECT_EQ(header_refusal("channels", "[]"), "channels: expected 149 values, found 0");
+  EXPECT_EQ(header_refusal("notes", "[]"),
+            "'notes' in the header: expected a JSON object of texts, found something else");
+}
+
+TEST(DstarFile, RefusesJointsAndChannelsInAnotherOrder) {
+  DstarNetwork network = *random_network(small_config());
+  const auto message = [&] {
+    const test::ScratchFolder folder;
+    save_dstar_network(folder / "net", network, TensorType::kF32);
+    return thrown_message<InputError>([&] { load_dstar_network(folder / "net", *g1()); });
+  };
+  std::swap(network.joints[3], network.joints[4]);
+  EXPECT_THAT(message(), HasSubstr("joint 3: expected '" + network.joints[4] + "', found '" + network.joints[3] + "'"));
+  std::swap(network.joints[3], network.joints[4]);
+  network.channels[5] = "temperature";
+  EXPECT_THAT(message(), HasSubstr("channel 5: expected 'partner_joint.pelvis.z', found 'temperature'"));
+}
+
+TEST(DstarFile, RefusesTensorsThatDoNotFit) {
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.tensors.erase("long.1.up.weight"); }),
+            "expected a tensor 'long.1.up.weight', found none");
+  EXPECT_EQ(refusal([](SafeTensors& content) {
+              content.tensors["extra"] = {{1}, {1.0F}};
+            }),
+            "tensor 'extra' is not one of this configuration");
+  EXPECT_EQ(refusal([](SafeTensors& content) {
+              content.tensors["temporal.bias"] = {{2}, {1.0F, 2.0F}};
+            }),
+            "tensor 'temporal.bias': expected shape (18), found (2) with 2 values");
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.tensors.erase("frame.mean"); }),
+            "expected a tensor 'frame.mean', found none");
+  EXPECT_EQ(refusal([](SafeTensors& content) {
+              content.tensors["plan.mean"] = {{1}, {1.0F}};
+            }),
+            "tensor 'plan.mean': expected shape (5, 36), found (1)");
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.tensors["frame.deviation"].values[7] = 0.0F; }),
+            "deviation of frames: expected positive numbers, found 0 at 7");
+  EXPECT_EQ(refusal([](SafeTensors& content) { content.tensors["plan.deviation"].values[8] = -1.0F; }),
+            "deviation of plans: expected positive numbers, found -1 at 8");
+}
+
+TEST(DstarFile, RefusesAGoldenPlanThatItMisses) {
+  for (const char* name : {"golden.frames", "golden.noise", "golden.language", "golden.distance", "golden.plan"})
+    EXPECT_EQ(refusal([&](SafeTensors& content) { content.tensors.erase(name); }),
+              std::string("expected a tensor '") + name + "', found none");
+  for (const char* name : {"denoise.out.bias", "long.in.weight", "phase.expert.1.weight", "golden.distance",
+                           "golden.language", "golden.frames", "golden.plan"})
+    EXPECT_THAT(refusal([&](SafeTensors& content) {
+                  for (float& value : content.tensors[name].values) value = 1.3F * value + 0.1F;
+                }),
+                StartsWith("the golden plan is missed by "))
+        << name;
+}
+
+TEST(DstarFile, RefusesNumbersThatAreNotFinite) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net.safetensors";
+  save_dstar_network(path, *random_network(small_config()), TensorType::kF32);
+  std::string bytes = read_file(path);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(bytes.data() + bytes.size() - 4, &nan, 4);
+  write_file(path, bytes);
+  EXPECT_THAT(thrown_message<InputError>([&] { load_dstar_network(path, *g1()); }),
+              HasSubstr("expected finite numbers"));
+  EXPECT_THAT(thrown_message<InputError>([&] { load_dstar_network(folder / "none", *g1()); }),
+              HasSubstr("cannot read"));
+}
+
+TEST(DstarFile, IsNotWrittenForWhatDoesNotFit) {
+  const test::ScratchFolder folder;
+  const auto message = [&](const std::function<void(DstarNetwork&)>& change) {
+    DstarNetwork network = *random_network(small_config());
+    change(network);
+    return thrown_message<std::invalid_argument>(
+        [&] { save_dstar_network(folder / "net", network, TensorType::kF32); });
+  };
+  EXPECT_EQ(message([](DstarNetwork& network) { network.config.heads = 5; }),
+            "save_dstar_network: 'width': expected a multiple of 'heads' (5), found 16");
+  EXPECT_EQ(message([](DstarNetwork& network) { network.config.layers = 3; }),
+            "save_dstar_network: expected a tensor 'long.2.norm1.weight', found none");
+  EXPECT_EQ(message([](DstarNetwork& network) { network.joints.pop_back(); }),
+            "save_dstar_network: joints: expected 29 values, found 28");
+  EXPECT_EQ(message([](DstarNetwork& network) { network.plan_mean.resize(3); }),
+            "save_dstar_network: mean of plans: expected 180 values, found 3");
+  EXPECT_FALSE(std::filesystem::exists(folder / "net"));
+  EXPECT_THROW(save_dstar_network("/proc/none/net", *random_network(small_config()), TensorType::kF32),
+               std::runtime_error);
+}
+
+}  // namespace
+}  // namespace duet

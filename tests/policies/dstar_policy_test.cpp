@@ -1,0 +1,206 @@
+#include "policies/dstar/dstar_policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "core/require.h"
+#include "core/skeleton.h"
+#include "policies/observation_history.h"
+#include "policies/scheduler.h"
+#include "tests/policies/dstar_fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::g1;
+using test::thrown_message;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+DstarConfig policy_config() {
+  DstarConfig config = test::small_config();
+  config.language = kLanguageSize;
+  return config;
+}
+
+std::unique_ptr<Policy> make(NoiseMode noise = NoiseMode::kEpisode) {
+  static const auto network = test::random_network(policy_config());
+  return make_dstar_policy("dstar", g1(), network, built_in_language(), noise);
+}
+
+// The standing robot with somebody about a metre in front of it, who waves as time goes by.
+ObservationFrame frame_at(int tick) {
+  ObservationFrame frame;
+  frame.robot = g1()->standing_state();
+  for (int j = 0; j < kSmplJoints; ++j)
+    frame.partner.col(j) = Eigen::Vector3d(1.0 + 0.01 * j, 0.1 * std::sin(j + 0.1 * tick), 0.3 + 0.05 * j);
+  return frame;
+}
+
+EpisodeContext context_of(std::uint64_t seed, const std::string& prompt = "") {
+  EpisodeContext context;
+  context.seed = seed;
+  context.prompt = prompt;
+  context.start = g1()->standing_state();
+  return context;
+}
+
+// Joint angles of every fourth reference of a second's plans.
+std::vector<double> episode(Policy& policy, const EpisodeContext& context) {
+  policy.reset(context);
+  ObservationHistory history;
+  history.reset();
+  std::vector<double> numbers;
+  for (int tick = 0; tick < 50; ++tick) {
+    history.add(frame_at(tick));
+    if (tick % kTicksPerPlan != 0) continue;
+    const std::vector<Reference> plan = policy.plan(history.at(tick));
+    EXPECT_EQ(plan.size(), 100U);
+    for (const Reference& reference : plan) {
+      numbers.insert(numbers.end(), reference.q.begin(), reference.q.end());
+      numbers.insert(numbers.end(), reference.X_WB.p.begin(), reference.X_WB.p.end());
+    }
+  }
+  EXPECT_FALSE(policy.faults().any());
+  return numbers;
+}
+
+TEST(DstarPolicy, RepeatsAnEpisodeToTheBit) {
+  const auto policy = make(), other = make();
+  const std::vector<double> first = episode(*policy, context_of(1));
+  EXPECT_EQ(episode(*policy, context_of(1)), first);
+  EXPECT_EQ(episode(*other, context_of(1)), first);
+  EXPECT_NE(episode(*policy, context_of(2)), first);
+  const auto fresh = make(NoiseMode::kCall);
+  const std::vector<double> by_call = episode(*fresh, context_of(1));
+  EXPECT_EQ(episode(*fresh, context_of(1)), by_call);
+  EXPECT_NE(by_call, first);
+}
+
+bool same_joints(const std::vector<Reference>& a, const std::vector<Reference>& b) {
+  return a.size() == b.size() && a.front().q == b.front().q && a.back().q == b.back().q;
+}
+
+TEST(DstarPolicy, KeepsItsNoiseForTheEpisodeOrDrawsItByCall) {
+  ObservationHistory history;
+  history.reset();
+  history.add(frame_at(0));
+  for (const NoiseMode mode : {NoiseMode::kEpisode, NoiseMode::kCall}) {
+    const auto policy = make(mode);
+    policy->reset(context_of(1));
+    const std::vector<Reference> first = policy->plan(history.at(0)), second = policy->plan(history.at(0));
+    EXPECT_EQ(same_joints(first, second), mode == NoiseMode::kEpisode);
+  }
+}
+
+TEST(DstarPolicy, HeedsThePromptAndElseTheTask) {
+  const auto policy = make();
+  const std::vector<double> hug = episode(*policy, context_of(1));
+  EXPECT_EQ(episode(*policy, context_of(1, std::string(task_prompt(Task::kHug)))), hug);
+  EXPECT_NE(episode(*policy, context_of(1, "wave at the person")), hug);
+  EpisodeContext wave = context_of(1);
+  wave.task = Task::kWave;
+  EXPECT_NE(episode(*policy, wave), hug);
+  EXPECT_THROW(policy->reset(context_of(1, "?")), std::invalid_argument);
+}
+
+TEST(DstarPolicy, LeavesOutAPlanOfWhatIsNotANumberAndGoesOn) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  const auto policy = make();
+  policy->reset(context_of(1));
+  int invalid = 0;
+  const std::vector<std::function<void(ObservationFrame&)>> faults = {
+      [&](ObservationFrame& frame) { frame.partner(2, 20) = nan; },
+      [&](ObservationFrame& frame) { frame.robot.q[4] = nan; },
+      [&](ObservationFrame& frame) { frame.robot.v[4] = infinity; }};
+  for (const auto& fault : faults) {
+    ObservationHistory history;
+    history.reset();
+    ObservationFrame frame = frame_at(0);
+    fault(frame);
+    history.add(frame);
+    EXPECT_TRUE(policy->plan(history.at(20)).empty());
+    EXPECT_EQ(policy->faults().invalid, ++invalid);
+  }
+  EXPECT_EQ(policy->faults().message, "policy 'dstar': tick 20: the observation is not finite");
+  ObservationHistory history;
+  history.reset();
+  history.add(frame_at(0));
+  EXPECT_EQ(policy->plan(history.at(30)).size(), 100U);
+  EXPECT_EQ(policy->faults().invalid, invalid);
+  policy->reset(context_of(1));
+  EXPECT_FALSE(policy->faults().any());
+}
+
+TEST(DstarPolicy, LeavesOutAPlanThatItsNetworkSpoils) {
+  DstarNetwork network = *test::random_network(policy_config());
+  for (float& value : network.weights["denoise.in.weight"].values) value = 1e38F;
+  const auto policy =
+      make_dstar_policy("dstar", g1(), std::make_shared<const DstarNetwork>(network), built_in_language());
+  policy->reset(context_of(1));
+  ObservationHistory history;
+  history.reset();
+  history.add(frame_at(0));
+  EXPECT_TRUE(policy->plan(history.at(0)).empty());
+  EXPECT_EQ(policy->faults().invalid, 1);
+  EXPECT_EQ(policy->faults().message, "policy 'dstar': tick 0: the network's plan is not finite");
+}
+
+TEST(DstarPolicy, ComesByItsNameWithANetworkOfItsOwn) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net.safetensors";
+  save_dstar_network(path, *test::random_network(policy_config()), TensorType::kF16);
+  for (const std::string name : {"dstar", "dp"}) {
+    const PolicyMaker maker = policy_maker(name, g1(), {{"network", path}});
+    const auto policy = maker(), other = maker();
+    EXPECT_EQ(policy->name(), name);
+    EXPECT_EQ(episode(*policy, context_of(1)), episode(*other, context_of(1)));
+    EXPECT_NE(episode(*make_policy(name, g1(), {{"network", path}, {"noise", "call"}}), context_of(1)),
+              episode(*policy, context_of(1)));
+  }
+}
+
+TEST(DstarPolicy, RefusesWhatItCannotRun) {
+  const auto refusal = [](const PolicyOptions& options) {
+    return thrown_message<std::invalid_argument>([&] { make_policy("dstar", g1(), options); });
+  };
+  EXPECT_THAT(refusal({{"noise", "cal"}}), StartsWith("policy 'dstar': unknown noise 'cal': did you mean 'call'?"));
+  EXPECT_THAT(refusal({{"netwrok", "x"}}), HasSubstr("'network'"));
+  EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("dstar", nullptr); }),
+            "policy 'dstar' needs a robot");
+  EXPECT_EQ(thrown_message<MissingError>([] {
+              make_policy("dstar", g1(), {{"network", "/none.safetensors"}});
+            }),
+            "no network of policy 'dstar' (option 'network'): looked at /none.safetensors");
+  EXPECT_EQ(thrown_message<MissingError>([] {
+              make_policy("dp", g1(), {{"language", "/none.npz"}});
+            }),
+            "no language table of policy 'dp' (option 'language'): looked at /none.npz");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([] { make()->act({}); }), "policy 'dstar': reset comes first");
+}
+
+TEST(DstarPolicy, RefusesAnotherLanguageThanItsNetworks) {
+  const auto message = [](const DstarConfig& config, const std::string& language) {
+    DstarNetwork network = *test::random_network(config);
+    network.language = language;
+    return thrown_message<std::invalid_argument>(
+        [&] { make_dstar_policy("dstar", g1(), std::make_shared<const DstarNetwork>(network), built_in_language()); });
+  };
+  EXPECT_EQ(message(policy_config(), "clip"),
+            "policy 'dstar': expected the language encoder of its network ('clip', 768 numbers), found 'duet-text-1' "
+            "with 768");
+  EXPECT_EQ(message(test::small_config(), "duet-text-1"),
+            "policy 'dstar': expected the language encoder of its network ('duet-text-1', 14 numbers), found "
+            "'duet-text-1' with 768");
+  DstarConfig silent = test::small_config();
+  silent.language_on = false;
+  EXPECT_EQ(message(silent, "clip"), "(nothing was thrown)");
+}
+
+}  // namespace
+}  // namespace duet
