@@ -7,6 +7,7 @@
 #include "core/names.h"
 #include "core/require.h"
 #include "policies/dstar/dstar_policy.h"
+#include "policies/external/external_policy.h"
 #include "policies/null_policy.h"
 #include "policies/replay_policy.h"
 #include "policies/scheduler.h"
@@ -41,7 +42,11 @@ constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>},
                                {"dstar", dstar_info, dstar_maker},
                                {"dp", dstar_info, dstar_maker}};
 
+// A name that is the path of a policy descriptor.
+constexpr Entry kDescriptor = {"", external_info, external_maker};
+
 const Entry& find_entry(const std::string& name) {
+  if (name.ends_with(".yaml")) return kDescriptor;
   for (const Entry& entry : kPolicies)
     if (name == entry.name) return entry;
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));

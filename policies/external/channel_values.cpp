@@ -1,0 +1,152 @@
+#include "policies/external/channel_values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/names.h"
+#include "core/require.h"
+#include "policies/dstar/features.h"
+
+namespace duet {
+namespace {
+
+constexpr double kTickSeconds = 0.02;
+
+void put(const Eigen::Vector3d& vector, std::span<float> out) {
+  Eigen::Map<Eigen::Vector3f>(out.data()) = vector.cast<float>();
+}
+
+void put(const Eigen::Quaterniond& rotation, std::span<float> out) {
+  const double sign = rotation.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one orientation
+  const Eigen::Vector4d wxyz(rotation.w(), rotation.x(), rotation.y(), rotation.z());
+  Eigen::Map<Eigen::Vector4f>(out.data()) = (sign * wxyz).cast<float>();
+}
+
+double at(const std::vector<double>& values, std::size_t i) { return values.size() == 1 ? values[0] : values[i]; }
+
+bool is_finite(const ObservationFrame& frame) {
+  const RobotState& robot = frame.robot;
+  return frame.partner.allFinite() && robot.X_WB.p.allFinite() && robot.X_WB.R.coeffs().allFinite() &&
+         robot.v_WB.allFinite() && robot.w_WB_B.allFinite() && robot.q.allFinite() && robot.v.allFinite();
+}
+
+}  // namespace
+
+std::vector<int> bind_joints(const PolicyDescriptor& descriptor, const RobotModel& robot) {
+  const std::vector<std::string> known = robot.joint_names();
+  const std::vector<std::string>& names = descriptor.joints.empty() ? known : descriptor.joints;
+  const auto refuse = [&](const std::string& message) {
+    throw InputError(fmt::format("{}:{}: 'joints' with robot '{}': {}", descriptor.file, descriptor.joints_line,
+                                 robot.name, message));
+  };
+  std::vector<int> indices;
+  indices.reserve(names.size());
+  for (const std::string& name : names) {
+    const auto it = std::ranges::find(known, name);
+    if (it == known.end()) refuse(unknown_name_message("joint", name, known));
+    indices.push_back(static_cast<int>(it - known.begin()));
+  }
+  for (const std::string& name : known)
+    if (std::ranges::find(names, name) == names.end())
+      refuse(fmt::format("expected its {} joints, found none '{}'", known.size(), name));
+  return indices;
+}
+
+std::vector<PolicyChannel> frame_channels() {
+  std::vector<PolicyChannel> channels;
+  for (const PolicyChannelKind kind :
+       {PolicyChannelKind::kPartnerRoot, PolicyChannelKind::kPartnerJoints, PolicyChannelKind::kBaseLinearVelocity,
+        PolicyChannelKind::kBaseAngularVelocity, PolicyChannelKind::kGravity, PolicyChannelKind::kJointPositions,
+        PolicyChannelKind::kJointVelocities, PolicyChannelKind::kRootOffset, PolicyChannelKind::kRootOrientation})
+    channels.push_back({.kind = kind});
+  return channels;
+}
+
+bool is_finite(const Observation& observation) {
+  return std::ranges::all_of(observation.history, [](const ObservationFrame& frame) { return is_finite(frame); });
+}
+
+ChannelValues::ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, PolicyFrame frame)
+    : robot_(std::move(robot)), joints_(std::move(joints)), frame_(frame) {}
+
+void ChannelValues::reset(const EpisodeContext& context, std::vector<float> language) {
+  start_ = context.start.X_WB.p;
+  task_ = context.task;
+  language_ = std::move(language);
+  noise_ = Random(context.seed, stream_key({"policy", "noise"}));
+}
+
+void ChannelValues::write(const PolicyChannel& channel, const Observation& observation, int frame,
+                          std::span<float> out) {
+  write_plain(channel.kind, observation, frame, out);
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<float>((out[i] - at(channel.offset, i)) * at(channel.scale, i));
+}
+
+void ChannelValues::write_plain(PolicyChannelKind kind, const Observation& observation, int frame,
+                                std::span<float> out) {
+  switch (kind) {
+    case PolicyChannelKind::kLanguage:
+      std::ranges::copy(language_, out.begin());
+      return;
+    case PolicyChannelKind::kTask:
+      for (std::size_t i = 0; i < kTasks.size(); ++i) out[i] = kTasks[i] == task_ ? 1.0F : 0.0F;
+      return;
+    case PolicyChannelKind::kTime:
+      out[0] = static_cast<float>(observation.tick * kTickSeconds);
+      return;
+    case PolicyChannelKind::kNoise:
+      for (float& number : out) number = static_cast<float>(noise_.normal());
+      return;
+    default:
+      write_of_frame(kind, observation.history[static_cast<std::size_t>(frame)],
+                     frame_ == PolicyFrame::kEgo ? ego_frame(observation.now().robot).inverse() : Pose{}, out);
+  }
+}
+
+// X_FW: of W in the frame that positions refer to.
+void ChannelValues::write_of_frame(PolicyChannelKind kind, const ObservationFrame& frame, const Pose& X_FW,
+                                   std::span<float> out) {
+  const RobotState& robot = frame.robot;
+  const bool ego = frame_ == PolicyFrame::kEgo;
+  switch (kind) {
+    case PolicyChannelKind::kPartnerRoot:
+      put(X_FW * Eigen::Vector3d(frame.partner.col(0)), out);
+      return;
+    case PolicyChannelKind::kPartnerJoints:
+      for (int j = 0; j < 24; ++j) {
+        const Eigen::Vector3d joint = frame.partner.col(j);
+        put(ego ? X_FW.R * (joint - frame.partner.col(0)) : joint, out.subspan(3 * j));
+      }
+      return;
+    case PolicyChannelKind::kBaseLinearVelocity:
+      put(robot.X_WB.R.conjugate() * robot.v_WB, out);
+      return;
+    case PolicyChannelKind::kBaseAngularVelocity:
+      put(robot.w_WB_B, out);
+      return;
+    case PolicyChannelKind::kGravity:
+      put(robot.X_WB.R.conjugate() * -Eigen::Vector3d::UnitZ(), out);
+      return;
+    case PolicyChannelKind::kRootOffset:
+      put(ego ? X_FW * robot.X_WB.p : robot.X_WB.p - start_, out);
+      return;
+    case PolicyChannelKind::kRootOrientation:
+      put(X_FW.R * robot.X_WB.R, out);
+      return;
+    default:
+      write_of_joints(kind, robot, out);
+  }
+}
+
+void ChannelValues::write_of_joints(PolicyChannelKind kind, const RobotState& robot, std::span<float> out) const {
+  const Eigen::VectorXd& values = kind == PolicyChannelKind::kJointVelocities ? robot.v : robot.q;
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const double zero = kind == PolicyChannelKind::kJointOffsets ? robot_->neutral[joints_[i]] : 0.0;
+    out[i] = static_cast<float>(values[joints_[i]] - zero);
+  }
+}
+
+}  // namespace duet

@@ -1,0 +1,47 @@
+// The numbers that channels of a policy descriptor show, for a robot with its joints in the descriptor's order. One
+// owner, not thread-safe.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/random.h"
+#include "policies/external/descriptor.h"
+#include "policies/policy.h"
+
+namespace duet {
+
+// Indices of the robot's joints in the descriptor's order. Throws InputError where they are not the robot's: file,
+// line, a joint that one of the two lacks.
+std::vector<int> bind_joints(const PolicyDescriptor& descriptor, const RobotModel& robot);
+
+// The channels of to_vector in its order: 149 numbers for 29 joints.
+std::vector<PolicyChannel> frame_channels();
+
+class ChannelValues {
+ public:
+  ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, PolicyFrame frame);
+  // `language`: the prompt's embedding, where a channel shows it.
+  void reset(const EpisodeContext& context, std::vector<float> language);
+  // Of the observation's frame `frame` (0 the oldest) and of its tick. `out` has channel_size numbers. No allocation.
+  void write(const PolicyChannel& channel, const Observation& observation, int frame, std::span<float> out);
+
+ private:
+  void write_plain(PolicyChannelKind kind, const Observation& observation, int frame, std::span<float> out);
+  void write_of_frame(PolicyChannelKind kind, const ObservationFrame& frame, const Pose& X_FW, std::span<float> out);
+  void write_of_joints(PolicyChannelKind kind, const RobotState& robot, std::span<float> out) const;
+
+  std::shared_ptr<const RobotModel> robot_;
+  std::vector<int> joints_;
+  PolicyFrame frame_;
+  Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
+  Task task_ = Task::kHug;
+  std::vector<float> language_;
+  Random noise_{0, 0};
+};
+
+// Whether every number that a channel could show is finite.
+bool is_finite(const Observation& observation);
+
+}  // namespace duet

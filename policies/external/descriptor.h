@@ -1,0 +1,106 @@
+// A policy descriptor (schema duet.policy/1): a policy that is not compiled into duet, as data. A network with what it
+// is shown and what its output means, or a program that answers messages. Format: docs/adding-a-policy.md. Joints are
+// named, not yet bound to a robot.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+inline constexpr int kPlanNumbersBeforeJoints = 7;  // of an anchor: root position (3), quaternion wxyz (4)
+
+enum class PolicyKind { kOnnx, kProcess };
+
+// What positions and orientations of an observation refer to.
+enum class PolicyFrame {
+  kWorld,  // W; the robot's root since the episode's start: to_vector (policies/policy.h)
+  kEgo,    // E: on the ground below the robot's root as it is now, x along its heading; joints of the partner from its
+           // root (policies/dstar/features.h)
+};
+
+// What the root of an anchor refers to.
+enum class PlanFrame {
+  kWorld,
+  kEgo,           // E of the observation's last frame
+  kDisplacement,  // position from the robot's root now, axes and orientation of W
+};
+
+enum class PolicyChannelKind {
+  kPartnerRoot,          // 3 [m]
+  kPartnerJoints,        // 72: SMPL-24 joints [m]
+  kBaseLinearVelocity,   // 3: in the axes of the base [m/s]
+  kBaseAngularVelocity,  // 3: in the axes of the base [rad/s]
+  kGravity,              // 3: its direction in the axes of the base
+  kJointPositions,       // [rad]
+  kJointOffsets,         // joint_positions from the card's neutral pose [rad]
+  kJointVelocities,      // [rad/s]
+  kRootOffset,           // 3 [m]
+  kRootOrientation,      // 4: quaternion wxyz, w >= 0
+  kLanguage,             // 768: the prompt's embedding
+  kTask,                 // 6: 1 for the episode's task, else 0
+  kTime,                 // 1: since the episode's start [s]
+  kNoise,                // `size` standard normal numbers, drawn anew at each call
+};
+
+struct PolicyChannel {
+  PolicyChannelKind kind = PolicyChannelKind::kPartnerRoot;
+  int line = 0;  // in the descriptor's file
+  int size = 0;  // of kNoise; others know their own
+  // Shown is (value - offset) * scale; one number for all or one each.
+  std::vector<double> offset = {0.0}, scale = {1.0};
+};
+
+struct PolicyInput {
+  std::string name;  // of the network's input; "" for its only one
+  int line = 0;
+  int frames = 1;  // of the history, the current one last
+  bool newest_first = false;
+  std::vector<PolicyChannel> channels;
+};
+
+struct PlanFormat {
+  int line = 0;
+  std::string name;  // of the network's output; "" for its only one
+  int anchors = 5;
+  int ticks_per_anchor = 25;  // at 50 Hz; the first anchor is now
+  PlanFrame frame = PlanFrame::kWorld;
+  bool joints_from_neutral = false;
+  // Meant is number * scale + offset; one number for all or one for each of an anchor's.
+  std::vector<double> scale = {1.0}, offset = {0.0};
+};
+
+struct PolicyDescriptor {
+  std::string file;  // where it was read, for messages
+  std::string name, about;
+  PolicyKind kind = PolicyKind::kOnnx;
+  std::vector<std::string> joints;  // order of every joint vector; empty: the robot's
+  int joints_line = 0;
+  PolicyFrame frame = PolicyFrame::kWorld;
+  PlanFormat output;
+  // kOnnx
+  std::string network;  // path, from the descriptor's folder
+  std::vector<PolicyInput> inputs;
+  // kProcess
+  std::vector<std::string> command;  // program and arguments, run in the descriptor's folder; or else
+  std::string socket;                // where a server listens: a path, from the descriptor's folder, or host:port
+  int deadline_ms = 200;             // for a plan
+  int start_ms = 10000;              // for the first answer and for that to a reset
+
+  [[nodiscard]] std::string folder() const;  // the descriptor's; never empty
+};
+
+std::string_view to_string(PolicyChannelKind kind);
+std::string_view to_string(PolicyFrame frame);
+std::string_view to_string(PlanFrame frame);
+// Numbers that a channel shows of a robot with `joints` joints.
+int channel_size(const PolicyChannel& channel, int joints);
+// Whether it differs between the frames of a history.
+bool is_of_a_frame(PolicyChannelKind kind);
+
+// Throws InputError("FILE:LINE: ...") as YamlSection does.
+PolicyDescriptor parse_policy_descriptor(const std::string& text, const std::string& file);
+PolicyDescriptor read_policy_descriptor(const std::string& path);
+
+}  // namespace duet

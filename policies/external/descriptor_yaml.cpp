@@ -1,0 +1,226 @@
+// The reader of policy descriptors. Every error names file, line, expected and found.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/names.h"
+#include "policies/external/descriptor.h"
+#include "policies/policy.h"
+#include "robots/yaml_section.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kSchema = "duet.policy/1";
+constexpr double kTickSeconds = 0.02;
+constexpr int kMostAnchors = 1000, kMostTicks = 500;
+constexpr int kMostNoise = 1000000;
+constexpr int kMostMilliseconds = 600000;
+
+std::vector<std::string> all_channels() {
+  std::vector<std::string> names;
+  for (int kind = 0; kind <= static_cast<int>(PolicyChannelKind::kNoise); ++kind)
+    names.emplace_back(to_string(static_cast<PolicyChannelKind>(kind)));
+  return names;
+}
+
+std::string text_or(const YamlSection& section, const char* key, const std::string& fallback) {
+  return section.has(key) ? section.text(key) : fallback;
+}
+
+// The place of the key's word in `known`; of `fallback` where the key is absent.
+int choice(const YamlSection& section, const char* key, const std::string& fallback,
+           const std::vector<std::string>& known) {
+  const std::string word = text_or(section, key, fallback);
+  const auto it = std::ranges::find(known, word);
+  if (it == known.end()) section.fail(section.line(key), unknown_name_message(key, word, known));
+  return static_cast<int>(it - known.begin());
+}
+
+int whole_or(const YamlSection& section, const char* key, int fallback, int least, int most) {
+  const double value = section.optional_number(key).value_or(fallback);
+  if (value != std::floor(value) || value < least || value > most)
+    section.fail(section.line(key),
+                 fmt::format("'{}': expected a whole number in [{}, {}], found {}", key, least, most, value));
+  return static_cast<int>(value);
+}
+
+std::vector<std::string> texts(const YamlSection& section, const char* key) {
+  std::vector<std::string> values;
+  for (const YAML::Node& item : section.items(key)) {
+    if (!item.IsScalar() || item.Scalar().empty())
+      section.fail(section.line(key), fmt::format("'{}': expected texts, found {}", key, describe(item)));
+    values.push_back(item.Scalar());
+  }
+  return values;
+}
+
+// A number or a list of them, without a NaN.
+std::vector<double> numbers_or(const YamlSection& section, const char* key, double fallback) {
+  if (!section.has(key)) return {fallback};
+  if (section.node(key).IsScalar()) return {section.number(key)};
+  std::vector<double> values;
+  for (const YAML::Node& item : section.items(key)) {
+    double value = 0.0;
+    if (!item.IsScalar() || !YAML::convert<double>::decode(item, value) || !std::isfinite(value))
+      section.fail(section.line(key), fmt::format("'{}': expected finite numbers, found {}", key, describe(item)));
+    values.push_back(value);
+  }
+  if (values.empty()) section.fail(section.line(key), fmt::format("'{}': expected numbers, found none", key));
+  return values;
+}
+
+// Reads one descriptor; its members are the state that the steps share.
+class Reader {
+ public:
+  Reader(const std::string& text, const std::string& file)
+      : root_(file, parse_yaml(text, file), "policy descriptor",
+              {"schema", "name", "about", "kind", "joints", "frame_of_reference", "output", "network", "inputs",
+               "command", "socket", "deadline_ms", "start_ms"}) {
+    out_.file = file;
+  }
+
+  PolicyDescriptor read() {
+    if (root_.text("schema") != kSchema)
+      root_.fail(root_.line("schema"),
+                 fmt::format("'schema': expected '{}', found '{}'", kSchema, root_.text("schema")));
+    out_.name = root_.text("name");
+    out_.about = root_.text("about");
+    out_.kind = static_cast<PolicyKind>(choice(root_, "kind", root_.text("kind"), {"onnx", "process"}));
+    out_.frame = static_cast<PolicyFrame>(choice(root_, "frame_of_reference", "world", {"world", "ego"}));
+    read_joints();
+    read_output();
+    if (out_.kind == PolicyKind::kOnnx)
+      read_network();
+    else
+      read_process();
+    return std::move(out_);
+  }
+
+ private:
+  void read_joints() {
+    out_.joints = texts(root_, "joints");
+    out_.joints_line = root_.line("joints");
+    for (auto it = out_.joints.begin(); it != out_.joints.end(); ++it)
+      if (std::find(out_.joints.begin(), it, *it) != it)
+        root_.fail(out_.joints_line, fmt::format("'joints': expected each joint once, found '{}' again", *it));
+  }
+
+  void read_output() {
+    PlanFormat& output = out_.output;
+    output.line = root_.line("output");
+    if (!root_.has("output")) return;
+    const YamlSection s(out_.file, root_.node("output"), "output",
+                        {"name", "anchors", "spacing", "frame", "joints_from", "scale", "offset"});
+    output.name = text_or(s, "name", "");
+    output.anchors = whole_or(s, "anchors", output.anchors, 1, kMostAnchors);
+    output.ticks_per_anchor = read_spacing(s);
+    output.frame = static_cast<PlanFrame>(choice(s, "frame", "world", {"world", "ego", "displacement"}));
+    output.joints_from_neutral = choice(s, "joints_from", "zero", {"zero", "neutral"}) == 1;
+    output.scale = numbers_or(s, "scale", 1.0);
+    output.offset = numbers_or(s, "offset", 0.0);
+  }
+
+  static int read_spacing(const YamlSection& s) {
+    const double spacing = s.optional_number("spacing").value_or(kAnchorSpacing);
+    const double ticks = std::round(spacing / kTickSeconds);
+    if (std::abs(ticks * kTickSeconds - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
+      s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}",
+                                            kTickSeconds, kTickSeconds, kMostTicks * kTickSeconds, spacing));
+    return static_cast<int>(ticks);
+  }
+
+  void refuse_keys(std::initializer_list<const char*> keys, const char* kind) const {
+    for (const char* key : keys)
+      if (root_.has(key))
+        root_.fail(root_.line(key), fmt::format("expected no key '{}' where 'kind' is '{}', found one", key, kind));
+  }
+
+  void read_network() {
+    refuse_keys({"command", "socket", "deadline_ms", "start_ms"}, "onnx");
+    out_.network = root_.text("network");
+    if (out_.joints.empty())
+      root_.fail(out_.joints_line, "'joints': expected the joints in the network's order, found none");
+    for (const YAML::Node& node : root_.items("inputs")) out_.inputs.push_back(read_input(node));
+    if (out_.inputs.empty()) root_.fail(root_.line("inputs"), "'inputs': expected at least one, found none");
+  }
+
+  [[nodiscard]] PolicyInput read_input(const YAML::Node& node) const {
+    const YamlSection s(out_.file, node, "input", {"name", "frames", "order", "channels"});
+    PolicyInput input{.name = text_or(s, "name", ""), .line = s.line(), .channels = {}};
+    input.frames = whole_or(s, "frames", 1, 1, kHistoryFrames);
+    input.newest_first = choice(s, "order", "oldest_first", {"oldest_first", "newest_first"}) == 1;
+    for (const YAML::Node& channel : s.items("channels")) input.channels.push_back(read_channel(s, channel));
+    if (input.channels.empty()) s.fail(s.line("channels"), "'channels': expected at least one, found none");
+    for (const PolicyChannel& channel : input.channels)
+      if (input.frames > 1 && !is_of_a_frame(channel.kind))
+        s.fail(channel.line, fmt::format("channel '{}': expected in an input of 1 frame, found in one of {}",
+                                         to_string(channel.kind), input.frames));
+    return input;
+  }
+
+  // A name, or a mapping with the key `channel` and what is said of it.
+  [[nodiscard]] PolicyChannel read_channel(const YamlSection& input, const YAML::Node& node) const {
+    PolicyChannel channel{.line = std::max(node.Mark().line, 0) + 1};
+    if (node.IsScalar()) {
+      channel.kind = kind_of(input, channel.line, node.Scalar());
+      refuse_noise_without_size(input, channel);
+      return channel;
+    }
+    const YamlSection s(out_.file, node, "channel", {"channel", "size", "offset", "scale"});
+    channel.kind = kind_of(s, s.line("channel"), s.text("channel"));
+    if (s.has("size") && channel.kind != PolicyChannelKind::kNoise)
+      s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", to_string(channel.kind)));
+    if (s.has("size")) channel.size = whole_or(s, "size", 0, 1, kMostNoise);
+    refuse_noise_without_size(s, channel);
+    channel.offset = numbers_for(s, "offset", 0.0, channel);
+    channel.scale = numbers_for(s, "scale", 1.0, channel);
+    return channel;
+  }
+
+  static PolicyChannelKind kind_of(const YamlSection& s, int line, const std::string& name) {
+    const std::vector<std::string> known = all_channels();
+    const auto it = std::ranges::find(known, name);
+    if (it == known.end()) s.fail(line, unknown_name_message("channel", name, known));
+    return static_cast<PolicyChannelKind>(it - known.begin());
+  }
+
+  static void refuse_noise_without_size(const YamlSection& s, const PolicyChannel& channel) {
+    if (channel.kind == PolicyChannelKind::kNoise && channel.size == 0)
+      s.fail(channel.line, "channel 'noise': expected {channel: noise, size: NUMBER}, found no size");
+  }
+
+  [[nodiscard]] std::vector<double> numbers_for(const YamlSection& s, const char* key, double fallback,
+                                                const PolicyChannel& channel) const {
+    std::vector<double> values = numbers_or(s, key, fallback);
+    const int size = channel_size(channel, static_cast<int>(out_.joints.size()));
+    if (values.size() != 1 && static_cast<int>(values.size()) != size)
+      s.fail(s.line(key), fmt::format("'{}': expected 1 or {} numbers, found {}", key, size, values.size()));
+    return values;
+  }
+
+  void read_process() {
+    refuse_keys({"network", "inputs"}, "process");
+    if (!out_.output.name.empty())
+      root_.fail(out_.output.line, "output: expected no key 'name' where 'kind' is 'process', found one");
+    out_.command = texts(root_, "command");
+    out_.socket = text_or(root_, "socket", "");
+    if (out_.command.empty() == out_.socket.empty())
+      root_.fail(root_.line("command"), fmt::format("expected one of 'command' and 'socket', found {}",
+                                                    out_.socket.empty() ? "none" : "both"));
+    out_.deadline_ms = whole_or(root_, "deadline_ms", out_.deadline_ms, 1, kMostMilliseconds);
+    out_.start_ms = whole_or(root_, "start_ms", out_.start_ms, 1, kMostMilliseconds);
+  }
+
+  YamlSection root_;
+  PolicyDescriptor out_;
+};
+
+}  // namespace
+
+PolicyDescriptor parse_policy_descriptor(const std::string& text, const std::string& file) {
+  return Reader(text, file).read();
+}
+
+}  // namespace duet

@@ -1,0 +1,90 @@
+#include "policies/external/external_policy.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
+
+#include "core/require.h"
+#include "core/share.h"
+#include "policies/external/channel_values.h"
+#include "policies/external/child_process.h"
+#include "policies/external/descriptor.h"
+#include "policies/external/onnx_policy.h"
+#include "policies/external/plan_decoder.h"
+#include "policies/external/process_policy.h"
+
+namespace duet {
+namespace {
+
+constexpr int kMostMilliseconds = 600000;
+
+std::string option(const PolicyOptions& options, const char* name, const std::string& fallback) {
+  const auto it = options.find(name);
+  return it == options.end() ? fallback : it->second;
+}
+
+int milliseconds(const PolicyDescriptor& descriptor, const PolicyOptions& options, const char* name, int fallback) {
+  const auto it = options.find(name);
+  if (it == options.end()) return fallback;
+  int value = 0;
+  const char* end = it->second.data() + it->second.size();
+  const auto [rest, error] = std::from_chars(it->second.data(), end, value);
+  require(error == std::errc() && rest == end && value >= 1 && value <= kMostMilliseconds,
+          fmt::format("policy '{}': {}: expected a whole number in [1, {}], found '{}'", descriptor.name, name,
+                      kMostMilliseconds, it->second));
+  return value;
+}
+
+std::shared_ptr<const LanguageEncoder> language_of(const PolicyDescriptor& descriptor, const PolicyOptions& options) {
+  if (!shows_language(descriptor)) return nullptr;
+  const std::string table = option(options, "language", "");
+  return table.empty() ? built_in_language() : load_language_table(table);
+}
+
+PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
+                       const PolicyOptions& options) {
+  const std::string beside = (std::filesystem::path(descriptor.folder()) / descriptor.network).string();
+  const std::string path =
+      first_existing(fmt::format("network of the policy '{}'", descriptor.name), {option(options, "network", beside)});
+  const std::string engine = option(options, "engine", "duet");
+  const auto make = [=, language = language_of(descriptor, options)] {
+    return make_onnx_policy(descriptor, robot, load_network(path, engine), path, language);
+  };
+  static_cast<void>(make());  // what cannot be made is refused now, not in every episode
+  return make;
+}
+
+PolicyMaker process_maker(PolicyDescriptor descriptor, const std::shared_ptr<const RobotModel>& robot,
+                          const PolicyOptions& options) {
+  descriptor.deadline_ms = milliseconds(descriptor, options, "deadline_ms", descriptor.deadline_ms);
+  descriptor.start_ms = milliseconds(descriptor, options, "start_ms", descriptor.start_ms);
+  static_cast<void>(PlanDecoder(descriptor, robot, bind_joints(descriptor, *robot)));
+  if (!descriptor.command.empty()) static_cast<void>(find_program(descriptor.command[0], descriptor.folder()));
+  return [=] { return make_process_policy(descriptor, robot); };
+}
+
+}  // namespace
+
+PolicyInfo external_info(const std::string& name) {
+  const PolicyDescriptor descriptor = read_policy_descriptor(name);
+  PolicyInfo info{.name = descriptor.name, .about = descriptor.about, .options = {}};
+  if (descriptor.kind == PolicyKind::kOnnx)
+    info.options = {{"network", descriptor.network, "path of the network's file"},
+                    {"engine", "duet", "what evaluates the network"},
+                    {"language", "", "NPZ table of prompts and embeddings instead of the built-in encoder"}};
+  else
+    info.options = {{"deadline_ms", std::to_string(descriptor.deadline_ms), "for a plan; later it is left out"},
+                    {"start_ms", std::to_string(descriptor.start_ms), "for the answers to hello and reset"}};
+  return info;
+}
+
+PolicyMaker external_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                           const PolicyOptions& options) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  const PolicyDescriptor descriptor = read_policy_descriptor(name);
+  return descriptor.kind == PolicyKind::kOnnx ? onnx_maker(descriptor, robot, options)
+                                              : process_maker(descriptor, robot, options);
+}
+
+}  // namespace duet

@@ -1,0 +1,20 @@
+// Policies that are not compiled into duet: those of a policy descriptor, by its path.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "policies/policy.h"
+
+namespace duet {
+
+// `name`: the path of a descriptor. Options of a network: `network`, `engine`, `language`; of a process: `deadline_ms`,
+// `start_ms`. Both throw InputError for a descriptor that is broken.
+PolicyInfo external_info(const std::string& name);
+// Throws InputError too for joints that are not the robot's and a network of other inputs or outputs,
+// std::invalid_argument for an option's value, MissingError where the network or the program is not there. Each policy
+// that it makes has its own network or process.
+PolicyMaker external_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                           const PolicyOptions& options);
+
+}  // namespace duet

@@ -1,0 +1,219 @@
+#include "policies/external/message.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "core/names.h"
+#include "core/require.h"
+#include "policies/external/channel_values.h"
+
+namespace duet {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kLengthBytes = 4;
+constexpr std::size_t kExcerpt = 40;  // of a message that is not JSON, in ours
+
+[[noreturn]] void refuse(const std::string& message) { throw InputError("message of the policy: " + message); }
+
+std::string excerpt(std::string_view text) {
+  std::string shown;
+  for (const char c : text.substr(0, kExcerpt)) shown += c >= ' ' && c <= '~' ? c : '?';
+  return text.size() > kExcerpt ? shown + "..." : shown;
+}
+
+Json parse_json(std::string_view text) {
+  Json json = Json::parse(text, nullptr, false);
+  if (!json.is_discarded()) return json;
+  for (const char* word : {"NaN", "Infinity"})
+    if (text.find(word) != std::string_view::npos) refuse(fmt::format("expected finite numbers, found {}", word));
+  refuse(fmt::format("expected JSON, found '{}'", excerpt(text)));
+}
+
+const Json& member(const Json& json, const char* key) {
+  const auto it = json.find(key);
+  if (it == json.end()) refuse(fmt::format("expected the key '{}', found none", key));
+  return *it;
+}
+
+int whole_number(const Json& json, const char* key) {
+  const Json& value = member(json, key);
+  if (!value.is_number_integer() || value < 0 || value > 1000000000)
+    refuse(fmt::format("'{}': expected a whole number, found {}", key, excerpt(value.dump())));
+  return value.get<int>();
+}
+
+void refuse_other_keys(const Json& json, const std::vector<std::string>& known) {
+  for (const auto& [key, value] : json.items())
+    if (std::ranges::find(known, key) == known.end()) refuse(unknown_name_message("key", excerpt(key), known));
+}
+
+PolicyMessage parse_hello(const Json& json) {
+  refuse_other_keys(json, {"type", "version", "joints"});
+  PolicyMessage message;
+  message.type = PolicyMessage::Type::kHello;
+  message.version = whole_number(json, "version");
+  if (!json.contains("joints")) return message;
+  const Json& joints = json["joints"];
+  if (!joints.is_array() || !std::ranges::all_of(joints, [](const Json& name) { return name.is_string(); }))
+    refuse(fmt::format("'joints': expected a list of names, found {}", joints.type_name()));
+  message.joints = joints.get<std::vector<std::string>>();
+  return message;
+}
+
+void append_anchor(const Json& anchor, PolicyMessage& message) {
+  if (!anchor.is_array()) refuse(fmt::format("'anchors': expected lists of numbers, found {}", anchor.type_name()));
+  for (const Json& number : anchor) {
+    if (!number.is_number())
+      refuse(fmt::format("'anchors': anchor {}: expected numbers, found {}", message.anchors, number.type_name()));
+    message.numbers.push_back(static_cast<float>(number.get<double>()));
+  }
+  ++message.anchors;
+  if (message.numbers.size() != anchor.size() * static_cast<std::size_t>(message.anchors))
+    refuse(fmt::format("'anchors': anchor {}: expected as many numbers as before, found {}", message.anchors - 1,
+                       anchor.size()));
+}
+
+PolicyMessage parse_plan(const Json& json) {
+  refuse_other_keys(json, {"type", "tick", "anchors"});
+  PolicyMessage message;
+  message.type = PolicyMessage::Type::kPlan;
+  message.tick = whole_number(json, "tick");
+  const Json& anchors = member(json, "anchors");
+  if (!anchors.is_array()) refuse(fmt::format("'anchors': expected a list of anchors, found {}", anchors.type_name()));
+  for (const Json& anchor : anchors) append_anchor(anchor, message);
+  return message;
+}
+
+std::vector<std::string> task_names() {
+  std::vector<std::string> names;
+  for (const Task task : kTasks) names.emplace_back(to_string(task));
+  return names;
+}
+
+Json channels_json(int joints) {
+  Json channels = Json::array();
+  int first = 0;
+  for (const PolicyChannel& channel : frame_channels()) {
+    const int size = channel_size(channel, joints);
+    channels.push_back({{"name", to_string(channel.kind)}, {"first", first}, {"size", size}});
+    first += size;
+  }
+  return channels;
+}
+
+std::vector<double> joint_values(const RobotModel& robot, const std::vector<std::string>& joints,
+                                 const Eigen::VectorXd& values) {
+  std::vector<double> picked;
+  picked.reserve(joints.size());
+  for (const std::string& name : joints) picked.push_back(values[robot.joint_index(name)]);
+  return picked;
+}
+
+}  // namespace
+
+PolicyMessage parse_policy_message(std::string_view text) {
+  const Json json = parse_json(text);
+  if (!json.is_object()) refuse(fmt::format("expected an object, found {}", json.type_name()));
+  const Json& type = member(json, "type");
+  if (!type.is_string()) refuse(fmt::format("'type': expected a name, found {}", type.type_name()));
+  const std::string name = type.get<std::string>();
+  if (name == "hello") return parse_hello(json);
+  if (name == "plan") return parse_plan(json);
+  const std::vector<std::string> known = {"hello", "ready", "plan"};
+  if (name != "ready") refuse(unknown_name_message("type", excerpt(name), known));
+  refuse_other_keys(json, {"type"});
+  return {};
+}
+
+std::string_view to_string(PolicyMessage::Type type) {
+  switch (type) {
+    case PolicyMessage::Type::kHello:
+      return "hello";
+    case PolicyMessage::Type::kReady:
+      return "ready";
+    case PolicyMessage::Type::kPlan:
+      return "plan";
+  }
+  return "";
+}
+
+std::string hello_message(const PolicyDescriptor& descriptor, const RobotModel& robot,
+                          const std::vector<std::string>& joints) {
+  const PlanFormat& output = descriptor.output;
+  const Json json = {{"type", "hello"},
+                     {"version", kPolicyMessageVersion},
+                     {"policy", descriptor.name},
+                     {"robot", robot.name},
+                     {"joints", joints},
+                     {"neutral", joint_values(robot, joints, robot.neutral)},
+                     {"lower", joint_values(robot, joints, robot.lower())},
+                     {"upper", joint_values(robot, joints, robot.upper())},
+                     {"rate_hz", 50},
+                     {"ticks_per_plan", kTicksPerPlan},
+                     {"frames", kHistoryFrames},
+                     {"frame_of_reference", to_string(descriptor.frame)},
+                     {"channels", channels_json(static_cast<int>(joints.size()))},
+                     {"tasks", task_names()},
+                     {"anchors", output.anchors},
+                     {"ticks_per_anchor", output.ticks_per_anchor},
+                     {"anchor_size", kPlanNumbersBeforeJoints + static_cast<int>(joints.size())},
+                     {"anchor_frame", to_string(output.frame)},
+                     {"deadline_ms", descriptor.deadline_ms}};
+  return json.dump();
+}
+
+std::string reset_message(const EpisodeContext& context) {
+  const Pose& start = context.start.X_WB;
+  const Json json = {
+      {"type", "reset"},
+      {"task", to_string(context.task)},
+      {"prompt", context.prompt},
+      {"seed", context.seed},
+      {"start", {start.p.x(), start.p.y(), start.p.z(), start.R.w(), start.R.x(), start.R.y(), start.R.z()}}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);  // a prompt need not be UTF-8
+}
+
+// Written by hand: the shortest decimals of a float are half as long as those of the same double.
+std::string observe_message(int tick, const std::vector<float>& numbers, int frames) {
+  const std::size_t size = numbers.size() / static_cast<std::size_t>(frames);
+  fmt::memory_buffer text;
+  fmt::format_to(std::back_inserter(text), R"({{"type":"observe","tick":{},"frames":[)", tick);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(frames); ++i) {
+    const auto row = std::span(numbers).subspan(i * size, size);
+    fmt::format_to(std::back_inserter(text), "{}[{}]", i == 0 ? "" : ",", fmt::join(row, ","));
+  }
+  fmt::format_to(std::back_inserter(text), "]}}");
+  return fmt::to_string(text);
+}
+
+std::string bye_message() { return R"({"type":"bye"})"; }
+
+std::string framed(std::string_view message) {
+  std::string bytes;
+  bytes.reserve(kLengthBytes + message.size());
+  for (std::size_t i = 0; i < kLengthBytes; ++i)
+    bytes += static_cast<char>(static_cast<unsigned char>(message.size() >> (8 * i)));
+  return bytes.append(message);
+}
+
+std::optional<std::string> MessageBuffer::next() {
+  if (bytes_.size() < kLengthBytes) return std::nullopt;
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < kLengthBytes; ++i)
+    length |= static_cast<std::size_t>(static_cast<unsigned char>(bytes_[i])) << (8 * i);
+  if (length > kLargestPolicyMessage)
+    refuse(fmt::format("expected at most {} bytes, found a length of {}", kLargestPolicyMessage, length));
+  if (bytes_.size() < kLengthBytes + length) return std::nullopt;
+  std::string message = bytes_.substr(kLengthBytes, length);
+  bytes_.erase(0, kLengthBytes + length);
+  return message;
+}
+
+}  // namespace duet

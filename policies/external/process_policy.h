@@ -1,0 +1,17 @@
+// A policy in a process of its own, started here or already running: observation -> message -> plan. A process that is
+// late, answers nonsense or dies costs a plan and is counted (Policy::faults); it never stops duet.
+#pragma once
+
+#include <memory>
+
+#include "policies/external/descriptor.h"
+#include "policies/policy.h"
+
+namespace duet {
+
+// Starts or connects and says hello; where the answer fails the policy is dead, with the reason. Throws InputError for
+// joints that are not the robot's, MissingError where the program is not there.
+std::unique_ptr<Policy> make_process_policy(const PolicyDescriptor& descriptor,
+                                            std::shared_ptr<const RobotModel> robot);
+
+}  // namespace duet

@@ -1,0 +1,90 @@
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/require.h"
+#include "policies/external/message.h"
+#include "tests/policies/external_fixtures.h"
+
+namespace duet {
+namespace {
+
+using nlohmann::json;
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+std::string refusal(const std::string& text) {
+  return thrown_message<InputError>([&] { parse_policy_message(text); });
+}
+
+TEST(PolicyMessage, IsReadAsItWasMeant) {
+  EXPECT_EQ(parse_policy_message(R"({"type":"ready"})").type, PolicyMessage::Type::kReady);
+  const PolicyMessage hello = parse_policy_message(R"({"type":"hello","version":1,"joints":["a","b"]})");
+  EXPECT_EQ(hello.type, PolicyMessage::Type::kHello);
+  EXPECT_EQ(hello.version, 1);
+  EXPECT_EQ(hello.joints, (std::vector<std::string>{"a", "b"}));
+  const PolicyMessage plan = parse_policy_message(R"({"type":"plan","tick":30,"anchors":[[1,2.5],[3,4]]})");
+  EXPECT_EQ(plan.type, PolicyMessage::Type::kPlan);
+  EXPECT_EQ(plan.tick, 30);
+  EXPECT_EQ(plan.anchors, 2);
+  EXPECT_EQ(plan.numbers, (std::vector<float>{1.0F, 2.5F, 3.0F, 4.0F}));
+}
+
+TEST(PolicyMessage, RefusesWhatIsNone) {
+  EXPECT_THAT(refusal("[1]"), HasSubstr("expected an object, found array"));
+  EXPECT_THAT(refusal("{}"), HasSubstr("expected the key 'type', found none"));
+  EXPECT_THAT(refusal(R"({"type":1})"), HasSubstr("'type': expected a name, found number"));
+  EXPECT_THAT(refusal(R"({"type":"plam"})"), HasSubstr("unknown type 'plam': did you mean 'plan'?"));
+  EXPECT_THAT(refusal(R"({"type":"ready","now":1})"), HasSubstr("unknown key 'now'"));
+  EXPECT_THAT(refusal(R"({"type":"hello"})"), HasSubstr("expected the key 'version', found none"));
+  EXPECT_THAT(refusal(R"({"type":"hello","version":"1"})"), HasSubstr("'version': expected a whole number, found"));
+  EXPECT_THAT(refusal(R"({"type":"hello","version":-1})"), HasSubstr("expected a whole number, found -1"));
+  EXPECT_THAT(refusal(R"({"type":"hello","version":1,"joints":[1]})"), HasSubstr("expected a list of names"));
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":1})"),
+              HasSubstr("expected a list of anchors, found number"));
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":[1]})"), HasSubstr("expected lists of numbers"));
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":[[null]]})"), HasSubstr("expected numbers, found null"));
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1e3,"anchors":[]})"), HasSubstr("'tick': expected a whole number"));
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":[[-Infinity]]})"), HasSubstr("found Infinity"));
+}
+
+TEST(PolicyMessage, BuffersCutAStreamAtAnyPlace) {
+  const std::vector<std::string> messages = {"first", "", std::string(70000, 'x'), "last"};
+  std::string stream;
+  for (const std::string& message : messages) stream += framed(message);
+  for (const std::size_t step : {std::size_t{1}, std::size_t{3}, std::size_t{4096}, stream.size()}) {
+    MessageBuffer buffer;
+    std::vector<std::string> found;
+    for (std::size_t at = 0; at < stream.size(); at += step) {
+      buffer.append(std::string_view(stream).substr(at, step));
+      while (std::optional<std::string> message = buffer.next()) found.push_back(std::move(*message));
+    }
+    EXPECT_EQ(found, messages) << step;
+  }
+}
+
+TEST(PolicyMessage, BuffersRefuseALengthThatIsNone) {
+  MessageBuffer buffer;
+  buffer.append(std::string_view("\x01\x00\x40\x00", 4));
+  EXPECT_THAT(thrown_message<InputError>([&] { buffer.next(); }),
+              HasSubstr("expected at most 4194304 bytes, found a length of 4194305"));
+}
+
+TEST(PolicyMessage, DuetSpeaksJson) {
+  const json observe = json::parse(observe_message(20, {1.0F, 0.1F, -2e-8F, 3.0F}, 2));
+  EXPECT_EQ(observe["tick"], 20);
+  ASSERT_EQ(observe["frames"].size(), 2U);
+  EXPECT_EQ(observe["frames"][0][1].get<float>(), 0.1F);
+  EXPECT_EQ(observe["frames"][1][0].get<float>(), -2e-8F);
+  EpisodeContext context = test::episode(test::g1()->standing_state());
+  context.prompt = "say \"hello\" \xff";  // not UTF-8
+  EXPECT_THAT(json::parse(reset_message(context))["prompt"].get<std::string>(), HasSubstr("say \"hello\""));
+  EXPECT_EQ(json::parse(bye_message())["type"], "bye");
+  const json hello = json::parse(hello_message({}, *test::g1(), test::g1()->joint_names()));
+  const json last = hello["channels"].back();
+  EXPECT_EQ(last["name"], "root_orientation");
+  EXPECT_EQ(last["first"].get<int>() + last["size"].get<int>(), kObservationSize);
+}
+
+}  // namespace
+}  // namespace duet
