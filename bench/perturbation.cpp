@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "bench/suite_names.h"
+#include "bench/yaml_range.h"
 #include "core/names.h"
 #include "core/require.h"
 
@@ -17,20 +18,6 @@ namespace {
 constexpr double kDefaultFriction = 0.4;
 constexpr int kDefaultDelay = 2;
 constexpr double kDefaultLatency = 20.0;  // [ms]
-
-struct Range {
-  double low, high;
-  bool with_low;  // whether `low` itself is allowed
-};
-
-double in_range(const YamlSection& section, const char* key, double fallback, const Range& range) {
-  const double value = section.optional_number(key).value_or(fallback);
-  if (value > range.high || value < range.low || (value == range.low && !range.with_low))
-    section.fail(section.has(key) ? section.line(key) : section.line(),
-                 fmt::format("{}: expected a number {} {:g}, at most {:g}, found {:g}", key,
-                             range.with_low ? "from" : "above", range.low, range.high, value));
-  return value;
-}
 
 int whole_ticks(const YamlSection& section) {
   const double value = in_range(section, "ticks", kDefaultDelay, {1.0, 50.0, true});
@@ -78,6 +65,8 @@ Perturbation read_kinds(const YamlSection& top, const std::string& file) {
   if (top.has("push")) perturbation.push = read_push(below("push", {"force", "duration", "every", "link"}));
   if (top.has("friction")) perturbation.friction = in_range(top, "friction", kDefaultFriction, {0.0, 10.0, true});
   if (top.has("mass")) perturbation.mass = read_mass(below("mass", {"link", "add"}));
+  perturbation.perception = read_perception(top, file);
+  if (top.has("partner")) perturbation.partner = read_partner_variation(top, file);
   return perturbation;
 }
 
@@ -104,7 +93,9 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
       suite.fail(line, fmt::format("perturbations: {}", error.what()));
     }
   }
-  const YamlSection item(file, node, "perturbation", {"name", "delay", "latency", "noise", "push", "friction", "mass"});
+  const YamlSection item(file, node, "perturbation",
+                         {"name", "delay", "latency", "noise", "push", "friction", "mass", "jitter", "dropout",
+                          "perception_latency", "vanish", "freeze", "jump", "partner"});
   const std::vector<std::string> kinds = kinds_of(item);
   if (kinds.empty())
     item.fail(line, fmt::format("expected at least one of {}, found none", fmt::join(perturbation_kinds(), ", ")));
@@ -119,7 +110,12 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
 }  // namespace
 
 const std::vector<std::string>& perturbation_kinds() {
-  static const std::vector<std::string> kinds = {"delay", "latency", "noise", "push", "friction", "mass"};
+  static const std::vector<std::string> kinds = [] {
+    std::vector<std::string> all = {"delay", "latency", "noise", "push", "friction", "mass"};
+    all.insert(all.end(), perception_kinds().begin(), perception_kinds().end());
+    all.emplace_back("partner");
+    return all;
+  }();
   return kinds;
 }
 
@@ -161,6 +157,8 @@ std::string to_yaml(const Perturbation& perturbation) {
   if (perturbation.friction) parts.push_back(fmt::format("friction: {}", *perturbation.friction));
   if (const auto& mass = perturbation.mass)
     parts.push_back(fmt::format("mass: {{link: {}, add: {}}}", mass->link, mass->add));
+  for (std::string& part : yaml_parts(perturbation.perception)) parts.push_back(std::move(part));
+  if (perturbation.partner) parts.push_back(to_yaml(*perturbation.partner));
   return parts.size() == 1 ? perturbation.name : fmt::format("{{{}}}", fmt::join(parts, ", "));
 }
 

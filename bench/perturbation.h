@@ -1,5 +1,6 @@
 // What disturbs an episode beside the clean arm: the controller's view of the state, its way to the joints, pushes, the
-// ground, the robot's mass. A named value of a suite; strict YAML (docs/file-formats.md, "Perturbations").
+// ground, the robot's mass, the policy's view of the partner, the partner itself. A named value of a suite; strict YAML
+// (docs/file-formats.md, "Perturbations").
 #pragma once
 
 #include <memory>
@@ -7,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/partner_variation.h"
+#include "bench/perception.h"
 #include "robots/robot_model.h"
 #include "robots/yaml_section.h"
 
@@ -44,9 +47,12 @@ struct Perturbation {
   std::optional<PushPlan> push;
   std::optional<double> friction;  // of the robot and the ground
   std::optional<AddedMass> mass;
+  PerceptionPlan perception;
+  std::optional<PartnerVariation> partner;
 };
 
-// The kinds that may be named alone, with their defaults: "delay", "latency", "noise", "push", "friction", "mass".
+// The kinds that may be named alone, with their defaults: "delay", "latency", "noise", "push", "friction", "mass",
+// those of perception (perception_kinds), "partner".
 const std::vector<std::string>& perturbation_kinds();
 
 // Throws std::invalid_argument for another name, with the nearest; "clean" is one.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "backends/factory.h"
 #include "bench/disturbance.h"
@@ -11,6 +12,7 @@
 #include "core/require.h"
 #include "policies/language.h"
 #include "policies/observation_history.h"
+#include "results/order_statistics.h"
 
 namespace duet {
 namespace {
@@ -68,6 +70,27 @@ class StepMeter {
   Eigen::Vector3d tick_ = Eigen::Vector3d::Zero();  // sum over the steps of this tick
 };
 
+// Asks the policy for plans and takes the time of it. No plan is none: the scheduler then holds the last one.
+class Planner {
+ public:
+  explicit Planner(Policy& policy) : policy_(policy) {}
+
+  void plan(const Observation& observation, Scheduler& scheduler) {
+    const Clock::time_point begin = Clock::now();
+    std::vector<Reference> plan = policy_.plan(observation);
+    milliseconds_.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
+    if (!plan.empty()) scheduler.push(std::move(plan), observation.tick);
+  }
+
+  [[nodiscard]] PlanTimes times() const {
+    return {quantile(milliseconds_, 0.5), quantile(milliseconds_, 0.95), quantile(milliseconds_, 1.0)};
+  }
+
+ private:
+  Policy& policy_;
+  std::vector<double> milliseconds_;
+};
+
 Outcome advance(Backend& backend, const Disturbance& disturbance, int steps, StepMeter& meter) {
   for (int i = 0; i < steps; ++i) {
     const Outcome outcome = backend.step(disturbance.in_effect(i));
@@ -103,6 +126,16 @@ bool has_fallen(const RobotState& state) {
   return state.X_WB.p.z() < 0.45 || cos_tilt < 0.7;
 }
 
+int episode_ticks(const RolloutSetup& setup) {
+  const int ticks = setup.reference.motion.frames();
+  return setup.perturbation.partner ? episode_ticks(*setup.perturbation.partner, ticks) : ticks;
+}
+
+HumanMotion episode_partner(const RolloutSetup& setup) {
+  return partner_motion(setup.clip->partner, setup.perturbation.partner, setup.reference.phases,
+                        setup.reference.clip_frame, episode_ticks(setup) + 1);
+}
+
 HumanJoints partner_joints(const PointTracks& joints, int frame) {
   return joints.frame(std::clamp(frame, 0, joints.frames() - 1));
 }
@@ -124,8 +157,8 @@ PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotio
 }
 
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy) {
-  const PointTracks& people = setup.clip->partner.joints;
-  const int ticks = setup.reference.motion.frames();
+  const PointTracks people = episode_partner(setup).joints;
+  const int ticks = episode_ticks(setup);
   const int steps_per_tick = static_cast<int>(std::lround(1.0 / (kControlRate * backend.scene().dt)));
   const Clock::time_point deadline =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(setup.wall_limit));
@@ -146,15 +179,18 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   Sha256 hash;
   JointCommand command = backend.scene().robot->default_command(setup.start.q);
   StepMeter meter(backend, setup.limits);
+  Planner planner(policy);
+  Perception perception(setup.perturbation.perception, setup.perturbation_seed);
   Disturbance disturbance(setup.perturbation, *backend.scene().robot, setup.start, steps_per_tick, backend.scene().dt,
                           setup.perturbation_seed);
 
   int tick = 0;
   for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
-    const HumanJoints partner = partner_joints(people, setup.reference.clip_frame + tick);
-    const HumanJoints velocities = partner_velocities(people, setup.reference.clip_frame + tick, kControlRate);
-    history.add({setup.seen_partner.empty() ? partner : partner_joints(setup.seen_partner, tick), backend.state()});
-    if (tick % kTicksPerPlan == 0) scheduler.push(policy.plan(history.at(tick)), tick);
+    const HumanJoints partner = partner_joints(people, tick);
+    const HumanJoints velocities = partner_velocities(people, tick, kControlRate);
+    const bool own = setup.seen_partner.empty();
+    history.add({perception.seen(tick, own ? partner : partner_joints(setup.seen_partner, tick)), backend.state()});
+    if (tick % kTicksPerPlan == 0) planner.plan(history.at(tick), scheduler);
     const Reference& reference = scheduler.at(tick);
     controller.act(disturbance.seen(backend.state()), reference, command);
     disturbance.send(command);
@@ -175,6 +211,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   trim(recording, tick);
   recording.message = describe(recording.outcome, tick, backend.name());
   rollout.late_plans = scheduler.late_ticks();
+  rollout.policy_faults = policy.faults();
+  rollout.plan_times = planner.times();
   rollout.faults = controller.faults();
   rollout.state_hash = hash.hex();
   return rollout;

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -37,7 +38,7 @@ struct RolloutSetup {
   // none.
   PointTracks seen_partner;
   std::uint64_t seed = 0;
-  Perturbation perturbation;  // but its friction and mass, which are the scene's
+  Perturbation perturbation;  // but its friction, its mass and the partner's size, which are the scene's too
   std::uint64_t perturbation_seed = 0;
   bool foot_trace = false;              // whether the row is to have one
   double wall_limit = 120.0;            // [s]
@@ -45,19 +46,31 @@ struct RolloutSetup {
   std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
 };
 
+// Wall time of the policy's plans [ms]; NaN where it made none.
+struct PlanTimes {
+  double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
+};
+
 struct Rollout {
   Recording recording;
   std::string state_hash;  // SHA-256 over the states at 50 Hz
   int late_plans = 0;
+  PolicyFaults policy_faults;
+  PlanTimes plan_times;
   GroundForce ground;
   std::optional<ContactSafetyResult> safety;  // of a solid partner, at physics rate
   ControllerFaults faults;
   bool interrupted = false;
 };
 
-// Runs until the reference ends, the robot falls (base below 0.45 m or tilted past acos 0.7), the
-// state diverges or the wall limit passes. Never throws for what the experiment may measure.
+// Runs until the reference ends (and the partner with it, where it is varied: episode_ticks), the robot falls (base
+// below 0.45 m or tilted past acos 0.7), the state diverges or the wall limit passes. Never throws for what the
+// experiment may measure.
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
+
+// What the partner does from tick 0 on, one frame more than the episode has ticks; and the number of those.
+HumanMotion episode_partner(const RolloutSetup& setup);
+int episode_ticks(const RolloutSetup& setup);
 
 // The partner's joints at a frame (clamped to the clip) and their velocities towards the next one.
 HumanJoints partner_joints(const PointTracks& joints, int frame);

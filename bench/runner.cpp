@@ -167,7 +167,10 @@ Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shar
   Scene scene;
   scene.robot = perturbed_robot(perturbation, robot);
   scene.friction.robot_ground = perturbation.friction.value_or(scene.friction.robot_ground);
-  scene.human = make_human_body(bone_lengths(spec.clip->partner));
+  std::array<double, kSmplJoints> bones = bone_lengths(spec.clip->partner);
+  if (perturbation.partner)
+    for (double& bone : bones) bone *= perturbation.partner->scale;
+  scene.human = make_human_body(bones);
   scene.partner = suite.partner;
   scene.dt = settings.dt;
   scene.options = settings.options;

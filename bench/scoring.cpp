@@ -7,6 +7,7 @@
 
 #include "metrics/detector.h"
 #include "metrics/diagnostics.h"
+#include "metrics/onset.h"
 #include "metrics/retargeting.h"
 #include "motion/human_motion.h"
 #include "robots/human_body.h"
@@ -142,7 +143,7 @@ PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, con
   motion.task = setup.clip->task;
   motion.phases = {0, frames};
   motion.reactor = setup.clip->reactor;
-  motion.partner = slice(setup.clip->partner, clip_begin, clip_begin + frames);
+  motion.partner = slice(episode_partner(setup), begin, begin + frames);
   motion.source_partner = slice(setup.clip->source_partner, clip_begin, clip_begin + frames);
   motion.source_reactor = slice(setup.clip->source_reactor, clip_begin, clip_begin + frames);
   motion.reshaped = setup.clip->reshaped.slice(clip_begin, clip_begin + frames);
@@ -166,6 +167,9 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.frames = recording.frames();
   row.sim_s = recording.frames() / recording.rate_hz;
   row.late_plans = rollout.late_plans;
+  row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
+                       rollout.policy_faults.message};
+  row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
   add_contacts(rollout, *setup.clip, robot, row);
   row.trace = state_trace(recording, robot);
   if (setup.foot_trace) row.feet = foot_trace(recording, robot);
@@ -180,6 +184,7 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
         row.success = result.success && recording.outcome == Outcome::kOk;
     }
   }
+  add_finite(onsets(recording, robot), row.metrics);
   constexpr int kShortest = 8;  // third differences at both ends
   if (recording.frames() < kShortest) return;
   add_finite(controller_diagnostics(recording, readings.diagnostics), row.metrics);

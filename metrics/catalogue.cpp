@@ -64,6 +64,8 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"contact_impulse", "N s", kPlain, kEpisode, "Contact impulse with the partner", kSafety},
     {"contact_limit_ratio", "1", kDown, kEpisode, "Largest contact load over its limit", kLimits},
     {"late_plans", "1", kDown, kEpisode, "Ticks without a plan in time", "supplement F"},
+    {"onset_s", "s", kPlain, kEpisode, "Onset of the robot's act", "duet: onset"},
+    {"partner_onset_s", "s", kPlain, kEpisode, "Onset of the partner's act", "duet: onset"},
     {"frames", "1", kPlain, kEpisode, "Frames", "duet: episode"},
     {"sim_s", "s", kPlain, kEpisode, "Simulated time", "duet: episode"},
     {"wall_s", "s", kPlain, kEpisode, "Wall time", "duet: episode"},

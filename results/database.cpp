@@ -25,6 +25,8 @@ CREATE TABLE episodes (
   fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
   contact_peak_n REAL, contact_impulse_ns REAL, contacts_total INTEGER NOT NULL, late_plans INTEGER NOT NULL,
   faults_observations INTEGER NOT NULL, faults_actions INTEGER NOT NULL, faults_stopped INTEGER NOT NULL,
+  policy_late INTEGER NOT NULL, policy_invalid INTEGER NOT NULL, policy_dead INTEGER NOT NULL,
+  policy_message TEXT NOT NULL, policy_ms_p50 REAL, policy_ms_p95 REAL, policy_ms_max REAL,
   state_hash TEXT NOT NULL, started_at TEXT NOT NULL);
 CREATE TABLE metrics (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
@@ -177,6 +179,13 @@ class RowWriter {
         .integer(row.faults.observations)
         .integer(row.faults.actions)
         .integer(row.faults.stopped ? 1 : 0)
+        .integer(row.policy_faults.late)
+        .integer(row.policy_faults.invalid)
+        .integer(row.policy_faults.dead ? 1 : 0)
+        .text(row.policy_faults.message)
+        .number(row.policy_ms.p50)
+        .number(row.policy_ms.p95)
+        .number(row.policy_ms.max)
         .text(row.state_hash)
         .text(row.started_at);
     database_.step(episode_.get());

@@ -231,6 +231,33 @@ RowFaults faults_from_json(const nlohmann::json& json) {
   return faults;
 }
 
+nlohmann::json to_json(const RowPolicyFaults& faults) {
+  return {{"late", faults.late}, {"invalid", faults.invalid}, {"dead", faults.dead}, {"message", faults.message}};
+}
+
+RowPolicyFaults policy_faults_from_json(const nlohmann::json& json) {
+  const char* what = "episode row: policy_faults";
+  JsonFields fields(json, what);
+  RowPolicyFaults faults;
+  faults.late = small_integer(fields, "late", what);
+  faults.invalid = small_integer(fields, "invalid", what);
+  faults.dead = fields.boolean("dead");
+  faults.message = fields.text("message");
+  fields.refuse_unknown();
+  return faults;
+}
+
+nlohmann::json to_json(const RowPolicyTime& time) {
+  return {{"p50", number_or_null(time.p50)}, {"p95", number_or_null(time.p95)}, {"max", number_or_null(time.max)}};
+}
+
+RowPolicyTime policy_time_from_json(const nlohmann::json& json) {
+  JsonFields fields(json, "episode row: policy_ms");
+  const RowPolicyTime time = {fields.number_or_nan("p50"), fields.number_or_nan("p95"), fields.number_or_nan("max")};
+  fields.refuse_unknown();
+  return time;
+}
+
 std::int64_t read_schema(JsonFields& fields) {
   const std::int64_t schema = fields.integer("schema");
   if (schema >= 1 && schema <= kRowSchema) return schema;
@@ -291,6 +318,12 @@ void read_controller_details(JsonFields& fields, EpisodeRow& row) {
   row.faults = faults_from_json(fields.at("faults"));
 }
 
+// New in schema 4.
+void read_policy_details(JsonFields& fields, EpisodeRow& row) {
+  row.policy_faults = policy_faults_from_json(fields.at("policy_faults"));
+  row.policy_ms = policy_time_from_json(fields.at("policy_ms"));
+}
+
 }  // namespace
 
 std::string episode_key(const EpisodeRow& row) {
@@ -342,6 +375,8 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"feet", to_json(row.feet)},
           {"faults", to_json(row.faults)},
           {"late_plans", row.late_plans},
+          {"policy_faults", to_json(row.policy_faults)},
+          {"policy_ms", to_json(row.policy_ms)},
           {"state_hash", row.state_hash},
           {"started_at", row.started_at}};
 }
@@ -354,6 +389,7 @@ EpisodeRow row_from_json(const nlohmann::json& json) {
   read_result(fields, row);
   if (schema >= 2) read_engine_details(fields, row);
   if (schema >= 3) read_controller_details(fields, row);
+  if (schema >= 4) read_policy_details(fields, row);
   fields.refuse_unknown();
   return row;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,7 +14,7 @@
 
 namespace duet {
 
-inline constexpr int kRowSchema = 3;  // rows of schemas 1 and 2 are read too; what they lack stays empty
+inline constexpr int kRowSchema = 4;  // rows of schemas 1 to 3 are read too; what they lack stays empty
 
 struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"
@@ -39,6 +40,20 @@ struct RowFaults {
   bool stopped = false;  // the safe stop was entered
 
   [[nodiscard]] bool any() const { return observations > 0 || actions > 0 || stopped; }
+};
+
+// What went wrong with a policy's plans.
+struct RowPolicyFaults {
+  int late = 0, invalid = 0;  // plans that did not come in time, or were not finite, of the wrong size, not unit
+  bool dead = false;          // it gave no plan any more
+  std::string message;        // of the first fault
+
+  [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
+};
+
+// Wall time of the policy's plans [ms]; NaN where none was asked for. Differs from run to run.
+struct RowPolicyTime {
+  double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
 };
 
 // Height of the lowest point of each sole over the ground, of a robot whose controller walks.
@@ -88,6 +103,8 @@ struct EpisodeRow {
   FootTrace feet;
   RowFaults faults;
   int late_plans = 0;
+  RowPolicyFaults policy_faults;
+  RowPolicyTime policy_ms;
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
 };

@@ -4,6 +4,7 @@
 
 #include "backends/factory.h"
 #include "bench/runner.h"
+#include "bench/scoring.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 
@@ -122,6 +123,54 @@ TEST(Rollout, FaultsAndTheDelayedStateAreTheControllers) {
   for (size_t t = 2; t < controller.seen.size(); ++t)
     ASSERT_EQ(controller.seen[t], rollout.recording.robot[t - 2].X_WB.p.x()) << t;
   EXPECT_EQ(controller.seen[1], setup.start.X_WB.p.x());
+}
+
+// Gives the replay's plans, but the second one.
+class MissingPlan final : public Policy {
+ public:
+  explicit MissingPlan(std::unique_ptr<Policy> replay) : replay_(std::move(replay)) {}
+  [[nodiscard]] std::string_view name() const override { return "missing"; }
+  void reset(const EpisodeContext& context) override { replay_->reset(context); }
+  Anchors act(const Observation& observation) override { return replay_->act(observation); }
+  std::vector<Reference> plan(const Observation& observation) override {
+    if (observation.tick == kTicksPerPlan) return {};
+    return Policy::plan(observation);
+  }
+  [[nodiscard]] PolicyFaults faults() const override { return {1, 0, false, "no plan in time"}; }
+
+ private:
+  std::unique_ptr<Policy> replay_;
+};
+
+TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
+  const Parts parts;
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const auto backend = make_backend("playback", episode_scene(parts.spec, parts.suite, parts.robot));
+  const auto controller = make_controller("pd", parts.robot);
+  MissingPlan policy(make_policy("replay", parts.robot));
+  const Rollout rollout = roll_out(setup, *backend, *controller, policy);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
+  EXPECT_EQ(rollout.late_plans, kTicksPerPlan);
+  EXPECT_EQ(rollout.policy_faults.late, 1);
+  EXPECT_EQ(rollout.policy_faults.message, "no plan in time");
+  EXPECT_GE(rollout.plan_times.max, rollout.plan_times.p95);
+  EXPECT_GE(rollout.plan_times.p95, rollout.plan_times.p50);
+  EpisodeRow row;
+  score_rollout(rollout, setup, parts.suite, {}, *parts.robot, row);
+  EXPECT_EQ(row.policy_faults.late, 1);
+  EXPECT_EQ(row.policy_ms.max, rollout.plan_times.max);
+}
+
+// The onset of a wave is the hand's, in the act; the policy's view of the partner changes nothing that is recorded.
+TEST(Rollout, ADisturbedViewIsThePolicysAlone) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const Rollout clean = roll(parts, setup);
+  setup.perturbation = default_perturbation("jitter");
+  setup.perturbation.perception.vanish = 1.0;
+  const Rollout disturbed = roll(parts, setup);
+  EXPECT_EQ(disturbed.recording.partner, clean.recording.partner);
+  EXPECT_EQ(disturbed.state_hash, clean.state_hash);
 }
 
 TEST(Rollout, FallIsLowOrTilted) {

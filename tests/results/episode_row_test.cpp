@@ -60,14 +60,57 @@ TEST(EpisodeRow, SurvivesTheWayThroughText) {
   EXPECT_EQ(back.faults.observations, 3);
   EXPECT_EQ(back.faults.actions, 1);
   EXPECT_TRUE(back.faults.stopped);
+  EXPECT_EQ(back.policy_faults.late, 4);
+  EXPECT_EQ(back.policy_faults.invalid, 1);
+  EXPECT_TRUE(back.policy_faults.dead);
+  EXPECT_EQ(back.policy_faults.message, "the process ended");
+  EXPECT_EQ(back.policy_ms.p50, 1.5);
+  EXPECT_EQ(back.policy_ms.p95, 0.1 + 0.2);
+  EXPECT_EQ(back.policy_ms.max, 80.0);
+}
+
+TEST(EpisodeRow, ReadsRowsOfTheThirdSchema) {
+  nlohmann::json json = to_json(full_row());
+  json["schema"] = 3;
+  EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
+  json.erase("policy_faults");
+  json.erase("policy_ms");
+  const EpisodeRow row = row_from_json(json);
+  EXPECT_EQ(row.faults.actions, 1);
+  EXPECT_FALSE(row.policy_faults.any());
+  EXPECT_TRUE(std::isnan(row.policy_ms.p95));
+}
+
+TEST(EpisodeRow, FaultsAndTimesOfPoliciesAreReadStrictly) {
+  const auto with = [](const char* object, const char* key, nlohmann::json value) {
+    nlohmann::json json = to_json(full_row());
+    json[object][key] = std::move(value);
+    return refusal(json);
+  };
+  EXPECT_THAT(with("policy_faults", "late", -1), HasSubstr("policy_faults: key 'late': expected a whole number"));
+  EXPECT_THAT(with("policy_faults", "dead", 1), HasSubstr("policy_faults: key 'dead': expected true or false"));
+  EXPECT_THAT(with("policy_faults", "message", 1), HasSubstr("policy_faults: key 'message'"));
+  EXPECT_THAT(with("policy_faults", "lat", 1), HasSubstr("policy_faults: unknown key 'lat'"));
+  EXPECT_THAT(with("policy_ms", "max", "1"), HasSubstr("policy_ms: key 'max': expected a number or null"));
+  EXPECT_THAT(with("policy_ms", "p5", 1), HasSubstr("policy_ms: unknown key 'p5'"));
+  EpisodeRow row = full_row();
+  row.policy_ms = {};
+  EXPECT_TRUE(to_json(row).at("policy_ms").at("max").is_null());
+}
+
+TEST(EpisodeRow, EveryArmIsRead) {
+  for (const char* arm : {"main", "null", "oracle", "shuffled"}) {
+    EpisodeRow row = full_row();
+    row.arm = arm;
+    EXPECT_EQ(row_from_json(to_json(row)).arm, arm);
+  }
 }
 
 TEST(EpisodeRow, ReadsRowsOfTheSecondSchema) {
   nlohmann::json json = to_json(full_row());
   json["schema"] = 2;
   EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
-  json.erase("feet");
-  json.erase("faults");
+  for (const char* key : {"feet", "faults", "policy_faults", "policy_ms"}) json.erase(key);
   const EpisodeRow row = row_from_json(json);
   EXPECT_EQ(row.trace.mm, full_row().trace.mm);
   EXPECT_TRUE(row.feet.left_mm.empty());
@@ -99,8 +142,8 @@ TEST(EpisodeRow, ReadsRowsOfTheFirstSchema) {
   nlohmann::json json = to_json(full_row());
   json["schema"] = 1;
   EXPECT_THAT(refusal(json), HasSubstr("unknown key"));
-  for (const char* key :
-       {"engine_profile", "profile_digest", "forces", "contacts", "contacts_total", "trace", "feet", "faults"})
+  for (const char* key : {"engine_profile", "profile_digest", "forces", "contacts", "contacts_total", "trace", "feet",
+                          "faults", "policy_faults", "policy_ms"})
     json.erase(key);
   const EpisodeRow row = row_from_json(json);
   EXPECT_EQ(row.key, full_row().key);
@@ -237,7 +280,7 @@ TEST(EpisodeRow, WrongValuesAreNamed) {
     json[key] = std::move(value);
     return refusal(json);
   };
-  EXPECT_THAT(with("schema", 4), HasSubstr("expected schema 1 to 3, found 4"));
+  EXPECT_THAT(with("schema", 5), HasSubstr("expected schema 1 to 4, found 5"));
   EXPECT_THAT(with("key", ""), HasSubstr("key 'key'"));
   EXPECT_THAT(with("episode", -1), HasSubstr("key 'episode': expected a whole number of at least 0, found -1"));
   EXPECT_THAT(with("episode", 1.5), HasSubstr("key 'episode': expected a whole number, found 1.5"));

@@ -59,6 +59,8 @@ inline EpisodeRow full_row() {
   row.feet = {.rate_hz = 25.0, .left_mm = {0, 61, -1}, .right_mm = {4, 0, 0}};
   row.faults = {.observations = 3, .actions = 1, .stopped = true};
   row.late_plans = 2;
+  row.policy_faults = {.late = 4, .invalid = 1, .dead = true, .message = "the process ended"};
+  row.policy_ms = {.p50 = 1.5, .p95 = 0.1 + 0.2, .max = 80.0};
   row.state_hash = std::string(64, 'c');
   row.started_at = "2026-01-02T03:04:05Z";
   row.key = episode_key(row);
