@@ -66,6 +66,7 @@ Denoiser::Denoiser(const DstarNetwork& network) : channels_(network.config.chann
   position_ = weights.values("denoise.position");
   norm_ = weights.norm("denoise.norm");
   const std::vector<std::vector<float>> steps = encode_steps(network);
+  blocks_.reserve(static_cast<std::size_t>(config.blocks));
   for (int b = 0; b < config.blocks; ++b) {
     const std::string name = fmt::format("denoise.{}", b);
     Block block{.norm1 = weights.norm(name + ".norm1"),
@@ -81,8 +82,18 @@ Denoiser::Denoiser(const DstarNetwork& network) : channels_(network.config.chann
     block.conv2 = {channels_, kTaps * channels_, block.taps2.data(), weights.values(name + ".conv2.bias")};
     blocks_.push_back(std::move(block));
   }
+  add_steps(config);
+  x_.resize(kPlanSize);
+  x0_.resize(kPlanSize);
+  h_.resize(static_cast<std::size_t>(kAnchors) * channels_);
+  y_.resize(h_.size());
+  padded_.resize(h_.size() + 2 * static_cast<std::size_t>(channels_));
+}
+
+void Denoiser::add_steps(const DstarConfig& config) {
   const std::vector<double> alpha_bar = squared_cosine_alpha_bar(config.training_steps);
   const std::vector<int> times = ddim_steps(config.training_steps, config.inference_steps);
+  steps_.reserve(times.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
     const double now = alpha_bar[static_cast<std::size_t>(times[i])];
     const double next = i + 1 < times.size() ? alpha_bar[static_cast<std::size_t>(times[i + 1])] : 1.0;
@@ -91,11 +102,6 @@ Denoiser::Denoiser(const DstarNetwork& network) : channels_(network.config.chann
                       .x0_share = static_cast<float>(std::sqrt(next)),
                       .noise_share = static_cast<float>(std::sqrt(1.0 - next))});
   }
-  x_.resize(kPlanSize);
-  x0_.resize(kPlanSize);
-  h_.resize(static_cast<std::size_t>(kAnchors) * channels_);
-  y_.resize(h_.size());
-  padded_.resize(h_.size() + 2 * static_cast<std::size_t>(channels_));
 }
 
 void Denoiser::condition(const float* condition) {

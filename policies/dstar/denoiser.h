@@ -13,6 +13,8 @@ namespace duet {
 class Denoiser {
  public:
   explicit Denoiser(const DstarNetwork& network);
+  Denoiser(const Denoiser&) = delete;  // its layers point into it
+  Denoiser& operator=(const Denoiser&) = delete;
   // `condition`: g, config.condition numbers; holds for the samples after it.
   void condition(const float* condition);
   // The plan in normalised units, kPlanSize numbers, from x_T. Valid until the next call.
@@ -26,6 +28,7 @@ class Denoiser {
     std::vector<float> film;        // scale and shift by the condition, for the sample at hand
     std::vector<float> film_steps;  // by each step of inference
   };
+  void add_steps(const DstarConfig& config);
   // x0 <- network(x, step).
   void denoise(const float* x, int step);
   void run(const Block& block, int step);

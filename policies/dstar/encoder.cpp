@@ -18,6 +18,7 @@ StreamEncoder::StreamEncoder(const DstarNetwork& network, const std::string& nam
   head_ = weights.linear(name + ".head");
   position_ = weights.values(name + ".position");
   norm_ = weights.norm(name + ".norm");
+  layers_.reserve(static_cast<std::size_t>(network.config.layers));
   for (int l = 0; l < network.config.layers; ++l) {
     const std::string layer = fmt::format("{}.{}", name, l);
     layers_.push_back({.norm1 = weights.norm(layer + ".norm1"),

@@ -44,9 +44,10 @@ void for_each_input(const DstarConfig& config, Golden& golden, const F& f) {
 Golden random_golden(const DstarNetwork& network) {
   Golden golden;
   Random random(kGoldenSeed, stream_key({"dstar", "golden"}));
-  for_each_input(network.config, golden, [&](const std::string&, std::vector<std::int64_t>, std::span<float> values) {
-    for (float& value : values) value = static_cast<float>(random.normal());
-  });
+  for_each_input(network.config, golden,
+                 [&](const std::string&, const std::vector<std::int64_t>&, std::span<float> values) {
+                   for (float& value : values) value = static_cast<float>(random.normal());
+                 });
   DstarFeatures& features = golden.features;
   for (auto frame : features.frames.colwise())
     frame = network.frame_mean + network.frame_deviation.cwiseProduct(Eigen::VectorXf(frame));
