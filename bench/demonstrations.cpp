@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <mutex>
 #include <optional>
 
 #include "backends/factory.h"
@@ -66,19 +65,22 @@ void add(const Take& take, DemonstrationSet& set) {
 
 }  // namespace
 
-DemonstrationSet make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
-                                     const DemonstrationOptions& options, Progress& progress) {
+std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                                    const DemonstrationOptions& options, Progress& progress,
+                                                    const std::function<bool()>& stop) {
   const std::vector<PairedMotion> clips =
       prepare_clips(synthetic(options.per_task, options.seed), *robot, options.threads, progress);
   const int takes = static_cast<int>(clips.size()) * options.starts;
   std::vector<std::optional<Take>> made(takes);
   progress.start("demonstrating", takes, "takes");
   parallel_for_each(takes, options.threads, [&](int i) {
+    if (stop()) return;
     made[i] = take_of(clips[i / options.starts], *robot, options.seed + static_cast<std::uint64_t>(i));
     if (!options.engine.empty()) follow(*made[i], robot, options);
     progress.advance();
   });
   progress.finish();
+  if (stop()) return std::nullopt;
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   for (std::optional<Take>& take : made) {

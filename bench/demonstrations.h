@@ -2,7 +2,9 @@
 // as it followed them in an engine. The seeds are none that a suite uses: what is tested on is never learnt.
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,10 +24,11 @@ struct DemonstrationOptions {
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
 
-// Demonstrations in which the robot fell are left out. Throws what prepare_clips and make_controller throw, and
-// MissingError for an engine that is not there.
-DemonstrationSet make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
-                                     const DemonstrationOptions& options, Progress& progress);
+// Demonstrations in which the robot fell are left out. None where `stop` said so in between. Throws what prepare_clips
+// and make_controller throw, and MissingError for an engine that is not there.
+std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                                    const DemonstrationOptions& options, Progress& progress,
+                                                    const std::function<bool()>& stop);
 
 // "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
 std::string split_text(const Suite& suite, int threads, Progress& progress);

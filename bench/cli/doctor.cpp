@@ -13,6 +13,7 @@
 #include "results/environment.h"
 #include "retarget/pair.h"
 #include "robots/robot_model.h"
+#include "training/dstar/trainer.h"
 
 namespace duet::cli {
 namespace {
@@ -57,6 +58,9 @@ std::vector<Finding> findings() {
   list.push_back({"PAIR kernels", true, kernels});
   list.push_back(robot_finding());
   for (const ControllerInfo& info : controllers()) list.push_back(controller_finding(info));
+  list.push_back({"training of policies", can_train_dstar(),
+                  can_train_dstar() ? "libtorch with " + training_blas()
+                                    : "built without libtorch; `./run train dstar` builds a program with it"});
   list.push_back({"machine", true, describe_machine()});
   return list;
 }

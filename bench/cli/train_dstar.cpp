@@ -37,14 +37,19 @@ std::string line(const DstarProgress& progress) {
       100.0 * progress.phase_accuracy);
 }
 
+struct Stopped {};  // by the user, while demonstrations are made: nothing is kept
+
+bool stop_asked() { return interrupt() != Interrupt::kNone; }
+
 // Made once per folder and kept there: hours of frames take minutes.
 std::shared_ptr<const DemonstrationSet> demonstrations(Session& session, const std::shared_ptr<const RobotModel>& robot,
                                                        const DemonstrationOptions& options, const std::string& file) {
   if (!fs::exists(file)) {
     Progress progress(session.progress());
-    const DemonstrationSet made = make_demonstrations(robot, options, progress);
+    const std::optional<DemonstrationSet> made = make_demonstrations(robot, options, progress, stop_asked);
+    if (!made) throw Stopped();
     fs::create_directories(fs::path(file).parent_path());
-    save_demonstrations(made, file);
+    save_demonstrations(*made, file);
   }
   return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest));
 }
@@ -94,7 +99,6 @@ void check_network(const Session& session, const DstarData& data, const DstarRun
 }
 
 void train(Session& session, TrainArguments& arguments, const std::string& name) {
-  catch_interrupts();
   if (!can_train_dstar()) train_dstar({}, {}, {}, {});  // says how to get it
   set_variant(arguments.run, name);
   if (!arguments.config.empty())
@@ -111,12 +115,8 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
         speed = progress.windows_per_second;
         note(session, line(progress));
       },
-      [] { return interrupt() != Interrupt::kNone; });
-  if (end == DstarEnd::kStopped) {
-    note(session, fmt::format("stopped; the same command goes on from '{}'", dstar_checkpoint(arguments.run)));
-    session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
-    return;
-  }
+      stop_asked);
+  if (end == DstarEnd::kStopped) throw Stopped();
   check_network(session, data, arguments.run);
   if (arguments.smoke && last >= first) {
     note(session, fmt::format("smoke test failed: the validation loss went from {:.4f} to {:.4f}, expected it to fall",
@@ -126,6 +126,16 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
   const std::string file = dstar_network_file(arguments.run);
   print(session, fmt::format("{}\n", file),
         {{"network", file}, {"validation", last}, {"phase_accuracy", accuracy}, {"windows_per_second", speed}});
+}
+
+void train_or_stop(Session& session, TrainArguments& arguments, const std::string& name) {
+  catch_interrupts();
+  try {
+    train(session, arguments, name);
+  } catch (const Stopped&) {
+    note(session, fmt::format("stopped; the same command goes on from what is in '{}'", arguments.run.folder));
+    session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
+  }
 }
 
 void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
@@ -155,7 +165,7 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
   command->add_option("--split", arguments->split, "test split that may not be learnt (default: the one that ships)");
   command->add_flag("--smoke", arguments->smoke,
                     "a small training in minutes; fails (exit 1) where the validation loss does not fall");
-  command->callback([&session, arguments, name] { train(session, *arguments, name); });
+  command->callback([&session, arguments, name] { train_or_stop(session, *arguments, name); });
 }
 
 void add_split(CLI::App& train_command, Session& session) {

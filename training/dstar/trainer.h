@@ -65,6 +65,9 @@ DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
                      const std::function<void(const DstarProgress&)>& report, const std::function<bool()>& stop);
 
 bool can_train_dstar();  // whether libtorch was built in
+// Which BLAS libtorch has got: OpenBLAS, or the reference one that is 20 to 40 times slower, by its file; empty without
+// libtorch.
+std::string training_blas();
 
 std::string dstar_checkpoint(const DstarRun& run);    // <folder>/<name>/checkpoint.safetensors
 std::string dstar_network_file(const DstarRun& run);  // <folder>/<name>/network.safetensors

@@ -21,4 +21,6 @@ double runner_difference(const DstarData&, const DstarRun&, const std::string&, 
 
 bool can_train_dstar() { return false; }
 
+std::string training_blas() { return ""; }
+
 }  // namespace duet

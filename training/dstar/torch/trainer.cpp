@@ -583,4 +583,12 @@ double runner_difference(const DstarData& data, const DstarRun& run, const std::
 
 bool can_train_dstar() { return true; }
 
+std::string training_blas() {
+  Dl_info info{};
+  void* gemm = dlsym(RTLD_DEFAULT, "sgemm_");
+  if (gemm == nullptr || dladdr(gemm, &info) == 0 || info.dli_fname == nullptr) return "unknown";
+  return fs::weakly_canonical(info.dli_fname).filename().string() +
+         (dlsym(RTLD_DEFAULT, "openblas_set_num_threads") != nullptr ? " (OpenBLAS)" : " (the slow reference BLAS)");
+}
+
 }  // namespace duet
