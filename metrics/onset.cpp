@@ -20,10 +20,14 @@ Eigen::Vector3d median_place(const Eigen::Matrix3Xd& track, Eigen::Index frames)
   return median;
 }
 
-// First frame from `begin` on whose mean over `window` frames exceeds the threshold; -1 where none does.
-Eigen::Index first_above(const Eigen::VectorXd& distance, Eigen::Index begin, Eigen::Index window) {
-  for (Eigen::Index t = begin; t + window <= distance.size(); ++t)
-    if (distance.segment(t, window).mean() > kOnsetDistance) return t;
+// First of `stay` frames in a row, from `begin` on, whose mean over `window` frames exceeds the threshold; -1 where
+// there are none.
+Eigen::Index first_above(const Eigen::VectorXd& distance, Eigen::Index begin, Eigen::Index window, Eigen::Index stay) {
+  Eigen::Index run = 0;
+  for (Eigen::Index t = begin; t + window <= distance.size(); ++t) {
+    run = distance.segment(t, window).mean() > kOnsetDistance ? run + 1 : 0;
+    if (run == stay) return t + 1 - stay;
+  }
   return -1;
 }
 
@@ -57,12 +61,13 @@ std::vector<Eigen::Matrix3Xd> wrists_of(const PointTracks& partner) {
 double onset(const std::vector<Eigen::Matrix3Xd>& hands, double rate_hz) {
   const auto rest = static_cast<Eigen::Index>(std::lround(kOnsetRest * rate_hz));
   const auto window = static_cast<Eigen::Index>(std::lround(kOnsetWindow * rate_hz));
+  const auto stay = static_cast<Eigen::Index>(std::lround(kOnsetStay * rate_hz));
   Eigen::Index first = -1;
   for (const Eigen::Matrix3Xd& hand : hands) {
     if (hand.cols() < rest + window) continue;
     const Eigen::Vector3d place = median_place(hand, rest);
     const Eigen::VectorXd distance = (hand.colwise() - place).colwise().norm().transpose();
-    const Eigen::Index found = first_above(distance, rest, window);
+    const Eigen::Index found = first_above(distance, rest, window, stay);
     if (found >= 0) first = first < 0 ? found : std::min(first, found);
   }
   return first < 0 ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(first) / rate_hz;

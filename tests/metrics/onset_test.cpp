@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "core/skeleton.h"
 #include "robots/kinematics.h"
@@ -33,16 +34,20 @@ TEST(Onset, NothingBeyondTheThresholdIsNone) {
   EXPECT_TRUE(std::isnan(onset({}, kRate)));
 }
 
-TEST(Onset, AMotionShorterThanRestAndWindowHasNone) {
-  EXPECT_TRUE(std::isnan(onset({step(59, 0, 1.0)}, kRate)));
-  Eigen::Matrix3Xd track = step(60, 50, 1.0);
-  EXPECT_DOUBLE_EQ(onset({track}, kRate), 1.0);
+TEST(Onset, AMotionThatEndsTooSoonHasNone) {
+  EXPECT_TRUE(std::isnan(onset({step(30, 0, 1.0)}, kRate)));
+  EXPECT_TRUE(std::isnan(onset({step(88, 50, 1.0)}, kRate)));  // one window short of the stay
+  EXPECT_DOUBLE_EQ(onset({step(89, 50, 1.0)}, kRate), 1.0);
 }
 
-TEST(Onset, AShortTwitchIsNone) {
-  Eigen::Matrix3Xd track = step(200, 100, 0.5);
-  track.rightCols(98) = step(98, 98, 0.0);  // two frames alone: 0.1 m in the mean
+// Arms swing by half of a second to either side while a person walks.
+TEST(Onset, ASwingThatComesBackIsNone) {
+  Eigen::Matrix3Xd track = Eigen::Matrix3Xd::Zero(3, 400);
+  for (int t = 0; t < 400; ++t) track(0, t) = 0.3 * std::sin(2.0 * std::numbers::pi * t / kRate);
   EXPECT_TRUE(std::isnan(onset({track}, kRate)));
+  track.rightCols(150).row(2).array() += 0.3;
+  const double found = onset({track}, kRate);
+  EXPECT_NEAR(found, 5.0, kOnsetWindow + 0.5);  // at most half a swing before
 }
 
 TEST(Onset, TheRestIsTheMedianOfTheFirstSecond) {
