@@ -22,6 +22,7 @@ struct ClipSource {
   Task task = Task::kHug;
   int index = 0;
   std::string file;
+  const ClipVariant* variant = nullptr;  // of the suite; null: as drawn
 };
 
 bool runs(const Suite& suite, Task task) {
@@ -31,8 +32,12 @@ bool runs(const Suite& suite, Task task) {
 std::vector<ClipSource> list_sources(const Suite& suite) {
   std::vector<ClipSource> sources;
   for (const std::string& file : suite.clips.files) sources.push_back({Task::kHug, 0, file});
-  for (const Task task : suite.tasks)
-    for (int index = 0; index < suite.clips.synth_per_task; ++index) sources.push_back({task, index, ""});
+  for (const Task task : suite.tasks) {
+    for (int index = 0; index < suite.clips.synth_per_task; ++index) {
+      if (suite.clips.variants.empty()) sources.push_back({task, index, ""});
+      for (const ClipVariant& variant : suite.clips.variants) sources.push_back({task, index, "", &variant});
+    }
+  }
   return sources;
 }
 
@@ -42,7 +47,12 @@ PairedMotion make_clip(const ClipSource& source, const Suite& suite, const Robot
   SynthesisOptions synthesis;
   synthesis.seed = suite.clips.synth_seed;
   synthesis.index = source.index;
-  return retarget(synthesize(source.task, synthesis), robot, options);
+  if (source.variant == nullptr) return retarget(synthesize(source.task, synthesis), robot, options);
+  synthesis.side = source.variant->side;
+  synthesis.target_height = source.variant->target_height;
+  InteractionClip clip = synthesize(source.task, synthesis);
+  clip.id += "-" + source.variant->name;
+  return retarget(clip, robot, options);
 }
 
 void check_ids(const std::vector<PairedMotion>& clips) {

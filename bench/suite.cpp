@@ -36,6 +36,7 @@ std::string quoted(const std::string& text) {
 
 std::string options_yaml(const std::map<std::string, std::string>& options) {
   std::vector<std::string> texts;
+  texts.reserve(options.size());
   for (const auto& [name, value] : options) texts.push_back(fmt::format("{}: {}", name, quoted(value)));
   return fmt::format(", options: {{{}}}", fmt::join(texts, ", "));
 }
@@ -59,6 +60,7 @@ std::string to_yaml(const SuitePolicy& policy) {
 template <typename Item>
 std::string list_yaml(const char* key, const std::vector<Item>& items) {
   std::vector<std::string> texts;
+  texts.reserve(items.size());
   for (const Item& item : items) texts.push_back(to_yaml(item));
   return fmt::format("{}: [{}]\n", key, fmt::join(texts, ", "));
 }
@@ -69,6 +71,20 @@ std::string perturbations_yaml(const Suite& suite) {
   std::string text = "perturbations:\n";
   for (const Perturbation& perturbation : suite.perturbations) text += fmt::format("  - {}\n", to_yaml(perturbation));
   return text;
+}
+
+// Nothing where there are none.
+std::string variants_yaml(const std::vector<ClipVariant>& variants) {
+  if (variants.empty()) return "";
+  std::vector<std::string> texts;
+  texts.reserve(variants.size());
+  for (const ClipVariant& variant : variants) {
+    std::string text = "{name: " + variant.name;
+    if (variant.side) text += fmt::format(", side: {}", name_of(side_names(), *variant.side));
+    if (variant.target_height) text += fmt::format(", target_height: {}", *variant.target_height);
+    texts.push_back(text + "}");
+  }
+  return fmt::format(", variants: [{}]", fmt::join(texts, ", "));
 }
 
 // Puts the content of files in the place of their paths: a descriptor's, and those that options name.
@@ -128,6 +144,11 @@ const NameTable<SuiteStart>& start_names() {
   return names;
 }
 
+const NameTable<Side>& side_names() {
+  static const NameTable<Side> names = {{"left", Side::kLeft}, {"right", Side::kRight}};
+  return names;
+}
+
 const NameTable<PartnerMode>& partner_names() {
   static const NameTable<PartnerMode> names = {
       {"none", PartnerMode::kNone}, {"ghost", PartnerMode::kGhost}, {"solid", PartnerMode::kSolid}};
@@ -161,8 +182,8 @@ std::string resolved_yaml(const Suite& suite) {
   std::string text =
       fmt::format("schema: duet.suite/1\nname: {}\nversion: \"{}\"\nseed: {}\n", suite.name, suite.version, suite.seed);
   if (suite.clips.files.empty()) {
-    text += fmt::format("clips: {{synth: {{per_task: {}, seed: {}}}}}\n", suite.clips.synth_per_task,
-                        suite.clips.synth_seed);
+    text += fmt::format("clips: {{synth: {{per_task: {}, seed: {}{}}}}}\n", suite.clips.synth_per_task,
+                        suite.clips.synth_seed, variants_yaml(suite.clips.variants));
   } else {
     text += "clips:\n  files:\n";
     for (const std::string& file : suite.clips.files) text += fmt::format("    - \"{}\"\n", file);
@@ -199,6 +220,7 @@ std::string suite_hash(const Suite& suite) {
   Suite by_content = suite;  // where a file lies does not matter, what is in it does
   for (std::string& file : by_content.clips.files) file = sha256_file(file);
   if (!suite.contact_limits.empty()) by_content.contact_limits = sha256_file(suite.contact_limits);
+  if (std::filesystem::is_regular_file(suite.robot)) by_content.robot = sha256_file(suite.robot);
   for (SuiteController& controller : by_content.controllers) use_contents(controller.use, controller.options);
   for (SuitePolicy& policy : by_content.policies) use_contents(policy.use, policy.options);
   return sha256_hex(resolved_yaml(by_content));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "controllers/controller.h"
 #include "core/task.h"
 #include "metrics/detector.h"
+#include "motion/synthesis.h"
 #include "policies/phase_adaptation.h"
 #include "policies/policy.h"
 
@@ -22,10 +24,18 @@ namespace duet {
 enum class SuiteStart { kAuto, kClip, kApproach, kAct };  // auto: act where the controller cannot walk, else approach
 enum class RecordTrajectories { kNone, kFailures, kAll };
 
+// Of each synthesised clip one with this hand and contact height; all else is drawn as for its index.
+struct ClipVariant {
+  std::string name;  // follows the clip's id; once per suite
+  std::optional<Side> side{};
+  std::optional<double> target_height{};  // [m]
+};
+
 struct SuiteClips {
   int synth_per_task = 0;  // synthesised clips of each task, or
   std::uint64_t synth_seed = 42;
-  std::vector<std::string> files;  // clips or paired motions (NPZ)
+  std::vector<std::string> files;       // clips or paired motions (NPZ)
+  std::vector<ClipVariant> variants{};  // of synthesised clips; none: each as it is drawn
 };
 
 // A controller as a suite names it: one of duet's, or an IO descriptor, with options, under a name of its own.

@@ -22,6 +22,7 @@ inline constexpr const char* kNullPolicy = "null";  // of the control arm
 bool is_path_option(std::string_view option);
 
 const NameTable<SuiteStart>& start_names();
+const NameTable<Side>& side_names();
 const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();

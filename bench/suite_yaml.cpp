@@ -16,6 +16,7 @@
 #include "core/require.h"
 #include "metrics/readings.h"
 #include "retarget/options.h"
+#include "robots/robot_model.h"
 #include "robots/yaml_section.h"
 
 namespace duet {
@@ -97,16 +98,53 @@ std::vector<std::string> engine_names() {
   return names;
 }
 
+ClipVariant read_variant(const YAML::Node& node, const std::string& file) {
+  const YamlSection item(file, node, "variant", {"name", "side", "target_height"});
+  ClipVariant variant;
+  variant.name = item.text("name");
+  if (!is_plain_name(variant.name))
+    item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(variant.name)));
+  if (item.has("side")) get_enum(item, "side", side_names(), variant.side.emplace());
+  variant.target_height = item.optional_number("target_height");
+  if (!variant.side && !variant.target_height) item.fail(item.line(), "expected side or target_height, found neither");
+  return variant;
+}
+
+// What a variant asks of a task that cannot give it is refused here, not when its clips are made.
+void check_variant(const YamlSection& top, const ClipVariant& variant, const Suite& suite) {
+  checked(top, "clips", [&] {
+    for (const Task task : suite.tasks) {
+      SynthesisOptions options;
+      options.side = variant.side;
+      options.target_height = variant.target_height;
+      check_synthesis_options(task, options);
+    }
+  });
+}
+
+void read_variants(const YamlSection& synth, Suite& suite) {
+  for (const YAML::Node& node : synth.items("variants")) {
+    suite.clips.variants.push_back(read_variant(node, suite.file));
+    const std::string& name = suite.clips.variants.back().name;
+    const auto same = [&](const ClipVariant& other) { return other.name == name; };
+    if (std::count_if(suite.clips.variants.begin(), suite.clips.variants.end(), same) > 1)
+      synth.fail(synth.line("variants"), fmt::format("variants: '{}' is there twice; names tell clips apart", name));
+  }
+}
+
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = below(top, suite.file, "clips", {"synth", "files"});
-  const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed"});
+  const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed", "variants"});
   get_integer(synth, "per_task", 1, suite.clips.synth_per_task);
   get_integer<std::uint64_t>(synth, "seed", 0, suite.clips.synth_seed);
+  read_variants(synth, suite);
   if (clips.has("files")) suite.clips.files = get_texts(clips, "files");
   const bool synthetic = suite.clips.synth_per_task > 0;
   if (synthetic != suite.clips.files.empty())
     clips.fail(clips.line(),
                fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
+  if (!synthetic && !suite.clips.variants.empty())
+    clips.fail(synth.line("variants"), "variants: expected per_task, as only synthesised clips have variants");
   for (std::string& file : suite.clips.files) file = from_folder_of(suite, file);
 }
 
@@ -133,6 +171,7 @@ void read_lists(const YamlSection& top, Suite& suite) {
   read_controllers(top, suite);
   read_policies(top, suite);
   suite.perturbations = read_perturbations(top, suite.file);
+  for (const ClipVariant& variant : suite.clips.variants) check_variant(top, variant, suite);
 }
 
 // A name, a path (from the suite's folder or from here), or the mapping that a run directory keeps. `dt` is the step of
@@ -166,6 +205,7 @@ void read_episode(const YamlSection& top, Suite& suite) {
   });
   get_enum(top, "partner", partner_names(), suite.partner);
   get(top, "robot", suite.robot);
+  if (is_plain_name(suite.robot) && !suite.robot.ends_with(".yaml")) suite.robot = card_path(suite.robot);
   if (top.has("contact_limits")) suite.contact_limits = from_folder_of(suite, top.text("contact_limits"));
   if (top.has("null_arm")) suite.null_arm = top.flag_or("null_arm", true);
   const YamlSection detector = below(top, suite.file, "detector", {"version", "thresholds"});

@@ -24,7 +24,10 @@ void check(const char* name, std::optional<double> value, double low, double hig
                       unit));
 }
 
-void check_options(const Act& act, const SynthesisOptions& options) {
+}  // namespace
+
+void check_synthesis_options(Task task, const SynthesisOptions& options) {
+  const Act& act = synthesis::act_of(task);
   require(options.index >= 0, fmt::format("synthesize: index {} is out of range; expected 0 or more", options.index));
   check("height_a", options.height_a, 1.5, 1.95, " m");
   check("height_b", options.height_b, 1.5, 1.95, " m");
@@ -40,6 +43,8 @@ void check_options(const Act& act, const SynthesisOptions& options) {
   check("target_height", options.target_height, act.lowest, act.highest, " m");
 }
 
+namespace {
+
 std::vector<ContactWindow> windows(const Scene& scene, double rate_hz) {
   std::vector<ContactWindow> found;
   for (const synthesis::Touch& touch : scene.touches)
@@ -51,8 +56,8 @@ std::vector<ContactWindow> windows(const Scene& scene, double rate_hz) {
 }  // namespace
 
 InteractionClip synthesize(Task task, const SynthesisOptions& options) {
+  check_synthesis_options(task, options);
   const Act& act = synthesis::act_of(task);
-  check_options(act, options);
   Draws draws(options.seed, task, options.index);
   Staged staged = set_stage(task, options, draws);
   act.perform(staged.scene, draws);

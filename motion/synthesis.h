@@ -27,6 +27,8 @@ struct SynthesisOptions {
 };
 
 // Throws std::invalid_argument for an option out of its range, naming it and the range.
+void check_synthesis_options(Task task, const SynthesisOptions& options);
+// Checks them.
 InteractionClip synthesize(Task task, const SynthesisOptions& options);
 
 }  // namespace duet

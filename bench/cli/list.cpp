@@ -97,6 +97,7 @@ std::vector<Listed> list_pair_options() {
 template <typename Option>
 std::vector<std::string> option_lines(const std::vector<Option>& options) {
   std::vector<std::string> lines;
+  lines.reserve(options.size());
   for (const Option& option : options)
     lines.push_back(fmt::format("{} ({}): {}", option.name,
                                 option.fallback.empty() ? "no default" : "default " + option.fallback, option.about));

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
+
 #include "core/file.h"
 #include "core/require.h"
 #include "tests/support.h"
@@ -156,11 +158,58 @@ TEST(Suite, ControllersThatAreNotOnesAreRefused) {
               HasSubstr("unknown controller 'vmc'"));
 }
 
+std::string with_synth(const std::string& synth, const std::string& tasks = "[handshake, wave]") {
+  std::string yaml = kMinimal;
+  yaml.replace(yaml.find("{per_task: 2}"), 13, synth);
+  return yaml + "tasks: " + tasks + "\n";
+}
+
+TEST(Suite, VariantsOfClipsAreReadAndCount) {
+  const std::string text =
+      with_synth("{per_task: 2, variants: [{name: low, side: left, target_height: 0.9}, {name: right, side: right}]}",
+                 "[handshake]");
+  const Suite suite = parse_suite(text, "s.yaml");
+  ASSERT_EQ(suite.clips.variants.size(), 2U);
+  EXPECT_EQ(suite.clips.variants[0].side, Side::kLeft);
+  EXPECT_EQ(suite.clips.variants[0].target_height, 0.9);
+  EXPECT_FALSE(suite.clips.variants[1].target_height.has_value());
+  EXPECT_EQ(suite_hash(parse_suite(resolved_yaml(suite), "again.yaml")), suite_hash(suite));
+  EXPECT_NE(suite_hash(suite), suite_hash(parse_suite(with_synth("{per_task: 2}", "[handshake]"), "s.yaml")));
+  EXPECT_EQ(resolved_yaml(parse_suite(kMinimal, "s.yaml")).find("variants"), std::string::npos);
+}
+
+TEST(Suite, VariantsThatCannotBeAreRefused) {
+  const auto with = [](const std::string& list) {
+    return refusal("", with_synth("{per_task: 1, variants: " + list + "}"));
+  };
+  EXPECT_THAT(with("[{name: low, target_height: 0.9}]"),
+              AllOf(HasSubstr("s.yaml:4"), HasSubstr("target_height 0.9 m")));
+  EXPECT_THAT(with("[{name: a, side: up}]"), HasSubstr("unknown side 'up'"));
+  EXPECT_THAT(with("[{name: a}]"), HasSubstr("expected side or target_height, found neither"));
+  EXPECT_THAT(with("[{side: left}]"), HasSubstr("name"));
+  EXPECT_THAT(with("[{name: 'a b', side: left}]"), HasSubstr("letters, digits"));
+  EXPECT_THAT(with("[{name: a, side: left}, {name: a, side: right}]"), HasSubstr("'a' is there twice"));
+  EXPECT_THAT(with("3"), HasSubstr("expected a list"));
+  EXPECT_THAT(refusal("", with_synth("{per_task: 1, variants: [{name: a, target_height: 1}]}", "[bend]")),
+              HasSubstr("bend has no target_height"));
+}
+
+TEST(Suite, ARobotMayGoByName) {
+  const Suite suite = parse_suite(std::string(kMinimal) + "robot: g1_27dof\n", "s.yaml");
+  EXPECT_EQ(suite.robot, card_path("g1_27dof"));
+  EXPECT_EQ(suite_hash(suite),
+            suite_hash(parse_suite(std::string(kMinimal) + "robot: " + suite.robot + "\n", "s.yaml")));
+}
+
 TEST(Suite, ShippedSuitesLoad) {
-  for (const char* name : {"demo", "core", "controllers"}) {
-    const Suite suite = load_suite(std::string(DUET_SOURCE_DIR) + "/suites/" + name + ".yaml");
-    EXPECT_EQ(suite.tasks.size(), std::string(name) == "controllers" ? 3U : kTasks.size()) << name;
+  int suites = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(DUET_SOURCE_DIR) + "/suites")) {
+    const Suite suite = load_suite(entry.path().string());
+    EXPECT_EQ(read_file(entry.path().string()).front(), '#') << entry.path();  // what question it answers
+    EXPECT_EQ(suite_hash(parse_suite(resolved_yaml(suite), "again.yaml")), suite_hash(suite)) << entry.path();
+    ++suites;
   }
+  EXPECT_GE(suites, 10);
 }
 
 }  // namespace
