@@ -220,13 +220,15 @@ void append_tensor(std::string& bytes, const std::string& name, const Tensor& te
   require(count == tensor.values.size(), fmt::format("tensor '{}': shape ({}) does not give the {} values found", name,
                                                      fmt::join(tensor.shape, ", "), tensor.values.size()));
   for (const float value : tensor.values) {
-    require(std::isfinite(value), fmt::format("tensor '{}': expected finite numbers, found {}", name, value));
+    if (!std::isfinite(value))  // the sentence is made only where it is needed: files hold many numbers
+      throw std::invalid_argument(fmt::format("tensor '{}': expected finite numbers, found {}", name, value));
     if (type == TensorType::kF32) {
       append(bytes, value);
       continue;
     }
     const auto half = Eigen::half(value);
-    require((Eigen::numext::isfinite)(half), fmt::format("tensor '{}': F16 cannot hold {}", name, value));
+    if (!(Eigen::numext::isfinite)(half))
+      throw std::invalid_argument(fmt::format("tensor '{}': F16 cannot hold {}", name, value));
     append(bytes, half.x);
   }
 }
