@@ -20,6 +20,7 @@ constexpr int kMostMilliseconds = 600000;
 
 std::vector<std::string> all_channels() {
   std::vector<std::string> names;
+  names.reserve(static_cast<std::size_t>(PolicyChannelKind::kNoise) + 1);
   for (int kind = 0; kind <= static_cast<int>(PolicyChannelKind::kNoise); ++kind)
     names.emplace_back(to_string(static_cast<PolicyChannelKind>(kind)));
   return names;

@@ -93,6 +93,7 @@ PolicyMessage parse_plan(const Json& json) {
 
 std::vector<std::string> task_names() {
   std::vector<std::string> names;
+  names.reserve(kTasks.size());
   for (const Task task : kTasks) names.emplace_back(to_string(task));
   return names;
 }

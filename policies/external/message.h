@@ -14,7 +14,7 @@
 namespace duet {
 
 inline constexpr int kPolicyMessageVersion = 1;
-inline constexpr std::size_t kLargestPolicyMessage = std::size_t{1} << 22;  // [bytes]
+inline constexpr std::size_t kLargestPolicyMessage = std::size_t{1} << 20;  // [bytes]
 
 // What a process says.
 struct PolicyMessage {

@@ -37,6 +37,7 @@ std::size_t find_port(std::span<const Port> ports, const std::string& name, cons
                       const std::string& place) {
   if (name.empty() && ports.size() == 1) return 0;
   std::vector<std::string> known;
+  known.reserve(ports.size());
   for (const Port& port : ports) known.push_back(port.name);
   const auto it = std::ranges::find(known, name);
   if (it == known.end()) throw InputError(fmt::format("{}: {}", place, unknown_name_message(kind, name, known)));
@@ -137,6 +138,7 @@ class OnnxPolicy final : public Policy {
       throw InputError(fmt::format("{}: output '{}': expected {} numbers ({} anchors of {}), found {}", place,
                                    ports[plan_output_].name, decoder_.size(), descriptor.output.anchors,
                                    decoder_.anchor_size(), ports[plan_output_].size));
+    results_.reserve(ports.size());
     for (const Port& port : ports) results_.emplace_back(port.size);
     network_outputs_.assign(results_.begin(), results_.end());
   }
@@ -165,7 +167,8 @@ bool shows_language(const PolicyDescriptor& descriptor) {
   return false;
 }
 
-std::unique_ptr<Policy> make_onnx_policy(const PolicyDescriptor& descriptor, std::shared_ptr<const RobotModel> robot,
+std::unique_ptr<Policy> make_onnx_policy(const PolicyDescriptor& descriptor,
+                                         const std::shared_ptr<const RobotModel>& robot,
                                          std::unique_ptr<Network> network, const std::string& network_path,
                                          std::shared_ptr<const LanguageEncoder> language) {
   require(robot != nullptr && network != nullptr,

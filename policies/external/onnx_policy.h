@@ -13,7 +13,8 @@ namespace duet {
 // `network_path` names the network in messages. `language`: needed where a channel shows it, shared between episodes.
 // Throws InputError for joints that are not the robot's and for a network whose inputs and outputs are not the
 // descriptor's: file, line, name, expected, found and the channels' places.
-std::unique_ptr<Policy> make_onnx_policy(const PolicyDescriptor& descriptor, std::shared_ptr<const RobotModel> robot,
+std::unique_ptr<Policy> make_onnx_policy(const PolicyDescriptor& descriptor,
+                                         const std::shared_ptr<const RobotModel>& robot,
                                          std::unique_ptr<Network> network, const std::string& network_path,
                                          std::shared_ptr<const LanguageEncoder> language);
 

@@ -35,7 +35,8 @@ std::vector<std::string> names_of(const std::vector<int>& joints, const RobotMod
 
 class ProcessPolicy final : public Policy {
  public:
-  ProcessPolicy(const PolicyDescriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::vector<int> joints)
+  ProcessPolicy(const PolicyDescriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
+                const std::vector<int>& joints)
       : descriptor_(descriptor),
         joint_names_(names_of(joints, *robot)),
         channels_(frame_channels()),
@@ -163,6 +164,7 @@ class ProcessPolicy final : public Policy {
       die(error.what());
       return std::nullopt;
     }
+    if (result == Result::kDone && std::chrono::steady_clock::now() > deadline) result = Result::kLate;
     if (result == Result::kClosed) lose_connection();
     if (result == Result::kLate) late();
     if (result != Result::kDone) return std::nullopt;
@@ -225,10 +227,9 @@ class ProcessPolicy final : public Policy {
 }  // namespace
 
 std::unique_ptr<Policy> make_process_policy(const PolicyDescriptor& descriptor,
-                                            std::shared_ptr<const RobotModel> robot) {
+                                            const std::shared_ptr<const RobotModel>& robot) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", descriptor.name));
-  std::vector<int> joints = bind_joints(descriptor, *robot);
-  return std::make_unique<ProcessPolicy>(descriptor, std::move(robot), std::move(joints));
+  return std::make_unique<ProcessPolicy>(descriptor, robot, bind_joints(descriptor, *robot));
 }
 
 }  // namespace duet

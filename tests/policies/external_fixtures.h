@@ -1,10 +1,14 @@
-// A descriptor as text with its parts to be changed, and observations of a moving robot.
+// A descriptor as text with its parts to be changed, observations of a moving robot, and whether a process runs.
 #pragma once
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
+#include <chrono>
+#include <fstream>
 #include <string>
+#include <thread>
 
 #include "core/file.h"
 #include "tests/policies/fixtures.h"
@@ -46,6 +50,29 @@ inline EpisodeContext episode(const RobotState& start) {
   context.start = start;
   context.seed = 7;
   return context;
+}
+
+// Whether a process runs; one that ended and waits to be reaped by whoever inherited it does not.
+inline bool runs(int pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string text((std::istreambuf_iterator<char>(stat)), {});
+  const std::size_t end = text.rfind(')');
+  return end != std::string::npos && text.at(end + 2) != 'Z' && text.at(end + 2) != 'X';
+}
+
+// What another process writes into a file: waits until it is there.
+inline int number_in(const std::string& path) {
+  int number = 0;
+  for (int i = 0; i < 2000 && number == 0; ++i) {
+    std::ifstream(path) >> number;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return number;
+}
+
+inline bool ends(int pid) {
+  for (int i = 0; i < 2000 && runs(pid); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return !runs(pid);
 }
 
 }  // namespace duet::test

@@ -65,9 +65,9 @@ TEST(PolicyMessage, BuffersCutAStreamAtAnyPlace) {
 
 TEST(PolicyMessage, BuffersRefuseALengthThatIsNone) {
   MessageBuffer buffer;
-  buffer.append(std::string_view("\x01\x00\x40\x00", 4));
+  buffer.append(std::string_view("\x01\x00\x10\x00", 4));
   EXPECT_THAT(thrown_message<InputError>([&] { buffer.next(); }),
-              HasSubstr("expected at most 4194304 bytes, found a length of 4194305"));
+              HasSubstr("expected at most 1048576 bytes, found a length of 1048577"));
 }
 
 TEST(PolicyMessage, DuetSpeaksJson) {

@@ -6,7 +6,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <thread>
 
 #include "core/require.h"
@@ -18,8 +17,11 @@
 namespace duet {
 namespace {
 
+using test::ends;
 using test::g1;
 using test::MovingHistory;
+using test::number_in;
+using test::runs;
 using test::thrown_message;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -138,6 +140,14 @@ TEST_F(ProcessPolicyTest, LateForEverIsCountedAndNeverBlocks) {
   EXPECT_FALSE(policy_->faults().dead);
 }
 
+// Plans of earlier ticks that never end keep no call from ending.
+TEST_F(ProcessPolicyTest, AFloodOfOldPlansIsLate) {
+  start(polite("plan(m)\nwhile True:\n    plan(m)\n"), 200);
+  static_cast<void>(plan(0));
+  EXPECT_EQ(plan(10), 0U);
+  EXPECT_GE(policy_->faults().late, 1);
+}
+
 TEST_F(ProcessPolicyTest, DeathIsReportedWithItsStatus) {
   start(polite("sys.exit(3)\n"));
   EXPECT_EQ(plan(0), 0U);
@@ -213,7 +223,7 @@ TEST_F(ProcessPolicyTest, ALengthOfFourGigabytesEndsIt) {
   EXPECT_TRUE(policy_->faults().dead);
   EXPECT_EQ(policy_->faults().invalid, 1);
   EXPECT_EQ(policy_->faults().message,
-            "policy 'mine': message of the policy: expected at most 4194304 bytes, found a length of 4294967295");
+            "policy 'mine': message of the policy: expected at most 1048576 bytes, found a length of 4294967295");
 }
 
 TEST_F(ProcessPolicyTest, SilenceAtHelloEndsIt) {
@@ -288,28 +298,6 @@ TEST_F(ProcessPolicyTest, ObservationsThatAreNotFiniteAreNotSent) {
   EXPECT_EQ(plan(10), 100U);
 }
 
-// Whether a process runs; one that ended and waits to be reaped by whoever inherited it does not.
-bool runs(int pid) {
-  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-  std::string text((std::istreambuf_iterator<char>(stat)), {});
-  const std::size_t end = text.rfind(')');
-  return end != std::string::npos && text.at(end + 2) != 'Z' && text.at(end + 2) != 'X';
-}
-
-int number_in(const std::string& path) {
-  int number = 0;
-  for (int i = 0; i < 2000 && number == 0; ++i) {
-    std::ifstream(path) >> number;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  return number;
-}
-
-bool ends(int pid) {
-  for (int i = 0; i < 2000 && runs(pid); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  return !runs(pid);
-}
-
 const std::string kDeaf = polite(R"(
 plan(m)
 f = open('pid.tmp', 'w')
@@ -365,20 +353,18 @@ serve(Still, 'here.sock')
   EXPECT_TRUE(refused->faults().dead);
   EXPECT_THAT(refused->faults().message, StartsWith("policy 'mine': cannot connect to '"));
   EXPECT_THAT(refused->faults().message, HasSubstr("here.sock': No such file or directory"));
-  {
-    const ChildProcess server({"env", "-u", "DUET_POLICY_FD", "python3", "server.py"},
-                              std::filesystem::path(folder_ / "x").parent_path().string(), 0);
-    std::unique_ptr<Policy> first;
-    for (int i = 0; i < 2000 && (first == nullptr || first->faults().dead); ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      first = make_policy(folder_ / "policy.yaml", g1());
-    }
-    const auto second = make_policy(folder_ / "policy.yaml", g1());  // two at once
-    for (const auto* policy : {first.get(), second.get()}) EXPECT_EQ(policy->faults().message, "");
-    for (auto* policy : {first.get(), second.get()}) {
-      policy->reset(test::episode(history_.at(0).now().robot));
-      EXPECT_EQ(policy->plan(history_.at(0)).size(), 100U);
-    }
+  const ChildProcess server({"env", "-u", "DUET_POLICY_FD", "python3", "server.py"},
+                            std::filesystem::path(folder_ / "x").parent_path().string(), 0);
+  std::unique_ptr<Policy> first;
+  for (int i = 0; i < 2000 && (first == nullptr || first->faults().dead); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    first = make_policy(folder_ / "policy.yaml", g1());
+  }
+  const auto second = make_policy(folder_ / "policy.yaml", g1());  // two at once
+  for (Policy* policy : {first.get(), second.get()}) {
+    EXPECT_EQ(policy->faults().message, "");
+    policy->reset(test::episode(history_.at(0).now().robot));
+    EXPECT_EQ(policy->plan(history_.at(0)).size(), 100U);
   }
 }
 
