@@ -57,6 +57,10 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
                     "SELECT late_plans, faults_observations, faults_actions, faults_stopped FROM episodes "
                     "WHERE suite = 'hhoi-core'"),
               testing::ElementsAre("2|3|1|1"));
+  EXPECT_THAT(query(path,
+                    "SELECT policy_late, policy_invalid, policy_dead, policy_message, policy_ms_p50, policy_ms_max, "
+                    "started_at FROM episodes WHERE suite = 'hhoi-core'"),
+              testing::ElementsAre("4|1|1|the process ended|1.5|80.0|" + row.started_at));
   EXPECT_THAT(query(path, "SELECT name, value FROM forces ORDER BY name"),
               testing::ElementsAre("ground.mean_n|343.125", "human.chest.quasi_static_n|12.3"));
   EXPECT_THAT(query(path,
