@@ -26,41 +26,60 @@ Suite synthetic(int per_task, std::uint64_t seed) {
   return suite;
 }
 
+constexpr std::size_t kBeforeFall = 50;  // frames
+constexpr int kShortest = 100;
+
 // One motion to be followed, beside its partner.
 struct Take {
   const PairedMotion* clip = nullptr;
   AdaptedMotion adapted;
   PointTracks partner;
-  std::optional<std::vector<RobotState>> followed;  // in the engine, where it stayed upright
+  std::vector<RobotState> followed;  // in the engine, while it was upright
 };
 
 Take take_of(const PairedMotion& clip, const RobotModel& robot, std::uint64_t seed) {
-  Take take{&clip, adapt_by_phase(clip.robot, clip.phases, robot, {.start = StartMode::kApproach}, seed), {}, {}};
+  Take take;
+  take.clip = &clip;
+  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, {.start = StartMode::kApproach}, seed);
   const int begin = take.adapted.clip_frame, frames = take.adapted.motion.frames();
   take.partner = clip.partner.joints.slice(begin, begin + frames);
   return take;
 }
 
-void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options) {
+void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options,
+            const PolicyMaker& make_policy) {
   Scene scene;
   scene.robot = robot;
   scene.human = make_human_body(bone_lengths(take.clip->partner));
   const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
   const std::unique_ptr<Controller> controller = make_controller(options.controller, robot);
-  const std::unique_ptr<Policy> policy = make_policy("replay", robot);
+  const std::unique_ptr<Policy> policy = make_policy();
   RolloutSetup setup;
   setup.clip = take.clip;
   setup.reference = take.adapted;
   setup.start = robot->standing_state(take.adapted.motion.root.front());
   Rollout rollout = roll_out(setup, *backend, *controller, *policy);
-  if (rollout.recording.outcome == Outcome::kOk) take.followed = std::move(rollout.recording.robot);
+  take.followed = std::move(rollout.recording.robot);
+  if (rollout.recording.outcome == Outcome::kOk) return;
+  take.followed.resize(std::max<std::size_t>(take.followed.size(), kBeforeFall) - kBeforeFall);
 }
 
-void add(const Take& take, DemonstrationSet& set) {
+// The first frames of a motion.
+RobotMotion begin_of(const RobotMotion& motion, int frames) {
+  return {motion.rate_hz,
+          motion.joint_names,
+          {motion.root.begin(), motion.root.begin() + frames},
+          motion.q.leftCols(frames)};
+}
+
+void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
   const Demonstration entry{take.clip->clip_id, clip_digest(*take.clip), take.clip->task, take.adapted.phases};
-  set.add(entry, states_of(take.adapted.motion), take.adapted.motion, take.partner);
-  if (take.followed && static_cast<int>(take.followed->size()) == take.adapted.motion.frames())
-    set.add(entry, *take.followed, take.adapted.motion, take.partner);
+  const RobotMotion& motion = take.adapted.motion;
+  if (as_it_is) set.add(entry, states_of(motion), motion, take.partner);
+  const int frames = std::min(static_cast<int>(take.followed.size()), motion.frames());
+  if (frames < kShortest) return;
+  set.add(entry, {take.followed.begin(), take.followed.begin() + frames}, begin_of(motion, frames),
+          take.partner.slice(0, frames));
 }
 
 }  // namespace
@@ -72,11 +91,14 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
       prepare_clips(synthetic(options.per_task, options.seed), *robot, options.threads, progress);
   const int takes = static_cast<int>(clips.size()) * options.starts;
   std::vector<std::optional<Take>> made(takes);
+  const bool itself = options.network.empty();
+  const PolicyMaker maker =
+      itself ? policy_maker("replay", robot) : policy_maker("dstar", robot, {{"network", options.network}});
   progress.start("demonstrating", takes, "takes");
   parallel_for_each(takes, options.threads, [&](int i) {
     if (stop()) return;
     made[i] = take_of(clips[i / options.starts], *robot, options.seed + static_cast<std::uint64_t>(i));
-    if (!options.engine.empty()) follow(*made[i], robot, options);
+    if (!options.engine.empty()) follow(*made[i], robot, options, maker);
     progress.advance();
   });
   progress.finish();
@@ -84,7 +106,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   for (std::optional<Take>& take : made) {
-    add(*take, set);
+    add(*take, itself, set);
     take.reset();
   }
   return set;

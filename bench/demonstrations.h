@@ -20,12 +20,15 @@ struct DemonstrationOptions {
   int starts = 2;                                         // of each clip, drawn as A.4.4 has it
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   int threads = 1;
+  // A network that acts in the place of the demonstration: the robot is seen where the policy takes it, and what it was
+  // meant to do stays (DAgger: Ross et al. 2011). Empty: the demonstration itself, also seen as it is.
+  std::string network;
 };
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
 
-// Demonstrations in which the robot fell are left out. None where `stop` said so in between. Throws what prepare_clips
-// and make_controller throw, and MissingError for an engine that is not there.
+// Of a take in which the robot fell, what is up to a second before; nothing of less than two. None where `stop` said so
+// in between. Throws what prepare_clips and make_controller throw, and MissingError for an engine that is not there.
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop);

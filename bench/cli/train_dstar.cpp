@@ -22,6 +22,7 @@ struct TrainArguments {
   DstarRun run;
   DemonstrationOptions data;
   std::string config, language, split;
+  int rounds = 2;
   bool smoke = false;
 };
 
@@ -73,11 +74,27 @@ DstarData data_of(Session& session, const TrainArguments& arguments) {
   return data;
 }
 
+std::string round_file(const DstarRun& run, int round) {
+  return (fs::path(run.folder) / run.name / fmt::format("round-{}.safetensors", round)).string();
+}
+
+// Adds what is seen where the network of now takes the robot.
+void add_round(Session& session, const TrainArguments& arguments, int round, DstarData& data) {
+  DemonstrationOptions options = arguments.data;
+  options.network = dstar_network_file(arguments.run);
+  options.starts = 1;
+  const auto more = demonstrations(session, data.robot, options, round_file(arguments.run, round));
+  auto both = std::make_shared<DemonstrationSet>(*data.train);
+  both->append(*more);
+  data.train = std::move(both);
+}
+
 // A small training whose outcome can be checked in minutes.
 void make_small(TrainArguments& arguments) {
   arguments.data.per_task = 2;
   arguments.data.starts = 1;
   arguments.data.engine = "";
+  arguments.rounds = 0;
   DstarRun& run = arguments.run;
   run.config.width = 64;
   run.config.layers = 1;
@@ -104,19 +121,22 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
   if (!arguments.config.empty())
     arguments.run.config = parse_dstar_config(read_file(arguments.config), arguments.config);
   if (arguments.smoke) make_small(arguments);
-  const DstarData data = data_of(session, arguments);
+  DstarData data = data_of(session, arguments);
   double first = -1.0, last = 0.0, accuracy = 0.0, speed = 0.0;
-  const DstarEnd end = train_dstar(
-      data, arguments.run,
-      [&](const DstarProgress& progress) {
-        if (first < 0.0 && progress.validation > 0.0) first = progress.validation;
-        last = progress.validation;
-        accuracy = progress.phase_accuracy;
-        speed = progress.windows_per_second;
-        note(session, line(progress));
-      },
-      stop_asked);
-  if (end == DstarEnd::kStopped) throw Stopped();
+  const auto report = [&](const DstarProgress& progress) {
+    if (first < 0.0 && progress.validation > 0.0) first = progress.validation;
+    last = progress.validation;
+    accuracy = progress.phase_accuracy;
+    speed = progress.windows_per_second;
+    note(session, line(progress));
+  };
+  const int rounds = arguments.data.engine.empty() ? 0 : arguments.rounds;
+  for (int round = 0; round <= rounds; ++round) {
+    DstarRun part = arguments.run;
+    part.until = part.steps * (round + 1) / (rounds + 1);
+    if (train_dstar(data, part, report, stop_asked) == DstarEnd::kStopped) throw Stopped();
+    if (round < rounds) add_round(session, arguments, round, data);
+  }
   check_network(session, data, arguments.run);
   if (arguments.smoke && last >= first) {
     note(session, fmt::format("smoke test failed: the validation loss went from {:.4f} to {:.4f}, expected it to fall",
@@ -154,6 +174,10 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
   command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
   command->add_option("--engine", arguments->data.engine, "that the clips are followed in; '' for none")
+      ->capture_default_str();
+  command
+      ->add_option("--rounds", arguments->rounds,
+                   "times that the policy so far acts in the engine and what it meets is added to the demonstrations")
       ->capture_default_str();
   command->add_option("--steps", run.steps, "of Adam")->capture_default_str();
   command->add_option("--batch", run.batch, "windows, a multiple of the threads")->capture_default_str();

@@ -108,6 +108,23 @@ void DemonstrationSet::add(Demonstration entry, const std::vector<RobotState>& s
   list.push_back(std::move(entry));
 }
 
+void DemonstrationSet::append(const DemonstrationSet& other) {
+  require(other.robot_digest == robot_digest, "demonstrations of two robots cannot be one set");
+  const int used = list.empty() ? 0 : list.back().end(), more = other.list.empty() ? 0 : other.list.back().end();
+  const auto join = [&](Eigen::MatrixXf& mine, const Eigen::MatrixXf& theirs) {
+    Eigen::MatrixXf both(theirs.rows(), used + more);
+    both << mine.leftCols(used), theirs.leftCols(more);
+    mine.swap(both);
+  };
+  join(observed, other.observed);
+  join(wanted, other.wanted);
+  join(partner, other.partner);
+  for (Demonstration entry : other.list) {
+    entry.begin += used;
+    list.push_back(std::move(entry));
+  }
+}
+
 RobotState DemonstrationSet::state(int column) const {
   const auto in = observed.col(column);
   const Eigen::Index n = (observed.rows() - 13) / 2;

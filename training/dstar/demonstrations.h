@@ -35,6 +35,8 @@ struct DemonstrationSet {
   // All three as long as one another (std::invalid_argument otherwise); begin and frames of `entry` are set here.
   void add(Demonstration entry, const std::vector<RobotState>& seen, const RobotMotion& meant,
            const PointTracks& partner_joints);
+  // All of another set, of the same robot (std::invalid_argument otherwise).
+  void append(const DemonstrationSet& other);
   [[nodiscard]] RobotState state(int column) const;
   [[nodiscard]] Reference reference(int column) const;
 };

@@ -32,7 +32,8 @@ struct DstarRun {
   std::uint64_t seed = 42;
   int threads = 2;
   int batch = 256;
-  long steps = 12000;
+  long steps = 9000;
+  long until = 0;            // pauses there, with a checkpoint and a network; 0: at `steps`
   double rate = 5e-4;        // Adam's, falling as a cosine to a twentieth after a warm-up of 200 steps
   double average = 0.999;    // EMA of the weights, which is what is validated and kept
   int patience = 12;         // validations without a better one after which it stops; 0: never
@@ -57,7 +58,7 @@ struct DstarData {
 // the network saved at `file`, in normalised units: what ships must be what was validated.
 double runner_difference(const DstarData& data, const DstarRun& run, const std::string& file, int windows);
 
-enum class DstarEnd { kComplete, kEarly, kStopped };
+enum class DstarEnd { kComplete, kPaused, kEarly, kStopped };
 
 // `report` is called about every ten seconds and after each validation. Throws std::invalid_argument for options out of
 // range or sets without a window, InputError for a checkpoint that is broken, of another robot, configuration or seed.

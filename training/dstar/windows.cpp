@@ -24,6 +24,12 @@ void move(RobotState& state, const Eigen::Vector3d& centre, const Eigen::Vector3
   state.v_WB = turn * state.v_WB;
 }
 
+// Not further from `centre` than `distance`, level.
+void bound(Eigen::Vector3d& p, const Eigen::Vector3d& centre, double distance) {
+  const Eigen::Vector2d away = (p - centre).head<2>();
+  if (away.norm() > distance) p.head<2>() = centre.head<2>() + distance / away.norm() * away;
+}
+
 }  // namespace
 
 std::vector<int> loss_frames(const RobotModel& robot) {
@@ -132,6 +138,7 @@ void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch,
   for (int k = 0; k < kAnchors; ++k) {
     const int then = clamped(entry, frame + k * kAnchorTicks);
     anchors[k] = set_.reference(then);
+    bound(anchors[k].X_WB.p, X_WE.p, options_.reach + options_.speed * kAnchorTicks / 50.0 * k);
     for (int point = 0; point < kLossPoints; ++point) {
       const Eigen::Vector3d p_W = set_.partner.col(then).segment<3>(3 * loss_joints()[point]).cast<double>();
       batch.partner.col(column).segment<3>(3 * (kLossPoints * k + point)) = (X_EW * p_W).cast<float>();

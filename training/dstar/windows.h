@@ -22,6 +22,8 @@ struct WindowOptions {
   double jitter = 0.04;   // largest deviation of the partner's joints [m]; of every second window
   double dropout = 0.2;   // largest share of joints that are not seen; of every third window
   bool augment = true;
+  // A robot that has gone astray is not asked to be back at once: the root of anchor k is at most so far from it.
+  double reach = 0.25, speed = 0.6;  // [m], and [m/s] times its 0.5 k s
 };
 
 // Keypoints whose places L_pos and L_spatial compare: of the robot and of the partner.

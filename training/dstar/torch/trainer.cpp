@@ -268,7 +268,7 @@ class Trainer {
     return network;
   }
 
-  void save(double minutes) const;
+  void save(double minutes);
   double restore();  // minutes so far; 0 where there is no checkpoint
 
   [[nodiscard]] long steps() const { return step_; }
@@ -297,6 +297,14 @@ class Trainer {
     Batch batch;
     LossParts parts;
   };
+
+  // Made of the first demonstrations and kept, whatever is added later.
+  [[nodiscard]] std::map<std::string, Eigen::VectorXf*> normalisers() {
+    return {{"frame_mean", &statistics_.frame_mean},
+            {"frame_deviation", &statistics_.frame_deviation},
+            {"plan_mean", &statistics_.plan_mean},
+            {"plan_deviation", &statistics_.plan_deviation}};
+  }
 
   void fill_validation() {
     WindowOptions options = run_.windows;
@@ -413,7 +421,7 @@ class Trainer {
 
 duet::Tensor flat(const float* values, int size) { return {{size}, {values, values + size}}; }
 
-void Trainer::save(double minutes) const {
+void Trainer::save(double minutes) {
   SafeTensors file;
   file.metadata = {{"format", kFormat},
                    {"robot_digest", data_.robot->digest},
@@ -423,6 +431,8 @@ void Trainer::save(double minutes) const {
                    {"minutes", fmt::format("{}", minutes)},
                    {"best", fmt::format("{}", best)},
                    {"stale", std::to_string(stale)}};
+  for (const auto& [name, values] : normalisers())
+    file.tensors[name] = flat(values->data(), static_cast<int>(values->size()));
   file.tensors["weights"] = flat(weights_.data(), weights_.size());
   file.tensors["average"] = flat(average_.data(), average_.size());
   file.tensors["adam.m"] = flat(m_.data(), weights_.size());
@@ -448,6 +458,8 @@ double Trainer::restore() {
     const Eigen::VectorXf values = vector_of(file, name, weights_.size(), path);
     std::copy(values.begin(), values.end(), out);
   };
+  for (const auto& [name, values] : normalisers()) *values = vector_of(file, name, values->size(), path);
+  units_ = std::make_unique<Units>(statistics_, *data_.language);
   load("weights", weights_.data());
   load("average", average_.data());
   load("adam.m", m_.data());
@@ -522,13 +534,15 @@ DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
     trainer.save(log.minutes());
     log.saved();
   };
-  while (trainer.steps() < run.steps) {
+  const long until = run.until > 0 ? std::min(run.until, run.steps) : run.steps;
+  const auto keep = [&] { save_dstar_network(dstar_network_file(run), trainer.network(), TensorType::kF32); };
+  while (trainer.steps() < until) {
     if (stop()) return save(), DstarEnd::kStopped;
     log.add(trainer.step());
     if (trainer.steps() % run.validate_every == 0 || trainer.steps() == run.steps) {
       const auto [loss, accuracy] = trainer.validate();
       trainer.stale = loss < trainer.best ? 0 : trainer.stale + 1;
-      if (loss < trainer.best) save_dstar_network(dstar_network_file(run), trainer.network(), TensorType::kF32);
+      if (loss < trainer.best) keep();
       trainer.best = std::min(trainer.best, loss);
       log.validated(loss, accuracy, trainer.steps(), trainer.rate());
       report(log.report(trainer.steps()));
@@ -538,8 +552,11 @@ DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
     }
     if (log.save_due()) save();
   }
+  // The rate has fallen to its end: the average of now is kept, though another may have been better on the states of
+  // the demonstrations, which are not those that the policy will be in.
+  keep();
   save();
-  return DstarEnd::kComplete;
+  return until < run.steps ? DstarEnd::kPaused : DstarEnd::kComplete;
 }
 
 double runner_difference(const DstarData& data, const DstarRun& run, const std::string& file, int windows) {
