@@ -10,6 +10,7 @@
 #include "policies/external/external_policy.h"
 #include "policies/null_policy.h"
 #include "policies/replay_policy.h"
+#include "policies/retrieval.h"
 #include "policies/scheduler.h"
 
 namespace duet {
@@ -36,11 +37,10 @@ PolicyInfo replay_info(const std::string& name) {
 PolicyInfo dense_info(const std::string& name) { return {name, "The same at 50 Hz, past the anchors", {}}; }
 PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral pose where it stands", {}}; }
 
-constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>},
-                               {"replay_dense", dense_info, of<DenseReplayPolicy>},
-                               {"null", null_info, of<NullPolicy>},
-                               {"dstar", dstar_info, dstar_maker},
-                               {"dp", dstar_info, dstar_maker}};
+constexpr Entry kPolicies[] = {
+    {"replay", replay_info, of<ReplayPolicy>}, {"replay_dense", dense_info, of<DenseReplayPolicy>},
+    {"null", null_info, of<NullPolicy>},       {"dstar", dstar_info, dstar_maker},
+    {"dp", dstar_info, dstar_maker},           {"retrieval", retrieval_info, retrieval_maker}};
 
 // A name that is the path of a policy descriptor.
 constexpr Entry kDescriptor = {"", external_info, external_maker};

@@ -11,6 +11,7 @@
 #include "core/require.h"
 #include "core/share.h"
 #include "policies/dstar/network.h"
+#include "training/dstar/retrieval.h"
 #include "training/dstar/trainer.h"
 
 namespace duet::cli {
@@ -26,6 +27,8 @@ struct TrainArguments {
   bool smoke = false;
 };
 
+constexpr const char* kRetrieval = "retrieval";
+constexpr int kLibraryWindows = 6000;
 constexpr int kValidationPerTask = 6, kGoldenWindows = 8;
 constexpr double kAgreement = 1e-4;  // between libtorch's plans and those of inference
 
@@ -148,10 +151,20 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
         {{"network", file}, {"validation", last}, {"phase_accuracy", accuracy}, {"windows_per_second", speed}});
 }
 
+// No training: windows of the same demonstrations, as they are.
+void make_library(Session& session, TrainArguments& arguments, const std::string& name) {
+  const DstarData data = data_of(session, arguments);
+  const fs::path file = fs::path(arguments.run.folder) / name / "library.safetensors";
+  fs::create_directories(file.parent_path());
+  save_retrieval_library(file.string(),
+                         make_retrieval_library(data.robot, *data.train, kLibraryWindows, arguments.run.seed));
+  print(session, fmt::format("{}\n", file.string()), {{"library", file.string()}});
+}
+
 void train_or_stop(Session& session, TrainArguments& arguments, const std::string& name) {
   catch_interrupts();
   try {
-    train(session, arguments, name);
+    name == kRetrieval ? make_library(session, arguments, name) : train(session, arguments, name);
   } catch (const Stopped&) {
     note(session, fmt::format("stopped; the same command goes on from what is in '{}'", arguments.run.folder));
     session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
@@ -209,6 +222,7 @@ void add_split(CLI::App& train_command, Session& session) {
 
 void add_train_dstar(CLI::App& train_command, Session& session) {
   for (const std::string& name : dstar_variants()) add_policy(train_command, session, name);
+  add_policy(train_command, session, kRetrieval);
   add_split(train_command, session);
 }
 

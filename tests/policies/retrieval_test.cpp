@@ -1,0 +1,97 @@
+#include "policies/retrieval.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/require.h"
+#include "robots/robot_model.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+std::shared_ptr<const RobotModel> robot() {
+  static const auto model = load_shared_robot("");
+  return model;
+}
+
+// Three windows; the plan of each says which it is, in the first joint.
+RetrievalLibrary made_library() {
+  RetrievalLibrary library;
+  library.robot = robot()->name;
+  library.joints = robot()->joint_names();
+  library.tasks = {0, 0, 1};
+  library.mean = Eigen::VectorXf::Zero(kRetrievalKey);
+  library.deviation = Eigen::VectorXf::Ones(kRetrievalKey);
+  library.keys = Eigen::MatrixXf::Zero(kRetrievalKey, 3);
+  library.keys(0, 1) = library.keys(0, 2) = 2.0F;
+  library.plans = Eigen::MatrixXf::Zero(kPlanSize, 3);
+  for (int i = 0; i < 3; ++i)
+    for (int k = 0; k < kAnchors; ++k) {
+      library.plans(kAnchorSize * k + 2, i) = 0.75F;
+      library.plans(kAnchorSize * k + 3, i) = 1.0F;
+      library.plans(kAnchorSize * k + 7 + 18, i) = 0.125F * static_cast<float>(i + 1);
+    }
+  return library;
+}
+
+Observation looking_at(const ObservationFrame& frame, std::array<ObservationFrame, kHistoryFrames>& history) {
+  history.fill(frame);
+  return {history, 0};
+}
+
+TEST(Retrieval, FindsTheNearestWindowOfTheTask) {
+  const RetrievalLibrary library = made_library();
+  Eigen::VectorXf key = Eigen::VectorXf::Zero(kRetrievalKey);
+  EXPECT_EQ(nearest_window(library, 0, key), 0);
+  key[0] = 1.5F;
+  EXPECT_EQ(nearest_window(library, 0, key), 1);
+  EXPECT_EQ(nearest_window(library, 1, key), 2);
+  EXPECT_EQ(nearest_window(library, 4, key), -1);
+}
+
+TEST(Retrieval, AnswersWithThePlanOfThatWindow) {
+  const test::ScratchFolder folder;
+  save_retrieval_library(folder / "library.safetensors", made_library());
+  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
+  EpisodeContext context;
+  context.task = Task::kHug;
+  context.start = robot()->standing_state();
+  policy->reset(context);
+  ObservationFrame frame;
+  frame.robot = context.start;
+  frame.partner.setZero();
+  frame.partner.row(0).setConstant(2.0);  // two metres ahead: the second window
+  std::array<ObservationFrame, kHistoryFrames> history;
+  const Anchors anchors = policy->act(looking_at(frame, history));
+  EXPECT_NEAR(anchors[0].q[18] - robot()->neutral[18], 0.25, 1e-6);
+  EXPECT_NEAR(anchors[4].X_WB.p.z(), 0.75, 1e-6);
+}
+
+TEST(Retrieval, RefusesATaskThatTheLibraryLacks) {
+  const test::ScratchFolder folder;
+  save_retrieval_library(folder / "library.safetensors", made_library());
+  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
+  EpisodeContext context;
+  context.task = Task::kWave;
+  EXPECT_THAT([&] { policy->reset(context); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("no window of task wave")));
+}
+
+TEST(Retrieval, RefusesALibraryOfAnotherRobotOrShape) {
+  const test::ScratchFolder folder;
+  RetrievalLibrary library = made_library();
+  library.robot = "h1";
+  save_retrieval_library(folder / "robot.safetensors", library);
+  EXPECT_THAT([&] { load_retrieval_library(folder / "robot.safetensors", *robot()); },
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("robot: expected 'g1', found 'h1'")));
+  library = made_library();
+  library.plans.conservativeResize(kPlanSize - 1, 3);
+  save_retrieval_library(folder / "shape.safetensors", library);
+  EXPECT_THAT(
+      [&] { load_retrieval_library(folder / "shape.safetensors", *robot()); },
+      testing::ThrowsMessage<InputError>(testing::HasSubstr("'plans': expected shape (3, 180), found (3, 179)")));
+}
+
+}  // namespace
+}  // namespace duet
