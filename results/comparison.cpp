@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "core/require.h"
-#include "results/leaderboard.h"
+#include "results/comparison_parts.h"
 #include "results/leaderboard_rows.h"
 #include "results/row_groups.h"
 
@@ -125,24 +125,7 @@ std::map<PairKey, const EpisodeRow*> indexed(const RowList& rows, const Pairing&
   return index;
 }
 
-// What is gathered of one comparison before its statistics are computed.
-struct Gathered {
-  PairedTable table;
-  std::vector<double> differences;  // success of A minus success of B, per pair
-  std::vector<int> clusters;
-  std::map<std::pair<std::string, std::string>, int> clips;  // (task, clip) -> cluster
-  long unpaired_a = 0, unpaired_b = 0;
-
-  void add(const EpisodeRow& a, const EpisodeRow& b) {
-    const bool of_a = headline_success(a);
-    const bool of_b = headline_success(b);
-    table.add(of_a, of_b);
-    differences.push_back(static_cast<double>(of_a) - static_cast<double>(of_b));
-    clusters.push_back(clips.try_emplace({a.task, a.clip}, static_cast<int>(clips.size())).first->second);
-  }
-};
-
-using Family = std::map<std::tuple<Group, int, std::string>, Gathered>;  // group, place of the task, task
+using Family = std::map<std::tuple<Group, int, std::string>, PairedRows>;  // group, place of the task, task
 
 Family gather(const std::map<PairKey, const EpisodeRow*>& a, const std::map<PairKey, const EpisodeRow*>& b) {
   Family family;
@@ -152,12 +135,12 @@ Family gather(const std::map<PairKey, const EpisodeRow*>& a, const std::map<Pair
   };
   for (const auto& [key, row] : a) {
     const auto partner = b.find(key);
-    both_levels(key, [&, of_a = row](Gathered& gathered) {
+    both_levels(key, [&, of_a = row](PairedRows& gathered) {
       partner == b.end() ? void(++gathered.unpaired_a) : gathered.add(*of_a, *partner->second);
     });
   }
   for (const auto& [key, row] : b) {
-    if (!a.contains(key)) both_levels(key, [](Gathered& gathered) { ++gathered.unpaired_b; });
+    if (!a.contains(key)) both_levels(key, [](PairedRows& gathered) { ++gathered.unpaired_b; });
   }
   return family;
 }
@@ -168,7 +151,17 @@ std::string group_name(const Group& group, const std::string& task) {
   return fmt::format("{}/{}/{}{} {}", engine, controller, policy, condition, task);
 }
 
-Comparison evaluate(const std::string& name, const Gathered& gathered, const LeaderboardOptions& options) {
+}  // namespace
+
+void PairedRows::add(const EpisodeRow& a, const EpisodeRow& b) {
+  const bool of_a = headline_success(a);
+  const bool of_b = headline_success(b);
+  table.add(of_a, of_b);
+  differences.push_back(static_cast<double>(of_a) - static_cast<double>(of_b));
+  clusters.push_back(clips.try_emplace({a.task, a.clip}, static_cast<int>(clips.size())).first->second);
+}
+
+Comparison evaluate(const std::string& name, const PairedRows& gathered, const LeaderboardOptions& options) {
   const PairedTable& table = gathered.table;
   Comparison result;
   result.group = name;
@@ -197,8 +190,6 @@ void correct_for_family(std::vector<Comparison>& comparisons) {
   const std::vector<double> adjusted = holm(p_values);
   for (std::size_t i = 0; i < comparisons.size(); ++i) comparisons[i].p_holm = adjusted[i];
 }
-
-}  // namespace
 
 std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
                                      const LeaderboardOptions& options) {

@@ -1,8 +1,8 @@
 // A comparison of two runs as Markdown and JSON.
 #include <fmt/format.h>
 
+#include "results/comparison_parts.h"
 #include "results/json_fields.h"
-#include "results/leaderboard.h"
 #include "results/leaderboard_rows.h"
 #include "results/text_table.h"
 
@@ -61,12 +61,16 @@ std::string notes(const std::vector<Comparison>& comparisons) {
 
 }  // namespace
 
-std::string comparison_markdown(const std::vector<Comparison>& comparisons) {
-  if (comparisons.empty()) return "Nothing to compare.\n";
+TextTable comparison_table(const std::vector<Comparison>& comparisons) {
   TextTable table;
   table.header = {"Comparison", "Pairs", "A", "B", "A - B", "by clip", "only A", "only B", "p", "p (Holm)", "MDE"};
   for (const Comparison& comparison : comparisons) table.rows.push_back(cells_of(comparison));
-  return markdown_table(table) + "\n" + notes(comparisons);
+  return table;
+}
+
+std::string comparison_markdown(const std::vector<Comparison>& comparisons) {
+  if (comparisons.empty()) return "Nothing to compare.\n";
+  return markdown_table(comparison_table(comparisons)) + "\n" + notes(comparisons);
 }
 
 nlohmann::json comparison_json(const std::vector<Comparison>& comparisons) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <tuple>
 
+#include "results/contact_table_parts.h"
 #include "results/cross_engine.h"
 #include "results/order_statistics.h"
 #include "results/row_groups.h"
@@ -16,11 +17,6 @@ namespace {
 
 constexpr std::string_view kPrefix = "human.";
 constexpr std::string_view kPeak = ".peak_n";
-
-bool has_solid_partner(const EpisodeRow& row) {
-  const auto first = row.forces.lower_bound(std::string(kPrefix));
-  return first != row.forces.end() && first->first.starts_with(kPrefix);
-}
 
 double force_or_nan(const EpisodeRow& row, const std::string& name) {
   const auto found = row.forces.find(name);
@@ -128,6 +124,17 @@ ContactGroup contact_group(const std::map<std::string, Episodes>& engines) {
 }
 
 }  // namespace
+
+bool has_solid_partner(const EpisodeRow& row) {
+  const auto first = row.forces.lower_bound(std::string(kPrefix));
+  return first != row.forces.end() && first->first.starts_with(kPrefix);
+}
+
+bool is_over_limit(const EpisodeRow& row) {
+  const RegionForces regions = touched_regions(row);
+  const auto any = regions.find(std::string(kAnyRegion));
+  return any != regions.end() && any->second.ratio > 1.0;
+}
 
 ContactTable contact_table(const std::vector<EpisodeRow>& rows, const std::string& arm) {
   require_one_suite(rows);

@@ -1,4 +1,4 @@
-// A contact table as titled tables of text, for Markdown, LaTeX and HTML: internal to those writers.
+// Parts of the contact table: the reading of a row; titled tables of text for Markdown, LaTeX and HTML.
 #pragma once
 
 #include <string>
@@ -18,6 +18,9 @@ std::vector<TitledTable> contact_group_tables(const ContactGroup& group);
 
 // How to read the tables, one sentence or two each.
 std::vector<std::string> contact_notes();
+
+bool has_solid_partner(const EpisodeRow& row);  // contacts with one were measured
+bool is_over_limit(const EpisodeRow& row);      // of force or pressure, on any region
 
 std::string no_contacts();  // the sentence for a table without groups
 

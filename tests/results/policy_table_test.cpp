@@ -1,0 +1,175 @@
+#include "results/policy_table.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/require.h"
+#include "tests/results/policy_rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::add_episodes;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+// Two policies and the null arm in one engine: 3 of 4, 1 of 4, 1 of 4.
+std::vector<EpisodeRow> two_policies(const std::string& engine = "mujoco") {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.engine = engine, .policy = "dstar", .successes = "1110"}, rows);
+  add_episodes({.engine = engine, .policy = "dp", .successes = "1000"}, rows);
+  add_episodes({.engine = engine, .policy = "null", .arm = "null", .successes = "1000"}, rows);
+  return rows;
+}
+
+const PolicyLine& line_of(const PolicyTable& table, const std::string& policy) {
+  for (const PolicyLine& line : table.lines)
+    if (line.policy == policy) return line;
+  throw std::runtime_error("no line of " + policy);
+}
+
+TEST(PolicyTable, CountsSuccessUnderBothDetectorsAndTheLift) {
+  const PolicyTable table = policy_table(two_policies());
+  ASSERT_EQ(table.lines.size(), 2U);  // the null arm is no policy
+  const PolicyFigures& dstar = line_of(table, "dstar").engines.at(0);
+  EXPECT_EQ(dstar.success.k, 3);
+  EXPECT_DOUBLE_EQ(dstar.success.interval.low, wilson(3, 4).low);
+  EXPECT_EQ(dstar.paper.k, 1);
+  EXPECT_DOUBLE_EQ(dstar.lift.difference, 0.5);
+  EXPECT_DOUBLE_EQ(dstar.lift.interval.high, newcombe_paired(1, 2, 0, 1).high);
+  EXPECT_TRUE(std::isnan(dstar.dof_jerk));
+  EXPECT_EQ(dstar.violations.n, 0);
+}
+
+TEST(PolicyTable, FallsJerkAndContactLimitsAreOfTheEpisodesThatHaveThem) {
+  std::vector<EpisodeRow> rows = two_policies();
+  rows[0].fell = true;
+  rows[0].metrics["dof_jerk"] = 100.0;
+  rows[1].metrics["dof_jerk"] = 300.0;
+  rows[1].forces = {{"human.chest.peak_n", 200.0}, {"human.chest.worst_ratio", 1.5}};
+  rows[2].forces = {{"human.chest.peak_n", 20.0}, {"human.chest.worst_ratio", 0.5}};
+  const PolicyTable table = policy_table(rows);
+  const PolicyFigures& dstar = line_of(table, "dstar").engines.at(0);
+  EXPECT_DOUBLE_EQ(dstar.falls.rate, 0.25);
+  EXPECT_DOUBLE_EQ(dstar.dof_jerk, 200.0);
+  EXPECT_EQ(dstar.violations.n, 2);
+  EXPECT_DOUBLE_EQ(dstar.violations.rate, 0.5);
+  EXPECT_THAT(policy_table_markdown(table), AllOf(HasSubstr("Over a contact limit"), HasSubstr("DOF jerk")));
+  EXPECT_THAT(policy_table_markdown(policy_table(two_policies())),
+              AllOf(Not(HasSubstr("Over a contact limit [%]")), Not(HasSubstr("DOF jerk"))));
+}
+
+TEST(PolicyTable, PlaybackIsInNoMeanAndTheWorstEngineIsNamed) {
+  std::vector<EpisodeRow> rows = two_policies();  // mujoco: 0.75
+  add_episodes({.engine = "bullet", .successes = "0010"}, rows);
+  add_episodes({.engine = "playback", .successes = "0000"}, rows);
+  const PolicyTable table = policy_table(rows);
+  const PolicyLine& dstar = line_of(table, "dstar");
+  ASSERT_EQ(dstar.engines.size(), 3U);
+  EXPECT_EQ(dstar.engines[2].key.engine, "playback");
+  const OverEngines over = over_engines(dstar, kPolicyFigures[0]);
+  EXPECT_EQ(over.engines, 2);
+  EXPECT_DOUBLE_EQ(over.mean, 0.5);
+  EXPECT_DOUBLE_EQ(over.range, 0.5);
+  EXPECT_EQ(over.worst, "bullet");
+  EXPECT_DOUBLE_EQ(dstar.mean_success, 0.5);
+  EXPECT_LE(dstar.mean_interval.low, 0.5);
+  EXPECT_THAT(policy_table_markdown(table), AllOf(HasSubstr("| bullet"), HasSubstr("Worst"), HasSubstr("Spread")));
+  EXPECT_THAT(policy_table_markdown(policy_table(two_policies())), Not(HasSubstr("Worst")));
+}
+
+TEST(PolicyTable, MoreFallsAreWorse) {
+  std::vector<EpisodeRow> rows = two_policies();
+  add_episodes({.engine = "bullet", .successes = "0010"}, rows);
+  rows[0].fell = true;
+  const PolicyTable table = policy_table(rows);
+  EXPECT_EQ(over_engines(line_of(table, "dstar"), kPolicyFigures[3]).worst, "mujoco");
+}
+
+TEST(PolicyTable, EveryPolicyMeetsEveryOtherInsideOneEngineAndController) {
+  std::vector<EpisodeRow> rows = two_policies();
+  add_episodes({.policy = "shown_another", .arm = "shuffled", .successes = "0000"}, rows);
+  add_episodes({.controller = "wbc_sim", .policy = "dstar", .successes = "1111"}, rows);
+  const PolicyTable table = policy_table(rows);
+  ASSERT_EQ(table.pairs.size(), 3U);  // of three; the other controller has one policy
+  const Comparison& first = table.pairs[0];
+  EXPECT_EQ(first.group, "mujoco/vmc: dp vs dstar");
+  EXPECT_EQ(first.only_b, 2);
+  EXPECT_EQ(first.both, 1);
+  EXPECT_DOUBLE_EQ(first.p, 0.5);
+  EXPECT_DOUBLE_EQ(first.p_holm, 1.0);
+  const Comparison& last = table.pairs[2];
+  EXPECT_EQ(last.group, "mujoco/vmc: dstar vs shown_another");
+  EXPECT_DOUBLE_EQ(last.p, 0.25);
+  EXPECT_DOUBLE_EQ(last.p_holm, 0.75);  // the smallest of three
+  EXPECT_GT(last.minimum_detectable, 0.0);
+}
+
+TEST(PolicyTable, OnlyCleanEpisodesCount) {
+  std::vector<EpisodeRow> rows = two_policies();
+  add_episodes({.policy = "dstar", .perturbation = "jitter_5cm", .successes = "0000"}, rows);
+  EXPECT_EQ(policy_table_csv(policy_table(rows)), policy_table_csv(policy_table(two_policies())));
+}
+
+TEST(PolicyTable, APolicyThatCouldNotRunIsNamedAndHasNoFigure) {
+  std::vector<EpisodeRow> rows = two_policies();
+  add_episodes({.policy = "no_language", .successes = "00"}, rows);
+  for (std::size_t i = rows.size() - 2; i < rows.size(); ++i) rows[i].outcome = Outcome::kUnsupported;
+  const PolicyTable table = policy_table(rows);
+  EXPECT_EQ(table.lines.size(), 2U);
+  EXPECT_THAT(policy_table_markdown(table), HasSubstr("no_language could not run (2 episodes)"));
+}
+
+TEST(PolicyTable, ThePapersRowsStandUnderThePapersDetectorsAlone) {
+  std::vector<EpisodeRow> rows = two_policies();
+  add_episodes({.task = "wave", .successes = "11"}, rows);
+  const PolicyTable table = policy_table(rows);
+  const std::vector<TitledTable> tables = policy_tables(table);
+  ASSERT_EQ(tables.size(), 4U);
+  EXPECT_EQ(tables[1].table.header, (std::vector<std::string>{"Policy", "Overall", "Hug", "Wave"}));
+  EXPECT_EQ(tables[1].table.rows.size(), 2U);
+  ASSERT_EQ(tables[2].table.rows.size(), 5U);
+  EXPECT_EQ(tables[2].table.rows[2], (std::vector<std::string>{"D-STAR (the paper's)", "84.9", "93.3", "96.3"}));
+  EXPECT_THAT(policy_table_markdown(table), HasSubstr("can be held against the paper's figures"));
+  EXPECT_EQ(policy_table_json(table).at("paper").at(0).at("success_percent").at("bend"), 93.3);
+}
+
+TEST(PolicyTable, ReplayAloneIsNoExperimentOnPolicies) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.policy = "replay"}, rows);
+  const PolicyTable table = policy_table(rows);
+  EXPECT_TRUE(table.lines.empty());
+  EXPECT_TRUE(policy_tables(table).empty());
+  EXPECT_EQ(policy_table_markdown(table), "No policy but replay ran.\n");
+  EXPECT_EQ(policy_table_latex(table), "% No policy but replay ran.\n");
+  EXPECT_EQ(policy_table_json(table).at("lines").size(), 0U);
+  EXPECT_TRUE(policy_table({}).lines.empty());
+}
+
+TEST(PolicyTable, CsvHasOneFigureALineNotRounded) {
+  const std::string csv = policy_table_csv(policy_table(two_policies()));
+  EXPECT_THAT(csv, AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,all,success,4,0.75,"),
+                         HasSubstr("duet,mujoco,vmc,main,dstar,all,lift,4,0.5,"),
+                         HasSubstr("duet,mujoco,vmc,main,dstar,all,dof_jerk,4,,,"),
+                         HasSubstr("paper,,,,\"D-STAR, HOMIE, waist free\",hug,paper_success,,0.66")));
+}
+
+TEST(PolicyTable, OrderOfRowsDoesNotMatter) {
+  std::vector<EpisodeRow> rows = two_policies();
+  const std::string before = policy_table_json(policy_table(rows)).dump();
+  std::reverse(rows.begin(), rows.end());
+  EXPECT_EQ(policy_table_json(policy_table(rows)).dump(), before);
+}
+
+TEST(PolicyTable, TheSameEpisodeTwiceIsRefused) {
+  std::vector<EpisodeRow> rows = two_policies();
+  rows.push_back(rows.front());
+  EXPECT_THAT(thrown_message<InputError>([&] { policy_table(rows); }), HasSubstr("is there twice"));
+}
+
+}  // namespace
+}  // namespace duet
