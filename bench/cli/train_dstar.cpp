@@ -205,6 +205,21 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
   command->callback([&session, arguments, name] { train_or_stop(session, *arguments, name); });
 }
 
+void add_pack(CLI::App& train_command, Session& session) {
+  auto from = std::make_shared<std::string>(), to = std::make_shared<std::string>();
+  CLI::App* command =
+      add_command(train_command, session, "pack", "Write a policy's network in half precision, to ship it",
+                  "duet train pack runs/policies/dstar/network.safetensors -o dstar.safetensors");
+  command->add_option("network", *from, "file of a training")->required();
+  command->add_option("-o,--output", *to, "file to write")->required();
+  command->callback([&session, from, to] {
+    const auto robot = load_shared_robot();
+    save_dstar_network(*to, *load_dstar_network(*from, *robot), TensorType::kF16);
+    load_dstar_network(*to, *robot);  // its golden plan is checked
+    print(session, fmt::format("{}: {} bytes\n", *to, fs::file_size(*to)), {{"network", *to}});
+  });
+}
+
 void add_split(CLI::App& train_command, Session& session) {
   auto file = std::make_shared<std::string>();
   CLI::App* command =
@@ -223,6 +238,7 @@ void add_split(CLI::App& train_command, Session& session) {
 void add_train_dstar(CLI::App& train_command, Session& session) {
   for (const std::string& name : dstar_variants()) add_policy(train_command, session, name);
   add_policy(train_command, session, kRetrieval);
+  add_pack(train_command, session);
   add_split(train_command, session);
 }
 
