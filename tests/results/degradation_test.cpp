@@ -1,0 +1,154 @@
+#include "results/degradation.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/require.h"
+#include "tests/results/policy_rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::add_episodes;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+
+void expect_size(std::string_view name, const std::string& family, double x, const std::string& unit) {
+  const auto size = perturbation_size(name);
+  ASSERT_TRUE(size.has_value()) << name;
+  EXPECT_EQ(size->family, family) << name;
+  EXPECT_NEAR(size->x, x, 1e-15) << name;
+  EXPECT_EQ(size->unit, unit) << name;
+}
+
+TEST(PerturbationSize, IsReadFromTheEndOfTheName) {
+  expect_size("jitter_1cm", "jitter", 0.01, "m");
+  expect_size("dropout_0.05", "dropout", 0.05, "");
+  expect_size("shift_-0.5s", "shift", -0.5, "s");
+  expect_size("shift_+1.5s", "shift", 1.5, "s");
+  expect_size("latency_200ms", "latency", 0.2, "s");
+  expect_size("push60", "push", 60.0, "");
+  expect_size("a_1_2", "a_1", 2.0, "");
+  expect_size("wind_3knots", "wind", 3.0, "knots");
+}
+
+TEST(PerturbationSize, OtherNamesHaveNone) {
+  for (const char* name :
+       {"clean", "push", "", "60", "_60", "jitter_", "jitter_1.", "jitter_.5", "x_1.2.3", "1cm", "-5"})
+    EXPECT_FALSE(perturbation_size(name).has_value()) << name;
+}
+
+// Clean 4 of 4, jitter 1 cm 3 of 4, 2 cm 2 of 4, 5 cm 2 of 4.
+std::vector<EpisodeRow> jittered() {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.perturbation = "jitter_5cm", .successes = "0011"}, rows);
+  add_episodes({.perturbation = "clean", .successes = "1111"}, rows);
+  add_episodes({.perturbation = "jitter_2cm", .successes = "0101"}, rows);
+  add_episodes({.perturbation = "jitter_1cm", .successes = "1101"}, rows);
+  add_episodes({.perturbation = "vanish", .successes = "0000"}, rows);
+  return rows;
+}
+
+TEST(Degradation, LossIsPairedWithTheCleanEpisodes) {
+  const Degradation result = degradation(jittered());
+  ASSERT_EQ(result.success.size(), 5U);
+  EXPECT_EQ(result.success[0].perturbation, "clean");
+  EXPECT_EQ(result.success[0].difference.pairs, 0);
+  EXPECT_EQ(result.success[1].perturbation, "jitter_1cm");
+  EXPECT_EQ(result.success[3].perturbation, "jitter_5cm");
+  EXPECT_EQ(result.success[4].perturbation, "vanish");
+  const PerturbedSuccess& two = result.success[2];
+  EXPECT_EQ(two.success.k, 2);
+  EXPECT_EQ(two.paper.k, 2);
+  EXPECT_EQ(two.difference.pairs, 4);
+  EXPECT_DOUBLE_EQ(two.difference.difference, -0.5);
+  EXPECT_DOUBLE_EQ(two.difference.interval.low, newcombe_paired(2, 0, 2, 0).low);
+}
+
+TEST(Degradation, OnlyEpisodesOfBothPair) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.successes = "11"}, rows);
+  add_episodes({.perturbation = "vanish", .successes = "01", .first = 1}, rows);
+  const Degradation result = degradation(rows);
+  EXPECT_EQ(result.success[1].difference.pairs, 1);
+  EXPECT_DOUBLE_EQ(result.success[1].difference.difference, -1.0);
+}
+
+TEST(Degradation, AreaOfACurveIsByTrapezia) {
+  const Degradation result = degradation(jittered());
+  ASSERT_EQ(result.curves.size(), 1U);
+  const DegradationCurve& curve = result.curves[0];
+  EXPECT_EQ(curve.family, "jitter");
+  EXPECT_EQ(curve.unit, "m");
+  ASSERT_EQ(curve.points.size(), 4U);
+  EXPECT_EQ(curve.points[0].x, 0.0);
+  EXPECT_EQ(curve.points[0].success, 1.0);
+  // (0.875 * 1 + 0.625 * 1 + 0.5 * 3) / 5
+  EXPECT_NEAR(curve.normalised_area, 0.6, 1e-12);
+  EXPECT_DOUBLE_EQ(curve.largest, 0.05);
+  EXPECT_DOUBLE_EQ(curve.difference.difference, -0.5);
+}
+
+TEST(Degradation, SizesOnBothSidesOfZeroAreOneCurve) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.successes = "1100"}, rows);
+  add_episodes({.perturbation = "shift_-1s", .successes = "0000"}, rows);
+  add_episodes({.perturbation = "shift_0.5s", .successes = "1100"}, rows);
+  const Degradation result = degradation(rows);
+  ASSERT_EQ(result.curves.size(), 1U);
+  EXPECT_DOUBLE_EQ(result.curves[0].points[0].x, -1.0);
+  EXPECT_DOUBLE_EQ(result.curves[0].largest, -1.0);
+  EXPECT_NEAR(result.curves[0].normalised_area, (0.25 + 0.25) / (1.5 * 0.5), 1e-12);
+}
+
+TEST(Degradation, ACurveThatNeverSucceedsHasNoArea) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.successes = "00"}, rows);
+  add_episodes({.perturbation = "jitter_1cm", .successes = "00"}, rows);
+  EXPECT_TRUE(std::isnan(degradation(rows).curves.at(0).normalised_area));
+}
+
+TEST(Degradation, ThePapersCurveStandsBesideOurs) {
+  const Degradation result = degradation(jittered());
+  ASSERT_EQ(result.paper.size(), 1U);
+  EXPECT_NEAR(result.paper[0].difference.difference, -0.071, 1e-12);
+  // (82.55 * 1 + 79.8 * 1 + 78.6 * 3) / 5 / 84.9
+  EXPECT_NEAR(result.paper[0].normalised_area, 398.15 / 5.0 / 84.9, 1e-12);
+  const std::vector<LinePlot> plots = degradation_plots(result);
+  ASSERT_EQ(plots.size(), 1U);
+  EXPECT_EQ(plots[0].x_label, "jitter [m]");
+  ASSERT_EQ(plots[0].series.size(), 2U);
+  EXPECT_EQ(plots[0].series[1].y.back(), 77.8);
+  EXPECT_THAT(degradation_markdown(result), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
+}
+
+TEST(Degradation, CleanAloneSaysSo) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({}, rows);
+  add_episodes({.policy = "dp", .perturbation = "vanish"}, rows);  // never clean
+  const Degradation result = degradation(rows);
+  EXPECT_TRUE(result.success.empty());
+  EXPECT_TRUE(degradation_tables(result).empty());
+  EXPECT_TRUE(degradation_plots(result).empty());
+  EXPECT_EQ(degradation_markdown(result), "No policy ran both clean and perturbed.\n");
+  EXPECT_EQ(degradation_json(result).at("success").size(), 0U);
+}
+
+TEST(Degradation, CsvHasOneFigureALineNotRounded) {
+  EXPECT_THAT(degradation_csv(degradation(jittered())),
+              AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,jitter_2cm,against_clean,4,-0.5,"),
+                    HasSubstr("duet,mujoco,vmc,main,dstar,clean,paper_success,4,0,"),
+                    HasSubstr("paper,,,,D-STAR,jitter,loss_at_largest,0,-0.07")));
+}
+
+TEST(Degradation, TheSameEpisodeTwiceIsRefused) {
+  std::vector<EpisodeRow> rows = jittered();
+  rows.push_back(rows.front());
+  EXPECT_THAT(thrown_message<InputError>([&] { degradation(rows); }), HasSubstr("is there twice"));
+}
+
+}  // namespace
+}  // namespace duet
