@@ -46,19 +46,19 @@ double square_and_add(double left, double right, double correlation) {
 }
 
 struct Cluster {
-  double sum = 0.0;
-  long count = 0;
+  double above = 0.0, below = 0.0;
 };
 
 // In the order of first appearance, so that the numbers that name clusters do not matter.
-std::vector<Cluster> clusters_of(std::span<const double> values, std::span<const int> ids) {
+std::vector<Cluster> clusters_of(std::span<const double> above, std::span<const double> below,
+                                 std::span<const int> ids) {
   std::vector<Cluster> clusters;
   std::map<int, std::size_t> place;
-  for (std::size_t i = 0; i < values.size(); ++i) {
+  for (std::size_t i = 0; i < above.size(); ++i) {
     const auto [found, is_new] = place.try_emplace(ids[i], clusters.size());
     if (is_new) clusters.emplace_back();
-    clusters[found->second].sum += values[i];
-    ++clusters[found->second].count;
+    clusters[found->second].above += above[i];
+    clusters[found->second].below += below[i];
   }
   return clusters;
 }
@@ -153,24 +153,33 @@ const std::vector<int>& ClusterBootstrap::draws(int clusters) {
 }
 
 Interval ClusterBootstrap::mean(std::span<const double> values, std::span<const int> cluster, double level) {
-  require(!values.empty(), "bootstrap: expected at least one value, found none");
-  require(values.size() == cluster.size(),
-          fmt::format("bootstrap: expected one cluster per value, found {} for {}", cluster.size(), values.size()));
+  return ratio(values, std::vector<double>(values.size(), 1.0), cluster, level);
+}
+
+Interval ClusterBootstrap::ratio(std::span<const double> above, std::span<const double> below,
+                                 std::span<const int> cluster, double level) {
+  require(!above.empty(), "bootstrap: expected at least one value, found none");
+  require(above.size() == cluster.size(),
+          fmt::format("bootstrap: expected one cluster per value, found {} for {}", cluster.size(), above.size()));
+  require(below.size() == above.size(),
+          fmt::format("bootstrap: expected one divisor per value, found {} for {}", below.size(), above.size()));
+  require(std::all_of(below.begin(), below.end(), [](double divisor) { return divisor > 0.0; }),
+          "bootstrap: expected divisors above 0");
   require_level(level);
-  const std::vector<Cluster> clusters = clusters_of(values, cluster);
+  const std::vector<Cluster> clusters = clusters_of(above, below, cluster);
   const std::vector<int>& drawn = draws(static_cast<int>(clusters.size()));
   auto draw = drawn.begin();
-  std::vector<double> means(resamples_);
-  for (double& mean : means) {
+  std::vector<double> ratios(resamples_);
+  for (double& value : ratios) {
     Cluster total;
     for (std::size_t i = 0; i < clusters.size(); ++i, ++draw) {
-      total.sum += clusters[*draw].sum;
-      total.count += clusters[*draw].count;
+      total.above += clusters[*draw].above;
+      total.below += clusters[*draw].below;
     }
-    mean = total.sum / static_cast<double>(total.count);
+    value = total.above / total.below;
   }
-  std::sort(means.begin(), means.end());
-  return {.low = quantile_of_sorted(means, 0.5 - 0.5 * level), .high = quantile_of_sorted(means, 0.5 + 0.5 * level)};
+  std::sort(ratios.begin(), ratios.end());
+  return {.low = quantile_of_sorted(ratios, 0.5 - 0.5 * level), .high = quantile_of_sorted(ratios, 0.5 + 0.5 * level)};
 }
 
 std::vector<double> holm(std::span<const double> p_values) {

@@ -33,6 +33,10 @@ class ClusterBootstrap {
  public:
   ClusterBootstrap(int resamples, std::uint64_t seed);  // throws std::invalid_argument for no resamples
   Interval mean(std::span<const double> values, std::span<const int> cluster, double level = 0.95);
+  // Of the sum of `above` over the sum of `below`, for instance a slope through the origin. Throws
+  // std::invalid_argument where a value of `below` is not above 0.
+  Interval ratio(std::span<const double> above, std::span<const double> below, std::span<const int> cluster,
+                 double level = 0.95);
 
  private:
   const std::vector<int>& draws(int clusters);

@@ -14,6 +14,7 @@ namespace duet {
 namespace {
 
 using test::thrown_message;
+using testing::HasSubstr;
 
 double normal_cdf(double x) { return 0.5 * std::erfc(-x / std::sqrt(2.0)); }
 
@@ -331,6 +332,25 @@ TEST(MinimumDetectableDifferencePaired, HasThePowerItPromises) {
   // The exact test is conservative: it gives up some points of power against the normal formula.
   EXPECT_GT(static_cast<double>(found) / kTrials, 0.72);
   EXPECT_LT(static_cast<double>(found) / kTrials, 0.84);
+}
+
+TEST(ClusterBootstrap, RatioOfEqualRatiosHasNoWidth) {
+  const std::vector<double> above = {1.0, 2.0, 6.0};
+  const std::vector<double> below = {2.0, 4.0, 12.0};
+  const std::vector<int> clusters = {0, 1, 2};
+  const Interval interval = ClusterBootstrap(200, 1).ratio(above, below, clusters);
+  EXPECT_DOUBLE_EQ(interval.low, 0.5);
+  EXPECT_DOUBLE_EQ(interval.high, 0.5);
+}
+
+TEST(ClusterBootstrap, RatioRefusesDivisorsThatAreNotAboveZero) {
+  const std::vector<double> above = {1.0, 2.0};
+  const std::vector<int> clusters = {0, 1};
+  const auto message = [&](const std::vector<double>& below) {
+    return thrown_message<std::invalid_argument>([&] { ClusterBootstrap(10, 1).ratio(above, below, clusters); });
+  };
+  EXPECT_THAT(message({1.0, 0.0}), HasSubstr("expected divisors above 0"));
+  EXPECT_THAT(message({1.0}), HasSubstr("expected one divisor per value, found 1 for 2"));
 }
 
 }  // namespace

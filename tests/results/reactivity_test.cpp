@@ -1,0 +1,148 @@
+#include "results/reactivity.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/require.h"
+#include "tests/results/policy_rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::add_episodes;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+// Six episodes of two clips; clean the partner's onset is at 2 s + number and the robot's 0.5 s later. A perturbation
+// moves the partner's by `shift`, the robot's by `follows` of it.
+void add_shifted(const std::string& policy, const std::string& perturbation, double shift, double follows,
+                 std::vector<EpisodeRow>& rows) {
+  const std::size_t first = rows.size();
+  add_episodes({.policy = policy, .perturbation = perturbation, .successes = "111111"}, rows);
+  for (std::size_t i = first; i < rows.size(); ++i) {
+    const double onset = 2.0 + rows[i].episode;
+    rows[i].metrics["partner_onset_s"] = onset + shift;
+    rows[i].metrics["onset_s"] = onset + 0.5 + follows * shift;
+  }
+}
+
+std::vector<EpisodeRow> shifted(const std::string& policy, double follows) {
+  std::vector<EpisodeRow> rows;
+  add_shifted(policy, "clean", 0.0, follows, rows);
+  add_shifted(policy, "later_1.0", 1.0, follows, rows);
+  add_shifted(policy, "earlier_0.5", -0.5, follows, rows);
+  add_shifted(policy, "jitter_1cm", 0.0, follows, rows);
+  return rows;
+}
+
+TEST(Reactivity, AFollowerHasSlopeOneAndAReplayNone) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  const std::vector<EpisodeRow> replay = shifted("replay", 0.0);
+  rows.insert(rows.end(), replay.begin(), replay.end());
+  const ReactivityTable table = reactivity_table(rows);
+  ASSERT_EQ(table.timing.size(), 2U);
+  const Reactivity& dstar = table.timing[0];
+  EXPECT_EQ(dstar.n, 12);  // jitter moves nobody
+  EXPECT_NEAR(dstar.slope, 1.0, 1e-12);
+  EXPECT_NEAR(dstar.interval.low, 1.0, 1e-12);
+  EXPECT_NEAR(dstar.delay_clean, 0.5, 1e-12);
+  EXPECT_NEAR(dstar.delay_moved, 0.5, 1e-12);
+  EXPECT_EQ(dstar.n_clean, 6);
+  EXPECT_NEAR(table.timing[1].slope, 0.0, 1e-12);
+  EXPECT_NEAR(table.timing[1].delay_moved, 0.25, 1e-12);  // half of them -0.5, half of them 1.0
+}
+
+TEST(Reactivity, SlopeIsLeastSquaresThroughTheOrigin) {
+  std::vector<EpisodeRow> rows;
+  add_shifted("dstar", "clean", 0.0, 0.0, rows);
+  add_shifted("dstar", "later_1.0", 1.0, 1.0, rows);
+  add_shifted("dstar", "later_2.0", 2.0, 0.5, rows);
+  const Reactivity of = reactivity_table(rows).timing.at(0);
+  EXPECT_NEAR(of.slope, (1.0 * 1.0 + 2.0 * 1.0) / (1.0 + 4.0), 1e-12);
+  ASSERT_EQ(of.shifts.size(), 2U);
+  EXPECT_NEAR(of.shifts[1].partner, 2.0, 1e-12);
+  EXPECT_NEAR(of.shifts[1].robot, 1.0, 1e-12);
+}
+
+TEST(Reactivity, OneClipHasNoInterval) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.clip != "hug-0"; });
+  const ReactivityTable table = reactivity_table(rows);
+  EXPECT_TRUE(std::isnan(table.timing.at(0).interval.low));
+  EXPECT_THAT(reactivity_markdown(table), HasSubstr(" 1.00 |"));
+}
+
+TEST(Reactivity, RobotsThatDidNotActAreCountedAndInNoSlope) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  for (EpisodeRow& row : rows)
+    if (row.perturbation == "later_1.0") row.metrics.erase("onset_s");
+  const Reactivity of = reactivity_table(rows).timing.at(0);
+  EXPECT_EQ(of.n, 6);
+  EXPECT_EQ(of.without, 6);
+  for (EpisodeRow& row : rows) row.metrics.erase("onset_s");
+  const ReactivityTable none = reactivity_table(rows);
+  EXPECT_EQ(none.timing.at(0).without, 12);
+  EXPECT_TRUE(std::isnan(none.timing.at(0).slope));
+  EXPECT_THAT(reactivity_markdown(none), HasSubstr(" 12 |"));
+  EXPECT_TRUE(reactivity_plots(none).empty());
+}
+
+TEST(Reactivity, WithoutAMovedPartnerOrVariantsThereIsNothing) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.perturbation == "clean"; });
+  const ReactivityTable table = reactivity_table(rows);
+  EXPECT_TRUE(table.empty());
+  EXPECT_TRUE(reactivity_tables(table).empty());
+  EXPECT_THAT(reactivity_markdown(table), HasSubstr("No perturbation moved a partner's onset"));
+  EXPECT_EQ(reactivity_json(table).at("timing").size(), 0U);
+}
+
+TEST(SpatialCell, IsAWordOfTheClipsId) {
+  EXPECT_EQ(spatial_cell("handshake-0003-left_high"), 0);
+  EXPECT_EQ(spatial_cell("handshake-right_low-0003"), 3);
+  EXPECT_EQ(spatial_cell("handshake-0003"), -1);
+  EXPECT_EQ(spatial_cell("left_higher"), -1);
+  EXPECT_EQ(spatial_cell("-"), -1);
+  EXPECT_EQ(spatial_cell(""), -1);
+}
+
+TEST(Reactivity, CellsAreSuccessByVariantBesideThePapers) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.task = "handshake", .successes = "1101"}, rows);
+  for (EpisodeRow& row : rows) row.clip = "handshake-0-left_high";
+  add_episodes({.task = "handshake", .successes = "0100"}, rows);
+  for (std::size_t i = 4; i < 8; ++i) rows[i].clip = "handshake-0-right_low";
+  const ReactivityTable table = reactivity_table(rows);
+  ASSERT_EQ(table.spatial.size(), 1U);
+  EXPECT_EQ(table.spatial[0].cells[0].k, 3);
+  EXPECT_EQ(table.spatial[0].cells[3].k, 1);
+  EXPECT_EQ(table.spatial[0].cells[1].n, 0);
+  const std::vector<TitledTable> tables = reactivity_tables(table);
+  ASSERT_EQ(tables.size(), 1U);
+  EXPECT_EQ(tables[0].table.rows.at(1),
+            (std::vector<std::string>{"D-STAR (the paper's)", "Handshake", "80.0", "100.0", "40.0", "60.0"}));
+  EXPECT_THAT(reactivity_markdown(table), AllOf(HasSubstr("75.0 ["), HasSubstr("real robot"), Not(HasSubstr("Slope"))));
+  EXPECT_THAT(reactivity_csv(table), AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,handshake,left_high,4,0.75,"),
+                                           HasSubstr("paper,,,,D-STAR,handshake,left_low,,0.4,,")));
+}
+
+TEST(Reactivity, PlotShowsTheShiftsOfEveryPolicy) {
+  const std::vector<LinePlot> plots = reactivity_plots(reactivity_table(shifted("dstar", 1.0)));
+  ASSERT_EQ(plots.size(), 1U);
+  ASSERT_EQ(plots[0].series.size(), 1U);
+  EXPECT_THAT(plots[0].series[0].x,
+              testing::ElementsAre(testing::DoubleNear(-0.5, 1e-12), testing::DoubleNear(1.0, 1e-12)));
+}
+
+TEST(Reactivity, TheSameEpisodeTwiceIsRefused) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  rows.push_back(rows.front());
+  EXPECT_THAT(thrown_message<InputError>([&] { reactivity_table(rows); }), HasSubstr("is there twice"));
+}
+
+}  // namespace
+}  // namespace duet
