@@ -126,6 +126,9 @@ std::string html_report(const ReportContent& content) {
     if (!body.empty()) sections.push_back({id, title, std::move(body)});
   };
   add("leaderboard", "Leaderboard", leaderboard_section(content));
+  add("policies", "Policies", policies_html(content.policies.policies));
+  add("perturbations", "Perturbations", degradation_html(content.policies.degradation));
+  add("reactivity", "Reactivity", reactivity_html(content.policies.reactivity));
   add("controllers", "Controllers", controllers_html(content));
   add("engines", "Across engines", cross_engine_html(content));
   add("contacts", "Contact with people", contacts_html(content.contacts));

@@ -14,6 +14,7 @@
 #include "results/leaderboard.h"
 #include "results/line_plot.h"
 #include "results/metric_column.h"
+#include "results/policy_report.h"
 #include "results/training_curves.h"
 
 namespace duet {
@@ -45,6 +46,7 @@ struct ReportContent {
   ContactTable contacts;                    // section "Contact with people", where it has groups
   ControllerTable controllers;              // section "Controllers", where it has entries
   std::vector<LinePlot> foot_plots;         // in that section
+  PolicyReport policies;                    // sections "Policies", "Perturbations", "Reactivity"
   std::vector<TrainingCurves> curves;       // section "Training"
   nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
 };

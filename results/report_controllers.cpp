@@ -26,6 +26,8 @@ bool shows_better(const EpisodeRow& a, const EpisodeRow& b) {
   return rank(a) < rank(b);
 }
 
+}  // namespace
+
 std::string plots_html(const std::vector<LinePlot>& plots) {
   std::string html = R"(<div class="plots">)";
   for (const LinePlot& plot : plots)
@@ -33,8 +35,6 @@ std::string plots_html(const std::vector<LinePlot>& plots) {
       html += fmt::format(R"(<figure><figcaption>{}</figcaption>{}</figure>)", escape_html(plot.title), svg);
   return html + "</div>\n";
 }
-
-}  // namespace
 
 std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
   std::map<std::string, const EpisodeRow*> shown;  // by controller

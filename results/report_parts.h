@@ -38,6 +38,14 @@ std::string cross_engine_html(const ReportContent& content);
 // Mark of the limits, notes and tables; "" for a table without groups.
 std::string contacts_html(const ContactTable& table);
 
+// Plots side by side, each under its title; those without a point are left out.
+std::string plots_html(const std::vector<LinePlot>& plots);
+
+// Tables and plots. "" where there are none.
+std::string policies_html(const PolicyTable& table);
+std::string degradation_html(const Degradation& result);
+std::string reactivity_html(const ReactivityTable& table);
+
 // Tables and foot heights; the curves. "" where there are none.
 std::string controllers_html(const ReportContent& content);
 std::string training_html(const ReportContent& content);

@@ -16,6 +16,7 @@
 #include "results/html_report.h"
 #include "results/interval_plot.h"
 #include "results/leaderboard.h"
+#include "results/policy_report.h"
 
 namespace duet::cli {
 namespace {
@@ -57,14 +58,17 @@ void check_formats(const std::vector<std::string>& formats) {
 }
 
 void write_format(const std::string& format, const std::string& path, const std::vector<Run>& runs,
-                  const std::vector<LeaderboardEntry>& entries, const ReportArguments& arguments, Progress& progress) {
+                  const std::vector<LeaderboardEntry>& entries, const PolicyReport& policies,
+                  const ReportArguments& arguments, Progress& progress) {
   if (format == "md") write_file(path, leaderboard_markdown(entries));
   if (format == "csv") write_file(path, leaderboard_csv(entries));
   if (format == "json") write_file(path, leaderboard_json(entries).dump(2) + "\n");
   if (format == "tex") write_file(path, leaderboard_latex(entries));
-  if (format == "html")
-    write_file(path,
-               html_report(report_content(runs, !arguments.no_clips, arguments.curves, arguments.threads, progress)));
+  if (format == "html") {
+    ReportContent content = report_content(runs, !arguments.no_clips, arguments.curves, arguments.threads, progress);
+    content.policies = policies;
+    write_file(path, html_report(content));
+  }
   if (format == "sqlite") write_database(all_rows(runs), path);
 }
 
@@ -98,7 +102,9 @@ void write_tables(const Tables& tables, const std::string& format, const Writer&
 void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
   const std::vector<Run> runs = load_runs(arguments.runs);
-  const Tables tables = make_tables(all_rows(runs), runs.front().info.certificate);
+  const std::vector<EpisodeRow> rows = all_rows(runs);
+  const Tables tables = make_tables(rows, runs.front().info.certificate);
+  const PolicyReport policies = policy_report(rows);
   const std::filesystem::path folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
   Progress progress(session.progress());
   nlohmann::json json = {{"files", nlohmann::json::array()}};
@@ -116,12 +122,14 @@ void run_report(const Session& session, const ReportArguments& arguments) {
                              : format == "sqlite" ? "results.sqlite"
                                                   : "leaderboard." + format;
     const std::string path = (folder / name).string();
-    write_format(format, path, runs, tables.leaderboard, arguments, progress);
+    write_format(format, path, runs, tables.leaderboard, policies, arguments, progress);
     wrote(path);
     write_tables(tables, format, write);
+    for (const auto& [file, text] : policy_report_files(policies, format)) write(file, text);
   }
   add_tables(tables, json);
-  print(session, tables_text(tables), json);
+  add_policy_report(policies, json);
+  print(session, tables_text(tables) + policy_report_text(policies), json);
 }
 
 }  // namespace

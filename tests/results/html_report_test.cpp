@@ -261,6 +261,27 @@ TEST(HtmlReport, ShowsControllersStepsAndTraining) {
   EXPECT_THAT(html_report(content()), AllOf(Not(HasSubstr("id=\"controllers\"")), Not(HasSubstr("id=\"training\""))));
 }
 
+TEST(HtmlReport, ShowsPoliciesPerturbationsAndReactivity) {
+  std::vector<EpisodeRow> rows;
+  for (const char* perturbation : {"clean", "later_1.0"}) {
+    for (int i = 0; i < 6; ++i) {
+      EpisodeRow row = test::engine_episode("mujoco", "<dstar>", i, i < 4);
+      row.perturbation = perturbation;
+      row.metrics = {{"partner_onset_s", row.perturbation == "clean" ? 2.0 : 3.0}, {"onset_s", 4.0}};
+      rows.push_back(row);
+    }
+  }
+  ReportContent shown = content();
+  shown.policies = policy_report(rows);
+  const std::string html = html_report(shown);
+  EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_THAT(
+      html, AllOf(HasSubstr("id=\"policies\""), HasSubstr("id=\"perturbations\""), HasSubstr("id=\"reactivity\""),
+                  HasSubstr("success [%]"), HasSubstr("shift of the partner&#39;s onset"), Not(HasSubstr("<dstar>"))));
+  for (const char* section : {"id=\"policies\"", "id=\"perturbations\"", "id=\"reactivity\""})
+    EXPECT_THAT(html_report(content()), Not(HasSubstr(section)));
+}
+
 TEST(FootPlots, OneEpisodePerControllerThatEndedWellFirst) {
   EpisodeRow still = walking("vmc", 0, Outcome::kOk);
   still.feet = {};

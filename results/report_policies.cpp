@@ -1,0 +1,25 @@
+// The sections "Policies", "Perturbations" and "Reactivity" of the HTML report.
+#include "results/report_parts.h"
+
+namespace duet {
+namespace {
+
+std::string section_html(const std::vector<LinePlot>& plots, const std::vector<TitledTable>& tables) {
+  std::string html = plots.empty() ? "" : plots_html(plots);
+  for (const TitledTable& titled : tables) html += titled_table_html(titled);
+  return html;
+}
+
+}  // namespace
+
+std::string policies_html(const PolicyTable& table) { return section_html({}, policy_tables(table)); }
+
+std::string degradation_html(const Degradation& result) {
+  return section_html(degradation_plots(result), degradation_tables(result));
+}
+
+std::string reactivity_html(const ReactivityTable& table) {
+  return section_html(reactivity_plots(table), reactivity_tables(table));
+}
+
+}  // namespace duet
