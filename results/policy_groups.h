@@ -16,7 +16,7 @@
 
 namespace duet {
 
-struct PolicyOptions {
+struct PolicyTableOptions {
   double level = 0.95;
   int resamples = 10000;
   std::uint64_t seed = 1;

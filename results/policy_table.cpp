@@ -184,7 +184,7 @@ OverEngines over_engines(const PolicyLine& line, const PolicyFigure& figure) {
   return over;
 }
 
-PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyOptions& options) {
+PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options) {
   PolicyTable table{.level = options.level, .lines = {}, .pairs = {}, .could_not_run = {}};
   const LeaderboardOptions paired{options.level, options.resamples, options.seed};
   const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);

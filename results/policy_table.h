@@ -69,7 +69,7 @@ struct PolicyTable {
 };
 
 // Empty where the only policy is `replay`, which decides nothing. Throws InputError as leaderboard() does.
-PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyOptions& options = {});
+PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
 
 // A row of Table S9 as the supplement prints it, in %: overall, then as in kTasks.
 struct PaperPolicy {
