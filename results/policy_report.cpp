@@ -47,7 +47,7 @@ PolicyReport policy_report(const std::vector<EpisodeRow>& rows, const PolicyTabl
 std::string policy_report_text(const PolicyReport& report) {
   std::string text;
   for (const Part& part : parts_of(report))
-    if (part.has_any) text += "\n" + part.markdown(report);
+    if (part.has_any) text.append("\n").append(part.markdown(report));
   return text;
 }
 
