@@ -110,8 +110,9 @@ void read_list(const YamlSection& top, const char* key, const char* kind,
 }  // namespace
 
 std::string from_folder_of(const Suite& suite, const std::string& file) {
-  const std::filesystem::path folder = std::filesystem::path(suite.file).parent_path();
-  return std::filesystem::absolute(folder / file).lexically_normal().string();
+  const std::filesystem::path beside = std::filesystem::path(suite.file).parent_path() / file;
+  const bool here = !std::filesystem::exists(beside) && std::filesystem::exists(file);
+  return std::filesystem::absolute(here ? std::filesystem::path(file) : beside).lexically_normal().string();
 }
 
 void read_controllers(const YamlSection& top, Suite& suite) {

@@ -12,7 +12,8 @@ namespace duet {
 void read_controllers(const YamlSection& top, Suite& suite);
 void read_policies(const YamlSection& top, Suite& suite);
 
-// A path of a suite file as an absolute one: relative ones start at the file's folder.
+// A path of a suite file as an absolute one: relative ones start at the file's folder, or, where nothing is there but
+// in the working folder (`-s policies=[my/policy.yaml]`), at that.
 std::string from_folder_of(const Suite& suite, const std::string& file);
 
 }  // namespace duet

@@ -243,8 +243,11 @@ WbcNetwork named(const RobotModel& robot) {
 }  // namespace
 
 const std::vector<WbcStage>& wbc_plan() {
-  static const std::vector<WbcStage> plan = {
-      {"stand", 5'500'000}, {"walk", 10'000'000}, {"brace", 4'000'000}, {"interact", 6'000'000}, {"student", 4'000'000}};
+  static const std::vector<WbcStage> plan = {{"stand", 5'500'000},
+                                             {"walk", 10'000'000},
+                                             {"brace", 4'000'000},
+                                             {"interact", 6'000'000},
+                                             {"student", 4'000'000}};
   return plan;
 }
 

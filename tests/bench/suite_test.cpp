@@ -201,6 +201,19 @@ TEST(Suite, ARobotMayGoByName) {
             suite_hash(parse_suite(std::string(kMinimal) + "robot: " + suite.robot + "\n", "s.yaml")));
 }
 
+TEST(Suite, APathThatOnlyTheWorkingFolderHasIsTakenFromThere) {
+  const test::ScratchFolder folder;
+  std::filesystem::create_directories(folder / "suites");
+  const std::string descriptor = std::string(DUET_SOURCE_DIR) + "/examples/policies/wave_policy.yaml";
+  std::filesystem::copy(descriptor, folder / "mine.yaml");
+  write_file(folder / "suites/s.yaml", kMinimal);
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder / "");
+  const Suite suite = load_suite("suites/s.yaml", {{"policies", "[mine.yaml]"}});
+  std::filesystem::current_path(before);
+  EXPECT_TRUE(std::filesystem::equivalent(suite.policies.at(0).use, folder / "mine.yaml"));
+}
+
 TEST(Suite, ShippedSuitesLoad) {
   int suites = 0;
   for (const auto& entry : std::filesystem::directory_iterator(std::string(DUET_SOURCE_DIR) + "/suites")) {
