@@ -165,7 +165,7 @@ PolicyMaker retrieval_maker(const std::string& name, std::shared_ptr<const Robot
                                                   : share_file("library of 'retrieval' (option `library`)",
                                                                "policies/dstar/retrieval.safetensors");
   const auto library = load_retrieval_library(path, *robot);
-  return [robot, library] { return std::make_unique<RetrievalPolicy>(robot, library); };
+  return [robot = std::move(robot), library] { return std::make_unique<RetrievalPolicy>(robot, library); };
 }
 
 }  // namespace duet
