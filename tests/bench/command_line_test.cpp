@@ -9,6 +9,7 @@
 
 #include "core/file.h"
 #include "tests/support.h"
+#include "training/dstar/trainer.h"
 
 namespace duet {
 namespace {
@@ -59,6 +60,15 @@ TEST(CommandLine, MissingEngineIsRefusedByName) {
   const Answer answer = duet_program("doctor --need warp9");
   EXPECT_EQ(answer.code, 2);
   EXPECT_THAT(answer.err, HasSubstr("warp9"));
+}
+
+TEST(CommandLine, TrainingAPolicyWithoutLibtorchSaysHowToGetIt) {
+  if (can_train_dstar()) GTEST_SKIP() << "not run: this program has libtorch";
+  const test::ScratchFolder folder;
+  const Answer answer = duet_program("train dstar --smoke -o " + (folder / "runs"));
+  EXPECT_EQ(answer.code, 4);
+  EXPECT_THAT(answer.err, HasSubstr("./run train dstar"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "runs"));
 }
 
 TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
