@@ -52,7 +52,7 @@ SafeTensors to_tensors(const TrainingState& state) {
 }
 
 TrainingState training_state(const SafeTensors& tensors, const std::string& file) {
-  check_format(tensors, kFormat, file);
+  expect_text(tensors, "format", kFormat, file);
   TrainingState state;
   state.agent.actor = read_mlp(tensors, "actor", file);
   state.agent.critic = read_mlp(tensors, "critic", file);

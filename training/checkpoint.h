@@ -1,22 +1,14 @@
-// What checkpoints of all trainings have in common: vectors, numbers, normalisers and Adam's moments among the tensors
-// of a file. Reading throws InputError naming the file, what is missing or what has another size.
+// What checkpoints of all trainings have in common: normalisers and Adam's moments among the tensors of a file. Reading
+// throws InputError naming the file, what is missing or what has another size.
 #pragma once
 
 #include <string>
 
-#include "nn/mlp_file.h"
+#include "nn/stored_values.h"
 #include "training/batch_mlp.h"
 #include "training/normaliser.h"
 
 namespace duet {
-
-Tensor tensor_of(const Eigen::Ref<const Eigen::VectorXf>& values);
-Eigen::VectorXf vector_of(const SafeTensors& tensors, const std::string& name, Eigen::Index size,
-                          const std::string& file);
-std::string text_of(const SafeTensors& tensors, const std::string& key, const std::string& file);
-double number_of(const SafeTensors& tensors, const std::string& key, const std::string& file);
-// Throws unless the header's format is this one.
-void check_format(const SafeTensors& tensors, const std::string& format, const std::string& file);
 
 void add_normaliser(SafeTensors& tensors, const std::string& prefix, const Normaliser& normaliser);
 Normaliser normaliser_of(const SafeTensors& tensors, const std::string& prefix, int size, const std::string& file);

@@ -82,7 +82,7 @@ SafeTensors to_tensors(const StudentState& state) {
 }
 
 StudentState student_state(const SafeTensors& tensors, const std::string& file) {
-  check_format(tensors, kFormat, file);
+  expect_text(tensors, "format", kFormat, file);
   StudentState state;
   state.student = read_mlp(tensors, "student", file);
   state.input = normaliser_of(tensors, "input", state.student.inputs(), file);

@@ -86,7 +86,7 @@ TEST(TrainingState, WhatIsMissingIsNamed) {
   tensors = to_tensors(fresh());
   tensors.metadata["format"] = "other";
   EXPECT_THAT([&] { training_state(tensors, "a"); },
-              testing::ThrowsMessage<InputError>(testing::HasSubstr("the format is 'other'")));
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("found 'other'")));
 }
 
 TEST_F(DistillationInMujoco, TheLossFallsAndTheSeedDecides) {
