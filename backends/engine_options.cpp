@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <stdexcept>
 
 #include "core/names.h"
+#include "core/number.h"
 #include "core/require.h"
 
 namespace duet {
@@ -24,12 +24,6 @@ std::string value_of(const EngineOptions& options, const EngineOption& option) {
   return set == options.end() ? option.value : set->second;
 }
 
-double parse(const std::string& text) {
-  double value = std::nan("");
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() ? value : std::nan("");
-}
-
 void check_value(std::string_view engine, const EngineOption& option, const std::string& text) {
   if (!option.choices.empty()) {
     require(
@@ -37,7 +31,7 @@ void check_value(std::string_view engine, const EngineOption& option, const std:
         fmt::format("{}: {} is '{}', expected one of {}", engine, option.name, text, fmt::join(option.choices, ", ")));
     return;
   }
-  const double value = parse(text);
+  const double value = parse_number(text).value_or(std::nan(""));
   const bool fits = value >= option.low && value <= option.high && (!option.whole || value == std::floor(value));
   require(fits, fmt::format("{}: {} is '{}', expected a {}number from {} to {}", engine, option.name, text,
                             option.whole ? "whole " : "", option.low, option.high));
@@ -70,7 +64,7 @@ void check_options(std::string_view engine, const EngineOptions& options, std::s
 }
 
 double option_number(const EngineOptions& options, std::span<const EngineOption> known, std::string_view name) {
-  return parse(value_of(options, find(known, name)));
+  return parse_number(value_of(options, find(known, name))).value_or(std::nan(""));
 }
 
 int option_integer(const EngineOptions& options, std::span<const EngineOption> known, std::string_view name) {

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "controllers/observer.h"
 #include "controllers/root_conversion.h"
 #include "core/names.h"
+#include "core/number.h"
 #include "core/require.h"
 
 namespace duet {
@@ -42,13 +42,11 @@ double& yaw_scale(Channel& channel) {
 Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& options) {
   const std::string text = option(options, "yaw_scale", "");
   if (text.empty()) return descriptor;
-  double scale = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), scale);
-  require(error == std::errc() && end == text.data() + text.size() && std::isfinite(scale),
-          fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
+  const std::optional<double> scale = parse_number(text);
+  require(scale.has_value(), fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
   for (ChannelGroup& group : descriptor.groups)
     for (Channel& channel : group.channels)
-      if (channel.kind == ChannelKind::kCommandVelocity) yaw_scale(channel) = scale;
+      if (channel.kind == ChannelKind::kCommandVelocity) yaw_scale(channel) = *scale;
   return descriptor;
 }
 

@@ -3,11 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "core/names.h"
+#include "core/number.h"
 #include "core/require.h"
 
 namespace duet {
@@ -34,12 +35,11 @@ double share_of(double value, double steps_from) {
   return steps_from > 0.0 ? std::abs(value) / steps_from : (value == 0.0 ? 0.0 : 1.0);
 }
 
-double parse_number(const std::string& text, const std::string& whole) {
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  require(error == std::errc() && end == text.data() + text.size() && std::isfinite(value),
+double number_of(const std::string& text, const std::string& whole) {
+  const std::optional<double> value = parse_number(text);
+  require(value.has_value(),
           fmt::format("option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", whole));
-  return value;
+  return *value;
 }
 
 std::vector<std::string> split(const std::string& text) {
@@ -68,8 +68,8 @@ VelocityCommand parse_velocity_command(const std::string& text, double standing)
   const std::vector<std::string> parts = split(text);
   require(parts.size() == 3 || parts.size() == 4,
           fmt::format("option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", text));
-  return {parse_number(parts[0], text), parse_number(parts[1], text), parse_number(parts[2], text),
-          parts.size() == 4 ? parse_number(parts[3], text) : standing};
+  return {number_of(parts[0], text), number_of(parts[1], text), number_of(parts[2], text),
+          parts.size() == 4 ? number_of(parts[3], text) : standing};
 }
 
 void RootConversion::reset() {
