@@ -27,14 +27,6 @@ std::string paper_sentence(const Degradation& result) {
              : "The paper's rows are Table S9 as printed, over all tasks. " + paper_detector_sentence();
 }
 
-template <typename Entry>
-RowLabels labels_of(const std::vector<Entry>& entries) {
-  std::vector<PolicyKey> keys;
-  keys.reserve(entries.size());
-  for (const Entry& entry : entries) keys.push_back(entry.key);
-  return policy_labels(keys);
-}
-
 TitledTable success_table(const Degradation& result) {
   TitledTable titled = labelled_table("Perturbations: success and loss", labels_of(result.success));
   titled.table.header.insert(titled.table.header.end(), {"Perturbation", "n", "Success [%]", "Against clean [points]",
@@ -109,19 +101,11 @@ nlohmann::json json_of(const DegradationCurve& curve) {
   return json;
 }
 
-void add_line(const char* source, const PolicyKey& key, const std::string& perturbation, const char* figure, long n,
-              double value, const Interval& interval, TextTable& lines) {
-  lines.rows.push_back({source, key.engine, key.controller, key.arm, key.policy, perturbation, figure,
-                        fmt::format("{}", n), number_cell(value), number_cell(interval.low),
-                        number_cell(interval.high)});
-}
-
 void add_lines(const char* source, const DegradationCurve& curve, TextTable& lines) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  add_line(source, curve.key, curve.family, "normalised_area", static_cast<long>(curve.points.size()),
-           curve.normalised_area, {kNone, kNone}, lines);
-  add_line(source, curve.key, curve.family, "loss_at_largest", curve.difference.pairs, curve.difference.difference,
-           curve.difference.interval, lines);
+  add_figure_line(source, curve.key, curve.family, "normalised_area", static_cast<long>(curve.points.size()),
+                  curve.normalised_area, kNoInterval, lines);
+  add_figure_line(source, curve.key, curve.family, "loss_at_largest", curve.difference.pairs,
+                  curve.difference.difference, curve.difference.interval, lines);
 }
 
 }  // namespace
@@ -159,12 +143,10 @@ std::string degradation_markdown(const Degradation& result) {
 }
 
 std::string degradation_csv(const Degradation& result) {
-  TextTable lines;
-  lines.header = {"source", "engine", "controller", "arm",    "policy", "perturbation",
-                  "figure", "n",      "value",      "ci_low", "ci_high"};
+  TextTable lines = figure_lines("perturbation");
   for (const PerturbedSuccess& entry : result.success) {
     const auto line = [&](const char* figure, long n, double value, const Interval& interval) {
-      add_line("duet", entry.key, entry.perturbation, figure, n, value, interval, lines);
+      add_figure_line("duet", entry.key, entry.perturbation, figure, n, value, interval, lines);
     };
     line("success", entry.success.n, entry.success.rate, entry.success.interval);
     if (entry.paper.n > 0) line("paper_success", entry.paper.n, entry.paper.rate, entry.paper.interval);

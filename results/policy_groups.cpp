@@ -124,6 +124,20 @@ nlohmann::json json_of(const Interval& interval) {
   return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
 }
 
+TextTable figure_lines(const std::string& about) {
+  TextTable lines;
+  lines.header = {"source", "engine", "controller", "arm",    "policy", about,
+                  "figure", "n",      "value",      "ci_low", "ci_high"};
+  return lines;
+}
+
+void add_figure_line(const char* source, const PolicyKey& key, const std::string& about, std::string_view figure,
+                     long n, double value, const Interval& interval, TextTable& lines) {
+  lines.rows.push_back({source, key.engine, key.controller, key.arm, key.policy, about, std::string(figure),
+                        fmt::format("{}", n), number_cell(value), number_cell(interval.low),
+                        number_cell(interval.high)});
+}
+
 nlohmann::json json_of(const Rate& rate) {
   return {{"n", rate.n}, {"k", rate.k}, {"rate", number_or_null(rate.rate)}, {"interval", json_of(rate.interval)}};
 }

@@ -60,6 +60,13 @@ std::string policy_name(const PolicyKey& key);  // "dstar", "dstar_shuffled (shu
 
 // Columns "Engine" and "Controller" as far as they differ, and "Policy"; the rest in the caption.
 RowLabels policy_labels(const std::vector<PolicyKey>& keys);
+template <typename Entry>  // with a `key`
+RowLabels labels_of(const std::vector<Entry>& entries) {
+  std::vector<PolicyKey> keys;
+  keys.reserve(entries.size());
+  for (const Entry& entry : entries) keys.push_back(entry.key);
+  return policy_labels(keys);
+}
 
 // A table with these labels and no other column yet.
 TitledTable labelled_table(const std::string& title, const RowLabels& labels);
@@ -70,6 +77,14 @@ std::string rate_cell(const Rate& rate);  // "84.9 [77.6, 90.1]", "-" without ep
 std::string tables_markdown(const std::vector<TitledTable>& tables);
 std::string tables_latex(const std::vector<TitledTable>& tables);
 std::string number_cell(double value);  // not rounded, "" for NaN: for CSV
+
+inline constexpr Interval kNoInterval = {std::numeric_limits<double>::quiet_NaN(),
+                                         std::numeric_limits<double>::quiet_NaN()};
+
+// CSV with one figure a line, not rounded. `about`: what the figure is of besides its policy ("task", "perturbation").
+TextTable figure_lines(const std::string& about);
+void add_figure_line(const char* source, const PolicyKey& key, const std::string& about, std::string_view figure,
+                     long n, double value, const Interval& interval, TextTable& lines);
 
 nlohmann::json json_of(const Rate& rate);
 nlohmann::json json_of(const Interval& interval);

@@ -205,11 +205,10 @@ TitledTable pairs_table(const PolicyTable& table) {
 
 std::string no_policies() { return "No policy but replay ran."; }
 
-using Line = std::function<void(const std::string& task, std::string_view figure, long n, double value,
-                                const Interval& interval)>;
-constexpr Interval kNoInterval = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
-
-void add_lines(const PolicyFigures& figures, const Line& line) {
+void add_lines(const PolicyFigures& figures, TextTable& lines) {
+  const auto line = [&](const std::string& task, const char* figure, long n, double value, const Interval& interval) {
+    add_figure_line("duet", figures.key, task, figure, n, value, interval, lines);
+  };
   for (const auto& [task, rate] : figures.by_task) line(task, "success", rate.n, rate.rate, rate.interval);
   for (const auto& [task, rate] : figures.by_task_paper)
     if (rate.n > 0) line(task, "paper_success", rate.n, rate.rate, rate.interval);
@@ -289,17 +288,8 @@ std::string policy_table_markdown(const PolicyTable& table) {
 }
 
 std::string policy_table_csv(const PolicyTable& table) {
-  TextTable lines;
-  lines.header = {"source", "engine", "controller", "arm",    "policy", "task",
-                  "figure", "n",      "value",      "ci_low", "ci_high"};
-  for (const PolicyFigures* figures : all_figures(table)) {
-    const PolicyKey& key = figures->key;
-    add_lines(
-        *figures, [&](const std::string& task, std::string_view figure, long n, double value, const Interval& ci) {
-          lines.rows.push_back({"duet", key.engine, key.controller, key.arm, key.policy, task, std::string(figure),
-                                fmt::format("{}", n), number_cell(value), number_cell(ci.low), number_cell(ci.high)});
-        });
-  }
+  TextTable lines = figure_lines("task");
+  for (const PolicyFigures* figures : all_figures(table)) add_lines(*figures, lines);
   if (table.lines.empty()) return csv_table(lines);
   for (const PaperPolicy& paper : paper_policies()) {
     if (!paper.family.empty()) continue;

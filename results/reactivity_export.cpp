@@ -20,14 +20,6 @@ std::string slope_cell(const Reactivity& of) {
   return fmt::format("{:.2f} [{:.2f}, {:.2f}]", of.slope + 0.0, of.interval.low + 0.0, of.interval.high + 0.0);
 }
 
-template <typename Entry>
-RowLabels labels_of(const std::vector<Entry>& entries) {
-  std::vector<PolicyKey> keys;
-  keys.reserve(entries.size());
-  for (const Entry& entry : entries) keys.push_back(entry.key);
-  return policy_labels(keys);
-}
-
 TitledTable timing_table(const ReactivityTable& table) {
   TitledTable titled = labelled_table("Reactivity: when the robot acts", labels_of(table.timing));
   titled.table.header.insert(titled.table.header.end(),
@@ -98,13 +90,6 @@ nlohmann::json json_of(const SpatialCells& of) {
   return json;
 }
 
-void add_line(const char* source, const PolicyKey& key, const std::string& task, std::string_view figure, long n,
-              double value, const Interval& interval, TextTable& lines) {
-  lines.rows.push_back({source, key.engine, key.controller, key.arm, key.policy, task, std::string(figure),
-                        fmt::format("{}", n), number_cell(value), number_cell(interval.low),
-                        number_cell(interval.high)});
-}
-
 }  // namespace
 
 std::vector<TitledTable> reactivity_tables(const ReactivityTable& table) {
@@ -140,21 +125,18 @@ std::string reactivity_markdown(const ReactivityTable& table) {
 }
 
 std::string reactivity_csv(const ReactivityTable& table) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  TextTable lines;
-  lines.header = {"source", "engine", "controller", "arm",    "policy", "task",
-                  "figure", "n",      "value",      "ci_low", "ci_high"};
+  TextTable lines = figure_lines("task");
   for (const Reactivity& of : table.timing) {
-    add_line("duet", of.key, "all", "slope", of.n, of.slope, of.interval, lines);
-    add_line("duet", of.key, "all", "did_not_act", of.n + of.without, static_cast<double>(of.without), {kNone, kNone},
-             lines);
-    add_line("duet", of.key, "all", "delay_clean_s", of.n_clean, of.delay_clean, {kNone, kNone}, lines);
-    add_line("duet", of.key, "all", "delay_moved_s", of.n, of.delay_moved, {kNone, kNone}, lines);
+    add_figure_line("duet", of.key, "all", "slope", of.n, of.slope, of.interval, lines);
+    add_figure_line("duet", of.key, "all", "did_not_act", of.n + of.without, static_cast<double>(of.without),
+                    kNoInterval, lines);
+    add_figure_line("duet", of.key, "all", "delay_clean_s", of.n_clean, of.delay_clean, kNoInterval, lines);
+    add_figure_line("duet", of.key, "all", "delay_moved_s", of.n, of.delay_moved, kNoInterval, lines);
   }
   for (const SpatialCells& of : table.spatial)
     for (std::size_t i = 0; i < kSpatialCells.size(); ++i)
-      add_line("duet", of.key, of.task, kSpatialCells[i].variant, of.cells[i].n, of.cells[i].rate, of.cells[i].interval,
-               lines);
+      add_figure_line("duet", of.key, of.task, kSpatialCells[i].variant, of.cells[i].n, of.cells[i].rate,
+                      of.cells[i].interval, lines);
   if (!table.spatial.empty())
     for (const SpatialCell& cell : kSpatialCells)
       lines.rows.push_back(
