@@ -9,6 +9,7 @@
 
 #include "core/require.h"
 #include "results/json_fields.h"
+#include "results/published.h"
 
 namespace duet {
 namespace {
@@ -157,6 +158,8 @@ Rows read_rows(const std::string& folder, const RunInfo& info) {
 }  // namespace
 
 RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info) {
+  if (is_published(path))
+    throw InputError(fmt::format("'{}' is published: its rows stay as they are; choose another folder", path));
   const bool resumed = is_run(path);
   if (!resumed) create(path, info);
   require_same_suite(path, read_identity(path), info);
@@ -188,6 +191,7 @@ void RunDirectory::append(const EpisodeRow& row) {
 
 Run load_run(const std::string& path) {
   if (!is_run(path)) throw InputError(fmt::format("'{}' is not a run directory (no run.json)", path));
+  check_published(path);
   Run run;
   run.info = read_identity(path);
   const std::string environment = beside(path, "env.json");

@@ -25,7 +25,7 @@ struct RunInfo {
 class RunDirectory {
  public:
   // Creates the folder, or opens it to resume. Throws InputError: the folder holds a run of another suite (names both),
-  // is not a run and not empty, cannot be written.
+  // is not a run and not empty, is published, cannot be written.
   static RunDirectory open(const std::string& path, const RunInfo& info);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -48,7 +48,8 @@ struct Run {
   int dropped_lines = 0;
 };
 
-// Throws InputError: not a run directory, a broken row (file and line), a key twice, a row of another suite.
+// Throws InputError: not a run directory, a broken row (file and line), a key twice, a row of another suite, a
+// published run that is not what was published (results/published.h).
 Run load_run(const std::string& path);
 
 }  // namespace duet

@@ -53,6 +53,7 @@ void add_report(CLI::App& app, Session& session);
 void add_compare(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
+void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);

@@ -56,6 +56,7 @@ int main(int argc, char** argv) {
   add_score(app, session);
   add_run(app, session);
   add_report(app, session);
+  add_publish(app, session);
   add_compare(app, session);
   add_check(app, session);
   add_bless(app, session);

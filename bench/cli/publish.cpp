@@ -1,0 +1,37 @@
+// duet publish: the rows of a run for others to build tables from.
+#include <fmt/format.h>
+
+#include "bench/cli/command.h"
+#include "results/published.h"
+#include "results/run_directory.h"
+
+namespace duet::cli {
+namespace {
+
+struct PublishArguments {
+  std::string run, folder;
+};
+
+void run_publish(Session& session, const PublishArguments& arguments) {
+  publish_run(arguments.run, arguments.folder);
+  const Run run = load_run(arguments.folder);
+  print(session,
+        fmt::format("{}: {} rows of {} {}; `duet report {}` builds its tables", arguments.folder, run.rows.size(),
+                    run.info.suite, run.info.suite_version, arguments.folder),
+        {{"published", arguments.folder}, {"rows", run.rows.size()}});
+}
+
+}  // namespace
+
+void add_publish(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(
+      app, session, "publish",
+      "freeze the rows of a run for others: without traces, with a manifest that `duet report` and all others check",
+      "duet publish runs/policies -o results/published/policies");
+  auto arguments = std::make_shared<PublishArguments>();
+  command->add_option("run", arguments->run, "run directory")->required();
+  command->add_option("-o,--output", arguments->folder, "folder to make")->required();
+  command->callback([&session, arguments] { run_publish(session, *arguments); });
+}
+
+}  // namespace duet::cli

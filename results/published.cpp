@@ -1,0 +1,97 @@
+#include "results/published.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/digest.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "results/json_fields.h"
+#include "results/run_directory.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSchema = "duet.published/1";
+constexpr const char* kManifest = "manifest.json";
+constexpr const char* kRows = "episodes.jsonl";
+constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // as they are, where they are
+
+std::string in(const std::string& folder, const std::string& name) { return (fs::path(folder) / name).string(); }
+
+std::string lean_rows(const Run& run) {
+  std::string text;
+  for (EpisodeRow row : run.rows) {
+    row.trace = {};
+    row.feet = {};
+    text += to_json(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  }
+  return text;
+}
+
+// Everything but the manifest is in `folder` by now.
+nlohmann::json manifest_of(const Run& run, const std::string& folder) {
+  nlohmann::json files = nlohmann::json::object();
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    files[entry.path().filename().string()] = sha256_file(entry.path().string());
+  return {{"schema", kSchema},
+          {"suite", run.info.suite},
+          {"suite_version", run.info.suite_version},
+          {"suite_hash", run.info.suite_hash},
+          {"rows", run.rows.size()},
+          {"without", {"trace", "feet"}},
+          {"files", files}};
+}
+
+void fill(const std::string& folder, const std::string& source, const Run& run) {
+  write_file(in(folder, kRows), lean_rows(run));
+  for (const char* name : kFiles)
+    if (fs::exists(in(source, name))) write_file(in(folder, name), read_file(in(source, name)));
+  write_file(in(folder, kManifest), manifest_of(run, folder).dump(2) + "\n");
+}
+
+}  // namespace
+
+void publish_run(const std::string& run, const std::string& folder) {
+  if (fs::exists(folder))
+    throw InputError(fmt::format("'{}' is there already: what is published stays; choose another folder", folder));
+  const Run loaded = load_run(run);
+  if (loaded.rows.empty()) throw InputError(fmt::format("'{}' has no rows to publish", run));
+  const std::string partial = fs::path(folder).lexically_normal().string() + ".partial";
+  fs::remove_all(partial);
+  try {
+    fill(partial, run, loaded);
+    fs::rename(partial, folder);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(partial, ignored);
+    throw;
+  }
+}
+
+bool is_published(const std::string& folder) { return fs::exists(in(folder, kManifest)); }
+
+void check_published(const std::string& folder) {
+  if (!is_published(folder)) return;
+  const std::string path = in(folder, kManifest);
+  const nlohmann::json json = parse_json(read_file(path), path);
+  JsonFields fields(json, path);
+  if (const std::string schema = fields.text("schema"); schema != kSchema)
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, schema));
+  const nlohmann::json& files = fields.at("files");
+  if (!files.is_object() || !files.contains(kRows))
+    throw InputError(fmt::format("{}: key 'files': expected the SHA-256 of {} and others", path, kRows));
+  for (const auto& [name, digest] : files.items()) {
+    const std::string found = sha256_file(in(folder, name));
+    if (digest != found)
+      throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", in(folder, name),
+                                   digest.dump(), found));
+  }
+}
+
+}  // namespace duet

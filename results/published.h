@@ -1,0 +1,19 @@
+// A run that others rely on: its rows without the traces that only plots of single episodes need, and a manifest with
+// the SHA-256 of every file. A run directory like any other to read; what is in it can neither change unnoticed nor
+// grow.
+#pragma once
+
+#include <string>
+
+namespace duet {
+
+// Writes `folder` at once: it is there whole or not at all. Throws InputError for what is no run or a run without rows,
+// and where `folder` is there already.
+void publish_run(const std::string& run, const std::string& folder);
+
+bool is_published(const std::string& folder);
+
+// Where `folder` is published: throws InputError (file, expected, found) unless every file is what the manifest says.
+void check_published(const std::string& folder);
+
+}  // namespace duet

@@ -1,0 +1,105 @@
+#include "results/published.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+
+#include "core/file.h"
+#include "core/require.h"
+#include "results/run_directory.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::episode;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+RunInfo run_info() {
+  RunInfo info;
+  info.suite = "tiny";
+  info.suite_version = "1.0.0";
+  info.suite_hash = "0123456789abcdef";
+  info.suite_yaml = "name: tiny\nversion: 1.0.0\n";
+  info.argv = {"duet", "run", "tiny.yaml"};
+  info.created_at = "2026-01-02T03:04:05Z";
+  info.environment = {{"machine", "a machine"}};
+  return info;
+}
+
+EpisodeRow traced(int index) {
+  EpisodeRow row = episode("replay", "hug", index, index % 2 == 0);
+  row.trace.points = {"root"};
+  row.trace.mm = {{1, 2, 3}};
+  row.feet.left_mm = row.feet.right_mm = {1, 2};
+  return row;
+}
+
+class Published : public testing::Test {
+ protected:
+  Published() {
+    RunDirectory run = RunDirectory::open(scratch_ / "run", run_info());
+    for (int i = 0; i < 3; ++i) run.append(traced(i));
+  }
+  test::ScratchFolder scratch_;
+};
+
+TEST_F(Published, IsTheRunWithoutItsTraces) {
+  const std::string folder = scratch_ / "published/tiny";
+  publish_run(scratch_ / "run", folder);
+  EXPECT_TRUE(is_published(folder));
+  EXPECT_FALSE(is_published(scratch_ / "run"));
+  const duet::Run before = load_run(scratch_ / "run"), after = load_run(folder);
+  ASSERT_EQ(after.rows.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EpisodeRow lean = before.rows[i];
+    lean.trace = {};
+    lean.feet = {};
+    EXPECT_EQ(to_json(after.rows[i]), to_json(lean));
+  }
+  EXPECT_EQ(after.info.argv, before.info.argv);
+  EXPECT_EQ(after.info.suite_yaml, before.info.suite_yaml);
+  EXPECT_EQ(after.info.environment, before.info.environment);
+}
+
+TEST_F(Published, AChangedFileIsRefusedByName) {
+  const std::string folder = scratch_ / "tiny";
+  publish_run(scratch_ / "run", folder);
+  for (const char* name : {"episodes.jsonl", "suite.yaml"}) {
+    const std::string file = folder + "/" + name, text = read_file(file);
+    write_file(file, text + "\n");
+    EXPECT_THAT(thrown_message<InputError>([&] { load_run(folder); }),
+                AllOf(StartsWith(file), HasSubstr("SHA-256 expected"), HasSubstr("not what was published")));
+    write_file(file, text);
+  }
+  EXPECT_EQ(load_run(folder).rows.size(), 3U);
+  std::filesystem::remove(folder + "/env.json");
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(folder); }), HasSubstr("env.json"));
+  write_file(folder + "/manifest.json", R"({"schema": "duet.published/2", "files": {}})");
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(folder); }), HasSubstr("expected schema duet.published/1"));
+}
+
+TEST_F(Published, DoesNotGrow) {
+  publish_run(scratch_ / "run", scratch_ / "tiny");
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch_ / "tiny", run_info()); }),
+              HasSubstr("is published"));
+  EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "run", scratch_ / "tiny"); }),
+              HasSubstr("is there already"));
+}
+
+TEST_F(Published, OfNothingIsRefusedAndLeavesNothing) {
+  EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "none", scratch_ / "tiny"); }),
+              HasSubstr("not a run directory"));
+  RunDirectory::open(scratch_ / "empty", run_info());
+  EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "empty", scratch_ / "tiny"); }),
+              HasSubstr("no rows"));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny"));
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny.partial"));
+}
+
+}  // namespace
+}  // namespace duet
