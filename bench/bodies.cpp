@@ -7,6 +7,8 @@
 #include "bench/suite_names.h"
 #include "core/require.h"
 #include "core/share.h"
+#include "policies/on_other_body.h"
+#include "robots/joint_map.h"
 
 namespace duet {
 namespace {
@@ -22,18 +24,6 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 }
 
 }  // namespace
-
-RobotMotion on_body(const RobotMotion& motion, const RobotModel& body) {
-  if (motion.joint_names == body.joint_names()) return motion;
-  RobotMotion moved = motion;
-  moved.joint_names = body.joint_names();
-  moved.q = body.neutral.replicate(1, motion.q.cols());
-  for (int j = 0; j < body.dof(); ++j) {
-    const auto found = std::find(motion.joint_names.begin(), motion.joint_names.end(), moved.joint_names[j]);
-    if (found != motion.joint_names.end()) moved.q.row(j) = motion.q.row(found - motion.joint_names.begin());
-  }
-  return moved;
-}
 
 Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
                const std::vector<std::string>& skipped_policies) {
@@ -55,7 +45,7 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
   add_policy(SuitePolicy{kNullPolicy});
 }
 
-// A network that is not of the nominal body is a mistake of the suite; one that is, need not fit every other body.
+// What was made for the nominal body goes by the joints' names on one that it does not fit.
 void Bodies::add_policy(const SuitePolicy& policy) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     PolicyOnBody& entry = policies_[{policy.name, place}];
@@ -64,10 +54,11 @@ void Bodies::add_policy(const SuitePolicy& policy) {
     } catch (const MissingError& error) {
       entry.refusal = fmt::format("policy '{}' is absent: {}", policy.name, error.what());
       absent_policies_[policy.name] = entry.refusal;
-    } catch (const std::exception& error) {
+    } catch (const std::exception&) {
       if (place == 0) throw;
-      entry.refusal =
-          fmt::format("policy '{}' on robot '{}': {}", policy.name, bodies_[place].robot->name, error.what());
+      entry.make = [make = policies_.at({policy.name, 0}).make, made_for = nominal(), body = bodies_[place].robot] {
+        return on_other_body(make(), *made_for, *body);
+      };
     }
   }
 }

@@ -16,14 +16,10 @@
 
 namespace duet {
 
-// The motion of another robot with joints of the same names: joints that `body` lacks are dropped, joints that `motion`
-// lacks stay at neutral. Of the same joints in the same order: the motion to the bit.
-RobotMotion on_body(const RobotMotion& motion, const RobotModel& body);
-
 // A policy on a body: what makes it, or why it cannot be there.
 struct PolicyOnBody {
   PolicyMaker make;
-  std::string refusal;  // empty where it can
+  std::string refusal;  // its files are not on this machine; empty where it can
 };
 
 class Bodies {
@@ -44,7 +40,7 @@ class Bodies {
   [[nodiscard]] const std::vector<PairedMotion>& clips(const std::string& controller) const;
   // Controllers of the suite that cannot run here, with the reason.
   [[nodiscard]] const std::map<std::string, std::string>& absent() const { return absent_; }
-  // Likewise policies. One that only does not fit some body is not among them.
+  // Likewise policies.
   [[nodiscard]] const std::map<std::string, std::string>& absent_policies() const { return absent_policies_; }
   // On the body of a controller. Throws std::out_of_range for a policy that was skipped.
   [[nodiscard]] const PolicyOnBody& policy(const std::string& controller, const std::string& policy) const;

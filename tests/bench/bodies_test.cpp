@@ -6,6 +6,9 @@
 #include "bench/runner.h"
 #include "bench/scoring.h"
 #include "core/require.h"
+#include "policies/observation_history.h"
+#include "policies/on_other_body.h"
+#include "robots/joint_map.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 
@@ -54,6 +57,58 @@ TEST(Bodies, ControllersOfOneBodyShareItAndItsClips) {
   EXPECT_EQ(&bodies.clips("pd"), &bodies.clips("vmc"));
   EXPECT_EQ(bodies.clips("pd").size(), 1U);
   EXPECT_TRUE(bodies.absent().empty());
+}
+
+// Wants what it is told to, and remembers what it saw.
+class Mirror final : public Policy {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "mirror"; }
+  void reset(const EpisodeContext& context) override { start = context.start; }
+  Anchors act(const Observation& observation) override {
+    seen = observation.now().robot;
+    Anchors anchors;
+    anchors.fill({seen.X_WB, wanted});
+    return anchors;
+  }
+  RobotState start, seen;
+  Eigen::VectorXd wanted;
+};
+
+TEST(OnOtherBody, JointsGoByNameBothWays) {
+  const auto robot = test::g1();
+  const RobotModel body = other_body(*robot);
+  auto mirror = std::make_unique<Mirror>();
+  Mirror& policy = *mirror;
+  policy.wanted = Eigen::VectorXd::LinSpaced(robot->dof(), 0.0, 28.0);
+  const auto moved = on_other_body(std::move(mirror), *robot, body);
+  EpisodeContext context;
+  context.start = body.standing_state();
+  context.start.q = Eigen::VectorXd::LinSpaced(body.dof(), 100.0, 128.0);
+  context.start.v = -context.start.q;
+  moved->reset(context);
+  EXPECT_EQ(policy.start.q[0], 101.0);
+  EXPECT_EQ(policy.start.q[1], 100.0);
+  EXPECT_EQ(policy.start.q[28], robot->neutral[28]);  // a joint that the body lacks
+  EXPECT_EQ(policy.start.v[0], -101.0);
+  EXPECT_EQ(policy.start.v[28], 0.0);
+  ObservationHistory history;
+  history.add({Eigen::Matrix<double, 3, 24>::Zero(), context.start});
+  for (const Reference& reference : moved->plan(history.at(0))) {
+    EXPECT_EQ(reference.q[0], 1.0);
+    EXPECT_EQ(reference.q[1], 0.0);
+    EXPECT_EQ(reference.q[28], body.neutral[28]);  // a joint that only the body has
+  }
+  EXPECT_EQ(policy.seen.q, policy.start.q);
+  EXPECT_EQ(moved->name(), "mirror");
+}
+
+TEST(OnOtherBody, OfStrangersIsRefused) {
+  const auto robot = test::g1();
+  RobotModel body = *robot;
+  for (RobotJoint& joint : body.joints) joint.name += "_of_another";
+  EXPECT_THAT(
+      test::thrown_message<std::invalid_argument>([&] { on_other_body(std::make_unique<Mirror>(), *robot, body); }),
+      HasSubstr("policy 'mirror'"));
 }
 
 TEST(Bodies, PerturbationsAreCheckedOnEveryBody) {
