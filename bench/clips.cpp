@@ -120,6 +120,16 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
   return clips;
 }
 
+std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
+                                          std::uint64_t seed, int threads, Progress& progress) {
+  Suite suite;
+  suite.file = "synthetic clips";
+  suite.tasks = tasks;
+  suite.clips.synth_per_task = per_task;
+  suite.clips.synth_seed = seed;
+  return prepare_clips(suite, robot, threads, progress);
+}
+
 std::vector<std::string> find_motion_files(const std::vector<std::string>& paths) {
   std::vector<std::string> files;
   for (const std::string& path : paths) {

@@ -25,6 +25,10 @@ MotionFile kind_of(const std::string& path);
 // Throws InputError where none remains.
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress);
 
+// The same of clips that are no suite's: `per_task` of each task, for training.
+std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
+                                          std::uint64_t seed, int threads, Progress& progress);
+
 PairOptions pair_options(const Suite& suite);
 
 // NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "backends/factory.h"
@@ -9,22 +10,12 @@
 #include "bench/parallel.h"
 #include "bench/rollout.h"
 #include "controllers/controller.h"
+#include "core/random.h"
 #include "motion/clip_digest.h"
 #include "policies/phase_adaptation.h"
 
 namespace duet {
 namespace {
-
-Suite synthetic(int per_task, std::uint64_t seed) {
-  Suite suite = parse_suite(
-      "schema: duet.suite/1\nname: demonstrations\nversion: 1.0.0\nengines: [playback]\n"
-      "controllers: [pd]\npolicies: [replay]\n"
-      "tasks: [hug, handshake, high_five, wave, bend, fly_kiss]\nclips: {synth: {per_task: 1}}\n",
-      "demonstrations");
-  suite.clips.synth_per_task = per_task;
-  suite.clips.synth_seed = seed;
-  return suite;
-}
 
 constexpr std::size_t kBeforeFall = 50;  // frames
 constexpr int kShortest = 100;
@@ -87,27 +78,31 @@ void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop) {
-  const std::vector<PairedMotion> clips =
-      prepare_clips(synthetic(options.per_task, options.seed), *robot, options.threads, progress);
-  const int takes = static_cast<int>(clips.size()) * options.starts;
-  std::vector<std::optional<Take>> made(takes);
-  const bool itself = options.network.empty();
-  const PolicyMaker maker =
-      itself ? policy_maker("replay", robot) : policy_maker("dstar", robot, {{"network", options.network}});
-  progress.start("demonstrating", takes, "takes");
-  parallel_for_each(takes, options.threads, [&](int i) {
-    if (stop()) return;
-    made[i] = take_of(clips[i / options.starts], *robot, options.seed + static_cast<std::uint64_t>(i));
-    if (!options.engine.empty()) follow(*made[i], robot, options, maker);
-    progress.advance();
-  });
-  progress.finish();
-  if (stop()) return std::nullopt;
+  const bool itself = options.policy == "replay";
+  const int per_task = itself ? options.per_task : std::min(options.per_task, options.followed);
+  const int starts = itself ? options.starts : 1;
+  const PolicyMaker maker = policy_maker(options.policy, robot, options.policy_options);
   DemonstrationSet set;
   set.robot_digest = robot->digest;
-  for (std::optional<Take>& take : made) {
-    add(*take, itself, set);
-    take.reset();
+  for (const Task task : kTasks) {  // one at a time: hours of clips and takes are gigabytes
+    const std::vector<PairedMotion> clips =
+        synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress);
+    std::vector<std::optional<Take>> made(clips.size() * starts);
+    progress.start(fmt::format("demonstrating {}", to_string(task)), static_cast<int>(made.size()), "takes");
+    parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
+      if (stop()) return;
+      const PairedMotion& clip = clips[i / starts];
+      made[i] = take_of(clip, *robot, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
+      const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
+      if (followed) follow(*made[i], robot, options, maker);
+      progress.advance();
+    });
+    progress.finish();
+    if (stop()) return std::nullopt;
+    for (std::optional<Take>& take : made) {
+      add(*take, itself, set);
+      take.reset();
+    }
   }
   return set;
 }

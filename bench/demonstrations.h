@@ -10,19 +10,22 @@
 
 #include "bench/progress.h"
 #include "bench/suite.h"
+#include "policies/policy.h"
 #include "training/dstar/demonstrations.h"
 
 namespace duet {
 
 struct DemonstrationOptions {
-  int per_task = 80;  // clips of each task
+  int per_task = 300;  // clips of each task
   std::uint64_t seed = 880001;
-  int starts = 2;                                         // of each clip, drawn as A.4.4 has it
+  int starts = 2;      // of each clip, drawn as A.4.4 has it
+  int followed = 120;  // clips of each task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   int threads = 1;
-  // A network that acts in the place of the demonstration: the robot is seen where the policy takes it, and what it was
-  // meant to do stays (DAgger: Ross et al. 2011). Empty: the demonstration itself, also seen as it is.
-  std::string network;
+  // Who acts: the demonstration itself, also seen as it is, or a policy, on the clips that are followed; then the robot
+  // is seen where the policy takes it, and what it was meant to do stays (DAgger: Ross et al. 2011).
+  std::string policy = "replay";
+  PolicyOptions policy_options = {};
 };
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;

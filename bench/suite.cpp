@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "bench/suite_actors.h"
 #include "bench/suite_names.h"
 #include "core/digest.h"
 #include "core/names.h"
@@ -97,7 +98,9 @@ void use_contents(std::string& use, std::map<std::string, std::string>& options)
 
 }  // namespace
 
-bool is_path_option(std::string_view option) { return option == "network" || option == "language"; }
+bool is_path_option(std::string_view option) {
+  return option == "network" || option == "language" || option == "library";
+}
 
 bool is_plain_name(std::string_view name) {
   constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
@@ -123,16 +126,17 @@ std::vector<std::string> perturbation_names_of(const Suite& suite) { return name
 
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
                            const std::string& value) {
-  ControllerInfo info = controller_info(controller_of(suite, controller).use);
-  info.name = controller;
-  check_controller_options(info, {{option, value}});
+  SuiteController asked = controller_of(suite, controller);
+  asked.options = {{option, value}};
+  check_options_of(asked);
   for (SuiteController& entry : suite.controllers)
     if (entry.name == controller) entry.options[option] = value;
 }
 
 void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value) {
-  require(policy != kNullPolicy, "policy 'null': expected no option of the control arm");
-  check_options("policy", policy, {{option, value}}, names_of(policy_info(policy_of(suite, policy).use).options));
+  SuitePolicy asked = policy_of(suite, policy);
+  asked.options = {{option, value}};
+  check_options_of(asked);
   for (SuitePolicy& entry : suite.policies)
     if (entry.name == policy) entry.options[option] = value;
 }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
-#include <utility>
 
 #include "bench/suite_names.h"
 #include "core/names.h"
@@ -109,6 +108,20 @@ void read_list(const YamlSection& top, const char* key, const char* kind,
 
 }  // namespace
 
+void check_options_of(const SuiteController& controller) {
+  ControllerInfo info = controller_info(controller.use);
+  info.name = controller.name;
+  check_controller_options(info, controller.options);
+}
+
+void check_options_of(const SuitePolicy& policy) {
+  const PolicyInfo info = policy_info(policy.use);
+  require(policy.name != kNullPolicy || policy.options.empty(), "policy 'null': expected no option of the control arm");
+  std::vector<std::string> known;
+  for (const PolicyOption& option : info.options) known.push_back(option.name);
+  check_options("policy", policy.name, policy.options, known);
+}
+
 std::string from_folder_of(const Suite& suite, const std::string& file) {
   const std::filesystem::path beside = std::filesystem::path(suite.file).parent_path() / file;
   const bool here = !std::filesystem::exists(beside) && std::filesystem::exists(file);
@@ -119,11 +132,8 @@ void read_controllers(const YamlSection& top, Suite& suite) {
   read_list(top, "controllers", "controller", [&](const YAML::Node& node) {
     SuiteController controller = read_controller(node, suite);
     require_new_name(suite.controllers, controller.name);
-    const Options options = std::exchange(controller.options, {});
-    static_cast<void>(controller_info(controller.use));
-    const std::string name = controller.name;
+    check_options_of(controller);
     suite.controllers.push_back(std::move(controller));
-    for (const auto& [option, value] : options) set_controller_option(suite, name, option, value);
   });
 }
 
@@ -132,11 +142,8 @@ void read_policies(const YamlSection& top, Suite& suite) {
     SuitePolicy policy = read_policy(node, suite);
     require_new_name(suite.policies, policy.name);
     require(policy.name != kNullPolicy || policy.use == kNullPolicy, "'null' is the name of the control arm");
-    const Options options = std::exchange(policy.options, {});
-    static_cast<void>(policy_info(policy.use));
-    const std::string name = policy.name;
+    check_options_of(policy);
     suite.policies.push_back(std::move(policy));
-    for (const auto& [option, value] : options) set_policy_option(suite, name, option, value);
   });
 }
 

@@ -6,15 +6,9 @@
 namespace duet {
 
 std::vector<RobotMotion> training_motions(const RobotModel& robot, int per_task, int threads, Progress& progress) {
-  Suite suite = parse_suite(
-      "schema: duet.suite/1\nname: training\nversion: 1.0.0\nengines: [playback]\n"
-      "controllers: [pd]\npolicies: [replay]\n"
-      "tasks: [hug, handshake, high_five, wave, bend, fly_kiss]\nclips: {synth: {per_task: 1}}\n",
-      "training");
-  suite.clips.synth_per_task = per_task;
-  suite.clips.synth_seed = kTrainingSeed;
   std::vector<RobotMotion> motions;
-  for (const PairedMotion& clip : prepare_clips(suite, robot, threads, progress)) {
+  for (const PairedMotion& clip :
+       synthetic_clips(robot, {kTasks.begin(), kTasks.end()}, per_task, kTrainingSeed, threads, progress)) {
     const AdaptationOptions options{.start = StartMode::kApproach};
     motions.push_back(adapt_by_phase(clip.robot, clip.phases, robot, options, kTrainingSeed + motions.size()).motion);
   }

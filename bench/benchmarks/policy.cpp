@@ -26,6 +26,7 @@ std::vector<Figure> time_inference(const BenchmarkOptions& options) {
     for (float& value : values) value = static_cast<float>(random.normal());
   };
   fill(features.frames.reshaped());
+  fill(features.past.reshaped());
   fill(features.position);
   fill(features.orientation);
   features.distance << 0.2F, 0.5F, 0.9F, 1.0F, 1.2F, 1.5F;

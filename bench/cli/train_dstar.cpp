@@ -84,8 +84,9 @@ std::string round_file(const DstarRun& run, int round) {
 // Adds what is seen where the network of now takes the robot.
 void add_round(Session& session, const TrainArguments& arguments, int round, DstarData& data) {
   DemonstrationOptions options = arguments.data;
-  options.network = dstar_network_file(arguments.run);
-  options.starts = 1;
+  options.policy = "dstar";
+  options.policy_options = {{"network", dstar_network_file(arguments.run)}};
+  if (!arguments.language.empty()) options.policy_options["language"] = arguments.language;
   const auto more = demonstrations(session, data.robot, options, round_file(arguments.run, round));
   auto both = std::make_shared<DemonstrationSet>(*data.train);
   both->append(*more);
@@ -186,7 +187,9 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
       ->capture_default_str();
   command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
-  command->add_option("--engine", arguments->data.engine, "that the clips are followed in; '' for none")
+  command->add_option("--followed", arguments->data.followed, "clips of each task that the robot follows in the engine")
+      ->capture_default_str();
+  command->add_option("--engine", arguments->data.engine, "that they are followed in; '' for none")
       ->capture_default_str();
   command
       ->add_option("--rounds", arguments->rounds,

@@ -93,6 +93,19 @@ TEST(SuitePolicies, NetworksAreFoundFromTheSuitesFolderAndCountByContent) {
   EXPECT_NE(suite_hash(a), suite_hash(read("b.yaml", "{name: d, use: dstar, network: b.net}")));
 }
 
+TEST(SuitePolicies, LibrariesOfRetrievalCountByContentToo) {
+  const test::ScratchFolder folder;
+  write_file(folder / "windows.st", "one");
+  write_file(folder / "p.yaml",
+             "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\nengines: [playback]\n"
+             "controllers: [pd]\npolicies: [{name: r, use: retrieval, options: {library: windows.st}}]\n");
+  const Suite suite = load_suite(folder / "p.yaml");
+  EXPECT_EQ(suite.policies[0].options.at("library"), folder / "windows.st");
+  const std::string before = suite_hash(suite);
+  write_file(folder / "windows.st", "two");
+  EXPECT_NE(suite_hash(suite), before);
+}
+
 TEST(SuitePolicies, APolicyWhoseNetworkIsNotHereIsAbsentAndOthersGoOn) {
   if (!has_dstar()) GTEST_SKIP() << "not run: policy dstar absent";
   const Suite suite = with_policies("[replay, {name: d, use: dstar, network: /nowhere/net.safetensors}]");
