@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "core/names.h"
@@ -52,17 +53,35 @@ const Entry& find_entry(const std::string& name) {
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
 }
 
+bool is_finite(const ObservationFrame& frame) {
+  const RobotState& robot = frame.robot;
+  return frame.partner.allFinite() && robot.X_WB.p.allFinite() && robot.X_WB.R.coeffs().allFinite() &&
+         robot.v_WB.allFinite() && robot.w_WB_B.allFinite() && robot.q.allFinite() && robot.v.allFinite();
+}
+
 }  // namespace
+
+std::vector<Reference> PolicyFaults::leave_out(std::string_view policy, int tick, std::string_view problem) {
+  ++invalid;
+  if (message.empty()) message = fmt::format("policy '{}': tick {}: {}", policy, tick, problem);
+  return {};
+}
+
+bool is_finite(const Observation& observation) {
+  return std::ranges::all_of(observation.history, [](const ObservationFrame& frame) { return is_finite(frame); });
+}
+
+Eigen::Vector4d wxyz_of(const Eigen::Quaterniond& R) {
+  const double sign = R.w() < 0.0 ? -1.0 : 1.0;
+  return sign * Eigen::Vector4d(R.w(), R.x(), R.y(), R.z());
+}
 
 Eigen::VectorXd to_vector(const ObservationFrame& frame, const Eigen::Vector3d& start_position) {
   const RobotState& robot = frame.robot;
   const Eigen::Matrix3d R_BW = robot.X_WB.R.conjugate().toRotationMatrix();
-  // q and -q are one orientation: the one with w >= 0 stands for both.
-  const double sign = robot.X_WB.R.w() < 0.0 ? -1.0 : 1.0;
-  const Eigen::Vector4d wxyz(robot.X_WB.R.w(), robot.X_WB.R.x(), robot.X_WB.R.y(), robot.X_WB.R.z());
   Eigen::VectorXd vector(3 + frame.partner.size() + 9 + robot.q.size() + robot.v.size() + 7);
   vector << frame.partner.col(0), frame.partner.reshaped(), R_BW * robot.v_WB, robot.w_WB_B,
-      R_BW * -Eigen::Vector3d::UnitZ(), robot.q, robot.v, robot.X_WB.p - start_position, sign * wxyz;
+      R_BW * -Eigen::Vector3d::UnitZ(), robot.q, robot.v, robot.X_WB.p - start_position, wxyz_of(robot.X_WB.R);
   return vector;
 }
 

@@ -42,6 +42,12 @@ struct Observation {
   [[nodiscard]] const ObservationFrame& now() const { return history.back(); }
 };
 
+// Whether every number of it is.
+bool is_finite(const Observation& observation);
+
+// w, x, y, z with w >= 0: q and -q are one orientation.
+Eigen::Vector4d wxyz_of(const Eigen::Quaterniond& R);
+
 using Anchors = std::array<Reference, kAnchors>;
 
 // What a policy may know when an episode starts. Only `replay` looks at `hindsight`.
@@ -61,6 +67,8 @@ struct PolicyFaults {
   bool dead = false;    // gives no plan any more
   std::string message;  // of the first fault
   [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
+  // Counts a plan of `policy` that is left out; returns no plan.
+  std::vector<Reference> leave_out(std::string_view policy, int tick, std::string_view problem);
 };
 
 class Policy {

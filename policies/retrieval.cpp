@@ -1,7 +1,6 @@
 #include "policies/retrieval.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -12,6 +11,7 @@
 #include "core/require.h"
 #include "core/share.h"
 #include "core/skeleton.h"
+#include "nn/stored_values.h"
 
 namespace duet {
 namespace {
@@ -31,6 +31,7 @@ class RetrievalPolicy final : public Policy {
 
   void reset(const EpisodeContext& context) override {
     task_ = static_cast<int>(context.task);
+    faults_ = {};
     require(std::find(library_->tasks.begin(), library_->tasks.end(), task_) != library_->tasks.end(),
             fmt::format("the library of 'retrieval' has no window of task {}", to_string(context.task)));
   }
@@ -43,6 +44,14 @@ class RetrievalPolicy final : public Policy {
     return decode_plan({library_->plans.col(found).data(), kPlanSize}, ego_frame(observation.now().robot), *robot_);
   }
 
+  // No window is near to what is not a number.
+  std::vector<Reference> plan(const Observation& observation) override {
+    if (is_finite(observation)) return Policy::plan(observation);
+    return faults_.leave_out(name(), observation.tick, "the observation is not finite");
+  }
+
+  [[nodiscard]] PolicyFaults faults() const override { return faults_; }
+
  private:
   std::shared_ptr<const RobotModel> robot_;
   std::shared_ptr<const RetrievalLibrary> library_;
@@ -50,44 +59,20 @@ class RetrievalPolicy final : public Policy {
   DstarFeatures features_;
   Eigen::VectorXf key_;
   int task_ = 0;
+  PolicyFaults faults_;
 };
 
-Tensor tensor_of(const Eigen::MatrixXf& matrix) {
-  return {{matrix.cols(), matrix.rows()}, {matrix.data(), matrix.data() + matrix.size()}};
-}
-
-std::string text_of(const SafeTensors& file, const char* key, const std::string& path) {
-  const auto found = file.metadata.find(key);
-  if (found == file.metadata.end()) throw InputError(fmt::format("{}: metadata '{}' is missing", path, key));
-  return found->second;
-}
-
-Eigen::MatrixXf matrix_of(const SafeTensors& file, const char* name, int rows, int columns, const std::string& path) {
-  const auto found = file.tensors.find(name);
-  if (found == file.tensors.end()) throw InputError(fmt::format("{}: tensor '{}' is missing", path, name));
-  if (found->second.shape != std::vector<std::int64_t>{columns, rows})
-    throw InputError(fmt::format("{}: tensor '{}': expected shape ({}, {}), found ({})", path, name, columns, rows,
-                                 fmt::join(found->second.shape, ", ")));
-  return Eigen::Map<const Eigen::MatrixXf>(found->second.values.data(), rows, columns);
-}
-
 void check_metadata(const SafeTensors& file, const RobotModel& robot, const std::string& path) {
-  const auto expect = [&](const char* key, const std::string& expected) {
-    const std::string found = text_of(file, key, path);
-    if (found != expected)
-      throw InputError(fmt::format("{}: {}: expected '{}', found '{}'", path, key, expected, found.substr(0, 200)));
-  };
-  expect("format", kFormat);
-  expect("robot", robot.name);
-  expect("joints", nlohmann::json(robot.joint_names()).dump());
+  expect_text(file, "format", kFormat, path);
+  expect_text(file, "robot", robot.name, path);
+  expect_text(file, "joints", nlohmann::json(robot.joint_names()).dump(), path);
 }
 
 std::vector<int> tasks_of(const SafeTensors& file, const std::string& path) {
-  const auto found = file.tensors.find("tasks");
-  if (found == file.tensors.end()) throw InputError(fmt::format("{}: tensor 'tasks' is missing", path));
+  const std::vector<float>& values = tensor_named(file, "tasks", path).values;
   std::vector<int> tasks;
-  tasks.reserve(found->second.values.size());
-  for (const float value : found->second.values) {
+  tasks.reserve(values.size());
+  for (const float value : values) {
     if (value < 0.0F || value >= static_cast<float>(kTasks.size()) || value != std::floor(value))
       throw InputError(fmt::format("{}: tensor 'tasks': expected 0 to {}, found {}", path, kTasks.size() - 1, value));
     tasks.push_back(static_cast<int>(value));
@@ -129,10 +114,10 @@ int nearest_window(const RetrievalLibrary& library, int task, const Eigen::Ref<c
 void save_retrieval_library(const std::string& path, const RetrievalLibrary& library) {
   SafeTensors file;
   file.metadata = {{"format", kFormat}, {"robot", library.robot}, {"joints", nlohmann::json(library.joints).dump()}};
-  file.tensors["keys"] = tensor_of(library.keys);
-  file.tensors["plans"] = tensor_of(library.plans);
-  file.tensors["mean"] = tensor_of(library.mean);
-  file.tensors["deviation"] = tensor_of(library.deviation);
+  file.tensors["keys"] = columns_tensor(library.keys);
+  file.tensors["plans"] = columns_tensor(library.plans);
+  file.tensors["mean"] = columns_tensor(library.mean);
+  file.tensors["deviation"] = columns_tensor(library.deviation);
   file.tensors["tasks"] = {{library.windows()}, {library.tasks.begin(), library.tasks.end()}};
   write_safetensors(path, file, TensorType::kF16);
 }
@@ -144,10 +129,10 @@ std::shared_ptr<const RetrievalLibrary> load_retrieval_library(const std::string
   library->robot = robot.name;
   library->joints = robot.joint_names();
   library->tasks = tasks_of(file, path);
-  library->mean = matrix_of(file, "mean", kRetrievalKey, 1, path);
-  library->deviation = matrix_of(file, "deviation", kRetrievalKey, 1, path);
-  library->keys = matrix_of(file, "keys", kRetrievalKey, library->windows(), path);
-  library->plans = matrix_of(file, "plans", kPlanSize, library->windows(), path);
+  library->mean = columns_of(file, "mean", kRetrievalKey, 1, path);
+  library->deviation = columns_of(file, "deviation", kRetrievalKey, 1, path);
+  library->keys = columns_of(file, "keys", kRetrievalKey, library->windows(), path);
+  library->plans = columns_of(file, "plans", kPlanSize, library->windows(), path);
   return library;
 }
 

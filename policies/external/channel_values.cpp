@@ -19,18 +19,10 @@ void put(const Eigen::Vector3d& vector, std::span<float> out) {
 }
 
 void put(const Eigen::Quaterniond& rotation, std::span<float> out) {
-  const double sign = rotation.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one orientation
-  const Eigen::Vector4d wxyz(rotation.w(), rotation.x(), rotation.y(), rotation.z());
-  Eigen::Map<Eigen::Vector4f>(out.data()) = (sign * wxyz).cast<float>();
+  Eigen::Map<Eigen::Vector4f>(out.data()) = wxyz_of(rotation).cast<float>();
 }
 
 double at(const std::vector<double>& values, std::size_t i) { return values.size() == 1 ? values[0] : values[i]; }
-
-bool is_finite(const ObservationFrame& frame) {
-  const RobotState& robot = frame.robot;
-  return frame.partner.allFinite() && robot.X_WB.p.allFinite() && robot.X_WB.R.coeffs().allFinite() &&
-         robot.v_WB.allFinite() && robot.w_WB_B.allFinite() && robot.q.allFinite() && robot.v.allFinite();
-}
 
 }  // namespace
 
@@ -62,10 +54,6 @@ std::vector<PolicyChannel> frame_channels() {
         PolicyChannelKind::kJointVelocities, PolicyChannelKind::kRootOffset, PolicyChannelKind::kRootOrientation})
     channels.push_back({.kind = kind});
   return channels;
-}
-
-bool is_finite(const Observation& observation) {
-  return std::ranges::all_of(observation.history, [](const ObservationFrame& frame) { return is_finite(frame); });
 }
 
 ChannelValues::ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, PolicyFrame frame)

@@ -41,7 +41,4 @@ class ChannelValues {
   Random noise_{0, 0};
 };
 
-// Whether every number that a channel could show is finite.
-bool is_finite(const Observation& observation);
-
 }  // namespace duet

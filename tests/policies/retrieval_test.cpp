@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "core/require.h"
 #include "robots/robot_model.h"
 #include "tests/support.h"
@@ -66,6 +68,27 @@ TEST(Retrieval, AnswersWithThePlanOfThatWindow) {
   const Anchors anchors = policy->act(looking_at(frame, history));
   EXPECT_NEAR(anchors[0].q[18] - robot()->neutral[18], 0.25, 1e-6);
   EXPECT_NEAR(anchors[4].X_WB.p.z(), 0.75, 1e-6);
+}
+
+TEST(Retrieval, LeavesOutAPlanForWhatIsNotANumber) {
+  const test::ScratchFolder folder;
+  save_retrieval_library(folder / "library.safetensors", made_library());
+  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
+  EpisodeContext context;
+  context.task = Task::kHug;
+  context.start = robot()->standing_state();
+  policy->reset(context);
+  ObservationFrame frame;
+  frame.robot = context.start;
+  frame.partner.setConstant(std::numeric_limits<double>::quiet_NaN());
+  std::array<ObservationFrame, kHistoryFrames> history;
+  EXPECT_TRUE(policy->plan(looking_at(frame, history)).empty());
+  EXPECT_EQ(policy->faults().invalid, 1);
+  EXPECT_EQ(policy->faults().message, "policy 'retrieval': tick 0: the observation is not finite");
+  frame.partner.setZero();
+  EXPECT_EQ(policy->plan(looking_at(frame, history)).size(), 100U);
+  policy->reset(context);
+  EXPECT_FALSE(policy->faults().any());
 }
 
 TEST(Retrieval, RefusesATaskThatTheLibraryLacks) {
