@@ -137,6 +137,18 @@ TEST(Windows, WithoutAugmentationAreTheDemonstrationInTheRobotsFrame) {
   EXPECT_EQ(made.batch.prompt[0], -1);
 }
 
+TEST(Windows, LookBackByTheStrideOfTheLongStream) {
+  const Made far({.long_stride = 5, .augment = false}), near({.augment = false});
+  const auto frame = [](const Eigen::MatrixXf& frames, int i) {
+    return frames.col(1).segment(kFrameSize * i, kFrameSize);
+  };
+  EXPECT_EQ(near.batch.past, near.batch.frames);
+  EXPECT_EQ(far.batch.frames, near.batch.frames);
+  EXPECT_EQ(frame(far.batch.past, 11), frame(far.batch.frames, 11));
+  EXPECT_EQ(frame(far.batch.past, 10), frame(far.batch.frames, 6));  // five ticks before
+  EXPECT_NE(frame(far.batch.past, 0), frame(far.batch.frames, 0));
+}
+
 TEST(Windows, TellWhereThePartnerWillBe) {
   const Made made({.augment = false});
   const int hand = kLossPoints - 1, joint = kRightHand;
@@ -169,6 +181,33 @@ TEST(Windows, OfADisplacedRobotLeadBackToTheDemonstration) {
   }
   EXPECT_GT(largest, 0.1);  // the first anchor is not where the displaced robot is
   EXPECT_LT(largest, 0.4);
+}
+
+TEST(Windows, OfARobotAstrayLeadBackAtAWalk) {
+  WindowOptions options;
+  options.stride = 1;
+  options.astray = 3.0;
+  options.turned = 3.0;
+  const DemonstrationSet set = made_set(*test::g1());
+  WindowMaker maker(test::g1(), set, options);
+  WindowBatch batch;
+  batch.resize(200);
+  Random random(1, 9);
+  double farthest = 0.0, most_turned = 0.0;
+  for (int i = 0; i < batch.size; ++i) {
+    maker.make({0, 60}, random, batch, i);
+    for (int k = 0; k < kAnchors; ++k) {
+      const auto anchor = batch.plan.col(i).segment<7>(kAnchorSize * k).cast<double>();
+      const double distance = anchor.head<2>().norm(), seconds = 0.5 * k;
+      const double turn = std::abs(yaw_of(Eigen::Quaterniond(anchor[3], anchor[4], anchor[5], anchor[6])));
+      EXPECT_LE(distance, options.reach + options.speed * seconds + 1e-5);
+      EXPECT_LE(turn, options.turn_reach + options.turn_rate * seconds + 1e-5);
+      farthest = std::max(farthest, distance - options.reach - options.speed * seconds);
+      most_turned = std::max(most_turned, turn - options.turn_reach - options.turn_rate * seconds);
+    }
+  }
+  EXPECT_NEAR(farthest, 0.0, 1e-4);  // some would have to run
+  EXPECT_NEAR(most_turned, 0.0, 1e-4);
 }
 
 TEST(Windows, StatisticsNormaliseTheirOwnSample) {

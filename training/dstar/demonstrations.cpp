@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/require.h"
 #include "core/skeleton.h"
+#include "nn/stored_values.h"
 
 namespace duet {
 namespace {
@@ -31,27 +32,6 @@ void write_pose(const Pose& X_WB, Eigen::Ref<Eigen::VectorXf> out) {
 
 Pose read_pose(const Eigen::Ref<const Eigen::VectorXf>& in) {
   return {Eigen::Quaterniond(in[3], in[4], in[5], in[6]).normalized(), in.head<3>().cast<double>()};
-}
-
-Tensor tensor_of(const Eigen::MatrixXf& matrix) {
-  return {{matrix.cols(), matrix.rows()}, {matrix.data(), matrix.data() + matrix.size()}};
-}
-
-Eigen::MatrixXf matrix_of(const SafeTensors& file, const char* name, std::int64_t rows, std::int64_t columns,
-                          const std::string& path) {
-  const auto found = file.tensors.find(name);
-  if (found == file.tensors.end()) throw InputError(fmt::format("{}: tensor '{}' is missing", path, name));
-  const std::vector<std::int64_t>& shape = found->second.shape;
-  if (shape.size() != 2 || shape[0] != columns || shape[1] != rows)
-    throw InputError(fmt::format("{}: tensor '{}': expected {} x {} numbers, found {}", path, name, columns, rows,
-                                 found->second.values.size()));
-  return Eigen::Map<const Eigen::MatrixXf>(found->second.values.data(), rows, columns);
-}
-
-std::string text_of(const SafeTensors& file, const char* key, const std::string& path) {
-  const auto found = file.metadata.find(key);
-  if (found == file.metadata.end()) throw InputError(fmt::format("{}: metadata '{}' is missing", path, key));
-  return found->second;
 }
 
 nlohmann::json json_of(const Demonstration& entry) {
@@ -165,16 +145,15 @@ void save_demonstrations(const DemonstrationSet& set, const std::string& path) {
   const int used = set.list.empty() ? 0 : set.list.back().end();
   SafeTensors file;
   file.metadata = {{"format", kFormat}, {"robot_digest", set.robot_digest}, {"demonstrations", list.dump()}};
-  file.tensors["observed"] = tensor_of(set.observed.leftCols(used));
-  file.tensors["wanted"] = tensor_of(set.wanted.leftCols(used));
-  file.tensors["partner"] = tensor_of(set.partner.leftCols(used));
+  file.tensors["observed"] = columns_tensor(set.observed.leftCols(used));
+  file.tensors["wanted"] = columns_tensor(set.wanted.leftCols(used));
+  file.tensors["partner"] = columns_tensor(set.partner.leftCols(used));
   write_safetensors(path, file);
 }
 
 DemonstrationSet load_demonstrations(const std::string& path, const std::string& robot_digest) {
   const SafeTensors file = read_safetensors(path);
-  const std::string format = text_of(file, "format", path);
-  if (format != kFormat) throw InputError(fmt::format("{}: format: expected '{}', found '{}'", path, kFormat, format));
+  expect_text(file, "format", kFormat, path);
   DemonstrationSet set;
   set.robot_digest = text_of(file, "robot_digest", path);
   if (set.robot_digest != robot_digest)
@@ -185,9 +164,9 @@ DemonstrationSet load_demonstrations(const std::string& path, const std::string&
   const auto wanted = file.tensors.find("wanted");
   const std::int64_t rows =
       wanted != file.tensors.end() && wanted->second.shape.size() == 2 ? wanted->second.shape[1] : 7;
-  set.wanted = matrix_of(file, "wanted", rows, used, path);
-  set.observed = matrix_of(file, "observed", 13 + 2 * (rows - 7), used, path);
-  set.partner = matrix_of(file, "partner", kPartnerSize, used, path);
+  set.wanted = columns_of(file, "wanted", rows, used, path);
+  set.observed = columns_of(file, "observed", 13 + 2 * (rows - 7), used, path);
+  set.partner = columns_of(file, "partner", kPartnerSize, used, path);
   return set;
 }
 

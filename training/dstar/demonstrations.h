@@ -10,7 +10,6 @@
 #include "core/robot_motion.h"
 #include "core/robot_state.h"
 #include "core/task.h"
-#include "nn/safetensors.h"
 
 namespace duet {
 

@@ -7,15 +7,6 @@
 namespace duet {
 namespace {
 
-DstarFeatures features_of(const WindowBatch& batch, int column) {
-  DstarFeatures features;
-  features.frames = batch.frames.col(column).reshaped(kFrameSize, kHistoryFrames);
-  features.position = batch.position.col(column);
-  features.distance = batch.distance.col(column);
-  features.orientation = batch.orientation.col(column);
-  return features;
-}
-
 void normalise(RetrievalLibrary& library) {
   library.mean = library.keys.rowwise().mean();
   library.keys.colwise() -= library.mean;
@@ -34,16 +25,11 @@ RetrievalLibrary make_retrieval_library(const std::shared_ptr<const RobotModel>&
   WindowMaker maker(robot, set, options);
   Random random(seed, stream_key({"retrieval"}));
   WindowBatch batch;
-  batch.resize(1);
-  RetrievalLibrary library{robot->name, robot->joint_names(), {}, {}, {}, {}, {}};
+  batch.resize(windows);
+  draw_windows(maker, all, random, batch);
+  RetrievalLibrary library{robot->name, robot->joint_names(), batch.task, {}, {}, {}, batch.plan};
   library.keys.resize(kRetrievalKey, windows);
-  library.plans.resize(kPlanSize, windows);
-  for (int i = 0; i < windows; ++i) {
-    maker.make(all[random.below(static_cast<int>(all.size()))], random, batch, 0);
-    write_key(features_of(batch, 0), library.keys.col(i));
-    library.plans.col(i) = batch.plan.col(0);
-    library.tasks.push_back(batch.task[0]);
-  }
+  for (int i = 0; i < windows; ++i) write_key(features_of(batch, i), library.keys.col(i));
   normalise(library);
   return library;
 }

@@ -31,14 +31,17 @@ struct DstarRun {
   WindowOptions windows;
   std::uint64_t seed = 42;
   int threads = 2;
-  int batch = 256;
-  long steps = 9000;
+  int batch = 128;
+  long steps = 16000;
   long until = 0;            // pauses there, with a checkpoint and a network; 0: at `steps`
-  double rate = 5e-4;        // Adam's, falling as a cosine to a twentieth after a warm-up of 200 steps
+  double rate = 7e-4;        // Adam's, falling as a cosine to a twentieth after a warm-up of 200 steps
   double average = 0.999;    // EMA of the weights, which is what is validated and kept
   int patience = 12;         // validations without a better one after which it stops; 0: never
   int validate_every = 250;  // steps
 };
+
+// run.windows as the run's network sees them.
+WindowOptions windows_of(const DstarRun& run);
 
 struct DstarProgress {
   long step = 0, steps = 0;

@@ -31,6 +31,12 @@ std::string file_of(const DstarRun& run, const char* name) { return (fs::path(ru
 
 }  // namespace
 
+WindowOptions windows_of(const DstarRun& run) {
+  WindowOptions options = run.windows;
+  options.long_stride = run.config.long_stride;
+  return options;
+}
+
 std::string dstar_checkpoint(const DstarRun& run) { return file_of(run, "checkpoint.safetensors"); }
 std::string dstar_network_file(const DstarRun& run) { return file_of(run, "network.safetensors"); }
 std::string dstar_curves(const DstarRun& run) { return file_of(run, "curves.csv"); }

@@ -30,6 +30,12 @@ void bound(Eigen::Vector3d& p, const Eigen::Vector3d& centre, double distance) {
   if (away.norm() > distance) p.head<2>() = centre.head<2>() + distance / away.norm() * away;
 }
 
+// Not turned from `heading` by more than `angle`; keeps its tilt.
+void bound(Eigen::Quaterniond& R, double heading, double angle) {
+  const double turn = std::remainder(yaw_of(R) - heading, 2.0 * EIGEN_PI);
+  if (std::abs(turn) > angle) R = yaw_rotation(std::copysign(angle, turn) - turn) * R;
+}
+
 }  // namespace
 
 std::vector<int> loss_frames(const RobotModel& robot) {
@@ -54,6 +60,7 @@ const std::array<int, kLossPoints>& loss_joints() {
 void WindowBatch::resize(int windows) {
   size = windows;
   frames.resize(kFrameSize * kHistoryFrames, windows);
+  past.resize(kFrameSize * kHistoryFrames, windows);
   position.resize(kPositionSize, windows);
   distance.resize(kRelations, windows);
   orientation.resize(kOrientationSize, windows);
@@ -77,10 +84,13 @@ WindowMaker::WindowMaker(std::shared_ptr<const RobotModel> robot, const Demonstr
     : robot_(std::move(robot)), set_(set), options_(options), features_(robot_) {}
 
 void WindowMaker::look(const Demonstration& entry, int frame, Random& random) {
+  const auto seen = [&](int before) {
+    const int column = clamped(entry, frame - before);
+    return ObservationFrame{set_.partner.col(column).cast<double>().reshaped(3, kSmplJoints), set_.state(column)};
+  };
   for (int i = 0; i < kHistoryFrames; ++i) {
-    const int column = clamped(entry, frame - (kHistoryFrames - 1 - i));
-    history_[i].robot = set_.state(column);
-    history_[i].partner = set_.partner.col(column).cast<double>().reshaped(3, kSmplJoints);
+    history_[i] = seen(kHistoryFrames - 1 - i);
+    past_[i] = seen((kHistoryFrames - 1 - i) * options_.long_stride);
   }
   if (!options_.augment) return;
   blur(random);
@@ -91,25 +101,39 @@ void WindowMaker::look(const Demonstration& entry, int frame, Random& random) {
 void WindowMaker::blur(Random& random) {
   const double sigma = random.chance(0.5) ? random.uniform(0.0, options_.jitter) : 0.0;
   const double lost = random.chance(1.0 / 3.0) ? random.uniform(0.0, options_.dropout) : 0.0;
+  const auto jittered = [&](Eigen::Vector3d place) -> Eigen::Vector3d {
+    if (sigma > 0.0) place += sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+    return place;
+  };
   for (int i = 0; i < kHistoryFrames; ++i) {
     for (int joint = 0; joint < kSmplJoints; ++joint) {
       auto place = history_[i].partner.col(joint);
-      if (sigma > 0.0) place += sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
+      place = jittered(place);
       if (lost > 0.0 && i > 0 && random.chance(lost)) place = history_[i - 1].partner.col(joint);
+      auto before = past_[i].partner.col(joint);
+      before = jittered(before);
     }
   }
 }
 
 // The robot beside the place and the posture that it is meant to have.
 void WindowMaker::displace(Random& random) {
-  const bool moved = random.chance(2.0 / 3.0);
   const Eigen::Vector3d centre = history_.back().robot.X_WB.p;
-  const Eigen::Vector3d shift =
-      (moved ? options_.root : 0.0) * Eigen::Vector3d(random.normal(), random.normal(), 0.1 * random.normal());
-  const Eigen::Quaterniond turn = yaw_rotation(moved ? options_.heading * random.normal() : 0.0);
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+  double angle = 0.0;
+  if (random.chance(2.0 / 3.0)) {
+    shift = options_.root * Eigen::Vector3d(random.normal(), random.normal(), 0.1 * random.normal());
+    angle = options_.heading * random.normal();
+  }
+  if (random.chance(0.25)) {
+    const double direction = random.uniform(0.0, 2.0 * EIGEN_PI), distance = random.uniform(0.0, options_.astray);
+    shift += distance * Eigen::Vector3d(std::cos(direction), std::sin(direction), 0.0);
+    angle += random.uniform(-options_.turned, options_.turned);
+  }
+  const Eigen::Quaterniond turn = yaw_rotation(angle);
   Eigen::VectorXd offset(robot_->dof());
   for (double& value : offset) value = options_.joints * random.normal();
-  for (ObservationFrame& frame : history_) {
+  const auto disturb = [&](ObservationFrame& frame) {
     move(frame.robot, centre, shift, turn);
     frame.robot.q += offset;
     for (int i = 0; i < robot_->dof(); ++i) {
@@ -120,25 +144,32 @@ void WindowMaker::displace(Random& random) {
       frame.robot.v_WB[axis] += options_.root * random.normal();
       frame.robot.w_WB_B[axis] += options_.heading * random.normal();
     }
-  }
+  };
+  std::ranges::for_each(history_, disturb);
+  std::ranges::for_each(past_, disturb);
+  past_.back() = history_.back();
 }
 
 void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch, int column) {
   const Demonstration& entry = set_.list[window.demonstration];
   const int frame = std::min(entry.frames - 1, window.frame + (options_.augment ? random.below(options_.stride) : 0));
   look(entry, frame, random);
-  features_.make({history_, frame}, made_);
+  features_.make({history_, frame}, past_, made_);
   batch.frames.col(column) = made_.frames.reshaped();
+  batch.past.col(column) = made_.past.reshaped();
   batch.position.col(column) = made_.position;
   batch.distance.col(column) = made_.distance;
   batch.orientation.col(column) = made_.orientation;
 
   const Pose X_WE = ego_frame(history_.back().robot), X_EW = X_WE.inverse();
+  const double heading = yaw_of(X_WE.R);
   Anchors anchors;
   for (int k = 0; k < kAnchors; ++k) {
     const int then = clamped(entry, frame + k * kAnchorTicks);
     anchors[k] = set_.reference(then);
-    bound(anchors[k].X_WB.p, X_WE.p, options_.reach + options_.speed * kAnchorTicks / 50.0 * k);
+    const double seconds = kAnchorTicks / 50.0 * k;
+    bound(anchors[k].X_WB.p, X_WE.p, options_.reach + options_.speed * seconds);
+    bound(anchors[k].X_WB.R, heading, options_.turn_reach + options_.turn_rate * seconds);
     for (int point = 0; point < kLossPoints; ++point) {
       const Eigen::Vector3d p_W = set_.partner.col(then).segment<3>(3 * loss_joints()[point]).cast<double>();
       batch.partner.col(column).segment<3>(3 * (kLossPoints * k + point)) = (X_EW * p_W).cast<float>();
@@ -151,13 +182,28 @@ void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch,
   batch.prompt[column] = options_.augment && random.chance(0.5) ? random.below(paraphrases) : -1;
 }
 
+void draw_windows(WindowMaker& maker, const std::vector<Window>& windows, Random& random, WindowBatch& batch) {
+  for (int i = 0; i < batch.size; ++i)
+    maker.make(windows[random.below(static_cast<int>(windows.size()))], random, batch, i);
+}
+
+DstarFeatures features_of(const WindowBatch& batch, int column) {
+  DstarFeatures features;
+  features.frames = batch.frames.col(column).reshaped(kFrameSize, kHistoryFrames);
+  features.past = batch.past.col(column).reshaped(kFrameSize, kHistoryFrames);
+  features.position = batch.position.col(column);
+  features.distance = batch.distance.col(column);
+  features.orientation = batch.orientation.col(column);
+  return features;
+}
+
 WindowStatistics window_statistics(WindowMaker& maker, const std::vector<Window>& windows, std::uint64_t seed) {
   Random random(seed, stream_key({"window statistics"}));
   WindowBatch batch;
   batch.resize(kStatisticsWindows);
-  for (int i = 0; i < kStatisticsWindows; ++i)
-    maker.make(windows[random.below(static_cast<int>(windows.size()))], random, batch, i);
-  const auto frames = batch.frames.reshaped(kFrameSize, Eigen::Index{kHistoryFrames} * kStatisticsWindows);
+  draw_windows(maker, windows, random, batch);
+  Eigen::MatrixXf frames(kFrameSize, 2 * Eigen::Index{kHistoryFrames} * kStatisticsWindows);
+  frames << batch.frames.reshaped(kFrameSize, frames.cols() / 2), batch.past.reshaped(kFrameSize, frames.cols() / 2);
   WindowStatistics statistics;
   statistics.frame_mean = frames.rowwise().mean();
   statistics.frame_deviation =

@@ -17,13 +17,17 @@ struct WindowOptions {
   int stride = 25;        // of windows in an epoch; each is moved by up to it at random
   double root = 0.06;     // deviation of the robot's place [m]; of two windows in three
   double heading = 0.08;  // [rad]
+  double astray = 0.8;    // the robot up to so far from where it should be [m]; of every fourth window
+  double turned = 0.5;    // and turned by so much [rad]
   double joints = 0.03;   // of all joints at once, and a fifth of it per frame [rad]
   double rates = 0.15;    // of joint rates [rad/s]
   double jitter = 0.04;   // largest deviation of the partner's joints [m]; of every second window
   double dropout = 0.2;   // largest share of joints that are not seen; of every third window
+  int long_stride = 1;    // of the network's configuration
   bool augment = true;
   // A robot that has gone astray is not asked to be back at once: the root of anchor k is at most so far from it.
-  double reach = 0.25, speed = 0.6;  // [m], and [m/s] times its 0.5 k s
+  double reach = 0.25, speed = 0.6;          // [m], and [m/s] times its 0.5 k s
+  double turn_reach = 0.3, turn_rate = 0.8;  // [rad], [rad/s]
 };
 
 // Keypoints whose places L_pos and L_spatial compare: of the robot and of the partner.
@@ -38,7 +42,7 @@ struct Window {
 // Plain arrays, a window per column, ready for a trainer.
 struct WindowBatch {
   int size = 0;
-  Eigen::MatrixXf frames;  // (149 * 12, size): oldest first
+  Eigen::MatrixXf frames, past;  // (149 * 12, size): as DstarFeatures has them
   Eigen::MatrixXf position, distance, orientation;
   Eigen::MatrixXf plan;           // (180, size): encode_plan
   Eigen::MatrixXf partner;        // (kAnchors * kLossPoints * 3, size): where the partner's points will be, in E
@@ -66,9 +70,15 @@ class WindowMaker {
   const DemonstrationSet& set_;
   WindowOptions options_;
   FeatureMaker features_;
-  std::array<ObservationFrame, kHistoryFrames> history_;
+  std::array<ObservationFrame, kHistoryFrames> history_, past_;
   DstarFeatures made_;
 };
+
+// Fills a batch with windows drawn evenly from a list.
+void draw_windows(WindowMaker& maker, const std::vector<Window>& windows, Random& random, WindowBatch& batch);
+
+// What the network saw of a window.
+DstarFeatures features_of(const WindowBatch& batch, int column);
 
 // Mean and deviation per channel of frames and plans over a sample of windows, as a network keeps them. Deviations are
 // at least `floor`.

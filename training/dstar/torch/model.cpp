@@ -44,10 +44,11 @@ Tensor stream(const DstarConfig& config, const Weights& weights, const std::stri
   return linear(weights, name + ".head", layer_norm(weights, name + ".norm", x.select(1, x.size(1) - 1)));
 }
 
-Tensor temporal(const DstarConfig& config, const Weights& weights, const Tensor& frames) {
-  const auto last = [&](int count) { return frames.slice(1, frames.size(1) - count); };
-  Tensor both = stream(config, weights, "long", last(config.long_frames));
-  if (config.short_stream) both = torch::cat({both, stream(config, weights, "short", last(config.short_frames))}, 1);
+Tensor temporal(const DstarConfig& config, const Weights& weights, const ModelInput& input) {
+  const auto last = [](const Tensor& frames, int count) { return frames.slice(1, frames.size(1) - count); };
+  Tensor both = stream(config, weights, "long", last(input.past, config.long_frames));
+  if (config.short_stream)
+    both = torch::cat({both, stream(config, weights, "short", last(input.frames, config.short_frames))}, 1);
   return linear(weights, "temporal", both);
 }
 
@@ -108,13 +109,13 @@ Tensor convolution(const Weights& weights, const std::string& name, const Tensor
 
 }  // namespace
 
-torch::Tensor classify(const DstarConfig& config, const Weights& weights, const torch::Tensor& frames) {
-  return phase_logits(weights, temporal(config, weights, frames));
+torch::Tensor classify(const DstarConfig& config, const Weights& weights, const ModelInput& input) {
+  return phase_logits(weights, temporal(config, weights, input));
 }
 
 ModelCondition encode(const DstarConfig& config, const Weights& weights, const ModelInput& input) {
   ModelCondition result;
-  const torch::Tensor f_temp = temporal(config, weights, input.frames);
+  const torch::Tensor f_temp = temporal(config, weights, input);
   std::vector<torch::Tensor> parts = {f_temp};
   if (config.phase_attention) {
     result.phase_logits = phase_logits(weights, f_temp);

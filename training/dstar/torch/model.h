@@ -15,6 +15,7 @@ using Weights = std::map<std::string, torch::Tensor>;
 
 struct ModelInput {
   torch::Tensor frames;       // (B, 12, 149), normalised
+  torch::Tensor past;         // likewise, of the long stream
   torch::Tensor position;     // (B, 144)
   torch::Tensor distance;     // (B, 6)
   torch::Tensor orientation;  // (B, 12)
@@ -27,8 +28,8 @@ struct ModelCondition {
 };
 
 ModelCondition encode(const DstarConfig& config, const Weights& weights, const ModelInput& input);
-// Only the phase classifier, of frames: for L_trans.
-torch::Tensor classify(const DstarConfig& config, const Weights& weights, const torch::Tensor& frames);
+// Only the phase classifier: for L_trans.
+torch::Tensor classify(const DstarConfig& config, const Weights& weights, const ModelInput& input);
 // x (B, 5, 36), step (B) -> x0 (B, 5, 36), normalised.
 torch::Tensor denoise(const DstarConfig& config, const Weights& weights, const torch::Tensor& x,
                       const torch::Tensor& step, const torch::Tensor& condition);

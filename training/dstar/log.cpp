@@ -1,0 +1,72 @@
+#include "training/dstar/log.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "core/file.h"
+
+namespace duet {
+namespace {
+
+constexpr double kReportEvery = 10.0, kCheckpointEvery = 60.0;  // [s]
+constexpr const char* kColumns = "step,minutes,loss,action,phase,auxiliary,validation,phase_accuracy,rate\n";
+
+double since(std::chrono::steady_clock::time_point begin) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+}  // namespace
+
+DstarLog::DstarLog(const DstarRun& run, long done, double minutes) : run_(run), first_(done), minutes_(minutes) {
+  std::filesystem::create_directories(std::filesystem::path(dstar_curves(run)).parent_path());
+  if (done == 0) write_file(dstar_curves(run), kColumns);
+}
+
+void DstarLog::add(const LossParts& parts) {
+  sum_.total += parts.total;
+  sum_.action += parts.action;
+  sum_.phase += parts.phase;
+  sum_.auxiliary += parts.auxiliary;
+  ++count_;
+}
+
+LossParts DstarLog::means() const {
+  const double n = std::max(1, count_);
+  return {sum_.total / n, sum_.action / n, sum_.phase / n, sum_.auxiliary / n};
+}
+
+void DstarLog::validated(double loss, double accuracy, long step, double rate) {
+  progress_.validation = loss;
+  progress_.phase_accuracy = accuracy;
+  const LossParts mean = means();
+  std::ofstream(dstar_curves(run_), std::ios::app)
+      << fmt::format("{},{:.3f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.4f},{:.2e}\n", step, minutes(), mean.total,
+                     mean.action, mean.phase, mean.auxiliary, loss, accuracy, rate);
+}
+
+DstarProgress DstarLog::report(long step) {
+  const LossParts mean = means();
+  DstarProgress progress = progress_;
+  progress.step = step;
+  progress.steps = run_.steps;
+  progress.loss = mean.total;
+  progress.action = mean.action;
+  progress.phase = mean.phase;
+  progress.auxiliary = mean.auxiliary;
+  const double speed = static_cast<double>(step - first_) / std::max(1e-9, since(begin_));
+  progress.windows_per_second = speed * run_.batch;
+  progress.seconds_left = static_cast<double>(run_.steps - step) / std::max(1e-9, speed);
+  sum_ = {};
+  count_ = 0;
+  reported_ = Clock::now();
+  return progress;
+}
+
+bool DstarLog::report_due() const { return since(reported_) > kReportEvery; }
+bool DstarLog::save_due() const { return since(saved_) > kCheckpointEvery; }
+double DstarLog::minutes() const { return minutes_ + since(begin_) / 60.0; }
+
+}  // namespace duet
