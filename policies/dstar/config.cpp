@@ -21,10 +21,11 @@ struct Size {
 };
 
 // The bounds keep what a broken file can ask for small.
-constexpr int kWidest = 8192, kDeepest = 64;
+constexpr int kWidest = 8192, kDeepest = 64, kLongestStride = 500;
 constexpr Size kSizes[] = {
     {"long_frames", &DstarConfig::long_frames, 1, kHistoryFrames},
     {"short_frames", &DstarConfig::short_frames, 1, kHistoryFrames},
+    {"long_stride", &DstarConfig::long_stride, 1, kLongestStride},
     {"width", &DstarConfig::width, 1, kWidest},
     {"heads", &DstarConfig::heads, 1, kWidest},
     {"feedforward", &DstarConfig::feedforward, 1, kWidest},

@@ -12,6 +12,7 @@ namespace duet {
 struct DstarConfig {
   // Long-short temporal encoder: each stream a pre-norm transformer over its frames, the newest frame's token read out.
   int long_frames = kHistoryFrames, short_frames = 6;
+  int long_stride = 20;  // ticks between the long stream's frames: 4.4 s; printed: 1, which are 0.22 s
   int width = 128, heads = 4, feedforward = 256, layers = 2;
   int stream = 768;    // what each stream gives
   int temporal = 256;  // f_temp
@@ -25,7 +26,7 @@ struct DstarConfig {
   int language = 768;  // with f_temp, f_phase and f_MSS: the condition, 1408
   // Diffusion head: 1-D convolutions of 3 over the anchors, group norm, FiLM by the condition and by the step.
   int condition = 256;  // the 1408 projected
-  int channels = 192, blocks = 4, groups = 8, step_embedding = 64;
+  int channels = 168, blocks = 4, groups = 8, step_embedding = 64;
   int training_steps = 50, inference_steps = 10;  // F: DDIM, squared-cosine
   // Ablations; what is off is neither computed nor in the file, and the condition is shorter by it.
   bool phase_attention = true, spatial_reasoning = true, short_stream = true, language_on = true;

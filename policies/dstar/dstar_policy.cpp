@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/names.h"
+#include "core/number.h"
 #include "core/random.h"
 #include "core/require.h"
 #include "core/share.h"
+#include "policies/dstar/past_frames.h"
 #include "policies/scheduler.h"
 
 namespace duet {
@@ -23,22 +26,17 @@ bool is_reference(const Reference& reference) {
   return reference.X_WB.p.allFinite() && std::abs(reference.X_WB.R.norm() - 1.0) < kUnit && reference.q.allFinite();
 }
 
-bool is_finite(const ObservationFrame& frame) {
-  const RobotState& robot = frame.robot;
-  return frame.partner.allFinite() && robot.X_WB.p.allFinite() && robot.X_WB.R.coeffs().allFinite() &&
-         robot.v_WB.allFinite() && robot.w_WB_B.allFinite() && robot.q.allFinite() && robot.v.allFinite();
-}
-
 class DstarPolicy final : public Policy {
  public:
   DstarPolicy(std::string name, Robot robot, std::shared_ptr<const DstarNetwork> network,
-              std::shared_ptr<const LanguageEncoder> language, NoiseMode noise)
+              std::shared_ptr<const LanguageEncoder> language, const DstarSampling& sampling)
       : name_(std::move(name)),
         robot_(std::move(robot)),
         network_(std::move(network)),
         language_(std::move(language)),
-        mode_(noise),
+        sampling_(sampling),
         maker_(robot_),
+        past_(network_->config.long_stride),
         runner_(network_) {}
 
   [[nodiscard]] std::string_view name() const override { return name_; }
@@ -49,24 +47,25 @@ class DstarPolicy final : public Policy {
     random_ = Random(context.seed, stream_key({"policy", "noise"}));
     draw();
     drawn_ = true;
+    past_.reset();
     faults_ = {};
   }
 
   Anchors act(const Observation& observation) override {
     require(drawn_, fmt::format("policy '{}': reset comes first", name_));
-    if (mode_ == NoiseMode::kCall) draw();
-    maker_.make(observation, features_);
+    if (sampling_.noise == NoiseMode::kCall) draw();
+    past_.add(observation);
+    maker_.make(observation, past_.frames(), features_);
     const std::span<const float> plan = runner_.run({.features = &features_, .language = embedding_, .noise = noise_});
     return decode_plan(plan, ego_frame(observation.now().robot), *robot_);
   }
 
   std::vector<Reference> plan(const Observation& observation) override {
     // A frame that is not finite may be clipped into one that is.
-    if (!std::ranges::all_of(observation.history, is_finite))
-      return leave_out(observation.tick, "the observation is not finite");
+    if (!is_finite(observation)) return faults_.leave_out(name_, observation.tick, "the observation is not finite");
     const Anchors anchors = act(observation);
     if (!std::ranges::all_of(anchors, is_reference))
-      return leave_out(observation.tick, "the network's plan is not finite");
+      return faults_.leave_out(name_, observation.tick, "the network's plan is not finite");
     return densify(anchors);
   }
 
@@ -74,21 +73,16 @@ class DstarPolicy final : public Policy {
 
  private:
   void draw() {
-    for (float& value : noise_) value = static_cast<float>(random_.normal());
-  }
-
-  std::vector<Reference> leave_out(int tick, const char* problem) {
-    ++faults_.invalid;
-    if (faults_.message.empty()) faults_.message = fmt::format("policy '{}': tick {}: {}", name_, tick, problem);
-    return {};
+    for (float& value : noise_) value = static_cast<float>(sampling_.temperature * random_.normal());
   }
 
   std::string name_;
   Robot robot_;                                      // shared with the backend and the controller of the same episode
   std::shared_ptr<const DstarNetwork> network_;      // shared: many episodes run one
   std::shared_ptr<const LanguageEncoder> language_;  // likewise
-  NoiseMode mode_;
+  DstarSampling sampling_;
   FeatureMaker maker_;
+  PastFrames past_;
   DstarRunner runner_;
   DstarFeatures features_;
   std::vector<float> embedding_, noise_ = std::vector<float>(kPlanSize);
@@ -124,6 +118,15 @@ NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
   return NoiseMode::kCall;
 }
 
+double temperature_of(const std::string& name, const PolicyOptions& options) {
+  const std::string given = option(options, "temperature");
+  if (given.empty()) return DstarSampling{}.temperature;
+  const std::optional<double> value = parse_number(given);
+  require(value && *value >= 0.0 && *value <= 1.0,
+          fmt::format("policy '{}': temperature: expected a number from 0 to 1, found '{}'", name, given));
+  return *value;
+}
+
 void check_language(const std::string& name, const DstarNetwork& network, const LanguageEncoder* language) {
   if (!network.config.language_on) return;
   require(language != nullptr, fmt::format("policy '{}': its network needs a language encoder", name));
@@ -137,14 +140,15 @@ void check_language(const std::string& name, const DstarNetwork& network, const 
 
 std::unique_ptr<Policy> make_dstar_policy(const std::string& name, Robot robot,
                                           std::shared_ptr<const DstarNetwork> network,
-                                          std::shared_ptr<const LanguageEncoder> language, NoiseMode noise) {
+                                          std::shared_ptr<const LanguageEncoder> language,
+                                          const DstarSampling& sampling) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
   require(network != nullptr, fmt::format("policy '{}' needs a network", name));
   require(
       network->joints == robot->joint_names(),
       fmt::format("policy '{}': its network was made for other joints than those of robot '{}'", name, robot->name));
   check_language(name, *network, language.get());
-  return std::make_unique<DstarPolicy>(name, std::move(robot), std::move(network), std::move(language), noise);
+  return std::make_unique<DstarPolicy>(name, std::move(robot), std::move(network), std::move(language), sampling);
 }
 
 PolicyInfo dstar_info(const std::string& name) {
@@ -154,16 +158,17 @@ PolicyInfo dstar_info(const std::string& name) {
                    : "D-STAR of the supplement: phase attention, spatial reasoning and language, by diffusion",
           {{"network", name, "path of a network; the one that ships where none is given"},
            {"language", std::string(kBuiltInLanguage), "path of an NPZ table of prompts and their embeddings"},
-           {"noise", "episode", "episode: x_T drawn once an episode; call: anew for each plan"}}};
+           {"noise", "episode", "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan"},
+           {"temperature", "0", "deviation of x_T, 0 (the most likely plan) to 1 (plans as they are distributed)"}}};
 }
 
 PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
-  const NoiseMode noise = noise_of(name, options);
+  const DstarSampling sampling{noise_of(name, options), temperature_of(name, options)};
   const std::shared_ptr<const LanguageEncoder> language = language_of(name, options);
   const std::shared_ptr<const DstarNetwork> network = load_dstar_network(network_path(name, options), *robot);
   check_language(name, *network, language.get());
-  return [=] { return make_dstar_policy(name, robot, network, language, noise); };
+  return [=] { return make_dstar_policy(name, robot, network, language, sampling); };
 }
 
 }  // namespace duet

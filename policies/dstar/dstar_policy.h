@@ -15,15 +15,20 @@ enum class NoiseMode {
   kCall,     // drawn anew at each call
 };
 
+struct DstarSampling {
+  NoiseMode noise = NoiseMode::kEpisode;
+  double temperature = 0.0;  // deviation of x_T; 0: the plan is a function of what is seen (docs/deviations.md, P24)
+};
+
 // `name`: as rows and tables show it. The network and the encoder are shared between episodes and threads.
 std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_ptr<const RobotModel> robot,
                                           std::shared_ptr<const DstarNetwork> network,
                                           std::shared_ptr<const LanguageEncoder> language,
-                                          NoiseMode noise = NoiseMode::kEpisode);
+                                          const DstarSampling& sampling = {});
 
 // Of "dstar" and "dp": options `network` (file; default: the one that ships in policies/dstar/), `language` (NPZ table;
-// default: built in), `noise` (episode | call). Throws what load_dstar_network and load_language_table throw;
-// MissingError where the file is not there.
+// default: built in), `noise` (episode | call), `temperature`. Throws what load_dstar_network and load_language_table
+// throw; MissingError where the file is not there.
 PolicyInfo dstar_info(const std::string& name);
 PolicyMaker dstar_maker(const std::string& name, std::shared_ptr<const RobotModel> robot, const PolicyOptions& options);
 

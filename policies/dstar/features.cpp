@@ -15,11 +15,6 @@ namespace {
 
 constexpr double kLongestWave = 4.0;  // [m]; each band halves it
 
-Eigen::Vector4f wxyz_of(const Eigen::Quaterniond& R) {
-  const double sign = R.w() < 0.0 ? -1.0 : 1.0;  // q and -q are one orientation
-  return (sign * Eigen::Vector4d(R.w(), R.x(), R.y(), R.z())).cast<float>();
-}
-
 // Where the person looks: level, at right angles to the line of the hips.
 double heading_of(const Eigen::Matrix<double, 3, kSmplJoints>& joints) {
   const Eigen::Vector3d left = joints.col(kLeftHip) - joints.col(kRightHip);
@@ -53,7 +48,7 @@ void write_frame(const ObservationFrame& frame, const Pose& X_EW, const Eigen::V
   const Eigen::Matrix<double, 3, kSmplJoints> joints = R_EW * (frame.partner.colwise() - frame.partner.col(0));
   out << (X_EW * Eigen::Vector3d(frame.partner.col(0))).cast<float>(), joints.reshaped().cast<float>(),
       (R_BW * robot.v_WB).cast<float>(), robot.w_WB_B.cast<float>(), (-R_BW.col(2)).cast<float>(),
-      (robot.q - neutral).cast<float>(), robot.v.cast<float>(), X_EB.p.cast<float>(), wxyz_of(X_EB.R);
+      (robot.q - neutral).cast<float>(), robot.v.cast<float>(), X_EB.p.cast<float>(), wxyz_of(X_EB.R).cast<float>();
 }
 
 void add_axes(const std::string& name, std::vector<std::string>& names) {
@@ -90,11 +85,14 @@ FeatureMaker::FeatureMaker(std::shared_ptr<const RobotModel> robot)
                                               robot_->name, channels, kFrameSize));
 }
 
-void FeatureMaker::make(const Observation& observation, DstarFeatures& features) {
+void FeatureMaker::make(const Observation& observation, std::span<const ObservationFrame> past,
+                        DstarFeatures& features) {
   const ObservationFrame& now = observation.now();
   const Pose X_WE = ego_frame(now.robot), X_EW = X_WE.inverse();
-  for (int i = 0; i < kHistoryFrames; ++i)
+  for (int i = 0; i < kHistoryFrames; ++i) {
     write_frame(observation.history[i], X_EW, robot_->neutral, features.frames.col(i));
+    write_frame(past[i], X_EW, robot_->neutral, features.past.col(i));
+  }
 
   kinematics_.update(now.robot.X_WB, now.robot.q);
   const Eigen::Vector3d head = kinematics_.frame_position(head_), left = kinematics_.frame_position(left_hand_),
@@ -117,7 +115,7 @@ void encode_plan(const Anchors& anchors, const Pose& X_WE, const RobotModel& rob
   for (int k = 0; k < kAnchors; ++k) {
     const Pose X_EB = X_EW * anchors[k].X_WB;
     Eigen::Map<Eigen::Matrix<float, kAnchorSize, 1>> out(plan.data() + kAnchorSize * k);
-    out << X_EB.p.cast<float>(), wxyz_of(X_EB.R), (anchors[k].q - robot.neutral).cast<float>();
+    out << X_EB.p.cast<float>(), wxyz_of(X_EB.R).cast<float>(), (anchors[k].q - robot.neutral).cast<float>();
   }
 }
 

@@ -21,10 +21,14 @@ inline constexpr int kPositionBands = 4;  // sinusoids per axis: wavelengths 4, 
 inline constexpr int kPositionSize = kRelations * 3 * 2 * kPositionBands;  // 144
 inline constexpr int kOrientationSize = 12;
 
+// Column i is frame i, oldest first.
+using DstarFrames = Eigen::Matrix<float, kFrameSize, kHistoryFrames>;
+
 struct DstarFeatures {
-  // Column i is frame i, oldest first: partner's root in E (3), SMPL joints from that root in E's axes (72), robot:
+  // Per frame: partner's root in E (3), SMPL joints from that root in E's axes (72), robot:
   // base velocities in B (3 + 3), gravity in B (3), q - neutral (29), v (29), root in E (3), orientation in E wxyz (4).
-  Eigen::Matrix<float, kFrameSize, kHistoryFrames> frames;
+  DstarFrames frames;
+  DstarFrames past;  // the long stream's: further apart, the last one is now, all in E of now
   Eigen::Matrix<float, kPositionSize, 1> position;        // sinusoids of the relations' vectors, now
   Eigen::Matrix<float, kRelations, 1> distance;           // their lengths [m]
   Eigen::Matrix<float, kOrientationSize, 1> orientation;  // bearing and facing as sine and cosine of 1x, 2x, 3x
@@ -39,7 +43,12 @@ class FeatureMaker {
  public:
   // Throws std::invalid_argument for a robot without the keypoints head, lhand and rhand or with other than 29 joints.
   explicit FeatureMaker(std::shared_ptr<const RobotModel> robot);
-  void make(const Observation& observation, DstarFeatures& features);
+  // `past`: kHistoryFrames frames for the long stream, oldest first (PastFrames).
+  void make(const Observation& observation, std::span<const ObservationFrame> past, DstarFeatures& features);
+  // Where the long stream's frames are those of the observation: long_stride 1.
+  void make(const Observation& observation, DstarFeatures& features) {
+    make(observation, observation.history, features);
+  }
 
  private:
   std::shared_ptr<const RobotModel> robot_;

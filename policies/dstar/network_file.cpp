@@ -31,6 +31,7 @@ void for_each_input(const DstarConfig& config, Golden& golden, const F& f) {
   DstarFeatures& features = golden.features;
   const auto values = [](auto& matrix) { return Values(matrix.data(), static_cast<std::size_t>(matrix.size())); };
   f("golden.frames", {kHistoryFrames, kFrameSize}, values(features.frames));
+  f("golden.past", {kHistoryFrames, kFrameSize}, values(features.past));
   if (config.spatial_reasoning) {
     f("golden.position", {kPositionSize}, values(features.position));
     f("golden.distance", {kRelations}, values(features.distance));
@@ -49,8 +50,9 @@ Golden random_golden(const DstarNetwork& network) {
                    for (float& value : values) value = static_cast<float>(random.normal());
                  });
   DstarFeatures& features = golden.features;
-  for (auto frame : features.frames.colwise())
-    frame = network.frame_mean + network.frame_deviation.cwiseProduct(Eigen::VectorXf(frame));
+  for (DstarFrames* frames : {&features.frames, &features.past})
+    for (auto frame : frames->colwise())
+      frame = network.frame_mean + network.frame_deviation.cwiseProduct(Eigen::VectorXf(frame));
   if (!network.config.spatial_reasoning) return golden;
   features.position = features.position.array().sin();
   features.orientation = features.orientation.array().sin();

@@ -26,7 +26,7 @@ std::shared_ptr<const DstarNetwork> checked(std::shared_ptr<const DstarNetwork> 
 struct DstarRunner::Work {
   explicit Work(std::shared_ptr<const DstarNetwork> given);
   void encode(const DstarInput& input);
-  void normalise(const DstarFeatures& features);
+  void normalise(const DstarFrames& in, DstarFrames& out) const;
   void denormalise();
 
   std::shared_ptr<const DstarNetwork> network;  // shared: many episodes run one
@@ -37,7 +37,7 @@ struct DstarRunner::Work {
   Linear temporal, condition1, condition2;
   Denoiser denoiser;
   std::vector<float> streams, context, hidden, condition, plan;
-  Eigen::Matrix<float, kFrameSize, kHistoryFrames> frames;
+  DstarFrames frames, past;
   std::span<const float> normalised;
 };
 
@@ -60,16 +60,17 @@ DstarRunner::Work::Work(std::shared_ptr<const DstarNetwork> given)
   condition.resize(hidden.size());
 }
 
-void DstarRunner::Work::normalise(const DstarFeatures& features) {
-  frames = (features.frames.colwise() - network->frame_mean).array().colwise() / network->frame_deviation.array();
-  clip({frames.data(), static_cast<std::size_t>(frames.size())}, kFrameClip);
+void DstarRunner::Work::normalise(const DstarFrames& in, DstarFrames& out) const {
+  out = (in.colwise() - network->frame_mean).array().colwise() / network->frame_deviation.array();
+  clip({out.data(), static_cast<std::size_t>(out.size())}, kFrameClip);
 }
 
 // The condition g of an input.
 void DstarRunner::Work::encode(const DstarInput& input) {
   const DstarConfig& config = network->config;
-  normalise(*input.features);
-  long_stream.encode(frames.data(), streams.data());
+  normalise(input.features->frames, frames);
+  normalise(input.features->past, past);
+  long_stream.encode(past.data(), streams.data());
   if (short_stream) short_stream->encode(frames.data(), streams.data() + config.stream);
   const float* f_temp = context.data();
   float* next = context.data() + config.temporal;

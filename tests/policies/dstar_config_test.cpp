@@ -33,7 +33,7 @@ TEST(DstarConfig, IsReadBackAsWritten) {
   DstarConfig config = test::small_config();
   config.spatial_reasoning = config.language_on = false;
   EXPECT_EQ(parse_dstar_config(to_json_text(config), "net"), config);
-  EXPECT_THAT(to_json_text({}), StartsWith(R"({"long_frames":12,"short_frames":6,"width":128,)"));
+  EXPECT_THAT(to_json_text({}), StartsWith(R"({"long_frames":12,"short_frames":6,"long_stride":20,"width":128,)"));
 }
 
 TEST(DstarConfig, HasThePapersConditionOf1408) {
@@ -65,7 +65,7 @@ TEST(DstarConfig, RefusesSizesThatDoNotDivide) {
   EXPECT_EQ(refusal("heads", 3), start + "'width': expected a multiple of 'heads' (3), found 128");
   EXPECT_EQ(refusal("tokens", 7), start + "'temporal': expected a multiple of 'tokens' (7), found 256");
   EXPECT_EQ(refusal("field", 126), start + "'field': expected a multiple of 'fusion_heads' (4), found 126");
-  EXPECT_EQ(refusal("groups", 5), start + "'channels': expected a multiple of 'groups' (5), found 192");
+  EXPECT_EQ(refusal("groups", 5), start + "'channels': expected a multiple of 'groups' (5), found 168");
   EXPECT_EQ(refusal("step_embedding", 63), start + "'step_embedding': expected an even number, found 63");
   EXPECT_EQ(refusal("inference_steps", 51),
             start + "'inference_steps': expected at most 'training_steps' (50), found 51");

@@ -88,7 +88,7 @@ TEST(DstarTensors, AreNamedOnceAndStandInThePapersSizes) {
       EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{256, 1408}));
     }
     if (tensor.name == "denoise.0.film_step.weight") {
-      EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{384, 256}));
+      EXPECT_EQ(tensor.shape, (std::vector<std::int64_t>{336, 256}));
     }
     EXPECT_NE(tensor.name, "denoise.0.film_step.bias");
   }

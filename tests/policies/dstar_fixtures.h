@@ -14,7 +14,7 @@ namespace duet::test {
 // Every size different from the others, so that none can stand for another.
 inline DstarConfig small_config() {
   DstarConfig config;
-  config.long_frames = 11, config.short_frames = 5;
+  config.long_frames = 11, config.short_frames = 5, config.long_stride = 3;
   config.width = 16, config.heads = 2, config.feedforward = 26, config.layers = 2;
   config.stream = 20, config.temporal = 18, config.tokens = 3, config.phase_hidden = 7, config.phase = 13;
   config.zone = 4, config.orientation = 5, config.field = 8, config.field_hidden = 10, config.fusion_heads = 4;

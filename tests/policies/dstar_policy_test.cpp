@@ -28,9 +28,9 @@ DstarConfig policy_config() {
   return config;
 }
 
-std::unique_ptr<Policy> make(NoiseMode noise = NoiseMode::kEpisode) {
+std::unique_ptr<Policy> make(const DstarSampling& sampling = {.temperature = 1.0}) {
   static const auto network = test::random_network(policy_config());
-  return make_dstar_policy("dstar", g1(), network, built_in_language(), noise);
+  return make_dstar_policy("dstar", g1(), network, built_in_language(), sampling);
 }
 
 // The standing robot with somebody about a metre in front of it, who waves as time goes by.
@@ -76,7 +76,7 @@ TEST(DstarPolicy, RepeatsAnEpisodeToTheBit) {
   EXPECT_EQ(episode(*policy, context_of(1)), first);
   EXPECT_EQ(episode(*other, context_of(1)), first);
   EXPECT_NE(episode(*policy, context_of(2)), first);
-  const auto fresh = make(NoiseMode::kCall);
+  const auto fresh = make({.noise = NoiseMode::kCall, .temperature = 1.0});
   const std::vector<double> by_call = episode(*fresh, context_of(1));
   EXPECT_EQ(episode(*fresh, context_of(1)), by_call);
   EXPECT_NE(by_call, first);
@@ -91,10 +91,39 @@ TEST(DstarPolicy, KeepsItsNoiseForTheEpisodeOrDrawsItByCall) {
   history.reset();
   history.add(frame_at(0));
   for (const NoiseMode mode : {NoiseMode::kEpisode, NoiseMode::kCall}) {
-    const auto policy = make(mode);
+    const auto policy = make({.noise = mode, .temperature = 1.0});
     policy->reset(context_of(1));
     const std::vector<Reference> first = policy->plan(history.at(0)), second = policy->plan(history.at(0));
     EXPECT_EQ(same_joints(first, second), mode == NoiseMode::kEpisode);
+  }
+}
+
+TEST(DstarPolicy, WithoutTemperatureItsSeedDoesNotMatter) {
+  const auto still = make({.temperature = 0.0}), half = make({.temperature = 0.5});
+  const std::vector<double> first = episode(*still, context_of(1));
+  EXPECT_EQ(episode(*still, context_of(2)), first);
+  EXPECT_NE(episode(*half, context_of(1)), episode(*half, context_of(2)));
+}
+
+// One plan at the end of a time in which the partner waved, or did not.
+std::vector<Reference> plan_after(Policy& policy, bool waved) {
+  policy.reset(context_of(1));
+  ObservationHistory history;
+  history.reset();
+  std::vector<Reference> plan;
+  for (int tick = 0; tick <= 200; ++tick) {
+    history.add(frame_at(waved && tick < 150 ? tick : 0));
+    if (tick % kTicksPerPlan == 0) plan = policy.plan(history.at(tick));
+  }
+  return plan;
+}
+
+TEST(DstarPolicy, RemembersWhatItsLongStreamLooksBackOn) {
+  DstarConfig config = policy_config();
+  for (const int stride : {1, 20}) {
+    config.long_stride = stride;
+    const auto policy = make_dstar_policy("dstar", g1(), test::random_network(config), built_in_language());
+    EXPECT_EQ(same_joints(plan_after(*policy, true), plan_after(*policy, false)), stride == 1);
   }
 }
 
@@ -160,8 +189,8 @@ TEST(DstarPolicy, ComesByItsNameWithANetworkOfItsOwn) {
     const auto policy = maker(), other = maker();
     EXPECT_EQ(policy->name(), name);
     EXPECT_EQ(episode(*policy, context_of(1)), episode(*other, context_of(1)));
-    EXPECT_NE(episode(*make_policy(name, g1(), {{"network", path}, {"noise", "call"}}), context_of(1)),
-              episode(*policy, context_of(1)));
+    const PolicyOptions noisy = {{"network", path}, {"noise", "call"}, {"temperature", "1"}};
+    EXPECT_NE(episode(*make_policy(name, g1(), noisy), context_of(1)), episode(*policy, context_of(1)));
   }
 }
 
@@ -170,6 +199,8 @@ TEST(DstarPolicy, RefusesWhatItCannotRun) {
     return thrown_message<std::invalid_argument>([&] { make_policy("dstar", g1(), options); });
   };
   EXPECT_THAT(refusal({{"noise", "cal"}}), StartsWith("policy 'dstar': unknown noise 'cal': did you mean 'call'?"));
+  EXPECT_EQ(refusal({{"temperature", "1.5"}}),
+            "policy 'dstar': temperature: expected a number from 0 to 1, found '1.5'");
   EXPECT_THAT(refusal({{"netwrok", "x"}}), HasSubstr("'network'"));
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("dstar", nullptr); }),
             "policy 'dstar' needs a robot");

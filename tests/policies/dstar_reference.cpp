@@ -90,8 +90,8 @@ class Plain {
     return out;
   }
 
-  [[nodiscard]] Vector stream(const std::string& name, int frames) const {
-    Matrix x = sample_.features.frames.cast<double>().rightCols(frames);
+  [[nodiscard]] Vector stream(const std::string& name, const DstarFrames& seen, int frames) const {
+    Matrix x = seen.cast<double>().rightCols(frames);
     x = ((x.colwise() - network_.frame_mean.cast<double>()).array().colwise() /
          network_.frame_deviation.cast<double>().array())
             .cwiseMax(-10.0)
@@ -137,8 +137,8 @@ class Plain {
   }
 
   Vector condition() {
-    Vector streams = stream("long", config_.long_frames);
-    if (config_.short_stream) streams = concat(streams, stream("short", config_.short_frames));
+    Vector streams = stream("long", sample_.features.past, config_.long_frames);
+    if (config_.short_stream) streams = concat(streams, stream("short", sample_.features.frames, config_.short_frames));
     const Vector f_temp = linear("temporal", streams);
     Vector c = f_temp;
     if (config_.phase_attention) c = concat(c, phase(f_temp));
@@ -194,6 +194,7 @@ DstarSample random_sample(const DstarConfig& config, std::uint64_t seed) {
     for (float& value : values) value = static_cast<float>(random.normal());
   };
   fill(sample.features.frames.reshaped());
+  fill(sample.features.past.reshaped());
   fill(sample.features.position);
   fill(sample.features.orientation);
   sample.features.distance << 0.05F, 0.29F, 0.3F, 0.79F, 0.8F, 2.5F;
