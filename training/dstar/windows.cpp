@@ -121,9 +121,12 @@ void WindowMaker::displace(Random& random) {
   const Eigen::Vector3d centre = history_.back().robot.X_WB.p;
   Eigen::Vector3d shift = Eigen::Vector3d::Zero();
   double angle = 0.0;
+  Eigen::Quaterniond lean = Eigen::Quaterniond::Identity();
   if (random.chance(2.0 / 3.0)) {
     shift = options_.root * Eigen::Vector3d(random.normal(), random.normal(), 0.1 * random.normal());
     angle = options_.heading * random.normal();
+    lean = Eigen::AngleAxisd(options_.tilt * random.normal(), Eigen::Vector3d::UnitX()) *
+           Eigen::AngleAxisd(options_.tilt * random.normal(), Eigen::Vector3d::UnitY());
   }
   if (random.chance(0.25)) {
     const double direction = random.uniform(0.0, 2.0 * EIGEN_PI), distance = random.uniform(0.0, options_.astray);
@@ -135,6 +138,7 @@ void WindowMaker::displace(Random& random) {
   for (double& value : offset) value = options_.joints * random.normal();
   const auto disturb = [&](ObservationFrame& frame) {
     move(frame.robot, centre, shift, turn);
+    frame.robot.X_WB.R = frame.robot.X_WB.R * lean;
     frame.robot.q += offset;
     for (int i = 0; i < robot_->dof(); ++i) {
       frame.robot.q[i] += 0.2 * options_.joints * random.normal();
