@@ -101,5 +101,16 @@ TEST_F(Published, OfNothingIsRefusedAndLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny.partial"));
 }
 
+// What this project publishes.
+TEST(PublishedRuns, AreWhatTheirManifestsSay) {
+  const std::string folder = DUET_SOURCE_DIR "/results/published";
+  ASSERT_TRUE(std::filesystem::exists(folder));
+  for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(folder)) {
+    if (!entry.is_directory()) continue;
+    EXPECT_TRUE(is_published(entry.path().string())) << entry.path();
+    EXPECT_FALSE(load_run(entry.path().string()).rows.empty()) << entry.path();
+  }
+}
+
 }  // namespace
 }  // namespace duet
