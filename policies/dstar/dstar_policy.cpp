@@ -168,7 +168,7 @@ PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOption
   const std::shared_ptr<const LanguageEncoder> language = language_of(name, options);
   const std::shared_ptr<const DstarNetwork> network = load_dstar_network(network_path(name, options), *robot);
   check_language(name, *network, language.get());
-  return [=] { return make_dstar_policy(name, robot, network, language, sampling); };
+  return [=, robot = std::move(robot)] { return make_dstar_policy(name, robot, network, language, sampling); };
 }
 
 }  // namespace duet
