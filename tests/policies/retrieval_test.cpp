@@ -37,6 +37,19 @@ RetrievalLibrary made_library() {
   return library;
 }
 
+std::unique_ptr<Policy> made_policy() {
+  const test::ScratchFolder folder;
+  save_retrieval_library(folder / "library.safetensors", made_library());
+  return make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
+}
+
+EpisodeContext hug() {
+  EpisodeContext context;
+  context.task = Task::kHug;
+  context.start = robot()->standing_state();
+  return context;
+}
+
 Observation looking_at(const ObservationFrame& frame, std::array<ObservationFrame, kHistoryFrames>& history) {
   history.fill(frame);
   return {history, 0};
@@ -53,12 +66,8 @@ TEST(Retrieval, FindsTheNearestWindowOfTheTask) {
 }
 
 TEST(Retrieval, AnswersWithThePlanOfThatWindow) {
-  const test::ScratchFolder folder;
-  save_retrieval_library(folder / "library.safetensors", made_library());
-  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
-  EpisodeContext context;
-  context.task = Task::kHug;
-  context.start = robot()->standing_state();
+  const auto policy = made_policy();
+  const EpisodeContext context = hug();
   policy->reset(context);
   ObservationFrame frame;
   frame.robot = context.start;
@@ -71,12 +80,8 @@ TEST(Retrieval, AnswersWithThePlanOfThatWindow) {
 }
 
 TEST(Retrieval, LeavesOutAPlanForWhatIsNotANumber) {
-  const test::ScratchFolder folder;
-  save_retrieval_library(folder / "library.safetensors", made_library());
-  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
-  EpisodeContext context;
-  context.task = Task::kHug;
-  context.start = robot()->standing_state();
+  const auto policy = made_policy();
+  const EpisodeContext context = hug();
   policy->reset(context);
   ObservationFrame frame;
   frame.robot = context.start;
@@ -92,9 +97,7 @@ TEST(Retrieval, LeavesOutAPlanForWhatIsNotANumber) {
 }
 
 TEST(Retrieval, RefusesATaskThatTheLibraryLacks) {
-  const test::ScratchFolder folder;
-  save_retrieval_library(folder / "library.safetensors", made_library());
-  const auto policy = make_policy("retrieval", robot(), {{"library", folder / "library.safetensors"}});
+  const auto policy = made_policy();
   EpisodeContext context;
   context.task = Task::kWave;
   EXPECT_THAT([&] { policy->reset(context); },

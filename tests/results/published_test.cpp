@@ -15,21 +15,10 @@ namespace {
 
 using test::episode;
 using test::thrown_message;
+using test::tiny_run;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
-
-RunInfo run_info() {
-  RunInfo info;
-  info.suite = "tiny";
-  info.suite_version = "1.0.0";
-  info.suite_hash = "0123456789abcdef";
-  info.suite_yaml = "name: tiny\nversion: 1.0.0\n";
-  info.argv = {"duet", "run", "tiny.yaml"};
-  info.created_at = "2026-01-02T03:04:05Z";
-  info.environment = {{"machine", "a machine"}};
-  return info;
-}
 
 EpisodeRow traced(int index) {
   EpisodeRow row = episode("replay", "hug", index, index % 2 == 0);
@@ -42,7 +31,7 @@ EpisodeRow traced(int index) {
 class Published : public testing::Test {
  protected:
   Published() {
-    RunDirectory run = RunDirectory::open(scratch_ / "run", run_info());
+    RunDirectory run = RunDirectory::open(scratch_ / "run", tiny_run());
     for (int i = 0; i < 3; ++i) run.append(traced(i));
   }
   test::ScratchFolder scratch_;
@@ -85,7 +74,7 @@ TEST_F(Published, AChangedFileIsRefusedByName) {
 
 TEST_F(Published, DoesNotGrow) {
   publish_run(scratch_ / "run", scratch_ / "tiny");
-  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch_ / "tiny", run_info()); }),
+  EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch_ / "tiny", tiny_run()); }),
               HasSubstr("is published"));
   EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "run", scratch_ / "tiny"); }),
               HasSubstr("is there already"));
@@ -94,7 +83,7 @@ TEST_F(Published, DoesNotGrow) {
 TEST_F(Published, OfNothingIsRefusedAndLeavesNothing) {
   EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "none", scratch_ / "tiny"); }),
               HasSubstr("not a run directory"));
-  RunDirectory::open(scratch_ / "empty", run_info());
+  RunDirectory::open(scratch_ / "empty", tiny_run());
   EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "empty", scratch_ / "tiny"); }),
               HasSubstr("no rows"));
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny"));

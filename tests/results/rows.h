@@ -4,8 +4,21 @@
 #include <string>
 
 #include "results/episode_row.h"
+#include "results/run_directory.h"
 
 namespace duet::test {
+
+inline RunInfo tiny_run() {
+  RunInfo info;
+  info.suite = "tiny";
+  info.suite_version = "1.0.0";
+  info.suite_hash = "0123456789abcdef";
+  info.suite_yaml = "name: tiny\nversion: 1.0.0\n";
+  info.argv = {"duet", "run", "tiny.yaml"};
+  info.created_at = "2026-01-02T03:04:05Z";
+  info.environment = {{"machine", "a machine"}};
+  return info;
+}
 
 // A row with every field set, none to its default.
 inline EpisodeRow full_row() {

@@ -18,20 +18,9 @@ namespace {
 using test::episode;
 using test::ScratchFolder;
 using test::thrown_message;
+using test::tiny_run;
 using testing::AllOf;
 using testing::HasSubstr;
-
-RunInfo tiny_run() {
-  RunInfo info;
-  info.suite = "tiny";
-  info.suite_version = "1.0.0";
-  info.suite_hash = "0123456789abcdef";
-  info.suite_yaml = "name: tiny\nversion: 1.0.0\n";
-  info.argv = {"duet", "run", "tiny.yaml"};
-  info.created_at = "2026-01-02T03:04:05Z";
-  info.environment = {{"machine", "a machine"}};
-  return info;
-}
 
 void append_text(const std::string& path, const std::string& text) {
   std::ofstream(path, std::ios::binary | std::ios::app) << text;
