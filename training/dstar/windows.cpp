@@ -101,17 +101,15 @@ void WindowMaker::look(const Demonstration& entry, int frame, Random& random) {
 void WindowMaker::blur(Random& random) {
   const double sigma = random.chance(0.5) ? random.uniform(0.0, options_.jitter) : 0.0;
   const double lost = random.chance(1.0 / 3.0) ? random.uniform(0.0, options_.dropout) : 0.0;
-  const auto jittered = [&](Eigen::Vector3d place) -> Eigen::Vector3d {
+  const auto jitter = [&](Eigen::Ref<Eigen::Vector3d> place) {
     if (sigma > 0.0) place += sigma * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
-    return place;
   };
   for (int i = 0; i < kHistoryFrames; ++i) {
     for (int joint = 0; joint < kSmplJoints; ++joint) {
       auto place = history_[i].partner.col(joint);
-      place = jittered(place);
+      jitter(place);
       if (lost > 0.0 && i > 0 && random.chance(lost)) place = history_[i - 1].partner.col(joint);
-      auto before = past_[i].partner.col(joint);
-      before = jittered(before);
+      jitter(past_[i].partner.col(joint));
     }
   }
 }
