@@ -57,7 +57,7 @@ void Bodies::add_policy(const SuitePolicy& policy) {
     } catch (const std::exception&) {
       if (place == 0) throw;
       entry.make = [make = policies_.at({policy.name, 0}).make, made_for = nominal(), body = bodies_[place].robot] {
-        return on_other_body(make(), *made_for, *body);
+        return on_other_body(make(), made_for, *body);
       };
     }
   }

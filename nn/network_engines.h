@@ -1,5 +1,5 @@
 // Evaluation by libraries that a build may lack. Each has one source that is compiled where the library was found and
-// one stub otherwise; a vendor's header appears only there. Internal to nn/.
+// one that says so otherwise; a vendor's header appears only there. Internal to nn/.
 #pragma once
 
 #include <memory>

@@ -14,11 +14,11 @@ namespace {
 
 class OnOtherBody final : public Policy {
  public:
-  OnOtherBody(std::unique_ptr<Policy> policy, const RobotModel& made_for, const RobotModel& body)
+  OnOtherBody(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> made_for, const RobotModel& body)
       : policy_(std::move(policy)),
-        made_for_(made_for),
-        to_policy_(body.joint_names(), made_for),
-        to_body_(made_for.joint_names(), body) {}
+        made_for_(std::move(made_for)),
+        to_policy_(body.joint_names(), *made_for_),
+        to_body_(made_for_->joint_names(), body) {}
 
   [[nodiscard]] std::string_view name() const override { return policy_->name(); }
 
@@ -26,7 +26,7 @@ class OnOtherBody final : public Policy {
     EpisodeContext moved = context;
     moved.start = to_policy_.state(context.start);
     if (context.hindsight != nullptr) {
-      hindsight_ = on_body(*context.hindsight, made_for_);
+      hindsight_ = on_body(*context.hindsight, *made_for_);
       moved.hindsight = &hindsight_;
     }
     policy_->reset(moved);
@@ -54,7 +54,7 @@ class OnOtherBody final : public Policy {
   }
 
   std::unique_ptr<Policy> policy_;
-  RobotModel made_for_;
+  std::shared_ptr<const RobotModel> made_for_;  // shared by the episodes of a run
   JointMap to_policy_, to_body_;
   RobotMotion hindsight_;
   std::array<ObservationFrame, kHistoryFrames> history_;
@@ -62,14 +62,14 @@ class OnOtherBody final : public Policy {
 
 }  // namespace
 
-std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, const RobotModel& made_for,
+std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> made_for,
                                       const RobotModel& body) {
-  const std::vector<std::string> ours = made_for.joint_names(), theirs = body.joint_names();
+  const std::vector<std::string> ours = made_for->joint_names(), theirs = body.joint_names();
   require(std::ranges::any_of(ours,
                               [&](const std::string& name) { return std::ranges::find(theirs, name) != theirs.end(); }),
           fmt::format("policy '{}': robot '{}' has no joint of robot '{}', which it was made for", policy->name(),
-                      body.name, made_for.name));
-  return std::make_unique<OnOtherBody>(std::move(policy), made_for, body);
+                      body.name, made_for->name));
+  return std::make_unique<OnOtherBody>(std::move(policy), std::move(made_for), body);
 }
 
 }  // namespace duet

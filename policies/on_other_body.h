@@ -9,7 +9,7 @@
 namespace duet {
 
 // Throws std::invalid_argument where the two have no joint in common.
-std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, const RobotModel& made_for,
+std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> made_for,
                                       const RobotModel& body);
 
 }  // namespace duet

@@ -80,7 +80,7 @@ TEST(OnOtherBody, JointsGoByNameBothWays) {
   auto mirror = std::make_unique<Mirror>();
   Mirror& policy = *mirror;
   policy.wanted = Eigen::VectorXd::LinSpaced(robot->dof(), 0.0, 28.0);
-  const auto moved = on_other_body(std::move(mirror), *robot, body);
+  const auto moved = on_other_body(std::move(mirror), robot, body);
   EpisodeContext context;
   context.start = body.standing_state();
   context.start.q = Eigen::VectorXd::LinSpaced(body.dof(), 100.0, 128.0);
@@ -107,7 +107,7 @@ TEST(OnOtherBody, OfStrangersIsRefused) {
   RobotModel body = *robot;
   for (RobotJoint& joint : body.joints) joint.name += "_of_another";
   EXPECT_THAT(
-      test::thrown_message<std::invalid_argument>([&] { on_other_body(std::make_unique<Mirror>(), *robot, body); }),
+      test::thrown_message<std::invalid_argument>([&] { on_other_body(std::make_unique<Mirror>(), robot, body); }),
       HasSubstr("policy 'mirror'"));
 }
 
