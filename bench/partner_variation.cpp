@@ -6,13 +6,10 @@
 #include <cmath>
 
 #include "bench/yaml_range.h"
+#include "core/clock.h"
 
 namespace duet {
 namespace {
-
-constexpr double kTicksPerSecond = 50.0;
-
-int ticks_of(double seconds) { return static_cast<int>(std::lround(seconds * kTicksPerSecond)); }
 
 // Where in the clip the partner is, in frames since the episode's first, tick by tick.
 class PlayHead {

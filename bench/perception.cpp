@@ -6,15 +6,13 @@
 #include <numbers>
 
 #include "bench/yaml_range.h"
+#include "core/clock.h"
 
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;  // [s]
 constexpr double kDefaultJitter = 0.02, kDefaultDropout = 0.1, kDefaultLatency = 200.0, kDefaultVanish = 2.0;
 constexpr Range kTime = {0.0, 600.0, true};
-
-int ticks_of(double seconds) { return static_cast<int>(std::lround(seconds / kTick)); }
 
 }  // namespace
 

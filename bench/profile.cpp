@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "backends/factory.h"
+#include "core/clock.h"
 #include "core/digest.h"
 #include "core/file.h"
 #include "core/names.h"
@@ -18,7 +19,6 @@ namespace duet {
 namespace {
 
 constexpr std::string_view kSchema = "duet.profile/1";
-constexpr double kControlPeriod = 0.02;  // [s]: a step must divide it
 
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
@@ -67,9 +67,9 @@ bool is_available(const std::string& engine) {
 }
 
 void check_step(double dt) {
-  const double steps = kControlPeriod / dt;
+  const double steps = kTick / dt;
   require(dt > 0.0 && std::abs(steps - std::round(steps)) < 1e-9,
-          fmt::format("expected a step [s] that divides {}, found {}", kControlPeriod, dt));
+          fmt::format("expected a step [s] that divides {}, found {}", kTick, dt));
 }
 
 EngineSettings Profile::settings(const std::string& engine) const {

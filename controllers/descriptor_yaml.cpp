@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "controllers/descriptor.h"
+#include "core/clock.h"
 #include "core/names.h"
 #include "robots/yaml_section.h"
 
 namespace duet {
 namespace {
 
-constexpr double kRateHz = 50.0;   // at which duet calls controllers
 constexpr int kMostFrames = 1000;  // of a history; more is a slip of the pen
 constexpr const char* kChannelKeys[] = {"joints", "zero",         "axes",   "offset", "clipped",
                                         "frame",  "frequency_hz", "phases", "steps",  "values"};
@@ -95,8 +95,8 @@ class Reader {
     out_.network = root_.text("network");
     out_.walks = root_.flag_or("walks", false);
     out_.waist_locked = one_of(root_, "waist", "free", {"free", "locked"}) == "locked";
-    if (const double rate = root_.number("rate_hz"); rate != kRateHz)
-      root_.fail(root_.line("rate_hz"), fmt::format("'rate_hz': expected {}, found {}", kRateHz, rate));
+    if (const double rate = root_.number("rate_hz"); rate != kTickRate)
+      root_.fail(root_.line("rate_hz"), fmt::format("'rate_hz': expected {}, found {}", kTickRate, rate));
     read_joints();
     read_action();
     read_groups();

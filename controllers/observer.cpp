@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/clock.h"
+
 namespace duet {
 namespace {
-
-constexpr double kTick = 0.02;  // [s]
 
 bool is_anchor(const Channel& channel) {
   return channel.kind == ChannelKind::kAnchorPositionError || channel.kind == ChannelKind::kAnchorOrientationError;

@@ -13,13 +13,13 @@
 
 #include "controllers/contact_forces.h"
 #include "controllers/stance.h"
+#include "core/clock.h"
 #include "robots/dynamics.h"
 #include "robots/kinematics.h"
 
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;                  // [s], 50 Hz
 constexpr int kIterations = 120;                // of the contact forces
 constexpr double kRegularisation = 1e-6;        // of contact forces: of two that do the same, the even one
 constexpr double kSoleDamping = 10.0;           // of a sole that moves although it should not [1/s]

@@ -3,7 +3,7 @@
 namespace duet {
 
 std::vector<Reference> densify(const Anchors& anchors) {
-  constexpr int kGrid = 100, kTicksPerAnchor = kGrid / (kAnchors - 1);
+  constexpr int kGrid = (kAnchors - 1) * kTicksPerAnchor;
   std::vector<Reference> dense;
   dense.reserve(kGrid);
   for (int i = 0; i < kGrid; ++i) {

@@ -23,8 +23,9 @@ namespace duet {
 inline constexpr int kHistoryFrames = 12;      // observation history, the current frame included, at 50 Hz
 inline constexpr int kAnchors = 5;             // at t + {0, 0.5, 1, 1.5, 2} s
 inline constexpr double kAnchorSpacing = 0.5;  // [s]
-inline constexpr int kTicksPerPlan = 10;       // 5 Hz on the 50 Hz clock
-inline constexpr int kObservationSize = 149;   // human root 3, SMPL joints 72, robot 74 (supplement A.2.1)
+inline constexpr int kTicksPerAnchor = 25;
+inline constexpr int kTicksPerPlan = 10;      // 5 Hz on the 50 Hz clock
+inline constexpr int kObservationSize = 149;  // human root 3, SMPL joints 72, robot 74 (supplement A.2.1)
 
 // One frame as sensed. The 149-D vector of supplement A.2.1 is built from it by to_vector.
 struct ObservationFrame {

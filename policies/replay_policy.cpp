@@ -6,15 +6,11 @@
 #include <cmath>
 #include <utility>
 
+#include "core/clock.h"
 #include "core/require.h"
 
 namespace duet {
-namespace {
-
-constexpr double kRateHz = 50.0;
-constexpr int kTicksPerAnchor = static_cast<int>(kAnchorSpacing * kRateHz);
-
-}  // namespace
+namespace {}  // namespace
 
 ReplayPolicy::ReplayPolicy(std::shared_ptr<const RobotModel> robot) : robot_(std::move(robot)) {
   require(robot_ != nullptr, "policy 'replay' needs a robot");
@@ -25,8 +21,8 @@ void ReplayPolicy::reset(const EpisodeContext& context) {
   const RobotMotion& motion = *context.hindsight;
   validate(motion, "policy 'replay'");
   require(motion.frames() > 0, "policy 'replay': expected a motion with frames, found none");
-  require(motion.rate_hz == kRateHz,
-          fmt::format("policy 'replay': expected a motion at {} Hz, found {} Hz", kRateHz, motion.rate_hz));
+  require(motion.rate_hz == kTickRate,
+          fmt::format("policy 'replay': expected a motion at {} Hz, found {} Hz", kTickRate, motion.rate_hz));
   require(motion.joint_names == robot_->joint_names(),
           fmt::format("policy 'replay': expected the {} joints of robot '{}' in its order, found {} others",
                       robot_->dof(), robot_->name, motion.joint_names.size()));

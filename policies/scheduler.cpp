@@ -7,12 +7,12 @@
 #include <numbers>
 #include <utility>
 
+#include "core/clock.h"
 #include "core/require.h"
 
 namespace duet {
 namespace {
 
-constexpr double kRateHz = 50.0;
 constexpr double kUnitTolerance = 1e-6;
 constexpr int kMaxTicks = 90;  // inside the 100 ticks of a plan, with room for a plan that comes late
 
@@ -132,7 +132,7 @@ void Scheduler::fuse(int tick, Reference& reference) const {
 // Moves `emitted` towards `target`, no faster than the bounds; where they do not bind it becomes `target` to the bit.
 void Scheduler::bound_root(const Pose& target, Pose& emitted) const {
   const bool tight = tightened_ && weight(tick_) < 1.0;
-  const double factor = (tight ? options_.late_factor : 1.0) / kRateHz;
+  const double factor = (tight ? options_.late_factor : 1.0) / kTickRate;
   const Eigen::Vector3d step = target.p - emitted.p;
   const double longest = options_.max_root_speed * factor;
   const double length = step.norm();

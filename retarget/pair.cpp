@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/skeleton.h"
 #include "retarget/gaussian_filter.h"
 #include "retarget/pair_kernel.h"
@@ -16,19 +17,17 @@ namespace duet {
 
 namespace {
 
-constexpr double kRate = 50.0;  // supplement A.1.1
-
 int scaled_frame(int frame, double ratio, int frames) {
   return std::clamp(static_cast<int>(std::lround(frame * ratio)), 0, frames);
 }
 
 // Phases and contact windows keep their instants.
 InteractionClip at_50_hz(const InteractionClip& clip) {
-  if (clip.rate_hz() == kRate) return clip;
+  if (clip.rate_hz() == kTickRate) return clip;
   InteractionClip out = clip;
-  out.a = resample(clip.a, kRate);
-  out.b = resample(clip.b, kRate);
-  const double ratio = kRate / clip.rate_hz();
+  out.a = resample(clip.a, kTickRate);
+  out.b = resample(clip.b, kTickRate);
+  const double ratio = kTickRate / clip.rate_hz();
   out.phases.act_begin = scaled_frame(clip.phases.act_begin, ratio, out.frames());
   out.phases.act_end = scaled_frame(clip.phases.act_end, ratio, out.frames());
   for (ContactWindow& window : out.contacts) {
@@ -42,7 +41,7 @@ RobotMotion robot_motion(const RobotModel& robot, const PairProblem& problem, co
                          const PairVariables& x) {
   const int dof = problem.chain.dof();
   RobotMotion motion;
-  motion.rate_hz = kRate;
+  motion.rate_hz = kTickRate;
   for (const RobotJoint& joint : robot.joints) motion.joint_names.push_back(joint.name);
   motion.q = x.frames.topRows(dof);
   if (options.filter) motion.q = gaussian_filter(motion.q);

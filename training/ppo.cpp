@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/clock.h"
 #include "core/require.h"
 #include "training/threads.h"
 
@@ -239,7 +240,7 @@ void Ppo::step(Worker& worker, int first, Batch& batch) const {
     if (transition.end == EpisodeEnd::kNone) continue;
     ++worker.sums.episodes;
     worker.sums.falls += transition.end == EpisodeEnd::kFell ? 1 : 0;
-    worker.sums.episode_seconds += 0.02 * environment.tick();
+    worker.sums.episode_seconds += kTick * environment.tick();
     worker.sums.episode_return += worker.returns[i];
     worker.returns[i] = 0.0;
     environment.reset();

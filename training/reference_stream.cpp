@@ -7,12 +7,11 @@
 #include <numbers>
 
 #include "controllers/stance.h"
+#include "core/clock.h"
 #include "core/require.h"
 
 namespace duet {
 namespace {
-
-constexpr double kTick = 0.02;
 
 void check_share(double share, const char* name) {
   require(share >= 0.0 && share <= 1.0,

@@ -7,12 +7,12 @@
 #include <numbers>
 
 #include "backends/factory.h"
+#include "core/clock.h"
 #include "training/domain.h"
 
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;
 constexpr double kLowest = 0.5, kLeastUpright = 0.6, kFarthest = 1.0;  // ends: pelvis [m], cosine of tilt, root [m]
 constexpr double kPendulumTime = 0.27;                                 // sqrt(height of the centre of mass / g) [s]
 constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;            // share, [m]

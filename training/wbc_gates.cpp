@@ -8,6 +8,7 @@
 
 #include "backends/factory.h"
 #include "controllers/wbc_sim/tracker.h"
+#include "core/clock.h"
 #include "core/recording.h"
 #include "metrics/diagnostics.h"
 #include "robots/kinematics.h"
@@ -16,7 +17,7 @@
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02, kStep = 0.002;
+constexpr double kStep = 0.002;
 constexpr double kLowest = 0.45, kLeastUpright = 0.7, kFarthest = 1.0;  // what counts as lost [m], cosine, [m]
 
 WbcGate standing(const std::string& name, double kick, double least, double least_oracle) {

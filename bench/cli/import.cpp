@@ -6,6 +6,7 @@
 
 #include "bench/cli/command.h"
 #include "bench/rollout.h"
+#include "core/clock.h"
 #include "core/require.h"
 #include "motion/bvh.h"
 #include "motion/pickle.h"
@@ -96,9 +97,9 @@ void import_robot(const Session& session, const ImportArguments& arguments) {
   const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
   std::vector<std::string> verdict = pickled.verdict;
   const RobotMotion motion = on_robot(pickled, arguments.files[0], *robot, verdict);
-  const RobotMotion resampled = resample(motion, kControlRate);
+  const RobotMotion resampled = resample(motion, kTickRate);
   verdict.push_back(fmt::format("resampled: {} frames at {:.4g} Hz -> {} frames at {:g} Hz", motion.frames(),
-                                motion.rate_hz, resampled.frames(), kControlRate));
+                                motion.rate_hz, resampled.frames(), kTickRate));
   const double error = kinematics_error(pickled, motion, *robot);
   if (!pickled.link_body_list.empty())
     verdict.push_back(fmt::format("its body positions and our kinematics differ by {:.2e} m at most", error));

@@ -4,10 +4,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/clock.h"
+
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;
 constexpr double kFilter = kTick / 0.15;  // of the reference's velocity
 constexpr int kHalfCyclesAtRest = 2;      // in which the feet come together before they stand
 

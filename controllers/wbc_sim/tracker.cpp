@@ -6,12 +6,11 @@
 #include <cmath>
 
 #include "controllers/stance.h"
+#include "core/clock.h"
 #include "core/require.h"
 
 namespace duet {
 namespace {
-
-constexpr double kRate = 50.0;
 
 std::array<LegChain, 2> two_legs(const RobotModel& robot, const Stance& stance) {
   require(stance.legs().size() == 2,
@@ -75,14 +74,14 @@ void WbcTracker::reset(const Reference& reference) {
 void WbcTracker::update(const RobotState& state, const Reference& reference) {
   const Pose target = within(reference.X_WB, bounds_);
   const double yaw = yaw_of(target.R);
-  root_velocity_.head<2>() = kRate * in_heading(yaw, target.p - last_root_.p);
-  root_velocity_.z() = kRate * wrapped(yaw - yaw_of(last_root_.R));
+  root_velocity_.head<2>() = kTickRate * in_heading(yaw, target.p - last_root_.p);
+  root_velocity_.z() = kTickRate * wrapped(yaw - yaw_of(last_root_.R));
   Eigen::Vector3d deviation;
   deviation.head<2>() = in_heading(yaw, state.X_WB.p - target.p);
   deviation.z() = wrapped(yaw_of(state.X_WB.R) - yaw);
   gait_.update(root_velocity_, deviation);
   track(reference);
-  v_ = kRate * (q_ - last_q_);
+  v_ = kTickRate * (q_ - last_q_);
   last_q_ = q_;
   last_root_ = root_;
 }

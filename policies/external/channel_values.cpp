@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/names.h"
 #include "core/require.h"
 #include "policies/dstar/features.h"
 
 namespace duet {
 namespace {
-
-constexpr double kTickSeconds = 0.02;
 
 void put(const Eigen::Vector3d& vector, std::span<float> out) {
   Eigen::Map<Eigen::Vector3f>(out.data()) = vector.cast<float>();
@@ -83,7 +82,7 @@ void ChannelValues::write_plain(PolicyChannelKind kind, const Observation& obser
       for (std::size_t i = 0; i < kTasks.size(); ++i) out[i] = kTasks[i] == task_ ? 1.0F : 0.0F;
       return;
     case PolicyChannelKind::kTime:
-      out[0] = static_cast<float>(observation.tick * kTickSeconds);
+      out[0] = static_cast<float>(observation.tick * kTick);
       return;
     case PolicyChannelKind::kNoise:
       for (float& number : out) number = static_cast<float>(noise_.normal());

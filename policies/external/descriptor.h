@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "policies/policy.h"
+
 namespace duet {
 
 inline constexpr int kPlanNumbersBeforeJoints = 7;  // of an anchor: root position (3), quaternion wxyz (4)
@@ -64,7 +66,7 @@ struct PlanFormat {
   int line = 0;
   std::string name;  // of the network's output; "" for its only one
   int anchors = 5;
-  int ticks_per_anchor = 25;  // at 50 Hz; the first anchor is now
+  int ticks_per_anchor = kTicksPerAnchor;  // the first anchor is now
   PlanFrame frame = PlanFrame::kWorld;
   bool joints_from_neutral = false;
   // Meant is number * scale + offset; one number for all or one for each of an anchor's.

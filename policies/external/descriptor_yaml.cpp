@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/clock.h"
 #include "core/names.h"
 #include "policies/external/descriptor.h"
 #include "policies/policy.h"
@@ -13,7 +14,6 @@ namespace duet {
 namespace {
 
 constexpr const char* kSchema = "duet.policy/1";
-constexpr double kTickSeconds = 0.02;
 constexpr int kMostAnchors = 1000, kMostTicks = 500;
 constexpr int kMostNoise = 1000000;
 constexpr int kMostMilliseconds = 600000;
@@ -125,10 +125,10 @@ class Reader {
 
   static int read_spacing(const YamlSection& s) {
     const double spacing = s.optional_number("spacing").value_or(kAnchorSpacing);
-    const double ticks = std::round(spacing / kTickSeconds);
-    if (std::abs(ticks * kTickSeconds - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
-      s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}",
-                                            kTickSeconds, kTickSeconds, kMostTicks * kTickSeconds, spacing));
+    const double ticks = std::round(spacing / kTick);
+    if (std::abs(ticks * kTick - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
+      s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}", kTick,
+                                            kTick, kMostTicks * kTick, spacing));
     return static_cast<int>(ticks);
   }
 

@@ -13,7 +13,6 @@ namespace duet {
 namespace {
 
 constexpr double kLeastQuaternion = 1e-3;  // norm; below it the direction is noise
-constexpr int kTicksPerAnchor = 25;
 
 double at(const std::vector<double>& values, int i) { return values.size() == 1 ? values[0] : values[i]; }
 

@@ -10,7 +10,6 @@
 namespace duet {
 namespace {
 
-constexpr int kAnchorTicks = 25;  // 0.5 s
 constexpr int kStatisticsWindows = 4000;
 constexpr float kLeastDeviation = 0.01F;
 
@@ -167,9 +166,9 @@ void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch,
   const double heading = yaw_of(X_WE.R);
   Anchors anchors;
   for (int k = 0; k < kAnchors; ++k) {
-    const int then = clamped(entry, frame + k * kAnchorTicks);
+    const int then = clamped(entry, frame + k * kTicksPerAnchor);
     anchors[k] = set_.reference(then);
-    const double seconds = kAnchorTicks / 50.0 * k;
+    const double seconds = kAnchorSpacing * k;
     bound(anchors[k].X_WB.p, X_WE.p, options_.reach + options_.speed * seconds);
     bound(anchors[k].X_WB.R, heading, options_.turn_reach + options_.turn_rate * seconds);
     for (int point = 0; point < kLossPoints; ++point) {
