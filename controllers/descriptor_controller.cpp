@@ -11,6 +11,7 @@
 
 #include "controllers/observer.h"
 #include "controllers/root_conversion.h"
+#include "core/clock.h"
 #include "core/names.h"
 #include "core/number.h"
 #include "core/require.h"
@@ -18,13 +19,7 @@
 namespace duet {
 namespace {
 
-constexpr double kTick = 0.02;  // [s]
 constexpr const char* kLockedWaist[] = {"waist_roll_joint", "waist_pitch_joint"};
-
-std::string option(const ControllerOptions& options, const char* name, const std::string& fallback) {
-  const auto it = options.find(name);
-  return it == options.end() ? fallback : it->second;
-}
 
 bool shows(const Descriptor& descriptor, ChannelKind kind) {
   for (const ChannelGroup& group : descriptor.groups)
@@ -40,7 +35,7 @@ double& yaw_scale(Channel& channel) {
 }
 
 Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& options) {
-  const std::string text = option(options, "yaw_scale", "");
+  const std::string text = option_or(options, "yaw_scale");
   if (text.empty()) return descriptor;
   const std::optional<double> scale = parse_number(text);
   require(scale.has_value(), fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
@@ -51,7 +46,7 @@ Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& option
 }
 
 bool waist_is_locked(const Descriptor& descriptor, const ControllerOptions& options) {
-  const std::string text = option(options, "waist", descriptor.waist_locked ? "locked" : "free");
+  const std::string text = option_or(options, "waist", descriptor.waist_locked ? "locked" : "free");
   const std::vector<std::string> known = {"free", "locked"};
   if (text != "free" && text != "locked")
     throw std::invalid_argument(unknown_name_message("value of the option 'waist'", text, known));
@@ -232,8 +227,8 @@ class DescriptorController final : public Controller {
   }
 
   void bind_command(const VelocityInterface& interface, const ControllerOptions& options) {
-    const std::string fixed = option(options, "command", "");
-    const RootConversionLaw law = root_conversion_law(option(options, "conversion", "adopted"));
+    const std::string fixed = option_or(options, "command");
+    const RootConversionLaw law = root_conversion_law(option_or(options, "conversion", "adopted"));
     if (fixed.empty())
       conversion_.emplace(law, interface);
     else

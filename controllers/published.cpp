@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "controllers/descriptor_controller.h"
+#include "core/names.h"
 #include "core/require.h"
 #include "core/share.h"
 
@@ -50,10 +51,8 @@ std::unique_ptr<Controller> make_published(const std::string& name, std::shared_
                                            const ControllerOptions& options) {
   const Descriptor descriptor = load_descriptor(name);
   const std::string path = find_network(descriptor, options);
-  const auto engine = options.find("engine");
   return make_descriptor_controller(descriptor, std::move(robot),
-                                    load_network(path, engine == options.end() ? "duet" : engine->second), path,
-                                    options);
+                                    load_network(path, option_or(options, "engine", "duet")), path, options);
 }
 
 }  // namespace duet

@@ -59,6 +59,12 @@ std::string unknown_name_message(std::string_view kind, std::string_view name,
   return fmt::format("unknown {} '{}'{} Known: {}", kind, name, question, known);
 }
 
+std::string option_or(const std::map<std::string, std::string>& options, const std::string& name,
+                      const std::string& fallback) {
+  const auto found = options.find(name);
+  return found == options.end() ? fallback : found->second;
+}
+
 void check_options(std::string_view kind, std::string_view name, const std::map<std::string, std::string>& options,
                    std::span<const std::string> known) {
   for (const auto& [option, value] : options) {

@@ -16,6 +16,10 @@ std::string closest_name(std::string_view name, std::span<const std::string> can
 // "unknown task 'hugg': did you mean 'hug'? Known: hug, handshake, ..." (the question only where there is a near name).
 std::string unknown_name_message(std::string_view kind, std::string_view name, std::span<const std::string> candidates);
 
+// The value of an option that is given by name, `fallback` where it is not.
+std::string option_or(const std::map<std::string, std::string>& options, const std::string& name,
+                      const std::string& fallback = "");
+
 // Throws std::invalid_argument where one of the options set of `kind` `name` is not `known`: "controller 'pd': expected
 // no option, found 'x'", or the sentence above.
 void check_options(std::string_view kind, std::string_view name, const std::map<std::string, std::string>& options,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/names.h"
 #include "core/require.h"
 #include "core/share.h"
 
@@ -74,8 +75,7 @@ class WbcSim final : public Controller {
 };
 
 std::string network_path(const ControllerOptions& options) {
-  const auto found = options.find("network");
-  std::string network = found == options.end() ? "student" : found->second;
+  std::string network = option_or(options, "network", "student");
   if (network != "student" && network != "oracle") return network;
   return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
 }

@@ -91,27 +91,22 @@ class DstarPolicy final : public Policy {
   bool drawn_ = false;
 };
 
-std::string option(const PolicyOptions& options, const std::string& name) {
-  const auto found = options.find(name);
-  return found == options.end() ? "" : found->second;
-}
-
 std::string network_path(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option(options, "network");
+  const std::string given = option_or(options, "network");
   if (!given.empty()) return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {given});
   return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
                     fmt::format("policies/dstar/{}.safetensors", name));
 }
 
 std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option(options, "language");
+  const std::string given = option_or(options, "language");
   if (given.empty()) return built_in_language();
   return load_language_table(
       first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {given}));
 }
 
 NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option(options, "noise");
+  const std::string given = option_or(options, "noise");
   if (given.empty() || given == "episode") return NoiseMode::kEpisode;
   const std::vector<std::string> known = {"episode", "call"};
   require(given == "call", fmt::format("policy '{}': {}", name, unknown_name_message("noise", given, known)));
@@ -119,7 +114,7 @@ NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
 }
 
 double temperature_of(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option(options, "temperature");
+  const std::string given = option_or(options, "temperature");
   if (given.empty()) return DstarSampling{}.temperature;
   const std::optional<double> value = parse_number(given);
   require(value && *value >= 0.0 && *value <= 1.0,

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <filesystem>
 
+#include "core/names.h"
 #include "core/require.h"
 #include "core/share.h"
 #include "policies/external/channel_values.h"
@@ -18,11 +19,6 @@ namespace duet {
 namespace {
 
 constexpr int kMostMilliseconds = 600000;
-
-std::string option(const PolicyOptions& options, const char* name, const std::string& fallback) {
-  const auto it = options.find(name);
-  return it == options.end() ? fallback : it->second;
-}
 
 int milliseconds(const PolicyDescriptor& descriptor, const PolicyOptions& options, const char* name, int fallback) {
   const auto it = options.find(name);
@@ -38,16 +34,16 @@ int milliseconds(const PolicyDescriptor& descriptor, const PolicyOptions& option
 
 std::shared_ptr<const LanguageEncoder> language_of(const PolicyDescriptor& descriptor, const PolicyOptions& options) {
   if (!shows_language(descriptor)) return nullptr;
-  const std::string table = option(options, "language", "");
+  const std::string table = option_or(options, "language");
   return table.empty() ? built_in_language() : load_language_table(table);
 }
 
 PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
                        const PolicyOptions& options) {
   const std::string beside = (std::filesystem::path(descriptor.folder()) / descriptor.network).string();
-  const std::string path =
-      first_existing(fmt::format("network of the policy '{}'", descriptor.name), {option(options, "network", beside)});
-  const std::string engine = option(options, "engine", "duet");
+  const std::string path = first_existing(fmt::format("network of the policy '{}'", descriptor.name),
+                                          {option_or(options, "network", beside)});
+  const std::string engine = option_or(options, "engine", "duet");
   const auto make = [=, language = language_of(descriptor, options)] {
     return make_onnx_policy(descriptor, robot, load_network(path, engine), path, language);
   };

@@ -77,22 +77,17 @@ class OnnxPolicy final : public Policy {
   }
 
   std::vector<Reference> plan(const Observation& observation) override {
-    if (!is_finite(observation)) return fault("observation: expected finite numbers, found others");
+    if (!is_finite(observation))
+      return faults_.leave_out(name_, observation.tick, "observation: expected finite numbers, found others");
     for (std::size_t i = 0; i < inputs_.size(); ++i) write(inputs_[i], observation, buffers_[i]);
     network_->run(network_inputs_, network_outputs_);
     DecodedPlan decoded = decoder_.decode(network_outputs_[plan_output_], observation.now().robot);
-    if (!decoded.fault.empty()) return fault(decoded.fault);
+    if (!decoded.fault.empty()) return faults_.leave_out(name_, observation.tick, decoded.fault);
     held_ = decoded.references.front();
     return std::move(decoded.references);
   }
 
  private:
-  std::vector<Reference> fault(const std::string& message) {
-    ++faults_.invalid;
-    if (faults_.message.empty()) faults_.message = fmt::format("policy '{}': {}", name_, message);
-    return {};
-  }
-
   void write(const PolicyInput& input, const Observation& observation, std::vector<float>& buffer) {
     const int newest = static_cast<int>(observation.history.size()) - 1;
     std::span<float> rest(buffer);

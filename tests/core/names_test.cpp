@@ -46,5 +46,12 @@ TEST(UnknownNameMessage, AsksOnlyWhereANameIsNear) {
   EXPECT_EQ(unknown_name_message("engine", "x", {}), "unknown engine 'x'. Known: none");
 }
 
+TEST(Names, OptionThatIsNotGivenFallsBack) {
+  const std::map<std::string, std::string> options = {{"waist", "locked"}};
+  EXPECT_EQ(option_or(options, "waist", "free"), "locked");
+  EXPECT_EQ(option_or(options, "engine", "duet"), "duet");
+  EXPECT_EQ(option_or(options, "language"), "");
+}
+
 }  // namespace
 }  // namespace duet

@@ -281,7 +281,7 @@ TEST(OnnxPolicy, CountsPlansThatAreNone) {
     EXPECT_EQ(policy->faults().invalid, 1);
     const std::string expected =
         std::isinf(number) ? "plan: anchor 0, number 0: expected a finite number, found inf" : message;
-    EXPECT_EQ(policy->faults().message, "policy 'mine': " + expected);
+    EXPECT_EQ(policy->faults().message, "policy 'mine': tick 0: " + expected);
     EXPECT_EQ(policy->act(history.at(10))[0].q, history.at(0).now().robot.q);  // holds the start
     policy->reset(test::episode(history.at(0).now().robot));
     EXPECT_FALSE(policy->faults().any());
@@ -297,7 +297,7 @@ TEST(OnnxPolicy, IsNotShownNumbersThatAreNotFinite) {
   policy->reset(test::episode(history.at(0).now().robot));
   history.frame(4).robot.q[3] = std::nan("");
   EXPECT_TRUE(policy->plan(history.at(0)).empty());
-  EXPECT_EQ(policy->faults().message, "policy 'mine': observation: expected finite numbers, found others");
+  EXPECT_EQ(policy->faults().message, "policy 'mine': tick 0: observation: expected finite numbers, found others");
 }
 
 TEST(OnnxPolicy, RefusesANetworkOfOtherPorts) {
