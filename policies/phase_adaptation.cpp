@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/clock.h"
 #include "core/random.h"
 #include "core/require.h"
 #include "policies/torso_orientation.h"
@@ -14,7 +15,7 @@
 namespace duet {
 namespace {
 
-constexpr double kRateHz = 50.0;
+constexpr int kRamp = 16;  // frames of Algorithm 7
 
 void check_joints(const RobotMotion& motion, const RobotModel& robot) {
   require(static_cast<int>(motion.joint_names.size()) == robot.dof(),
@@ -30,8 +31,8 @@ void check_joints(const RobotMotion& motion, const RobotModel& robot) {
 
 void check(const RobotMotion& motion, const Phases& phases, const RobotModel& robot, const AdaptationOptions& options) {
   validate(motion, "phase adaptation");
-  require(motion.rate_hz == kRateHz,
-          fmt::format("phase adaptation: expected a motion at {} Hz, found {} Hz", kRateHz, motion.rate_hz));
+  require(motion.rate_hz == kTickRate,
+          fmt::format("phase adaptation: expected a motion at {} Hz, found {} Hz", kTickRate, motion.rate_hz));
   check_joints(motion, robot);
   require(0 <= phases.act_begin && phases.act_begin < phases.act_end && phases.act_end <= motion.frames(),
           fmt::format("phase adaptation: expected an act inside [0, {}), found [{}, {})", motion.frames(),
@@ -43,6 +44,7 @@ void check(const RobotMotion& motion, const Phases& phases, const RobotModel& ro
   check_option("start_radius", options.start_radius);
   check_option("lead", options.lead);
   check_option("return_time", options.return_time);
+  check_option("mild_yaw", options.mild_yaw);
 }
 
 // `offset` from `pose`, uniform over the disc of `radius` in the ground plane.
@@ -74,15 +76,17 @@ class Adaptation {
 
   // Preparation: from `start` straight to the first act frame.
   void approach(const Pose& start) {
-    const Pose goal = motion_.root[static_cast<std::size_t>(phases_.act_begin)];
-    for (int t = 0; t < phases_.act_begin; ++t) root(t) = interpolate(start, goal, preparation_share(t));
+    const Pose goal = root(phases_.act_begin);
+    for (int t = 0; t < phases_.act_begin; ++t)
+      root(t) = interpolate(start, goal, static_cast<double>(t) / phases_.act_begin);
   }
 
-  // Preparation: the upper body from neutral to the first act frame.
-  void raise_upper_body() {
+  // Preparation: the upper body from neutral to the first act frame over the last `ticks`, at most all of it.
+  void raise_upper_body(int ticks) {
     const Eigen::VectorXd goal = motion_.q.col(phases_.act_begin);
+    const int begin = std::max(0, phases_.act_begin - ticks);
     for (int t = 0; t < phases_.act_begin; ++t) {
-      const double s = preparation_share(t);
+      const double s = t < begin ? 0.0 : static_cast<double>(t - begin) / (phases_.act_begin - begin);
       for (const int j : upper_) motion_.q(j, t) = (1.0 - s) * robot_.neutral[j] + s * goal[j];
     }
   }
@@ -125,7 +129,6 @@ class Adaptation {
   }
 
  private:
-  [[nodiscard]] double preparation_share(int t) const { return static_cast<double>(t) / phases_.act_begin; }
   Pose& root(int t) { return motion_.root[static_cast<std::size_t>(t)]; }
   // Where the robot is in the middle of the act: a person may still be walking in its first frames.
   Pose stance_at_act() { return robot_.standing_state(root((phases_.act_begin + phases_.act_end) / 2)).X_WB; }
@@ -140,8 +143,25 @@ AdaptedMotion adapt_approach(const RobotMotion& motion, const Phases& phases, co
                              const AdaptationOptions& options, std::uint64_t seed) {
   Adaptation adaptation(motion, phases, robot);
   adaptation.approach(displaced(motion.root.front(), options.start_radius, seed));
-  adaptation.raise_upper_body();
-  adaptation.lower_upper_body(options.return_time * kRateHz);
+  adaptation.raise_upper_body(phases.act_begin);
+  adaptation.lower_upper_body(options.return_time * kTickRate);
+  adaptation.freeze(phases.act_end, motion.frames(), phases.act_end - 1);
+  return std::move(adaptation).result(0);
+}
+
+// `start` turned about the vertical until its heading is at most `mild_yaw` from that of `goal`.
+Pose mildly_turned(const Pose& start, const Pose& goal, double mild_yaw) {
+  const double turn = std::remainder(yaw_of(start.R) - yaw_of(goal.R), 2.0 * std::numbers::pi);
+  const double back = std::clamp(turn, -mild_yaw, mild_yaw) - turn;
+  return {(yaw_rotation(back) * start.R).normalized(), start.p};
+}
+
+AdaptedMotion adapt_for_real(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
+                             const AdaptationOptions& options) {
+  Adaptation adaptation(motion, phases, robot);
+  adaptation.approach(mildly_turned(motion.root.front(), motion.root[phases.act_begin], options.mild_yaw));
+  adaptation.raise_upper_body(kRamp);
+  adaptation.lower_upper_body(kRamp);
   adaptation.freeze(phases.act_end, motion.frames(), phases.act_end - 1);
   return std::move(adaptation).result(0);
 }
@@ -149,13 +169,13 @@ AdaptedMotion adapt_approach(const RobotMotion& motion, const Phases& phases, co
 AdaptedMotion adapt_in_place(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options) {
   // A lead longer than the clip is all of it; the bound also keeps the product inside int.
-  const double lead = std::min(std::round(options.lead * kRateHz), static_cast<double>(phases.act_begin));
+  const double lead = std::min(std::round(options.lead * kTickRate), static_cast<double>(phases.act_begin));
   const int begin = phases.act_begin - static_cast<int>(lead);
   const Phases shifted{phases.act_begin - begin, phases.act_end - begin};
   Adaptation adaptation(cut(motion, begin, motion.frames()), shifted, robot);
   if (options.hold_stance && options.keep_torso) adaptation.keep_torso();
-  adaptation.raise_upper_body();
-  adaptation.lower_upper_body(options.return_time * kRateHz);
+  adaptation.raise_upper_body(shifted.act_begin);
+  adaptation.lower_upper_body(options.return_time * kTickRate);
   if (options.hold_stance) {
     adaptation.stand();
   } else {
@@ -182,6 +202,8 @@ AdaptedMotion adapt_by_phase(const RobotMotion& motion, const Phases& phases, co
       return adapt_approach(motion, phases, robot, options, seed);
     case StartMode::kAct:
       return adapt_in_place(motion, phases, robot, options);
+    case StartMode::kSimToReal:
+      return adapt_for_real(motion, phases, robot, options);
   }
   throw std::invalid_argument("phase adaptation: unknown start mode");
 }

@@ -1,5 +1,5 @@
-// Supplement A.4.4: adapts a retargeted motion by phase. Act is kept; preparation and follow-up become smooth
-// primitives.
+// Supplement A.4.4, and section D with Algorithm 7: adapts a retargeted motion by phase. Act is kept; preparation and
+// follow-up become smooth primitives.
 #pragma once
 
 #include <cstdint>
@@ -12,9 +12,10 @@
 namespace duet {
 
 enum class StartMode {
-  kClip,      // the motion as retargeted, whole clip
-  kApproach,  // A.4.4: root starts within 1 m of the original start, bilinear interpolation to the first act frame
-  kAct,       // for controllers that cannot walk: root at the act position from the start, upper body ramps in place
+  kClip,       // the motion as retargeted, whole clip
+  kApproach,   // A.4.4: root starts within 1 m of the original start, bilinear interpolation to the first act frame
+  kAct,        // for controllers that cannot walk: root at the act position from the start, upper body ramps in place
+  kSimToReal,  // Algorithm 7: what a policy is fine-tuned on before it meets the real robot
 };
 
 struct AdaptedMotion {
@@ -28,6 +29,7 @@ struct AdaptationOptions {
   double start_radius = 1.0;  // [m], kApproach
   double lead = 1.0;          // of neutral-to-act ramp kept before the act with kAct [s]
   double return_time = 1.0;   // over which the upper body goes back to neutral after the act [s]
+  double mild_yaw = 0.35;     // kSimToReal: largest turn of the root on its way to the act [rad]
   bool hold_stance = true;    // kAct: legs stay in the standing pose, the pelvis keeps its act position on the ground
   bool keep_torso = true;  // kAct with hold_stance: the waist takes over, inside its limits, what the pelvis loses of
                            // its turn and tilt, so that the torso is oriented as in the clip; false: waist as in the
@@ -45,6 +47,10 @@ bool is_leg_joint(std::string_view name);
 //   stands upright at x, y and yaw of the act's middle frame at the robot's standing height, legs standing; the upper
 //   body goes from neutral to the first act frame, through the act and back. Without hold_stance root and legs wait in
 //   the first act frame, go through the act to the bit and stay in its last frame.
+// kSimToReal: act to the bit. Before it the root goes from the clip's start straight to the first act frame and turns
+// by
+//   at most `mild_yaw`; the upper body is neutral and goes to the first act frame over the last 16 frames; legs as in
+//   the clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral over 16 frames.
 // A follow-up shorter than `return_time` ends on the way to neutral: no frame is added, the partner has none for it.
 // The seed matters to kApproach only: the same seed gives the same bits.
 // Throws std::invalid_argument where the motion is not valid, not at 50 Hz or not of this robot's joints in its order,

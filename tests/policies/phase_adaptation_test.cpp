@@ -125,6 +125,47 @@ TEST(ApproachAdaptation, SameSeedGivesTheSameBits) {
   EXPECT_NE(a.root.front().p, c.root.front().p);
 }
 
+TEST(SimToRealAdaptation, WalksStraightTurnsMildlyAndRaisesTheArmsInTheLastSixteenFrames) {
+  RobotMotion motion = swinging_motion(kFrames, 4);
+  const Pose goal = motion.root[kPhases.act_begin];
+  motion.root.front().R = yaw_rotation(2.0) * goal.R;
+  const RobotMotion result = adapted(motion, {.start = StartMode::kSimToReal}).motion;
+  EXPECT_NEAR(result.root.front().R.angularDistance(goal.R), 0.35, 1e-9);
+  for (int t = 0; t < kPhases.act_begin; ++t) {
+    const double s = static_cast<double>(t) / kPhases.act_begin;
+    EXPECT_NEAR((result.root[t].p - (1.0 - s) * motion.root.front().p - s * goal.p).norm(), 0.0, kAlgebra);
+    const double up = std::max(0.0, (t - (kPhases.act_begin - 16)) / 16.0);
+    for (int j = 0; j < g1()->dof(); ++j) {
+      const double raised = (1.0 - up) * g1()->neutral[j] + up * motion.q(j, kPhases.act_begin);
+      EXPECT_NEAR(result.q(j, t), is_leg_joint(g1()->joints[j].name) ? motion.q(j, t) : raised, kAlgebra);
+    }
+  }
+  for (int t = kPhases.act_begin; t < kPhases.act_end; ++t) expect_same_frame(result, t, motion, t);
+}
+
+TEST(SimToRealAdaptation, StandsStillAfterTheActAndLowersTheArmsInSixteenFrames) {
+  const RobotMotion motion = swinging_motion(kFrames, 5);
+  const RobotMotion result = adapted(motion, {.start = StartMode::kSimToReal}).motion;
+  const int last = kPhases.act_end - 1;
+  for (int j = 0; j < g1()->dof(); ++j) {
+    const bool leg = is_leg_joint(g1()->joints[j].name);
+    EXPECT_NEAR(result.q(j, last + 8), leg ? motion.q(j, last) : 0.5 * (motion.q(j, last) + g1()->neutral[j]),
+                kAlgebra);
+    EXPECT_NEAR(result.q(j, last + 16), leg ? motion.q(j, last) : g1()->neutral[j], kAlgebra);
+  }
+  EXPECT_EQ(result.root.back().p, motion.root[last].p);
+}
+
+TEST(SimToRealAdaptation, IsTheSameForEverySeedAndLeavesAMildStartAsItIs) {
+  RobotMotion motion = swinging_motion(kFrames, 6);
+  motion.root.front().R = yaw_rotation(-0.2) * motion.root[kPhases.act_begin].R;
+  const RobotMotion first = adapted(motion, {.start = StartMode::kSimToReal}, 1).motion;
+  const RobotMotion second = adapted(motion, {.start = StartMode::kSimToReal}, 2).motion;
+  EXPECT_EQ(first.q, second.q);
+  EXPECT_EQ(first.root[7].p, second.root[7].p);
+  EXPECT_NEAR(first.root.front().R.angularDistance(motion.root.front().R), 0.0, 1e-7);
+}
+
 TEST(ApproachAdaptation, WorksWithoutPreparationOrFollowUp) {
   const RobotMotion motion = swinging_motion(50, 5);
   const AdaptedMotion result = adapted(motion, {}, 1, {0, 50});
@@ -132,7 +173,7 @@ TEST(ApproachAdaptation, WorksWithoutPreparationOrFollowUp) {
 }
 
 TEST(PhaseAdaptation, KeepsJointLimitsAndNeverJumps) {
-  for (const StartMode start : {StartMode::kApproach, StartMode::kAct})
+  for (const StartMode start : {StartMode::kApproach, StartMode::kAct, StartMode::kSimToReal})
     for (const bool hold_stance : {false, true})
       for (std::uint64_t seed = 0; seed < 5; ++seed) {
         const RobotMotion motion = swinging_motion(kFrames, seed);
