@@ -28,10 +28,10 @@ struct Take {
   std::vector<RobotState> followed;  // in the engine, while it was upright
 };
 
-Take take_of(const PairedMotion& clip, const RobotModel& robot, std::uint64_t seed) {
+Take take_of(const PairedMotion& clip, const RobotModel& robot, StartMode start, std::uint64_t seed) {
   Take take;
   take.clip = &clip;
-  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, {.start = StartMode::kApproach}, seed);
+  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, {.start = start}, seed);
   const int begin = take.adapted.clip_frame, frames = take.adapted.motion.frames();
   take.partner = clip.partner.joints.slice(begin, begin + frames);
   return take;
@@ -75,6 +75,16 @@ void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
 
 }  // namespace
 
+std::string origin_of(const DemonstrationOptions& options) {
+  const std::string clips =
+      fmt::format("{} clips of each task (seed {}), {} start{} of each{}", options.per_task, options.seed,
+                  options.starts, options.starts == 1 ? "" : "s",
+                  options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
+  if (options.engine.empty()) return clips + ", none followed";
+  return fmt::format("{}, {} followed in {} under {} by {}", clips, options.followed, options.engine,
+                     options.controller, options.policy);
+}
+
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop) {
@@ -84,6 +94,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
   const PolicyMaker maker = policy_maker(options.policy, robot, options.policy_options);
   DemonstrationSet set;
   set.robot_digest = robot->digest;
+  set.origin = origin_of(options);
   for (const Task task : kTasks) {  // one at a time: hours of clips and takes are gigabytes
     const std::vector<PairedMotion> clips =
         synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress);
@@ -92,7 +103,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
     parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
       if (stop()) return;
       const PairedMotion& clip = clips[i / starts];
-      made[i] = take_of(clip, *robot, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
+      made[i] = take_of(clip, *robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
       const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
       if (followed) follow(*made[i], robot, options, maker);
       progress.advance();

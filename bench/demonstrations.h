@@ -10,6 +10,7 @@
 
 #include "bench/progress.h"
 #include "bench/suite.h"
+#include "policies/phase_adaptation.h"
 #include "policies/policy.h"
 #include "training/dstar/demonstrations.h"
 
@@ -18,8 +19,9 @@ namespace duet {
 struct DemonstrationOptions {
   int per_task = 300;  // clips of each task
   std::uint64_t seed = 880001;
-  int starts = 2;      // of each clip, drawn as A.4.4 has it
-  int followed = 120;  // clips of each task whose first start is also followed in the engine
+  int starts = 2;                          // of each clip, drawn as A.4.4 has it
+  StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
+  int followed = 120;                      // clips of each task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   int threads = 1;
   // Who acts: the demonstration itself, also seen as it is, or a policy, on the clips that are followed; then the robot
@@ -29,6 +31,9 @@ struct DemonstrationOptions {
 };
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
+
+// "300 clips of each task (seed 880001), 2 starts of each, 120 followed in mujoco under wbc_sim by replay".
+std::string origin_of(const DemonstrationOptions& options);
 
 // Of a take in which the robot fell, what is up to a second before; nothing of less than two. None where `stop` said so
 // in between. Throws what prepare_clips and make_controller throw, and MissingError for an engine that is not there.

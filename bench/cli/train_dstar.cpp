@@ -8,6 +8,7 @@
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "core/require.h"
 #include "core/share.h"
 #include "policies/dstar/network.h"
@@ -22,8 +23,8 @@ namespace fs = std::filesystem;
 struct TrainArguments {
   DstarRun run;
   DemonstrationOptions data;
-  std::string config, language, split;
-  int rounds = 2;
+  std::string config, language, split, from, start = "approach";
+  int rounds = 2, round_clips = 120;
   bool smoke = false;
 };
 
@@ -55,7 +56,7 @@ std::shared_ptr<const DemonstrationSet> demonstrations(Session& session, const s
     fs::create_directories(fs::path(file).parent_path());
     save_demonstrations(*made, file);
   }
-  return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest));
+  return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest, origin_of(options)));
 }
 
 DstarData data_of(Session& session, const TrainArguments& arguments) {
@@ -85,6 +86,7 @@ std::string round_file(const DstarRun& run, int round) {
 void add_round(Session& session, const TrainArguments& arguments, int round, DstarData& data) {
   DemonstrationOptions options = arguments.data;
   options.policy = "dstar";
+  options.followed = arguments.round_clips;
   options.policy_options = {{"network", dstar_network_file(arguments.run)}};
   if (!arguments.language.empty()) options.policy_options["language"] = arguments.language;
   const auto more = demonstrations(session, data.robot, options, round_file(arguments.run, round));
@@ -95,7 +97,7 @@ void add_round(Session& session, const TrainArguments& arguments, int round, Dst
 
 // A small training whose outcome can be checked in minutes.
 void make_small(TrainArguments& arguments) {
-  arguments.data.per_task = 2;
+  arguments.data.per_task = 12;
   arguments.data.starts = 1;
   arguments.data.engine = "";
   arguments.rounds = 0;
@@ -105,8 +107,16 @@ void make_small(TrainArguments& arguments) {
   run.config.channels = 64;
   run.batch = 64;
   if (run.steps == DstarRun{}.steps) run.steps = 300;
-  run.validate_every = static_cast<int>(std::max(1L, run.steps / 3));
+  run.validate_every = static_cast<int>(std::max(1L, run.steps / 10));  // the first of a network that knows nothing yet
   run.patience = 0;
+}
+
+void read_start(TrainArguments& arguments) {
+  const std::vector<std::string> known = {"approach", "sim_to_real"};
+  if (arguments.start == known[0]) return;
+  require(arguments.start == known[1], unknown_name_message("start of demonstrations", arguments.start, known));
+  arguments.data.start = StartMode::kSimToReal;
+  arguments.data.starts = 1;  // they are all the same
 }
 
 // What was learnt, as the program will run it.
@@ -125,7 +135,9 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
   if (!arguments.config.empty())
     arguments.run.config = parse_dstar_config(read_file(arguments.config), arguments.config);
   if (arguments.smoke) make_small(arguments);
+  read_start(arguments);
   DstarData data = data_of(session, arguments);
+  if (!arguments.from.empty()) arguments.run.from = load_dstar_network(arguments.from, *data.robot);
   double first = -1.0, last = 0.0, accuracy = 0.0, speed = 0.0;
   const auto report = [&](const DstarProgress& progress) {
     if (first < 0.0 && progress.validation > 0.0) first = progress.validation;
@@ -154,6 +166,7 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
 
 // No training: windows of the same demonstrations, as they are.
 void make_library(Session& session, TrainArguments& arguments, const std::string& name) {
+  read_start(arguments);
   const DstarData data = data_of(session, arguments);
   const fs::path file = fs::path(arguments.run.folder) / name / "library.safetensors";
   fs::create_directories(file.parent_path());
@@ -187,6 +200,10 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
       ->capture_default_str();
   command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
+  command
+      ->add_option("--start", arguments->start,
+                   "how the robot comes: approach (A.4.4) or sim_to_real (Algorithm 7, before it meets the real robot)")
+      ->capture_default_str();
   command->add_option("--followed", arguments->data.followed, "clips of each task that the robot follows in the engine")
       ->capture_default_str();
   command->add_option("--engine", arguments->data.engine, "that they are followed in; '' for none")
@@ -195,11 +212,15 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
       ->add_option("--rounds", arguments->rounds,
                    "times that the policy so far acts in the engine and what it meets is added to the demonstrations")
       ->capture_default_str();
+  command->add_option("--round-clips", arguments->round_clips, "clips of each task on which it then acts")
+      ->capture_default_str();
   command->add_option("--steps", run.steps, "of Adam")->capture_default_str();
   command->add_option("--batch", run.batch, "windows, a multiple of the threads")->capture_default_str();
   command->add_option("--rate", run.rate, "of Adam")->capture_default_str();
   command->add_option("--seed", run.seed, "of weights, windows and noise")->capture_default_str();
   command->add_option("--threads", run.threads, "the result depends on it")->capture_default_str();
+  command->add_option("--from", arguments->from, "network to begin with (fine-tuning); default: new weights");
+  command->add_option("--device", run.device, "auto (the GPU if libtorch has one), cpu, cuda")->capture_default_str();
   command->add_option("--config", arguments->config, "JSON of the network's shape (default: the one that ships)");
   command->add_option("--language", arguments->language, "NPZ of prompts and embeddings (default: built in)");
   command->add_option("--split", arguments->split, "test split that may not be learnt (default: the one that ships)");

@@ -63,6 +63,29 @@ TEST(MakeDemonstrations, MoreThreadsAndMoreClipsChangeNoneOfThem) {
             second.observed.middleCols(second.list[1].begin, frames));
 }
 
+TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
+  DemonstrationOptions options = small_options();
+  EXPECT_EQ(made(options).origin,
+            "3 clips of each task (seed 880001), 2 starts of each, 1 followed in playback under pd by replay");
+  options.starts = 1;
+  options.engine = "";
+  EXPECT_EQ(origin_of(options), "3 clips of each task (seed 880001), 1 start of each, none followed");
+}
+
+TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.start = StartMode::kSimToReal;
+  const DemonstrationSet set = made(options);
+  EXPECT_EQ(set.origin,
+            "3 clips of each task (seed 880001), 1 start of each for the real robot (Algorithm 7), none followed");
+  const Demonstration& first = set.list.front();
+  // Arms down, all the way up to 16 frames before the act.
+  EXPECT_EQ(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 16).q.tail(14));
+  EXPECT_NE(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 8).q.tail(14));
+}
+
 TEST(MakeDemonstrations, StoppedTheyAreNone) {
   Progress quiet(Progress::Style::kQuiet);
   EXPECT_FALSE(make_demonstrations(test::g1(), small_options(), quiet, [] { return true; }).has_value());

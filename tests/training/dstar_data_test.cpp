@@ -41,6 +41,7 @@ Demonstration entry(const std::string& id) { return {id, std::string(64, id.back
 DemonstrationSet made_set(const RobotModel& robot) {
   DemonstrationSet set;
   set.robot_digest = robot.digest;
+  set.origin = "3 clips";
   for (const char* id : {"clip-a", "clip-b", "clip-c"}) {
     const RobotMotion motion = made_motion(robot, 150);
     set.add(entry(id), states_of(motion), motion, made_partner(150));
@@ -60,7 +61,7 @@ TEST(Demonstrations, SurviveAFile) {
   const std::string path = folder / "set.safetensors";
   const DemonstrationSet set = made_set(*test::g1());
   save_demonstrations(set, path);
-  const DemonstrationSet read = load_demonstrations(path, test::g1()->digest);
+  const DemonstrationSet read = load_demonstrations(path, test::g1()->digest, "3 clips");
   ASSERT_EQ(read.list.size(), 3U);
   EXPECT_EQ(read.list[1].clip_id, "clip-b");
   EXPECT_EQ(read.list[1].begin, 150);
@@ -74,8 +75,17 @@ TEST(Demonstrations, OfAnotherRobotAreRefused) {
   const test::ScratchFolder folder;
   const std::string path = folder / "set.safetensors";
   save_demonstrations(made_set(*test::g1()), path);
-  EXPECT_THAT([&] { load_demonstrations(path, std::string(64, '0')); },
+  EXPECT_THAT([&] { load_demonstrations(path, std::string(64, '0'), "3 clips"); },
               testing::ThrowsMessage<InputError>(testing::HasSubstr("demonstrations of another robot")));
+}
+
+TEST(Demonstrations, MadeOtherwiseAreRefused) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "set.safetensors";
+  save_demonstrations(made_set(*test::g1()), path);
+  EXPECT_THAT([&] { load_demonstrations(path, test::g1()->digest, "300 clips"); },
+              testing::ThrowsMessage<InputError>(
+                  path + ": demonstrations made otherwise: expected 300 clips, found 3 clips: choose another folder"));
 }
 
 TEST(Demonstrations, OfDifferentLengthsAreRefused) {

@@ -15,7 +15,7 @@
 namespace duet {
 namespace {
 
-constexpr const char* kFormat = "duet.demonstrations/1";
+constexpr const char* kFormat = "duet.demonstrations/2";
 constexpr int kPartnerSize = 3 * kSmplJoints;
 
 // Keeps the memory of hours of frames from being copied at each demonstration.
@@ -144,14 +144,16 @@ void save_demonstrations(const DemonstrationSet& set, const std::string& path) {
   for (const Demonstration& entry : set.list) list.push_back(json_of(entry));
   const int used = set.list.empty() ? 0 : set.list.back().end();
   SafeTensors file;
-  file.metadata = {{"format", kFormat}, {"robot_digest", set.robot_digest}, {"demonstrations", list.dump()}};
+  file.metadata = {
+      {"format", kFormat}, {"robot_digest", set.robot_digest}, {"origin", set.origin}, {"demonstrations", list.dump()}};
   file.tensors["observed"] = columns_tensor(set.observed.leftCols(used));
   file.tensors["wanted"] = columns_tensor(set.wanted.leftCols(used));
   file.tensors["partner"] = columns_tensor(set.partner.leftCols(used));
   write_safetensors(path, file);
 }
 
-DemonstrationSet load_demonstrations(const std::string& path, const std::string& robot_digest) {
+DemonstrationSet load_demonstrations(const std::string& path, const std::string& robot_digest,
+                                     const std::string& origin) {
   const SafeTensors file = read_safetensors(path);
   expect_text(file, "format", kFormat, path);
   DemonstrationSet set;
@@ -159,6 +161,10 @@ DemonstrationSet load_demonstrations(const std::string& path, const std::string&
   if (set.robot_digest != robot_digest)
     throw InputError(fmt::format("{}: demonstrations of another robot (digest {}..., expected {}...)", path,
                                  set.robot_digest.substr(0, 12), robot_digest.substr(0, 12)));
+  set.origin = text_of(file, "origin", path);
+  if (set.origin != origin)
+    throw InputError(fmt::format("{}: demonstrations made otherwise: expected {}, found {}: choose another folder",
+                                 path, origin, set.origin));
   set.list = list_of(text_of(file, "demonstrations", path), path);
   const std::int64_t used = set.list.empty() ? 0 : set.list.back().end();
   const auto wanted = file.tensors.find("wanted");

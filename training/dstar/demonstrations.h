@@ -27,6 +27,7 @@ struct Demonstration {
 // (7 + n, frames): root position, quaternion wxyz, q; partner (72, frames): SMPL joints in W.
 struct DemonstrationSet {
   std::string robot_digest;
+  std::string origin;  // how it was made, in words: another way makes another set
   std::vector<Demonstration> list;
   Eigen::MatrixXf observed, wanted, partner;
 
@@ -43,9 +44,10 @@ struct DemonstrationSet {
 // Kinematic observation: the state that would follow the motion exactly (central differences).
 std::vector<RobotState> states_of(const RobotMotion& motion);
 
-// One safetensors file. Loading throws InputError (file, what, expected, found): another robot, sizes, names.
+// One safetensors file. Loading throws InputError (file, what, expected, found): another robot or origin, sizes, names.
 void save_demonstrations(const DemonstrationSet& set, const std::string& path);
-DemonstrationSet load_demonstrations(const std::string& path, const std::string& robot_digest);
+DemonstrationSet load_demonstrations(const std::string& path, const std::string& robot_digest,
+                                     const std::string& origin);
 
 // Throws InputError naming the clip where one of `digests` (of clips held out for tests) is in the set.
 void check_held_out(const DemonstrationSet& set, const std::vector<std::string>& digests, const std::string& split);

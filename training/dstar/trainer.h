@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "policies/dstar/config.h"
+#include "policies/dstar/network.h"
 #include "policies/language.h"
 #include "training/dstar/demonstrations.h"
 #include "training/dstar/windows.h"
@@ -30,6 +30,10 @@ struct DstarRun {
   DstarLoss loss;
   WindowOptions windows;
   std::uint64_t seed = 42;
+  std::shared_ptr<const DstarNetwork> from;  // weights and normalisers to begin with; none: new ones
+  // "cpu", "cuda" (MissingError where libtorch has none), "auto": the GPU if there is one. Networks run there, data and
+  // losses stay on the CPU.
+  std::string device = "auto";
   int threads = 2;
   int batch = 128;
   long steps = 16000;
@@ -64,7 +68,8 @@ double runner_difference(const DstarData& data, const DstarRun& run, const std::
 enum class DstarEnd { kComplete, kPaused, kEarly, kStopped };
 
 // `report` is called about every ten seconds and after each validation. Throws std::invalid_argument for options out of
-// range or sets without a window, InputError for a checkpoint that is broken, of another robot, configuration or seed.
+// range or sets without a window or `from` of another configuration, InputError for a checkpoint that is broken, of
+// another robot, configuration or seed.
 DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
                      const std::function<void(const DstarProgress&)>& report, const std::function<bool()>& stop);
 

@@ -97,7 +97,8 @@ Tensor spatial_reasoning(const DstarConfig& config, const Weights& weights, cons
 
 Tensor step_embedding(const DstarConfig& config, const Weights& weights, const Tensor& step) {
   const int half = config.step_embedding / 2;
-  const Tensor frequency = torch::exp(-std::log(10000.0) / half * torch::arange(half, torch::kFloat32));
+  const Tensor frequency =
+      torch::exp(-std::log(10000.0) / half * torch::arange(half, step.options().dtype(torch::kFloat32)));
   const Tensor angle = step.to(torch::kFloat32).unsqueeze(1) * frequency;
   const Tensor waves = torch::cat({torch::sin(angle), torch::cos(angle)}, 1);
   return linear(weights, "step.2", torch::silu(linear(weights, "step.1", waves)));
@@ -151,7 +152,7 @@ torch::Tensor sample(const DstarConfig& config, const Weights& weights, const to
   const std::vector<int> steps = ddim_steps(config.training_steps, config.inference_steps);
   torch::Tensor x = noise;
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    const torch::Tensor step = torch::full({x.size(0)}, steps[i], torch::kInt64);
+    const torch::Tensor step = torch::full({x.size(0)}, steps[i], x.options().dtype(torch::kInt64));
     const torch::Tensor x0 = denoise(config, weights, x, step, condition).clamp(-5.0, 5.0);
     const double now = alpha_bar[steps[i]], next = i + 1 < steps.size() ? alpha_bar[steps[i + 1]] : 1.0;
     const torch::Tensor eps = (x - std::sqrt(now) * x0) / std::sqrt(1.0 - now);

@@ -43,11 +43,32 @@ Tensor noised(const Tensor& clean, const Tensor& step, const std::vector<double>
   return bar.sqrt() * clean + (1.0 - bar).sqrt() * noise;
 }
 
+torch::Device device_of(const std::string& name) {
+  require(name == "auto" || name == "cpu" || name == "cuda",
+          fmt::format("training D-STAR: device: expected auto, cpu or cuda, found '{}'", name));
+  if (name != "cpu" && torch::cuda::is_available()) return torch::kCUDA;
+  if (name == "cuda") throw MissingError("training D-STAR: the libtorch that duet was built with finds no GPU (CUDA)");
+  return torch::kCPU;
+}
+
+ModelInput on_device(const ModelInput& input, torch::Device device) {
+  return {input.frames.to(device),   input.past.to(device),        input.position.to(device),
+          input.distance.to(device), input.orientation.to(device), input.language.to(device)};
+}
+
+// Copies that gather gradients.
+Weights leaves_on(const Weights& weights, torch::Device device) {
+  Weights leaves;
+  for (const auto& [name, tensor] : weights) leaves[name] = tensor.to(device).requires_grad_(true);
+  return leaves;
+}
+
 class Trainer {
  public:
   Trainer(const DstarData& data, const DstarRun& run)
       : data_(data),
         run_(run),
+        device_(device_of(run.device)),
         weights_(run.config),
         average_(run.config),
         m_(weights_.size(), 0.0F),
@@ -63,9 +84,10 @@ class Trainer {
     one_thread_each();
     WindowMaker maker(data.robot, *data.train, windows_of(run));
     statistics_ = window_statistics(maker, windows_, run.seed);
+    weights_.initialise(run.seed);
+    if (run.from) begin_with(*run.from);
     units_ = std::make_unique<Units>(statistics_, *data.language);
     for (int i = 0; i < run.threads; ++i) lanes_.push_back(std::make_unique<Lane>(data, run));
-    weights_.initialise(run.seed);
     std::copy(weights_.data(), weights_.data() + weights_.size(), average_.data());
     fill_validation();
   }
@@ -117,7 +139,8 @@ class Trainer {
                      {"steps", std::to_string(step_)},
                      {"batch", std::to_string(run_.batch)},
                      {"windows", std::to_string(windows_.size())},
-                     {"demonstrations", std::to_string(data_.train->list.size())}};
+                     {"demonstrations", std::to_string(data_.train->list.size())},
+                     {"device", device_.str()}};
     return network;
   }
 
@@ -150,6 +173,19 @@ class Trainer {
     WindowBatch windows, later;  // later: the first ones half a second on
     LossParts parts;
   };
+
+  void begin_with(const DstarNetwork& network) {
+    const std::string expected = to_json_text(run_.config), found = to_json_text(network.config);
+    require(expected == found, fmt::format("training D-STAR: the network to begin with has another configuration: "
+                                           "expected {}, found {}",
+                                           expected, found));
+    require(
+        network.language == data_.language->name(),
+        fmt::format("training D-STAR: the network to begin with learnt from the language encoder '{}', this is '{}'",
+                    network.language, data_.language->name()));
+    weights_.assign(network.weights);
+    statistics_ = {network.frame_mean, network.frame_deviation, network.plan_mean, network.plan_deviation};
+  }
 
   // Made of the first demonstrations and kept, whatever is added later.
   [[nodiscard]] std::map<std::string, Eigen::VectorXf*> normalisers() {
@@ -186,14 +222,15 @@ class Trainer {
     Random random(run_.seed, stream_key({"dstar step", std::to_string(step_), std::to_string(number)}));
     fill(lane, random);
     std::copy(weights_.data(), weights_.data() + weights_.size(), lane.weights.data());
+    if (!device_.is_cpu()) lane.leaves = leaves_on(lane.weights.views(false), device_);
     WindowBatch& batch = lane.windows;
-    const ModelInput input = units_->input(batch);
-    const ModelCondition encoded = encode(run_.config, lane.leaves, input);
+    const ModelCondition encoded = encode(run_.config, lane.leaves, on_device(units_->input(batch), device_));
     const Tensor wanted = view(batch.plan, {batch.size, kAnchors, kAnchorSize});
     Tensor step = torch::empty({batch.size}, torch::kInt64);
     for (int i = 0; i < batch.size; ++i) step.data_ptr<std::int64_t>()[i] = random.below(run_.config.training_steps);
     const Tensor x = noised(units_->normalised(wanted), step, alpha_bar_, random);
-    const Tensor plan = units_->physical(denoise(run_.config, lane.leaves, x, step, encoded.condition));
+    const Tensor clean = denoise(run_.config, lane.leaves, x.to(device_), step.to(device_), encoded.condition);
+    const Tensor plan = units_->physical(clean.cpu());
     const Tensor loss = total_loss(lane, plan, wanted, encoded);
     (loss / run_.threads).backward();
     collect(lane);
@@ -213,8 +250,8 @@ class Trainer {
       loss = loss + w.lambda_auxiliary * auxiliary;
     }
     if (w.lambda_phase > 0.0 && encoded.phase_logits.defined()) {
-      const Tensor next = classify(run_.config, lane.leaves, units_->input(lane.later));
-      const Tensor phase = phase_loss(w, encoded.phase_logits, tensor_of_ints(batch.phase), next);
+      const Tensor next = classify(run_.config, lane.leaves, on_device(units_->input(lane.later), device_)).cpu();
+      const Tensor phase = phase_loss(w, encoded.phase_logits.cpu(), tensor_of_ints(batch.phase), next);
       lane.parts.phase = phase.item<double>();
       loss = loss + w.lambda_phase * phase;
     }
@@ -228,7 +265,7 @@ class Trainer {
       Tensor& gradient = lane.leaves.at(shape.name).mutable_grad();
       const std::size_t n = WeightBlock::count(shape);
       if (gradient.defined()) {
-        const Tensor flat = gradient.contiguous();
+        const Tensor flat = gradient.cpu().contiguous();
         std::copy(flat.data_ptr<float>(), flat.data_ptr<float>() + n, at);
         gradient.reset();
       } else {
@@ -254,6 +291,7 @@ class Trainer {
 
   DstarData data_;
   DstarRun run_;
+  torch::Device device_;  // of the networks while they learn
   WeightBlock weights_, average_;
   std::vector<float> m_, v_, gradient_;
   std::vector<double> alpha_bar_;

@@ -53,6 +53,11 @@ std::map<std::string, duet::Tensor> WeightBlock::tensors() const {
   return result;
 }
 
+void WeightBlock::assign(const std::map<std::string, duet::Tensor>& tensors) {
+  float* at = values_.data();
+  for (const TensorShape& shape : shapes_) at = std::ranges::copy(tensors.at(shape.name).values, at).out;
+}
+
 void WeightBlock::initialise(std::uint64_t seed) {
   Random random(seed, stream_key({"dstar weights"}));
   float* at = values_.data();

@@ -26,6 +26,8 @@ class WeightBlock {
   // Weights uniform within +-sqrt(1.5 / inputs), positions within +-0.05, biases 0, norms 1; what ends a residual
   // branch or steers one is smaller.
   void initialise(std::uint64_t seed);
+  // Those of a network of the same configuration.
+  void assign(const std::map<std::string, duet::Tensor>& tensors);
 
  private:
   std::vector<TensorShape> shapes_;
