@@ -85,6 +85,8 @@ StartMode start_mode(const Suite& suite, const SuiteController& controller) {
       return StartMode::kApproach;
     case SuiteStart::kAct:
       return StartMode::kAct;
+    case SuiteStart::kSimToReal:
+      return StartMode::kSimToReal;
     case SuiteStart::kAuto:
       break;
   }

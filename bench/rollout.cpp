@@ -8,6 +8,7 @@
 
 #include "backends/factory.h"
 #include "bench/disturbance.h"
+#include "core/clock.h"
 #include "core/digest.h"
 #include "core/require.h"
 #include "policies/language.h"
@@ -109,11 +110,11 @@ void trim(Recording& recording, int frames) {
 std::string describe(Outcome outcome, int tick, std::string_view engine) {
   switch (outcome) {
     case Outcome::kFell:
-      return fmt::format("the robot fell at {:.2f} s", tick / kControlRate);
+      return fmt::format("the robot fell at {:.2f} s", tick / kTickRate);
     case Outcome::kDiverged:
-      return fmt::format("the state of {} diverged at {:.2f} s", engine, tick / kControlRate);
+      return fmt::format("the state of {} diverged at {:.2f} s", engine, tick / kTickRate);
     case Outcome::kTimedOut:
-      return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kControlRate);
+      return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kTickRate);
     default:
       return "";
   }
@@ -159,7 +160,7 @@ PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotio
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy) {
   const PointTracks people = episode_partner(setup).joints;
   const int ticks = episode_ticks(setup);
-  const int steps_per_tick = static_cast<int>(std::lround(1.0 / (kControlRate * backend.scene().dt)));
+  const int steps_per_tick = static_cast<int>(std::lround(1.0 / (kTickRate * backend.scene().dt)));
   const Clock::time_point deadline =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(setup.wall_limit));
 
@@ -173,7 +174,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   controller.reset(setup.start);
   policy.reset({setup.clip->task, setup.prompt.empty() ? std::string(task_prompt(setup.clip->task)) : setup.prompt,
                 setup.start, &setup.reference.motion, setup.seed});
-  Scheduler scheduler;
+  Scheduler scheduler({.fuse_ticks = setup.fuse_ticks});
   scheduler.reset({setup.start.X_WB, setup.start.q});
   ObservationHistory history;
   Sha256 hash;
@@ -187,7 +188,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   int tick = 0;
   for (; tick < ticks && recording.outcome == Outcome::kOk; ++tick) {
     const HumanJoints partner = partner_joints(people, tick);
-    const HumanJoints velocities = partner_velocities(people, tick, kControlRate);
+    const HumanJoints velocities = partner_velocities(people, tick, kTickRate);
     const bool own = setup.seen_partner.empty();
     history.add({perception.seen(tick, own ? partner : partner_joints(setup.seen_partner, tick)), backend.state()});
     if (tick % kTicksPerPlan == 0) planner.plan(history.at(tick), scheduler);

@@ -20,8 +20,6 @@
 
 namespace duet {
 
-inline constexpr double kControlRate = 50.0;  // [Hz]
-
 // Ground reaction on the robot: the sum over its contacts. The peak is a mean over a control period, as a rigid
 // impact's force in one step is its impulse over the step and says nothing of the robot.
 struct GroundForce {
@@ -41,6 +39,7 @@ struct RolloutSetup {
   Perturbation perturbation;  // but its friction, its mass and the partner's size, which are the scene's too
   std::uint64_t perturbation_seed = 0;
   bool foot_trace = false;              // whether the row is to have one
+  int fuse_ticks = kTicksPerPlan;       // SchedulerOptions
   double wall_limit = 120.0;            // [s]
   std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
   std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`

@@ -195,6 +195,7 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
   setup.perturbation_seed = spec.perturbation_seed;
   setup.foot_trace = spec.engine != kPlayback && spec.arm == "main" && controller_info(controller.use).walks;
   setup.wall_limit = suite.wall_limit;
+  setup.fuse_ticks = suite.fuse_ticks;
   if (suite.partner == PartnerMode::kSolid)
     setup.limits =
         load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);

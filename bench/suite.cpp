@@ -145,7 +145,8 @@ const NameTable<SuiteStart>& start_names() {
   static const NameTable<SuiteStart> names = {{"auto", SuiteStart::kAuto},
                                               {"clip", SuiteStart::kClip},
                                               {"approach", SuiteStart::kApproach},
-                                              {"act", SuiteStart::kAct}};
+                                              {"act", SuiteStart::kAct},
+                                              {"sim_to_real", SuiteStart::kSimToReal}};
   return names;
 }
 
@@ -196,8 +197,9 @@ std::string resolved_yaml(const Suite& suite) {
   text += fmt::format("tasks: [{}]\nengines: [{}]\n{}{}{}", fmt::join(tasks, ", "), fmt::join(suite.engines, ", "),
                       list_yaml("controllers", suite.controllers), list_yaml("policies", suite.policies),
                       perturbations_yaml(suite));
-  text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\n", suite.episodes_per_clip,
-                      to_string(suite.start), suite.start_radius, to_string(suite.partner));
+  text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\nfuse_ticks: {}\n",
+                      suite.episodes_per_clip, to_string(suite.start), suite.start_radius, to_string(suite.partner),
+                      suite.fuse_ticks);
   std::vector<std::string> settings;
   for (const std::string& engine : suite.engines)
     if (engine != "playback")

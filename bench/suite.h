@@ -21,7 +21,8 @@
 
 namespace duet {
 
-enum class SuiteStart { kAuto, kClip, kApproach, kAct };  // auto: act where the controller cannot walk, else approach
+// auto: act where the controller cannot walk, else approach
+enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
 enum class RecordTrajectories { kNone, kFailures, kAll };
 
 // Of each synthesised clip one with this hand and contact height; all else is drawn as for its index.
@@ -68,7 +69,8 @@ struct Suite {
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
   PartnerMode partner = PartnerMode::kGhost;
-  Profile profile;  // step and solver settings of the suite's engines
+  int fuse_ticks = kTicksPerPlan;  // SchedulerOptions
+  Profile profile;                 // step and solver settings of the suite's engines
   DetectorVersion detector = DetectorVersion::kRobot;
   ThresholdSet thresholds = ThresholdSet::kPaper;
   std::string contact_limits;                   // table; empty: the one that ships with duet

@@ -15,6 +15,7 @@
 #include "core/names.h"
 #include "core/require.h"
 #include "metrics/readings.h"
+#include "policies/scheduler.h"
 #include "retarget/options.h"
 #include "robots/robot_model.h"
 #include "robots/yaml_section.h"
@@ -204,6 +205,8 @@ void read_episode(const YamlSection& top, Suite& suite) {
             fmt::format("expected 0 to 5 m, found {}", suite.start_radius));
   });
   get_enum(top, "partner", partner_names(), suite.partner);
+  get_integer(top, "fuse_ticks", 1, suite.fuse_ticks);
+  checked(top, "fuse_ticks", [&] { static_cast<void>(Scheduler({.fuse_ticks = suite.fuse_ticks})); });
   get(top, "robot", suite.robot);
   if (is_plain_name(suite.robot) && !suite.robot.ends_with(".yaml")) suite.robot = card_path(suite.robot);
   if (top.has("contact_limits")) suite.contact_limits = from_folder_of(suite, top.text("contact_limits"));
@@ -243,11 +246,31 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   Suite suite;
   suite.file = file;
   const YamlSection top(file, document, "suite",
-                        {"schema",         "name",         "version",     "seed",         "clips",
-                         "tasks",          "engines",      "controllers", "policies",     "episodes_per_clip",
-                         "start",          "start_radius", "partner",     "dt",           "profile",
-                         "contact_limits", "robot",        "detector",    "limits",       "record",
-                         "null_arm",       "retarget",     "readings",    "perturbations"});
+                        {"schema",
+                         "name",
+                         "version",
+                         "seed",
+                         "clips",
+                         "tasks",
+                         "engines",
+                         "controllers",
+                         "policies",
+                         "perturbations",
+                         "episodes_per_clip",
+                         "start",
+                         "start_radius",
+                         "partner",
+                         "fuse_ticks",
+                         "profile",
+                         "dt",
+                         "contact_limits",
+                         "robot",
+                         "detector",
+                         "limits",
+                         "record",
+                         "null_arm",
+                         "retarget",
+                         "readings"});
   const std::string schema = top.text("schema");
   if (schema != "duet.suite/1")
     top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));

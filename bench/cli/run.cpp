@@ -141,7 +141,7 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
   command->add_option("--network", arguments->networks,
                       "NAME=PATH: the network of one of the suite's controllers or policies (repeatable)");
-  command->add_option("--start", arguments->start, "auto, clip, approach or act: where episodes begin");
+  command->add_option("--start", arguments->start, "auto, clip, approach, act or sim_to_real: where episodes begin");
   command->add_option("--partner", arguments->partner, "none, ghost or solid");
   command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");
   command->add_option("--certificate", arguments->certificate,

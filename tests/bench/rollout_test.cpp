@@ -45,6 +45,15 @@ TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
     EXPECT_EQ(rollout.recording.robot[t].q, rollout.recording.reference[t - 1].q) << t;
 }
 
+TEST(Rollout, ASuiteMayHandPlansOverAtOnce) {
+  Parts parts;
+  const Rollout slowly = roll(parts, episode_setup(parts.spec, parts.suite, *parts.robot));
+  parts.suite.fuse_ticks = 1;
+  const Rollout at_once = roll(parts, episode_setup(parts.spec, parts.suite, *parts.robot));
+  const int wave = parts.clip.phases.act_begin + 4;  // within the fuse of a plan
+  EXPECT_NE(slowly.recording.reference[wave].q, at_once.recording.reference[wave].q);
+}
+
 TEST(Rollout, SameEpisodeGivesTheSameHash) {
   const Parts parts;
   const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);

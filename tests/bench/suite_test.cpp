@@ -108,6 +108,7 @@ TEST(Suite, ValuesOutOfRangeAreRefused) {
   EXPECT_THAT(refusal("episodes_per_clip: 0\n"), HasSubstr("1 or more"));
   EXPECT_THAT(refusal("episodes_per_clip: 1.5\n"), HasSubstr("whole number"));
   EXPECT_THAT(refusal("start_radius: 9\n"), HasSubstr("0 to 5 m"));
+  EXPECT_THAT(refusal("fuse_ticks: 91\n"), HasSubstr("expected fuse_ticks in 1..90, found 91"));
   EXPECT_THAT(refusal("limits: {wall_s_per_episode: 0}\n"), HasSubstr("more than 0 s"));
   EXPECT_THAT(refusal("seed: -4\n"), HasSubstr("0 or more"));
 }
