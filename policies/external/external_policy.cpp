@@ -75,7 +75,8 @@ PolicyInfo external_info(const std::string& name) {
   return info;
 }
 
-PolicyMaker external_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
+PolicyMaker external_maker(const std::string& name,
+                           std::shared_ptr<const RobotModel> robot,  // NOLINT: all makers have this signature
                            const PolicyOptions& options) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
   const PolicyDescriptor descriptor = read_policy_descriptor(name);

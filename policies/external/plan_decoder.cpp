@@ -70,7 +70,7 @@ std::string PlanDecoder::fault_of(std::span<const float> numbers) const {
 }
 
 double PlanDecoder::meant(std::span<const float> numbers, int anchor, int i) const {
-  return numbers[static_cast<std::size_t>(anchor * anchor_size() + i)] * at(format_.scale, i) + at(format_.offset, i);
+  return numbers[anchor * anchor_size() + i] * at(format_.scale, i) + at(format_.offset, i);
 }
 
 Eigen::Quaterniond PlanDecoder::rotation(std::span<const float> numbers, int anchor) const {
