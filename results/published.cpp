@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr const char* kSchema = "duet.published/1";
 constexpr const char* kManifest = "manifest.json";
 constexpr const char* kRows = "episodes.jsonl";
-constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // as they are, where they are
+constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // where they are
 
 std::string in(const std::string& folder, const std::string& name) { return (fs::path(folder) / name).string(); }
 
@@ -30,6 +30,20 @@ std::string lean_rows(const Run& run) {
     row.trace = {};
     row.feet = {};
     text += to_json(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  }
+  return text;
+}
+
+// A run names files by their places on its machine; what is published names them from the folder that it is published
+// from.
+std::string without_places(std::string text) {
+  for (std::size_t at = 0; (at = text.find("\"/", at)) != std::string::npos;) {
+    const std::size_t begin = at + 1, end = text.find('"', begin);
+    if (end == std::string::npos) break;
+    const fs::path place = text.substr(begin, end - begin);
+    const std::string from_here = place.lexically_proximate(fs::current_path()).string();
+    text.replace(begin, place.string().size(), from_here);
+    at = begin + from_here.size() + 1;
   }
   return text;
 }
@@ -51,7 +65,7 @@ nlohmann::json manifest_of(const Run& run, const std::string& folder) {
 void fill(const std::string& folder, const std::string& source, const Run& run) {
   write_file(in(folder, kRows), lean_rows(run));
   for (const char* name : kFiles)
-    if (fs::exists(in(source, name))) write_file(in(folder, name), read_file(in(source, name)));
+    if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
   write_file(in(folder, kManifest), manifest_of(run, folder).dump(2) + "\n");
 }
 

@@ -7,7 +7,8 @@
 
 namespace duet {
 
-// Writes `folder` at once: it is there whole or not at all. Throws InputError for what is no run or a run without rows,
+// Writes `folder` at once: it is there whole or not at all. Files that the run names by their places on its machine are
+// named from the working folder. Throws InputError for what is no run or a run without rows,
 // and where `folder` is there already.
 void publish_run(const std::string& run, const std::string& folder);
 

@@ -55,6 +55,16 @@ TEST_F(Published, IsTheRunWithoutItsTraces) {
   EXPECT_EQ(after.info.environment, before.info.environment);
 }
 
+TEST_F(Published, DoesNotSayWhereItsMachineKeepsFiles) {
+  const std::filesystem::path here = std::filesystem::current_path();
+  RunInfo info = tiny_run();
+  info.suite_yaml = "networks: [\"" + (here / "runs/a.safetensors").string() + "\", \"" +
+                    (here.parent_path() / "b.onnx").string() + "\", c.onnx]\n";
+  RunDirectory::open(scratch_ / "placed", info).append(traced(0));
+  publish_run(scratch_ / "placed", scratch_ / "tiny");
+  EXPECT_EQ(load_run(scratch_ / "tiny").info.suite_yaml, "networks: [\"runs/a.safetensors\", \"../b.onnx\", c.onnx]\n");
+}
+
 TEST_F(Published, AChangedFileIsRefusedByName) {
   const std::string folder = scratch_ / "tiny";
   publish_run(scratch_ / "run", folder);

@@ -235,10 +235,10 @@ TEST(LoadRun, RefusesWhatIsNoRun) {
 }
 
 TEST(Environment, HasWhatResultsDependOnAndNamesNobody) {
-  setenv("DUET_TEST_FOLDER", "/home/somebody/data", 1);
+  setenv("DUET_TEST_FOLDER", "/people/somebody/data", 1);
   const char* before = std::getenv("HOME");
   const std::string home = before != nullptr ? before : "";
-  setenv("HOME", "/home/somebody", 1);
+  setenv("HOME", "/people/somebody", 1);
   const nlohmann::json environment = capture_environment();
   setenv("HOME", home.c_str(), 1);
   unsetenv("DUET_TEST_FOLDER");
