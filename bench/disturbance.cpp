@@ -3,10 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/clock.h"
+
 namespace duet {
 namespace {
 
-int ticks_of(double seconds, double tick) { return std::max(1, static_cast<int>(std::lround(seconds / tick))); }
+int ticks_for(double seconds) { return std::max(1, ticks_of(seconds)); }
 
 }  // namespace
 
@@ -24,8 +26,8 @@ Disturbance::Disturbance(const Perturbation& perturbation, const RobotModel& rob
       kinematics_(robot) {
   if (!perturbation_.push) return;
   link_ = robot.frames[robot.frame_index(perturbation_.push->link)].link;
-  push_ticks_ = ticks_of(perturbation_.push->duration, steps_per_tick * dt);
-  every_ticks_ = ticks_of(perturbation_.push->every, steps_per_tick * dt);
+  push_ticks_ = ticks_for(perturbation_.push->duration);
+  every_ticks_ = ticks_for(perturbation_.push->every);
 }
 
 const RobotState& Disturbance::seen(const RobotState& state) {

@@ -63,7 +63,7 @@ class Trial {
 
   GateTrial run() {
     start();
-    const int ticks = static_cast<int>(std::lround(gate_.seconds / kTick));
+    const int ticks = ticks_of(gate_.seconds);
     for (int tick = 0; tick < ticks && alive_; ++tick) advance(tick);
     result_.survived = alive_;
     result_.seconds = kTick * recording_.frames();

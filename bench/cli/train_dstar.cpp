@@ -135,7 +135,6 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
   if (!arguments.config.empty())
     arguments.run.config = parse_dstar_config(read_file(arguments.config), arguments.config);
   if (arguments.smoke) make_small(arguments);
-  read_start(arguments);
   DstarData data = data_of(session, arguments);
   if (!arguments.from.empty()) arguments.run.from = load_dstar_network(arguments.from, *data.robot);
   double first = -1.0, last = 0.0, accuracy = 0.0, speed = 0.0;
@@ -166,7 +165,6 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
 
 // No training: windows of the same demonstrations, as they are.
 void make_library(Session& session, TrainArguments& arguments, const std::string& name) {
-  read_start(arguments);
   const DstarData data = data_of(session, arguments);
   const fs::path file = fs::path(arguments.run.folder) / name / "library.safetensors";
   fs::create_directories(file.parent_path());
@@ -177,6 +175,7 @@ void make_library(Session& session, TrainArguments& arguments, const std::string
 
 void train_or_stop(Session& session, TrainArguments& arguments, const std::string& name) {
   catch_interrupts();
+  read_start(arguments);
   try {
     name == kRetrieval ? make_library(session, arguments, name) : train(session, arguments, name);
   } catch (const Stopped&) {

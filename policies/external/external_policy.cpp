@@ -75,9 +75,10 @@ PolicyInfo external_info(const std::string& name) {
   return info;
 }
 
-PolicyMaker external_maker(const std::string& name,
-                           std::shared_ptr<const RobotModel> robot,  // NOLINT: all makers have this signature
-                           const PolicyOptions& options) {
+PolicyMaker external_maker(
+    const std::string& name,
+    std::shared_ptr<const RobotModel> robot,  // NOLINT(performance-unnecessary-value-param): as all makers
+    const PolicyOptions& options) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
   const PolicyDescriptor descriptor = read_policy_descriptor(name);
   return descriptor.kind == PolicyKind::kOnnx ? onnx_maker(descriptor, robot, options)
