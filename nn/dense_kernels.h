@@ -1,11 +1,14 @@
 // Dense linear algebra in float for networks: one source compiled for three instruction sets, chosen at run time. The
-// only float arithmetic of the project beside PAIR's lanes. Thread-safe: no state. gemv and elu do not allocate; gemm
-// may (blocking buffers).
+// only float arithmetic of the project beside PAIR's lanes. Thread-safe: no state. gemv, gemv_half and elu do not
+// allocate; gemm may (blocking buffers).
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 
 namespace duet {
+
+inline constexpr int kHalfColumns = 16;
 
 struct DenseKernels {
   std::string_view level;  // "x86-64-v4", "x86-64-v3", "x86-64-v2"
@@ -14,6 +17,9 @@ struct DenseKernels {
                bool accumulate);
   // y = W x + b, W (rows, cols) row-major as PyTorch and ONNX store it; b may be null.
   void (*gemv)(int rows, int cols, const float* W, const float* x, const float* b, float* y);
+  // The same with W in IEEE half precision: half the memory to read, which is what gemv waits for. `cols` is a multiple
+  // of kHalfColumns; products and sums are in float.
+  void (*gemv_half)(int rows, int cols, const std::uint16_t* W, const float* x, const float* b, float* y);
   // x <- elu(x), in place; and d <- d elu'(.), where `a` holds elu's results.
   void (*elu)(int n, float* x);
   void (*elu_backward)(int n, const float* a, float* d);

@@ -1,10 +1,31 @@
 #include "nn/mlp.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "nn/dense_kernels.h"
 
 namespace duet {
+namespace {
+
+int filled_up(Eigen::Index columns) {
+  return static_cast<int>((columns + kHalfColumns - 1) / kHalfColumns) * kHalfColumns;
+}
+
+// Empty where a weight would change.
+std::vector<std::uint16_t> in_half(const decltype(MlpLayer::W)& W) {
+  const int columns = filled_up(W.cols());
+  std::vector<std::uint16_t> halves(static_cast<size_t>(W.rows()) * columns, 0);
+  for (Eigen::Index row = 0; row < W.rows(); ++row)
+    for (Eigen::Index c = 0; c < W.cols(); ++c) {
+      const Eigen::half half(W(row, c));
+      if (static_cast<float>(half) != W(row, c)) return {};
+      halves[static_cast<size_t>(row * columns + c)] = half.x;
+    }
+  return halves;
+}
+
+}  // namespace
 
 std::vector<int> Mlp::sizes() const {
   std::vector<int> sizes = {inputs()};
@@ -25,21 +46,32 @@ Mlp random_mlp(const std::vector<int>& sizes, float output_scale, Random& random
   return mlp;
 }
 
-MlpRunner::MlpRunner(const Mlp& mlp) : mlp_(mlp) {
-  for (const MlpLayer& layer : mlp.layers) values_.emplace_back(layer.W.rows());
+MlpRunner::MlpRunner(const Mlp& mlp) : mlp_(mlp), input_(Eigen::VectorXf::Zero(filled_up(mlp.inputs()))) {
+  for (const MlpLayer& layer : mlp.layers) {
+    Layer& runs = layers_.emplace_back();
+    runs.half = in_half(layer.W);
+    runs.columns = runs.half.empty() ? static_cast<int>(layer.W.cols()) : filled_up(layer.W.cols());
+    runs.value.setZero(filled_up(layer.W.rows()));
+  }
 }
 
 std::span<const float> MlpRunner::run(std::span<const float> input) {
   const DenseKernels& kernels = dense_kernels();
-  const float* x = input.data();
-  for (size_t i = 0; i < mlp_.layers.size(); ++i) {
+  std::ranges::copy(input.first(static_cast<size_t>(mlp_.inputs())), input_.data());
+  const float* x = input_.data();
+  for (size_t i = 0; i < layers_.size(); ++i) {
     const MlpLayer& layer = mlp_.layers[i];
+    Layer& runs = layers_[i];
     const int rows = static_cast<int>(layer.W.rows());
-    kernels.gemv(rows, static_cast<int>(layer.W.cols()), layer.W.data(), x, layer.b.data(), values_[i].data());
-    if (i + 1 < mlp_.layers.size()) kernels.elu(rows, values_[i].data());
-    x = values_[i].data();
+    float* y = runs.value.data();
+    if (runs.half.empty())
+      kernels.gemv(rows, runs.columns, layer.W.data(), x, layer.b.data(), y);
+    else
+      kernels.gemv_half(rows, runs.columns, runs.half.data(), x, layer.b.data(), y);
+    if (i + 1 < layers_.size()) kernels.elu(rows, y);
+    x = y;
   }
-  return {values_.back().data(), static_cast<size_t>(values_.back().size())};
+  return {x, static_cast<size_t>(mlp_.outputs())};
 }
 
 }  // namespace duet

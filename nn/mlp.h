@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,8 @@ struct Mlp {
 // Weights normal with deviation 1.3 / sqrt(inputs) (the last layer: output_scale / sqrt(inputs)), biases 0.
 Mlp random_mlp(const std::vector<int>& sizes, float output_scale, Random& random);
 
-// Evaluates one network again and again; keeps a reference to it. No allocation after construction.
+// Evaluates one network again and again; keeps a reference to it. Weights that half precision holds exactly (those of a
+// file in F16) are kept so: what limits batch 1 is reading them. No allocation after construction.
 class MlpRunner {
  public:
   explicit MlpRunner(const Mlp& mlp);
@@ -34,8 +36,14 @@ class MlpRunner {
   std::span<const float> run(std::span<const float> input);
 
  private:
+  struct Layer {
+    std::vector<std::uint16_t> half;  // W, rows filled up with zeros; empty where W is not exact in half precision
+    int columns = 0;                  // of W or of `half`
+    Eigen::VectorXf value;            // the layer's result, filled up with zeros for the next one
+  };
   const Mlp& mlp_;
-  std::vector<Eigen::VectorXf> values_;  // after each layer
+  Eigen::VectorXf input_;
+  std::vector<Layer> layers_;
 };
 
 }  // namespace duet

@@ -260,8 +260,9 @@ std::string safetensors_bytes(const SafeTensors& content, TensorType type) {
   for (const auto& [name, tensor] : content.tensors) {
     require(name != kMetadata, fmt::format("a tensor cannot have the name '{}'", kMetadata));
     const std::size_t begin = data.size();
-    append_tensor(data, name, tensor, type);
-    header[name] = {{"dtype", name_of(type)}, {"shape", tensor.shape}, {"data_offsets", {begin, data.size()}}};
+    const TensorType stored = tensor.type.value_or(type);
+    append_tensor(data, name, tensor, stored);
+    header[name] = {{"dtype", name_of(stored)}, {"shape", tensor.shape}, {"data_offsets", {begin, data.size()}}};
   }
   const std::string text = header_text(header);
   std::string bytes;

@@ -5,23 +5,25 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace duet {
 
+enum class TensorType { kF32, kF16 };
+
 struct Tensor {
   std::vector<std::int64_t> shape;
-  std::vector<float> values;  // row-major
+  std::vector<float> values;            // row-major
+  std::optional<TensorType> type = {};  // to write it in, where it is not the file's
 };
 
 struct SafeTensors {
   std::map<std::string, std::string> metadata;  // the header's __metadata__
   std::map<std::string, Tensor> tensors;
 };
-
-enum class TensorType { kF32, kF16 };
 
 // Throws InputError naming file, tensor, expected and found: truncated, a header that is not JSON or longer than the
 // file, overlapping or uncovered bytes, a shape that does not give the byte count, an unknown type, a number that is

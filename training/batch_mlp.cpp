@@ -18,7 +18,8 @@ const Eigen::MatrixXf& BatchMlp::forward(const Eigen::MatrixXf& x) {
     const MlpLayer& layer = mlp_.layers[i];
     const int out = static_cast<int>(layer.W.rows()), in = static_cast<int>(layer.W.cols());
     Eigen::MatrixXf& y = values_[i + 1];
-    y = layer.b.replicate(1, n);
+    y.resize(out, n);
+    y.colwise() = layer.b;  // not replicate(), which divides for every element
     kernels.gemm(true, false, out, n, in, layer.W.data(), values_[i].data(), y.data(), true);
     if (i + 1 < mlp_.layers.size()) kernels.elu(static_cast<int>(y.size()), y.data());
   }

@@ -35,11 +35,20 @@ Eigen::VectorXf golden_input(const WbcNetwork& network) {
   return input;
 }
 
+// In full precision whatever the weights are in: the golden pair has to be.
 template <typename Vector>
 Tensor tensor_of(const Vector& values) {
-  Tensor tensor{.shape = {values.size()}, .values = {}};
+  Tensor tensor{.shape = {values.size()}, .values = {}, .type = TensorType::kF32};
   for (const auto value : values) tensor.values.push_back(static_cast<float>(value));
   return tensor;
+}
+
+void round_to_half(Mlp& mlp) {
+  const auto rounded = [](float value) { return static_cast<float>(Eigen::half(value)); };
+  for (MlpLayer& layer : mlp.layers) {
+    layer.W = layer.W.unaryExpr(rounded).eval();
+    layer.b = layer.b.unaryExpr(rounded).eval();
+  }
 }
 
 // Reading, with every message in one form.
@@ -160,7 +169,9 @@ void save_wbc_network(const std::string& path, const WbcNetwork& network, Tensor
                       {"steps", std::to_string(network.steps)},
                       {"note", network.note}};
   const Eigen::VectorXf input = golden_input(network);
-  WbcPolicy policy(network);
+  WbcNetwork stored = network;
+  if (type == TensorType::kF16) round_to_half(stored.mlp);
+  WbcPolicy policy(stored);
   tensors.tensors["golden.input"] = tensor_of(input);
   tensors.tensors["golden.output"] = tensor_of(policy.act({input.data(), static_cast<size_t>(input.size())}));
   write_safetensors(path, tensors, type);

@@ -17,7 +17,7 @@ namespace duet {
 
 inline constexpr float kNormalClip = 5.0F;    // of a normalised input
 inline constexpr double kActionBound = 4.0;   // of an action, in both directions
-inline constexpr double kGoldenError = 1e-4;  // of an output at load; with weights in F16 the pair is made from those
+inline constexpr double kGoldenError = 1e-4;  // of an output at load
 
 enum class WbcKind { kOracle, kStudent };  // 163-D with base velocity; 1090-D with history
 
@@ -48,7 +48,8 @@ class WbcPolicy {
   Eigen::VectorXf input_, action_;
 };
 
-// Throws std::runtime_error where the file cannot be written, std::invalid_argument for sizes that do not fit.
+// The weights in `type`, the rest in F32; the golden pair is of the weights as they are stored. Throws
+// std::runtime_error where the file cannot be written, std::invalid_argument for sizes that do not fit.
 void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type);
 
 // Throws InputError (file, what, expected, found): not a WBC-Sim network, a robot of another name, joints of other

@@ -69,6 +69,24 @@ TEST(DenseKernels, GemvEqualsDoubleWithAndWithoutBias) {
   }
 }
 
+TEST(DenseKernels, GemvOfHalvesEqualsDoubleForAnyNumberOfRows) {
+  constexpr int cols = 3 * kHalfColumns;
+  for (const int rows : {1, 3, 4, 13}) {
+    const VectorXf x = random_matrix(cols, 1, 5), b = random_matrix(rows, 1, 6);
+    const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W =
+        random_matrix(rows, cols, 4).cast<Eigen::half>();
+    const Eigen::VectorXd product = W.cast<double>() * x.cast<double>();
+    const auto* halves = reinterpret_cast<const std::uint16_t*>(W.data());
+    for (const DenseKernels* kernels : levels()) {
+      VectorXf y(rows);
+      kernels->gemv_half(rows, cols, halves, x.data(), nullptr, y.data());
+      EXPECT_LT((y.cast<double>() - product).cwiseAbs().maxCoeff(), tolerance(cols)) << kernels->level;
+      kernels->gemv_half(rows, cols, halves, x.data(), b.data(), y.data());
+      EXPECT_LT((y.cast<double>() - product - b.cast<double>()).cwiseAbs().maxCoeff(), tolerance(cols));
+    }
+  }
+}
+
 TEST(DenseKernels, EluAndItsDerivativeAreTheClosedForms) {
   for (const DenseKernels* kernels : levels())
     for (const float x : {-30.0F, -1.0F, -1e-3F, 0.0F, 1e-3F, 2.0F}) {

@@ -24,6 +24,20 @@ TEST(Mlp, EqualsTheFormulaInDouble) {
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(y[i], x[i], 1e-5);
 }
 
+// Weights that half precision holds run from it: the sums are the same but for their order.
+TEST(Mlp, WeightsInHalfPrecisionGiveWhatTheyGiveInFloat) {
+  Random random(3, 4);
+  Mlp mlp = random_mlp({37, 50, 18, 5}, 1.0F, random);
+  for (MlpLayer& layer : mlp.layers)
+    layer.W = layer.W.unaryExpr([](float w) { return static_cast<float>(Eigen::half(w)); }).eval();
+  const Eigen::VectorXf input = Eigen::VectorXf::LinSpaced(37, -1.0F, 2.0F);
+  Mlp inexact = mlp;
+  for (MlpLayer& layer : inexact.layers) layer.W(0, 0) += 1e-7F;  // one weight is enough
+  MlpRunner half(mlp), full(inexact);
+  const std::span<const float> a = half.run({input.data(), 37}), b = full.run({input.data(), 37});
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(a[i], b[i], 2e-5);
+}
+
 TEST(Mlp, SizesAreThoseAskedFor) {
   Random random(1, 2);
   EXPECT_EQ(random_mlp({4, 3, 2}, 1.0F, random).sizes(), (std::vector<int>{4, 3, 2}));
