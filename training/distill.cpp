@@ -49,7 +49,7 @@ struct Distillation::Worker {
   MatrixXf clean, critic, seen, input, teacher_input;
   MatrixXf batch_input, batch_target, difference;
   Normaliser moments;
-  DistillReport sums;
+  IterationReport sums;
   double loss = 0.0;
 
   Worker(const WbcAgent& agent, const Mlp& mlp, std::uint64_t seed, int thread, long round)
@@ -123,14 +123,14 @@ Distillation::Distillation(const std::shared_ptr<const RobotModel>& robot, const
   });
 }
 
-DistillReport Distillation::round() {
+IterationReport Distillation::iterate() {
   const auto begin = std::chrono::steady_clock::now();
   const int each = options_.environments / options_.threads, samples = options_.environments * options_.horizon;
   on_threads(options_.threads,
              [&](int t) { collect(t, state_.round < options_.warm_rounds, next_ + t * each * options_.horizon); });
   next_ = (next_ + samples) % options_.buffer;
   filled_ = std::min(options_.buffer, filled_ + samples);
-  DistillReport report;
+  IterationReport report;
   for (const auto& worker : workers_) {
     // The statistics are those of the first rounds: a normaliser that moves would move what has been learnt.
     if (state_.round < 4L * options_.warm_rounds) state_.input.merge(worker->moments);
@@ -150,10 +150,9 @@ DistillReport Distillation::round() {
     auto parameters = flat_views(state_.student.layers);
     state_.adam.step(parameters, gradients, report.rate, 1.0);
   }
-  report.round = ++state_.round;
+  report.iteration = ++state_.round;
   report.steps = state_.steps += samples;
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  state_.minutes += report.seconds / 60.0;
+  state_.minutes += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / 60.0;
   return report;
 }
 

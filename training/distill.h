@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "training/agent.h"
+#include "training/iteration_report.h"
 #include "training/wbc_environment.h"
 
 namespace duet {
@@ -40,14 +41,6 @@ struct StudentState {
   std::uint64_t seed = 0;
 };
 
-struct DistillReport {
-  long round = 0, steps = 0;
-  int episodes = 0, falls = 0;
-  double loss = 0.0;  // mean squared difference of an action
-  double rate = 0.0, seconds = 0.0;
-  TrackingStatistics tracking;
-};
-
 StudentState make_student(int joints, std::uint64_t seed);
 SafeTensors to_tensors(const StudentState& state);
 StudentState student_state(const SafeTensors& tensors, const std::string& file);
@@ -57,7 +50,7 @@ class Distillation {
   // `rounds`: after how many the learning rate has reached its last value.
   Distillation(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, const DistillOptions& options,
                WbcAgent teacher, StudentState state, long rounds);
-  DistillReport round();
+  IterationReport iterate();
   [[nodiscard]] const StudentState& state() const { return state_; }
 
  private:

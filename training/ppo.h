@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "training/agent.h"
+#include "training/iteration_report.h"
 #include "training/mirror.h"
 #include "training/wbc_environment.h"
 
@@ -23,14 +24,6 @@ struct PpoOptions {
   double divergence_low = 0.012, divergence_high = 0.03;
   double mirror_pull = 0.3;  // of the mean towards the mirrored one's, in 1/sigma^2
   double least_std = 0.05, largest_std = 1.0;
-};
-
-struct IterationReport {
-  long iteration = 0, steps = 0;
-  int episodes = 0, falls = 0;
-  double episode_seconds = 0.0, episode_return = 0.0;  // mean over the episodes that ended
-  double divergence = 0.0, rate = 0.0, std = 0.0;
-  TrackingStatistics tracking;
 };
 
 class Ppo {

@@ -104,29 +104,29 @@ class Log {
     if (steps_before == 0 || !fs::exists(path_)) write_file(path_, kColumns);
   }
 
-  void add(int episodes, int falls, double returns, double seconds, const TrackingStatistics& tracking) {
-    episodes_ += episodes;
-    falls_ += falls;
-    returns_ += returns * episodes;
-    seconds_ += seconds * episodes;
-    progress_.tracking.add(tracking);
+  void add(const IterationReport& iteration) {
+    episodes_ += iteration.episodes;
+    falls_ += iteration.falls;
+    returns_ += iteration.episode_return * iteration.episodes;
+    seconds_ += iteration.episode_seconds * iteration.episodes;
+    progress_.tracking.add(iteration.tracking);
   }
 
   [[nodiscard]] bool report_due() const { return since(reported_) > kReportEvery; }
   [[nodiscard]] bool save_due() const { return since(saved_) > kCheckpointEvery; }
   void saved() { saved_ = Clock::now(); }
 
-  WbcProgress report(long steps, double minutes, double rate, double std, double loss) {
+  WbcProgress report(const IterationReport& last, double minutes) {
     const double n = std::max(1, episodes_), elapsed = since(begin_);
-    progress_.steps = steps;
-    progress_.steps_per_second = static_cast<double>(steps - steps_before_) / std::max(1e-9, elapsed);
+    progress_.steps = last.steps;
+    progress_.steps_per_second = static_cast<double>(last.steps - steps_before_) / std::max(1e-9, elapsed);
     progress_.seconds_left =
-        static_cast<double>(progress_.steps_wanted - steps) / std::max(1e-9, progress_.steps_per_second);
+        static_cast<double>(progress_.steps_wanted - last.steps) / std::max(1e-9, progress_.steps_per_second);
     progress_.episode_return = returns_ / n;
     progress_.fall_share = falls_ / n;
     progress_.episode_seconds = seconds_ / n;
-    progress_.loss = loss;
-    append(minutes, rate, std);
+    progress_.loss = last.loss;
+    append(minutes, last.rate, last.std);
     WbcProgress reported = progress_;
     progress_.tracking = {};
     episodes_ = falls_ = 0;
@@ -164,31 +164,34 @@ WbcTask task_of(const std::string& stage, const WbcRun& run) {
   return task;
 }
 
-bool train_oracle(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run, long steps_wanted,
-                  const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
-  PpoOptions options;
-  options.threads = run.threads;
-  options.environments = run.environments;
-  const WbcTask task = task_of(run.stage, run);
-  options.entropy = task.entropy;
-  Ppo ppo(robot, task, options, first_state(run, *robot));
-  Log log(run, ppo.state().steps, steps_wanted);
+// The loop of a stage; `trainer` is a Ppo or a Distillation.
+template <typename Trainer>
+bool train_stage(Trainer& trainer, const RobotModel& robot, const WbcRun& run, long steps_wanted,
+                 const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
+  Log log(run, trainer.state().steps, steps_wanted);
   const auto save = [&] {
-    write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(ppo.state()));
-    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(*robot, ppo.state()), TensorType::kF32);
+    write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(trainer.state()));
+    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(robot, trainer.state()), TensorType::kF16);
     log.saved();
   };
   bool stopped = false;
-  while (ppo.state().steps < steps_wanted && !(stopped = stop())) {
-    const IterationReport iteration = ppo.iterate();
-    log.add(iteration.episodes, iteration.falls, iteration.episode_return, iteration.episode_seconds,
-            iteration.tracking);
+  while (trainer.state().steps < steps_wanted && !(stopped = stop())) {
+    const IterationReport iteration = trainer.iterate();
+    log.add(iteration);
     if (log.save_due()) save();
-    if (log.report_due() || ppo.state().steps >= steps_wanted)
-      report(log.report(iteration.steps, ppo.state().minutes, iteration.rate, iteration.std, 0.0));
+    if (log.report_due() || iteration.steps >= steps_wanted) report(log.report(iteration, trainer.state().minutes));
   }
   save();
   return !stopped;
+}
+
+Ppo oracle_trainer(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run) {
+  const WbcTask task = task_of(run.stage, run);
+  PpoOptions options;
+  options.threads = run.threads;
+  options.environments = run.environments;
+  options.entropy = task.entropy;
+  return {robot, task, options, first_state(run, *robot)};
 }
 
 StudentState first_student(const WbcRun& run, const RobotModel& robot) {
@@ -201,31 +204,13 @@ StudentState first_student(const WbcRun& run, const RobotModel& robot) {
   return state;
 }
 
-bool train_student(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run, long steps_wanted,
-                   const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
+Distillation student_trainer(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run, long steps_wanted) {
   DistillOptions options;
   options.threads = run.threads;
   options.environments = run.environments;
   const long rounds = steps_wanted / (static_cast<long>(options.environments) * options.horizon);
   const TrainingState teacher = load_state(beginning(run), *robot);
-  Distillation distillation(robot, task_of(run.stage, run), options, teacher.agent, first_student(run, *robot), rounds);
-  Log log(run, distillation.state().steps, steps_wanted);
-  const auto save = [&] {
-    write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(distillation.state()));
-    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(*robot, distillation.state()),
-                     TensorType::kF32);
-    log.saved();
-  };
-  bool stopped = false;
-  while (distillation.state().steps < steps_wanted && !(stopped = stop())) {
-    const DistillReport round = distillation.round();
-    log.add(round.episodes, round.falls, 0.0, 0.0, round.tracking);
-    if (log.save_due()) save();
-    if (log.report_due() || distillation.state().steps >= steps_wanted)
-      report(log.report(round.steps, distillation.state().minutes, round.rate, 0.0, round.loss));
-  }
-  save();
-  return !stopped;
+  return {robot, task_of(run.stage, run), options, teacher.agent, first_student(run, *robot), rounds};
 }
 
 WbcNetwork named(const RobotModel& robot) {
@@ -243,11 +228,8 @@ WbcNetwork named(const RobotModel& robot) {
 }  // namespace
 
 const std::vector<WbcStage>& wbc_plan() {
-  static const std::vector<WbcStage> plan = {{"stand", 5'500'000},
-                                             {"walk", 10'000'000},
-                                             {"brace", 4'000'000},
-                                             {"interact", 6'000'000},
-                                             {"student", 4'000'000}};
+  static const std::vector<WbcStage> plan = {
+      {"stand", 4'500'000}, {"walk", 9'000'000}, {"brace", 7'000'000}, {"interact", 8'000'000}, {"student", 6'000'000}};
   return plan;
 }
 
@@ -290,8 +272,12 @@ bool train_wbc(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run
   const WbcStage& stage = find_stage(run.stage);
   require(run.steps >= 0, fmt::format("train wbc: {} steps, expected a positive number", run.steps));
   const long steps = run.steps > 0 ? run.steps : stage.steps;
-  return run.stage == "student" ? train_student(robot, run, steps, report, stop)
-                                : train_oracle(robot, run, steps, report, stop);
+  if (run.stage == "student") {
+    Distillation student = student_trainer(robot, run, steps);
+    return train_stage(student, *robot, run, steps, report, stop);
+  }
+  Ppo oracle = oracle_trainer(robot, run);
+  return train_stage(oracle, *robot, run, steps, report, stop);
 }
 
 }  // namespace duet
