@@ -44,6 +44,7 @@ SafeTensors to_tensors(const TrainingState& state) {
   tensors.metadata["rate"] = fmt::format("{}", state.rate);
   tensors.metadata["iteration"] = std::to_string(state.iteration);
   tensors.metadata["steps"] = std::to_string(state.steps);
+  if (state.critic_alone > 0) tensors.metadata["critic_alone"] = std::to_string(state.critic_alone);
   tensors.metadata["minutes"] = fmt::format("{}", state.minutes);
   tensors.metadata["stage"] = state.stage;
   tensors.metadata["robot_digest"] = state.robot_digest;
@@ -63,6 +64,8 @@ TrainingState training_state(const SafeTensors& tensors, const std::string& file
   state.rate = number_of(tensors, "rate", file);
   state.iteration = std::lround(number_of(tensors, "iteration", file));
   state.steps = std::lround(number_of(tensors, "steps", file));
+  if (tensors.metadata.contains("critic_alone"))
+    state.critic_alone = std::lround(number_of(tensors, "critic_alone", file));
   state.minutes = number_of(tensors, "minutes", file);
   state.stage = text_of(tensors, "stage", file);
   state.robot_digest = text_of(tensors, "robot_digest", file);

@@ -25,7 +25,8 @@ struct TrainingState {
   Adam adam;
   double rate = 3e-4;
   long iteration = 0, steps = 0;
-  double minutes = 0.0;  // of training so far
+  long critic_alone = 0;  // iterations at the beginning in which only the critic learns: it is newer than the actor
+  double minutes = 0.0;   // of training so far
   std::string stage, robot_digest;
   std::uint64_t seed = 0;
 };

@@ -22,7 +22,17 @@ void Normaliser::merge(const Normaliser& other) {
   count = total;
 }
 
-Eigen::VectorXf Normaliser::deviation() const { return variance.cwiseSqrt().array() + 1e-2F; }
+namespace {
+
+constexpr float kLeastDeviation = 1e-2F;
+
+}  // namespace
+
+Eigen::VectorXf Normaliser::deviation() const { return variance.cwiseSqrt().array() + kLeastDeviation; }
+
+void Normaliser::set_deviation(const Eigen::VectorXf& deviation) {
+  variance = (deviation.array() - kLeastDeviation).max(0.0F).square();
+}
 
 void Normaliser::apply(Eigen::MatrixXf& x) const {
   const Eigen::ArrayXf inverse = deviation().cwiseInverse();

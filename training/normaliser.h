@@ -5,6 +5,8 @@
 
 namespace duet {
 
+inline constexpr double kLongestMemory = 4e6;  // samples: what the first poses looked like must not weigh for ever
+
 struct Normaliser {
   Eigen::VectorXf mean, variance;
   double count = 1e-2;
@@ -15,6 +17,7 @@ struct Normaliser {
   // (x - mean) / deviation, clipped to +-kNormalClip, in place.
   void apply(Eigen::MatrixXf& x) const;
   [[nodiscard]] Eigen::VectorXf deviation() const;  // never below 1e-2
+  void set_deviation(const Eigen::VectorXf& deviation);
 };
 
 }  // namespace duet

@@ -124,7 +124,7 @@ IterationReport Ppo::iterate() {
     advantages(t, batch);
   });
   const double divergence = learn(batch);
-  steer(divergence);
+  if (!critic_alone()) steer(divergence);
   IterationReport report = summary();
   report.divergence = divergence;
   report.iteration = ++state_.iteration;
@@ -165,9 +165,8 @@ IterationReport Ppo::summary() {
     report.episode_return += worker->sums.episode_return;
     for (WbcEnvironment& environment : worker->environments) report.tracking.add(environment.take_statistics());
   }
-  // What the first poses looked like must not weigh for ever.
   for (Normaliser* input : {&state_.agent.actor_input, &state_.agent.critic_input})
-    input->count = std::min(input->count, 4e6);
+    input->count = std::min(input->count, kLongestMemory);
   const double episodes = std::max(1, report.episodes);
   report.episode_seconds /= episodes;
   report.episode_return /= episodes;
@@ -294,6 +293,10 @@ double Ppo::gradients(int thread, std::span<const int> samples, const std::vecto
     worker.critic_batch.col(i) = batch.critic[mirrored[samples[i]]].col(samples[i]);
   }
   const double divergence = differentiate_policy(worker, samples, mirrored, share, batch);
+  if (critic_alone()) {
+    worker.mean_gradient.setZero();
+    worker.log_std_gradient.setZero();
+  }
   worker.actor.backward(worker.mean_gradient);
   const MatrixXf& value = worker.critic.forward(worker.critic_batch);
   worker.value_gradient.resize(1, n);

@@ -53,6 +53,7 @@ class Ppo {
   [[nodiscard]] float ratio_gradient(float log_ratio, float advantage) const;
   void apply_gradients();
   void steer(double divergence);
+  [[nodiscard]] bool critic_alone() const { return state_.iteration < state_.critic_alone; }
 
   PpoOptions options_;
   TrainingState state_;

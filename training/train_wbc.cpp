@@ -19,6 +19,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr double kReportEvery = 10.0, kCheckpointEvery = 60.0;  // [s]
+constexpr double kFirstStd = 0.6;                               // of an action; training leaves it near this
+constexpr long kCriticAlone = 40;                               // iterations
 constexpr const char* kColumns =
     "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
     "action_rate,clock,lift_m,rate,std,loss\n";
@@ -66,6 +68,37 @@ TrainingState load_state(const std::string& file, const RobotModel& robot) {
   return state;
 }
 
+TrainingState new_state(const RobotModel& robot, std::uint64_t seed) {
+  const WbcLayout layout(robot.dof());
+  TrainingState state;
+  state.agent = make_agent(layout.oracle(), layout.critic(static_cast<int>(critic_links(robot).size())), robot.dof(),
+                           kFirstStd, seed);
+  return state;
+}
+
+// A network as it ships has an actor alone: its critic is new.
+TrainingState state_of_network(const std::string& file, const RobotModel& robot, std::uint64_t seed) {
+  const WbcNetwork network = load_wbc_network(file, robot);
+  if (network.kind != WbcKind::kOracle)
+    throw InputError(fmt::format("{}: the network of a student, expected that of an oracle", file));
+  TrainingState state = new_state(robot, seed);
+  WbcAgent& agent = state.agent;
+  agent.actor = network.mlp;
+  agent.actor_input.mean = network.mean;
+  agent.actor_input.set_deviation(network.deviation);
+  agent.actor_input.count = kLongestMemory;
+  state.critic_alone = kCriticAlone;
+  return state;
+}
+
+TrainingState load_beginning(const std::string& file, const RobotModel& robot, std::uint64_t seed) {
+  if (is_wbc_network(read_safetensors(file))) return state_of_network(file, robot, seed);
+  TrainingState state = load_state(file, robot);
+  state.adam = {};
+  state.critic_alone = 0;
+  return state;
+}
+
 TrainingState first_state(const WbcRun& run, const RobotModel& robot) {
   const std::string here = wbc_checkpoint(run.folder, run.stage);
   if (fs::exists(here)) {
@@ -76,15 +109,7 @@ TrainingState first_state(const WbcRun& run, const RobotModel& robot) {
     return state;
   }
   const std::string from = beginning(run);
-  TrainingState state;
-  if (from.empty()) {
-    const WbcLayout layout(robot.dof());
-    const int critic = layout.critic(static_cast<int>(critic_links(robot).size()));
-    state.agent = make_agent(layout.oracle(), critic, robot.dof(), 0.6, run.seed);
-  } else {
-    state = load_state(from, robot);
-    state.adam = {};
-  }
+  TrainingState state = from.empty() ? new_state(robot, run.seed) : load_beginning(from, robot, run.seed);
   state.iteration = state.steps = 0;
   state.minutes = 0.0;
   state.stage = run.stage;
@@ -209,7 +234,7 @@ Distillation student_trainer(const std::shared_ptr<const RobotModel>& robot, con
   options.threads = run.threads;
   options.environments = run.environments;
   const long rounds = steps_wanted / (static_cast<long>(options.environments) * options.horizon);
-  const TrainingState teacher = load_state(beginning(run), *robot);
+  const TrainingState teacher = load_beginning(beginning(run), *robot, run.seed);
   return {robot, task_of(run.stage, run), options, teacher.agent, first_student(run, *robot), rounds};
 }
 

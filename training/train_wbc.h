@@ -23,7 +23,7 @@ const std::vector<WbcStage>& wbc_plan();  // stand, walk, brace, interact, stude
 struct WbcRun {
   std::string stage;   // of wbc_plan()
   std::string folder;  // runs/wbc: this stage writes into <folder>/<stage>/
-  std::string from;    // checkpoint to begin with; empty: that of the stage before in `folder`, or new weights
+  std::string from;    // checkpoint or oracle's network to begin with; empty: the stage before in `folder`, or nothing
   long steps = 0;      // 0: the plan's
   std::uint64_t seed = 1;
   int threads = 2;

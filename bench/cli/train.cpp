@@ -145,7 +145,8 @@ void add_train(CLI::App& app, Session& session) {
   wbc->add_option("--stage", arguments->stage, "stand, walk, brace, interact, student, or all in turn")
       ->capture_default_str();
   wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
-  wbc->add_option("--from", arguments->run.from, "checkpoint to begin with (default: the stage before in the folder)");
+  wbc->add_option("--from", arguments->run.from,
+                  "checkpoint, or the network of an oracle, to begin with (default: the stage before in the folder)");
   wbc->add_option("--steps", arguments->run.steps, "of the environment, in all (default: the stage's)");
   wbc->add_option("--seed", arguments->run.seed, "of weights, commands and noise")->capture_default_str();
   wbc->add_option("--threads", arguments->run.threads, "the result depends on it")->capture_default_str();

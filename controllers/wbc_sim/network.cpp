@@ -177,6 +177,11 @@ void save_wbc_network(const std::string& path, const WbcNetwork& network, Tensor
   write_safetensors(path, tensors, type);
 }
 
+bool is_wbc_network(const SafeTensors& tensors) {
+  const auto format = tensors.metadata.find("format");
+  return format != tensors.metadata.end() && format->second == kFormat;
+}
+
 WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   const SafeTensors tensors = read_safetensors(path);
   const Reader reader(tensors, path);

@@ -52,6 +52,9 @@ class WbcPolicy {
 // std::runtime_error where the file cannot be written, std::invalid_argument for sizes that do not fit.
 void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type);
 
+// Whether a file's header says that it is such a network.
+bool is_wbc_network(const SafeTensors& tensors);
+
 // Throws InputError (file, what, expected, found): not a WBC-Sim network, a robot of another name, joints of other
 // names or in another order, observation channels other than this program's, shapes that do not fit, numbers that are
 // not finite, a golden output that is missed by more than kGoldenError.

@@ -58,6 +58,36 @@ TEST_F(TrainWbcInMujoco, AStoppedStageGoesOnWhereItWas) {
   EXPECT_EQ(training_state(read_safetensors(file), file).steps, 1024);
 }
 
+// The critic is new: while it learns alone the actor stays as it is, also in a training that was stopped in between.
+TEST_F(TrainWbcInMujoco, BeginsWithTheNetworkOfAnOracle) {
+  const test::ScratchFolder scratch;
+  train(small_run(scratch / "wbc", "stand"));
+  WbcRun finer = small_run(scratch / "finer", "brace");
+  finer.from = wbc_network_file(scratch / "wbc", "stand");
+  int asked = 0;
+  EXPECT_FALSE(train(finer, [&] { return ++asked > 1; }));
+  EXPECT_TRUE(train(finer));
+  const WbcNetwork before = load_wbc_network(finer.from, *g1());
+  const std::string file = wbc_checkpoint(scratch / "finer", "brace");
+  const TrainingState after = training_state(read_safetensors(file), file);
+  EXPECT_GT(after.critic_alone, 2);
+  EXPECT_EQ(after.iteration, 2);
+  for (size_t i = 0; i < before.mlp.layers.size(); ++i)
+    EXPECT_EQ(after.agent.actor.layers[i].W, before.mlp.layers[i].W) << "layer " << i;
+  EXPECT_LT((after.agent.actor_input.deviation() - before.deviation).cwiseAbs().maxCoeff(), 0.05F);
+}
+
+TEST_F(TrainWbcInMujoco, TheNetworkOfAStudentIsNoBeginning) {
+  const test::ScratchFolder scratch;
+  train(small_run(scratch / "wbc", "stand"));
+  WbcRun student = small_run(scratch / "wbc", "student");
+  student.from = wbc_network_file(scratch / "wbc", "stand");
+  train(student);
+  WbcRun walk = small_run(scratch / "wbc", "walk");
+  walk.from = wbc_network_file(scratch / "wbc", "student");
+  EXPECT_THAT([&] { train(walk); }, ThrowsMessage<InputError>(HasSubstr("expected that of an oracle")));
+}
+
 TEST_F(TrainWbcInMujoco, ABrokenCheckpointStopsTheTrainingAndStays) {
   const test::ScratchFolder scratch;
   train(small_run(scratch / "wbc", "stand"));
