@@ -3,12 +3,19 @@
 // allocate; gemm may (blocking buffers).
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
 namespace duet {
 
-inline constexpr int kHalfColumns = 16;
+// How gemv_half wants its weights: row and column filled up with zeros to multiples of these, and element (row, c) at
+// half_index.
+inline constexpr int kHalfRows = 4, kHalfColumns = 16;
+constexpr std::size_t half_index(int row, int c, int cols) {
+  const int block = row / kHalfRows * (cols / kHalfColumns) + c / kHalfColumns;
+  return (static_cast<std::size_t>(block) * kHalfRows + row % kHalfRows) * kHalfColumns + c % kHalfColumns;
+}
 
 struct DenseKernels {
   std::string_view level;  // "x86-64-v4", "x86-64-v3", "x86-64-v2"
@@ -18,7 +25,7 @@ struct DenseKernels {
   // y = W x + b, W (rows, cols) row-major as PyTorch and ONNX store it; b may be null.
   void (*gemv)(int rows, int cols, const float* W, const float* x, const float* b, float* y);
   // The same with W in IEEE half precision: half the memory to read, which is what gemv waits for. `cols` is a multiple
-  // of kHalfColumns; products and sums are in float.
+  // of kHalfColumns, W in the order of half_index; products and sums are in float.
   void (*gemv_half)(int rows, int cols, const std::uint16_t* W, const float* x, const float* b, float* y);
   // x <- elu(x), in place; and d <- d elu'(.), where `a` holds elu's results.
   void (*elu)(int n, float* x);

@@ -37,7 +37,7 @@ class MlpRunner {
 
  private:
   struct Layer {
-    std::vector<std::uint16_t> half;  // W, rows filled up with zeros; empty where W is not exact in half precision
+    std::vector<std::uint16_t> half;  // W in the order of half_index; empty where W is not exact in half precision
     int columns = 0;                  // of W or of `half`
     Eigen::VectorXf value;            // the layer's result, filled up with zeros for the next one
   };

@@ -14,7 +14,8 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr int kSteps = 3;
+constexpr int kSteps = 3;           // at most
+constexpr double kExact = 1e-9;     // error that is none [m]
 constexpr double kDamping = 1e-4;   // of J^T J; keeps a stretched knee from turning over [m^2]
 constexpr double kLongest = 0.3;    // step of one joint [rad]
 constexpr double kRotation = 0.15;  // a radian of the foot's orientation weighs as much as this [m]
@@ -64,13 +65,14 @@ void LegChain::solve(const Pose& X_BF, Vector6& q) const {
   const Eigen::Matrix3d R_BF = X_BF.R.toRotationMatrix();
   for (int step = 0; step < kSteps; ++step) {
     const Placed placed = place(q);
+    Vector6 error;
+    error << X_BF.p - placed.p_BF, kRotation * turn(placed.R_BF, R_BF);
+    if (error.squaredNorm() < kExact * kExact) return;
     Matrix6 J;
     for (int i = 0; i < 6; ++i) {
       J.col(i).head<3>() = placed.axes.col(i).cross(placed.p_BF - placed.origins.col(i));
       J.col(i).tail<3>() = kRotation * placed.axes.col(i);
     }
-    Vector6 error;
-    error << X_BF.p - placed.p_BF, kRotation * turn(placed.R_BF, R_BF);
     const Matrix6 normal = J.transpose() * J + kDamping * Matrix6::Identity();
     const Vector6 dq = normal.ldlt().solve(J.transpose() * error);
     for (int i = 0; i < 6; ++i)

@@ -130,11 +130,15 @@ long whole_number(const Reader& reader, const std::string& key, const std::strin
 }  // namespace
 
 WbcPolicy::WbcPolicy(const WbcNetwork& network)
-    : network_(network), runner_(network.mlp), input_(network.mean.size()), action_(network.mlp.outputs()) {}
+    : network_(network),
+      runner_(network.mlp),
+      inverse_deviation_(network.deviation.cwiseInverse()),
+      input_(network.mean.size()),
+      action_(network.mlp.outputs()) {}
 
 const Eigen::VectorXf& WbcPolicy::act(std::span<const float> observation) {
-  input_ = ((Eigen::Map<const Eigen::ArrayXf>(observation.data(), input_.size()) - network_.mean.array()) /
-            network_.deviation.array())
+  input_ = ((Eigen::Map<const Eigen::ArrayXf>(observation.data(), input_.size()) - network_.mean.array()) *
+            inverse_deviation_.array())
                .cwiseMax(-kNormalClip)
                .cwiseMin(kNormalClip);
   const std::span<const float> output = runner_.run({input_.data(), static_cast<size_t>(input_.size())});

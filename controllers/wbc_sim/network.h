@@ -45,7 +45,7 @@ class WbcPolicy {
  private:
   const WbcNetwork& network_;
   MlpRunner runner_;
-  Eigen::VectorXf input_, action_;
+  Eigen::VectorXf inverse_deviation_, input_, action_;
 };
 
 // The weights in `type`, the rest in F32; the golden pair is of the weights as they are stored. Throws

@@ -76,12 +76,14 @@ TEST(DenseKernels, GemvOfHalvesEqualsDoubleForAnyNumberOfRows) {
     const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W =
         random_matrix(rows, cols, 4).cast<Eigen::half>();
     const Eigen::VectorXd product = W.cast<double>() * x.cast<double>();
-    const auto* halves = reinterpret_cast<const std::uint16_t*>(W.data());
+    std::vector<std::uint16_t> halves((rows + kHalfRows - 1) / kHalfRows * kHalfRows * static_cast<size_t>(cols), 0);
+    for (int row = 0; row < rows; ++row)
+      for (int c = 0; c < cols; ++c) halves[half_index(row, c, cols)] = W(row, c).x;
     for (const DenseKernels* kernels : levels()) {
       VectorXf y(rows);
-      kernels->gemv_half(rows, cols, halves, x.data(), nullptr, y.data());
+      kernels->gemv_half(rows, cols, halves.data(), x.data(), nullptr, y.data());
       EXPECT_LT((y.cast<double>() - product).cwiseAbs().maxCoeff(), tolerance(cols)) << kernels->level;
-      kernels->gemv_half(rows, cols, halves, x.data(), b.data(), y.data());
+      kernels->gemv_half(rows, cols, halves.data(), x.data(), b.data(), y.data());
       EXPECT_LT((y.cast<double>() - product - b.cast<double>()).cwiseAbs().maxCoeff(), tolerance(cols));
     }
   }
