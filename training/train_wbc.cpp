@@ -44,16 +44,17 @@ std::string file_of(const std::string& folder, const std::string& stage, const c
 // The checkpoint that a stage begins with; empty: new weights.
 std::string beginning(const WbcRun& run) {
   if (!run.from.empty()) return run.from;
-  const std::vector<std::string> names = stage_names();
-  const auto here = std::ranges::find(names, run.stage);
-  if (here == names.begin()) return "";
-  std::string before = wbc_checkpoint(run.folder, *(here - 1));
-  if (!fs::exists(before))
+  auto stage = std::ranges::find(wbc_plan(), run.stage, &WbcStage::name);
+  if (stage == wbc_plan().begin()) return "";
+  const auto checkpoint = [&] { return wbc_checkpoint(run.folder, stage->name); };
+  do --stage;
+  while (stage->extra && !fs::exists(checkpoint()));
+  if (!fs::exists(checkpoint()))
     throw InputError(
         fmt::format("stage '{}' begins with '{}', which is not there: run stage '{}' first, or name a "
                     "checkpoint with --from",
-                    run.stage, before, *(here - 1)));
-  return before;
+                    run.stage, checkpoint(), stage->name));
+  return checkpoint();
 }
 
 void check_robot(const TrainingState& state, const RobotModel& robot, const std::string& file) {
@@ -253,8 +254,11 @@ WbcNetwork named(const RobotModel& robot) {
 }  // namespace
 
 const std::vector<WbcStage>& wbc_plan() {
-  static const std::vector<WbcStage> plan = {
-      {"stand", 4'500'000}, {"walk", 9'000'000}, {"brace", 7'000'000}, {"interact", 8'000'000}, {"student", 6'000'000}};
+  static const std::vector<WbcStage> plan = {{"stand", 5'700'000},
+                                             {"walk", 3'600'000},
+                                             {.name = "brace", .steps = 7'000'000, .extra = true},
+                                             {.name = "interact", .steps = 8'000'000, .extra = true},
+                                             {"student", 1'200'000}};
   return plan;
 }
 

@@ -16,7 +16,8 @@ namespace duet {
 // What a stage is given unless the caller says otherwise. "student" is the distillation of what came before it.
 struct WbcStage {
   std::string name;
-  long steps = 0;  // of the environment
+  long steps = 0;      // of the environment
+  bool extra = false;  // is run when asked for by name; what comes after it goes without where it was not
 };
 const std::vector<WbcStage>& wbc_plan();  // stand, walk, brace, interact, student
 

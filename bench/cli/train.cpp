@@ -78,7 +78,8 @@ std::vector<std::string> stages_of(const TrainArguments& arguments) {
   if (arguments.smoke) return {"stand", "student"};
   if (arguments.stage != "all") return {arguments.stage};
   std::vector<std::string> stages;
-  for (const WbcStage& stage : wbc_plan()) stages.push_back(stage.name);
+  for (const WbcStage& stage : wbc_plan())
+    if (!stage.extra) stages.push_back(stage.name);
   return stages;
 }
 
@@ -102,6 +103,7 @@ void train(Session& session, TrainArguments& arguments) {
   for (const std::string& stage : stages) {
     WbcRun run = arguments.smoke ? smoke_run(arguments, stage) : arguments.run;
     run.stage = stage;
+    if (!arguments.smoke && stage != stages.front()) run.from.clear();  // the others begin with the one before them
     if (!arguments.smoke && (stage == "interact" || stage == "student")) {
       Progress progress(session.progress());
       run.motions = std::make_shared<const std::vector<RobotMotion>>(
@@ -142,7 +144,9 @@ void add_train(CLI::App& app, Session& session) {
                   "WBC-Sim (supplement A.3.2): an oracle by PPO in stages, then a student by distillation.\n"
                   "Killed or stopped, the same command goes on from the last checkpoint",
                   "duet train wbc --smoke -o runs/wbc-smoke");
-  wbc->add_option("--stage", arguments->stage, "stand, walk, brace, interact, student, or all in turn")
+  wbc->add_option(
+         "--stage", arguments->stage,
+         "stand, walk, student, or all three in turn; or, before student, brace (pushes) and interact (clips, too)")
       ->capture_default_str();
   wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
   wbc->add_option("--from", arguments->run.from,

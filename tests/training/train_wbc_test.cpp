@@ -77,6 +77,14 @@ TEST_F(TrainWbcInMujoco, BeginsWithTheNetworkOfAnOracle) {
   EXPECT_LT((after.agent.actor_input.deviation() - before.deviation).cwiseAbs().maxCoeff(), 0.05F);
 }
 
+TEST_F(TrainWbcInMujoco, AnExtraStageMayBeLeftOut) {
+  const test::ScratchFolder scratch;
+  train(small_run(scratch / "wbc", "stand"));
+  train(small_run(scratch / "wbc", "walk"));
+  EXPECT_TRUE(train(small_run(scratch / "wbc", "student")));
+  EXPECT_TRUE(train(small_run(scratch / "wbc", "interact")));  // after walk: there is no brace
+}
+
 TEST_F(TrainWbcInMujoco, TheNetworkOfAStudentIsNoBeginning) {
   const test::ScratchFolder scratch;
   train(small_run(scratch / "wbc", "stand"));
