@@ -16,7 +16,7 @@ namespace duet {
 // ghost: the partner touches nothing (as in the supplement). solid: contacts act on the robot and are reported.
 enum class PartnerMode { kNone, kGhost, kSolid };
 
-// Friction is stated per pair of bodies (ARCHITECTURE decision 4); the adapter finds values that give it.
+// Friction is stated per pair of bodies (docs/architecture.md, 4); the adapter finds values that give it.
 struct PairFriction {
   double robot_ground = 0.8;
   double robot_human = 0.5;

@@ -1,5 +1,5 @@
 // An episode that begins with bodies inside one another would be thrown apart: refused by name in every engine alike.
-// What touches lightly at the start (soles, a hand on a shoulder) is let be.
+// A light touch at the start (soles, a hand on a shoulder) is allowed.
 #pragma once
 
 #include "backends/partner.h"
@@ -13,8 +13,8 @@ inline constexpr double kPartnerOverlap = 0.10;  // of a link with a capsule of 
 
 // For Backend::reset. Throws std::invalid_argument naming the deepest overlap beyond kRobotOverlap.
 void refuse_robot_overlap(const Scene& scene, const RobotState& state);
-// For the first Backend::set_partner after a reset: the same for the solid partner and kPartnerOverlap. Another mode of
-// partner is let be.
+// For the first Backend::set_partner after a reset: the same for the solid partner and kPartnerOverlap. A partner of
+// another mode is never refused.
 void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints);
 
 }  // namespace duet

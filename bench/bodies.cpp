@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "bench/suite_names.h"
+#include "bench/trust.h"
 #include "core/require.h"
 #include "core/share.h"
 #include "policies/on_other_body.h"
@@ -13,20 +14,21 @@
 namespace duet {
 namespace {
 
-std::string card_of(const Suite& suite, const SuiteController& controller) {
-  if (!suite.robot.empty()) return suite.robot;
-  const std::string robot = controller_info(controller.use).robot;
-  return robot.empty() ? default_card_path() : card_path(robot);
-}
-
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
 }  // namespace
 
+std::string card_of(const Suite& suite, const SuiteController& controller) {
+  if (!suite.robot.empty()) return suite.robot;
+  const std::string robot = controller_info(controller.use).robot;
+  return robot.empty() ? default_card_path() : card_path(robot);
+}
+
 Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
                const std::vector<std::string>& skipped_policies) {
+  require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
   add(suite.robot.empty() ? default_card_path() : suite.robot);
   for (const SuiteController& controller : suite.controllers) {
     if (contains(skipped_controllers, controller.name)) continue;
@@ -45,7 +47,16 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
   add_policy(SuitePolicy{kNullPolicy});
 }
 
-// What was made for the nominal body goes by the joints' names on one that it does not fit.
+// What was made for the nominal body goes by the joints' names on one that it does not fit. Its files were read for the
+// nominal body a moment ago; where they were not, they are broken, and what was thrown goes on.
+void Bodies::map_policy(const std::string& name, std::size_t place) {
+  const PolicyMaker& make = policies_.at({name, 0}).make;
+  if (place == 0 || !make) throw;
+  policies_.at({name, place}).make = [make, made_for = nominal(), body = bodies_[place].robot] {
+    return on_other_body(make(), made_for, *body);
+  };
+}
+
 void Bodies::add_policy(const SuitePolicy& policy) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     PolicyOnBody& entry = policies_[{policy.name, place}];
@@ -54,11 +65,10 @@ void Bodies::add_policy(const SuitePolicy& policy) {
     } catch (const MissingError& error) {
       entry.refusal = fmt::format("policy '{}' is absent: {}", policy.name, error.what());
       absent_policies_[policy.name] = entry.refusal;
-    } catch (const std::exception&) {
-      if (place == 0) throw;
-      entry.make = [make = policies_.at({policy.name, 0}).make, made_for = nominal(), body = bodies_[place].robot] {
-        return on_other_body(make(), made_for, *body);
-      };
+    } catch (const InputError&) {
+      map_policy(policy.name, place);
+    } catch (const std::invalid_argument&) {
+      map_policy(policy.name, place);
     }
   }
 }

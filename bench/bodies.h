@@ -1,6 +1,6 @@
-// Who is on stage: the robot that each controller of a suite was made for, the clips and the policies on that robot,
-// and what this machine cannot run. Each card is loaded once, and what a policy loads once per body. Immutable once the
-// clips are there; shared by threads.
+// The robot that each controller of a suite was made for, the clips and the policies on that robot, and what this
+// machine cannot run. Each card is loaded once, and what a policy loads once per body. Immutable once the clips are
+// there; shared by threads.
 #pragma once
 
 #include <map>
@@ -22,11 +22,14 @@ struct PolicyOnBody {
   std::string refusal;  // its files are not on this machine; empty where it can
 };
 
+// The card of the robot that one of the suite's controllers runs on. Throws MissingError where it is not there.
+std::string card_of(const Suite& suite, const SuiteController& controller);
+
 class Bodies {
  public:
   // Throws as load_robot for the suite's own card and for a card that is broken, and as policy_maker where a policy
-  // does not fit nominal() or its files are broken. A controller or policy whose files are not on this machine is
-  // absent, not an error; those in `skipped` are not looked at.
+  // does not fit nominal() or its files are broken. InputError too for programs that are not allowed. A controller or
+  // policy whose files are not on this machine is absent, not an error; those in `skipped` are not looked at.
   explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
                   const std::vector<std::string>& skipped_policies = {});
 
@@ -53,6 +56,8 @@ class Bodies {
   };
   std::size_t add(const std::string& card);
   void add_policy(const SuitePolicy& policy);
+  // Called while an exception is handled; throws it again where there is nothing to map.
+  void map_policy(const std::string& name, std::size_t place);
   [[nodiscard]] std::size_t place(const std::string& controller) const;
 
   std::vector<Body> bodies_;                  // the nominal first

@@ -7,6 +7,7 @@
 #include "core/digest.h"
 #include "core/file.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "results/environment.h"
 #include "results/json_fields.h"
 
@@ -120,7 +121,7 @@ void read_list(JsonFields& fields, const std::string& key, const std::string& wh
 Verdict read_verdict(const std::string& text, const std::string& what) {
   for (const Verdict verdict : {Verdict::kPass, Verdict::kFail, Verdict::kDeviation})
     if (text == conformance::to_string(verdict)) return verdict;
-  throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, text));
+  throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, shown(text)));
 }
 
 CertifiedMeasurement read_measurement(const json& object, const std::string& what) {
@@ -233,10 +234,10 @@ json certificate_json(const Certificate& certificate) {
 
 Certificate load_certificate(const std::string& path) {
   const std::string what = fmt::format("certificate '{}'", path);
-  const json document = parse_json(read_file(path), what);
+  const json document = parse_json(read_text(path), what);
   JsonFields fields(document, what);
   if (const std::string schema = fields.text("schema"); schema != kSchema)
-    throw InputError(fmt::format("{}: schema is '{}', expected '{}'", what, schema, kSchema));
+    throw InputError(fmt::format("{}: schema is '{}', expected '{}'", what, shown(schema), kSchema));
   Certificate certificate;
   certificate.effort = fields.text("effort");
   certificate.created_at = fields.text("created_at");

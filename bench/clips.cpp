@@ -5,11 +5,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <variant>
 
 #include "bench/parallel.h"
+#include "bench/prepared_clips.h"
 #include "bench/progress.h"
-#include "core/npz.h"
+#include "bench/stop_sign.h"
+#include "bench/suite_names.h"
+#include "core/digest.h"
+#include "core/names.h"
+#include "core/naming_file.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "motion/synthesis.h"
 #include "retarget/pair.h"
 
@@ -18,41 +25,131 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ClipSource {
-  Task task = Task::kHug;
-  int index = 0;
-  std::string file;
-  const ClipVariant* variant = nullptr;  // of the suite; null: as drawn
+struct SyntheticClip {
+  Task task;
+  int index;
+  std::uint64_t seed;
+  const ClipVariant* variant;  // of the suite; null: as drawn
 };
+using ClipSource = std::variant<std::string, SyntheticClip>;  // a file, or what is synthesised
 
-bool runs(const Suite& suite, Task task) {
-  return std::find(suite.tasks.begin(), suite.tasks.end(), task) != suite.tasks.end();
+void add_synthetic(const std::vector<Task>& tasks, const SuiteClips& clips, std::vector<ClipSource>& sources) {
+  for (const Task task : tasks) {
+    for (int index = 0; index < clips.synth_per_task; ++index) {
+      if (clips.variants.empty()) sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, nullptr});
+      for (const ClipVariant& variant : clips.variants)
+        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, &variant});
+    }
+  }
 }
 
 std::vector<ClipSource> list_sources(const Suite& suite) {
-  std::vector<ClipSource> sources;
-  for (const std::string& file : suite.clips.files) sources.push_back({Task::kHug, 0, file});
-  for (const Task task : suite.tasks) {
-    for (int index = 0; index < suite.clips.synth_per_task; ++index) {
-      if (suite.clips.variants.empty()) sources.push_back({task, index, ""});
-      for (const ClipVariant& variant : suite.clips.variants) sources.push_back({task, index, "", &variant});
-    }
-  }
+  std::vector<ClipSource> sources(suite.clips.files.begin(), suite.clips.files.end());
+  add_synthetic(suite.tasks, suite.clips, sources);
   return sources;
 }
 
-PairedMotion make_clip(const ClipSource& source, const Suite& suite, const RobotModel& robot,
-                       const PairOptions& options) {
-  if (!source.file.empty()) return load_or_retarget(source.file, robot, options);
-  SynthesisOptions synthesis;
-  synthesis.seed = suite.clips.synth_seed;
-  synthesis.index = source.index;
-  if (source.variant == nullptr) return retarget(synthesize(source.task, synthesis), robot, options);
-  synthesis.side = source.variant->side;
-  synthesis.target_height = source.variant->target_height;
-  InteractionClip clip = synthesize(source.task, synthesis);
+InteractionClip synthesize(const SyntheticClip& source) {
+  SynthesisOptions options;
+  options.seed = source.seed;
+  options.index = source.index;
+  if (source.variant == nullptr) return synthesize(source.task, options);
+  options.side = source.variant->side;
+  options.target_height = source.variant->target_height;
+  InteractionClip clip = synthesize(source.task, options);
   clip.id += "-" + source.variant->name;
-  return retarget(clip, robot, options);
+  return clip;
+}
+
+// What tells a clip that is made from others.
+std::string label_of(const SyntheticClip& clip) {
+  std::string label = fmt::format("{} {} {}", to_string(clip.task), clip.seed, clip.index);
+  if (clip.variant == nullptr) return label;
+  label += " " + clip.variant->name;
+  if (clip.variant->side) label += fmt::format(" {}", name_of(side_names(), *clip.variant->side));
+  if (clip.variant->target_height) label += fmt::format(" {}", *clip.variant->target_height);
+  return label;
+}
+
+// What all clips of a suite have in common.
+std::string maker_of(const Suite& suite, const RobotModel& robot) {
+  std::string text =
+      fmt::format("duet.prepared/1 {} {} {}", program_identity(), robot.digest, to_string(available_kernels().front()));
+  for (const auto& [name, value] : suite.retarget) text += fmt::format("\n{}={}", name, value);
+  return text;
+}
+
+// What is kept under the label, or what `make` gives, which is kept then.
+template <typename Make>
+LoadedMotion find_or_make(const PreparedClips& prepared, const std::string& label, Make&& make) {
+  if (std::optional<PairedMotion> clip = prepared.find(label)) return {std::move(*clip), {}};
+  LoadedMotion made = make();
+  prepared.keep(label, made.motion);
+  return made;
+}
+
+// A file that is only read is not kept.
+LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const PairOptions& options,
+                       const PreparedClips& prepared) {
+  if (const auto* file = std::get_if<std::string>(&source)) {
+    const Npz npz = Npz::load(*file);
+    const auto read = [&] { return load_or_retarget(npz, robot, options); };
+    const bool keep = prepared.keeps() && kind_of(npz) == MotionFile::kClip;
+    return keep ? find_or_make(prepared, sha256_file(*file), read) : read();
+  }
+  const auto& clip = std::get<SyntheticClip>(source);
+  const auto make = [&] { return LoadedMotion{retarget(synthesize(clip), robot, options), {}}; };
+  return prepared.keeps() ? find_or_make(prepared, label_of(clip), make) : make();
+}
+
+// A folder of clips that all lack phases is one matter, not a thousand lines.
+void note_all(const std::vector<LoadedMotion>& made, Progress& progress) {
+  constexpr int kMost = 10;
+  int count = 0;
+  for (const LoadedMotion& motion : made)
+    for (const std::string& sentence : motion.notes)
+      if (++count <= kMost) progress.note(sentence);
+  if (count > kMost) progress.note(fmt::format("... and {} notes more", count - kMost));
+}
+
+std::vector<LoadedMotion> make_clips(const std::vector<ClipSource>& sources, const RobotModel& robot,
+                                     const PairOptions& options, int threads, Progress& progress,
+                                     const PreparedClips& prepared = {"", ""}, const StopSign* stop = nullptr) {
+  std::vector<LoadedMotion> made(sources.size());
+  progress.start("preparing clips", static_cast<int>(sources.size()), "clips");
+  parallel_for_each(static_cast<int>(sources.size()), threads, [&](int i) {
+    if (stop != nullptr && stop->asked()) throw Stopped();
+    made[i] = make_clip(sources[i], robot, options, prepared);
+    progress.advance();
+  });
+  progress.finish();
+  note_all(made, progress);
+  return made;
+}
+
+// Task by task, each task's in the order that they have; other tasks are left out.
+std::vector<PairedMotion> by_task(std::vector<LoadedMotion> made, const std::vector<Task>& tasks) {
+  std::vector<PairedMotion> clips;
+  std::vector<bool> taken(made.size(), false);
+  for (const Task task : tasks) {
+    for (size_t i = 0; i < made.size(); ++i) {
+      if (taken[i] || made[i].motion.task != task) continue;
+      clips.push_back(std::move(made[i].motion));
+      taken[i] = true;
+    }
+  }
+  return clips;
+}
+
+// That a motion from a file is of this robot.
+void check_robot(const PairedMotion& clip, const RobotModel& robot) {
+  if (clip.robot.joint_names != robot.joint_names())
+    throw InputError(fmt::format("clip '{}' was retargeted to another robot: its joints are not those of '{}'",
+                                 clip.clip_id, robot.name));
+  const int pairs = static_cast<int>(robot.pairs.size());
+  if (!clip.reshaped.empty() && clip.reshaped.points() != pairs)
+    throw InputError(fmt::format("clip '{}': key 'reshaped': expected the {} pairs of '{}', found {} points",
+                                 clip.clip_id, pairs, robot.name, clip.reshaped.points()));
 }
 
 void check_ids(const std::vector<PairedMotion>& clips) {
@@ -60,33 +157,40 @@ void check_ids(const std::vector<PairedMotion>& clips) {
     for (size_t j = i + 1; j < clips.size(); ++j) {
       if (clips[i].clip_id == clips[j].clip_id && clips[i].task == clips[j].task)
         throw InputError(fmt::format("two clips of task {} have the id '{}'; ids name episodes and must differ",
-                                     to_string(clips[i].task), clips[i].clip_id));
+                                     to_string(clips[i].task), shown(clips[i].clip_id)));
     }
   }
 }
 
 }  // namespace
 
-MotionFile kind_of(const std::string& path) {
-  const Npz npz = Npz::load(path);
+MotionFile kind_of(const Npz& npz) {
   const std::string schema = npz.text("schema");
   if (schema == "duet.interaction_clip") return MotionFile::kClip;
   if (schema == "duet.paired_motion") return MotionFile::kPaired;
   if (schema == "duet.recording") return MotionFile::kRecording;
   throw InputError(fmt::format(
-      "{}: key 'schema': expected 'duet.interaction_clip', 'duet.paired_motion' or 'duet.recording', found '{}'", path,
-      schema));
+      "'{}': key 'schema': expected 'duet.interaction_clip', 'duet.paired_motion' or 'duet.recording', found '{}'",
+      npz.name(), shown(schema)));
 }
 
-PairedMotion load_or_retarget(const std::string& path, const RobotModel& robot, const PairOptions& options) {
-  switch (kind_of(path)) {
-    case MotionFile::kClip:
-      return retarget(load_clip(path), robot, options);
-    case MotionFile::kPaired:
-      return load_paired_motion(path);
-    default:
-      throw InputError(fmt::format("{}: expected a clip or a paired motion, found a recording", path));
-  }
+LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
+                              Implausible implausible) {
+  return naming_file(npz.name(), [&]() -> LoadedMotion {
+    switch (kind_of(npz)) {
+      case MotionFile::kClip: {
+        ForeignClip read = read_foreign_clip(npz, implausible);
+        return {retarget(read.clip, robot, options), std::move(read.notes)};
+      }
+      case MotionFile::kPaired:
+        return {read_paired_motion(npz), {}};
+      case MotionFile::kRecording:
+        break;
+    }
+    throw InputError(
+        "expected a clip of two people or a paired motion (`duet synth`, `duet import A.bvh B.bvh` and `duet retarget` "
+        "make them), found a recording of a robot, which `duet score` judges");
+  });
 }
 
 PairOptions pair_options(const Suite& suite) {
@@ -95,39 +199,26 @@ PairOptions pair_options(const Suite& suite) {
   return options;
 }
 
-std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress) {
-  const std::vector<ClipSource> sources = list_sources(suite);
-  const PairOptions options = pair_options(suite);
-  std::vector<std::optional<PairedMotion>> made(sources.size());
-  progress.start("preparing clips", static_cast<int>(sources.size()), "clips");
-  parallel_for_each(static_cast<int>(sources.size()), threads, [&](int i) {
-    made[i] = make_clip(sources[i], suite, robot, options);
-    progress.advance();
-  });
-  progress.finish();
-  std::vector<PairedMotion> clips;
-  for (const Task task : suite.tasks) {
-    for (std::optional<PairedMotion>& clip : made)
-      if (clip && clip->task == task && runs(suite, task)) clips.push_back(std::move(*clip)), clip.reset();
-  }
+std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
+                                        const PrepareOptions& prepare) {
+  const PreparedClips prepared(prepare.keep_in, maker_of(suite, robot));
+  std::vector<PairedMotion> clips =
+      by_task(make_clips(list_sources(suite), robot, pair_options(suite), threads, progress, prepared, prepare.stop),
+              suite.tasks);
   if (clips.empty()) throw InputError(fmt::format("{}: no clip is left for the tasks of the suite", suite.file));
-  for (const PairedMotion& clip : clips) {
-    if (clip.robot.joint_names != robot.joint_names())
-      throw InputError(fmt::format("clip '{}' was retargeted to another robot: its joints are not those of '{}'",
-                                   clip.clip_id, robot.name));
-  }
+  for (const PairedMotion& clip : clips) check_robot(clip, robot);
   check_ids(clips);
   return clips;
 }
 
 std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
                                           std::uint64_t seed, int threads, Progress& progress) {
-  Suite suite;
-  suite.file = "synthetic clips";
-  suite.tasks = tasks;
-  suite.clips.synth_per_task = per_task;
-  suite.clips.synth_seed = seed;
-  return prepare_clips(suite, robot, threads, progress);
+  SuiteClips clips;
+  clips.synth_per_task = per_task;
+  clips.synth_seed = seed;
+  std::vector<ClipSource> sources;
+  add_synthetic(tasks, clips, sources);
+  return by_task(make_clips(sources, robot, {}, threads, progress), tasks);
 }
 
 std::vector<std::string> find_motion_files(const std::vector<std::string>& paths) {

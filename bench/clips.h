@@ -6,26 +6,42 @@
 #include <vector>
 
 #include "bench/suite.h"
+#include "core/npz.h"
 #include "motion/paired_motion.h"
+#include "motion/plausibility.h"
 #include "retarget/options.h"
 #include "robots/robot_model.h"
 
 namespace duet {
 
 class Progress;
+class StopSign;
 
-// Reads a clip (and retargets it) or a paired motion: the file's `schema` key tells which. Throws InputError.
-PairedMotion load_or_retarget(const std::string& path, const RobotModel& robot, const PairOptions& options);
+struct PrepareOptions {
+  std::string keep_in = {};        // a run folder that keeps the clips as each is finished (bench/prepared_clips.h)
+  const StopSign* stop = nullptr;  // asked before each clip
+};
 
-// Whether an NPZ holds a clip, a paired motion or a recording. Throws InputError for anything else.
+// What an NPZ of motion holds, by its key `schema`. Throws InputError for anything else.
 enum class MotionFile { kClip, kPaired, kRecording };
-MotionFile kind_of(const std::string& path);
+MotionFile kind_of(const Npz& npz);
 
-// Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads.
-// Throws InputError where none remains.
-std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress);
+struct LoadedMotion {
+  PairedMotion motion;
+  std::vector<std::string> notes;  // what a clip's reader should know (motion/plausibility.h)
+};
 
-// The same of clips that are no suite's: `per_task` of each task, for training.
+// A clip, retargeted, or a paired motion. Throws InputError; for a recording with what is needed instead.
+LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
+                              Implausible implausible = Implausible::kRefused);
+
+// Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads; what
+// there is to know of them is noted on `progress`. Throws InputError where none remains, Stopped (bench/stop_sign.h)
+// where it was asked to stop.
+std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
+                                        const PrepareOptions& options = {});
+
+// Clips that are no suite's: `per_task` of each task, for training.
 std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
                                           std::uint64_t seed, int threads, Progress& progress);
 

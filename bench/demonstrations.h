@@ -1,5 +1,5 @@
 // Demonstrations for D-STAR: synthesised clips through PAIR and A.4.4, seen as the robot would follow them exactly and
-// as it followed them in an engine. The seeds are none that a suite uses: what is tested on is never learnt.
+// as it followed them in an engine. No suite that ships draws its clips from these seeds (a test of ShippedSuites).
 #pragma once
 
 #include <functional>
@@ -35,8 +35,9 @@ inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 89
 // "300 clips of each task (seed 880001), 2 starts of each, 120 followed in mujoco under wbc_sim by replay".
 std::string origin_of(const DemonstrationOptions& options);
 
-// Of a take in which the robot fell, what is up to a second before; nothing of less than two. None where `stop` said so
-// in between. Throws what prepare_clips and make_controller throw, and MissingError for an engine that is not there.
+// A rollout in which the robot fell is kept up to a second before the fall, and dropped where less than two seconds are
+// left. Returns nothing where `stop` said so in between. Throws what prepare_clips and make_controller throw, and
+// MissingError for an engine that is not there.
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop);

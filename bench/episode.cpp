@@ -36,44 +36,40 @@ const PairedMotion& next_of_task(const std::vector<PairedMotion>& clips, const P
                   to_string(clip.task)));
 }
 
-// The episodes of one engine, controller and perturbation.
-class Planner {
- public:
-  Planner(const Suite& suite, std::vector<EpisodeSpec>& plan)
-      : suite_(suite), suite_id_(suite.name + "@" + suite.version), plan_(plan) {}
-
-  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips) {
-    for (const SuitePolicy& policy : suite_.policies)
-      if (policy.name != kNullPolicy) add(combination, clips, policy, policy.shuffled_partner ? "shuffled" : "main");
-    if (suite_.null_arm) add(combination, clips, SuitePolicy{kNullPolicy}, "null");
-  }
-
- private:
-  void add(const EpisodeSpec& combination, const std::vector<PairedMotion>& clips, const SuitePolicy& policy,
-           const char* arm) {
-    for (const PairedMotion& clip : clips) {
-      for (int episode = 0; episode < suite_.episodes_per_clip; ++episode) {
-        EpisodeSpec spec = combination;
-        spec.clip = &clip;
-        spec.seen = policy.shuffled_partner ? &next_of_task(clips, clip, policy.name) : nullptr;
-        spec.policy = policy.name;
-        spec.arm = arm;
-        spec.episode = episode;
-        spec.seed = seed(clip, episode, "episode");
-        spec.perturbation_seed = seed(clip, episode, "perturbation");
-        plan_.push_back(std::move(spec));
+// Engine, controller and perturbation of all episodes.
+std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
+  std::vector<EpisodeSpec> combinations;
+  const bool once = one_playback(suite);
+  for (const std::string& engine : suite.engines) {
+    for (const SuiteController& controller : suite.controllers) {
+      const bool playback = engine == kPlayback;
+      if (playback && once && controller.name != suite.controllers.front().name) continue;
+      EpisodeSpec combination;
+      combination.engine = engine;
+      combination.controller = controller.name;
+      if (playback) combinations.push_back(combination);
+      if (playback) continue;
+      for (const Perturbation& perturbation : suite.perturbations) {
+        combination.perturbation = perturbation.name;
+        combinations.push_back(combination);
       }
     }
   }
+  return combinations;
+}
 
-  [[nodiscard]] std::uint64_t seed(const PairedMotion& clip, int episode, const char* stream) const {
-    return suite_.seed + stream_key({suite_id_, to_string(clip.task), clip.clip_id, std::to_string(episode), stream});
-  }
+std::vector<EpisodeArm> arms_of(const Suite& suite) {
+  std::vector<EpisodeArm> arms;
+  for (const SuitePolicy& policy : suite.policies)
+    if (policy.name != kNullPolicy)
+      arms.push_back({policy.name, policy.shuffled_partner ? "shuffled" : "main", policy.shuffled_partner});
+  if (suite.null_arm) arms.push_back({kNullPolicy, "null"});
+  return arms;
+}
 
-  const Suite& suite_;
-  std::string suite_id_;
-  std::vector<EpisodeSpec>& plan_;
-};
+bool chosen(const std::vector<std::string>& names, std::string_view name) {
+  return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
+}
 
 }  // namespace
 
@@ -93,36 +89,94 @@ StartMode start_mode(const Suite& suite, const SuiteController& controller) {
   return controller_info(controller.use).walks ? StartMode::kApproach : StartMode::kAct;
 }
 
-std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies) {
-  std::vector<EpisodeSpec> plan;
-  Planner planner(suite, plan);
-  const bool once = one_playback(suite);
-  for (const std::string& engine : suite.engines) {
-    for (const SuiteController& controller : suite.controllers) {
-      const bool playback = engine == kPlayback;
-      if (playback && once && controller.name != suite.controllers.front().name) continue;
-      EpisodeSpec combination;
-      combination.engine = engine;
-      combination.controller = controller.name;
-      const std::vector<PairedMotion>& clips = bodies.clips(controller.name);
-      if (playback) {
-        planner.add(combination, clips);
-        continue;
-      }
-      for (const Perturbation& perturbation : suite.perturbations) {
-        combination.perturbation = perturbation.name;
-        planner.add(combination, clips);
-      }
-    }
-  }
-  return plan;
+EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies)
+    : suite_(suite),
+      bodies_(bodies),
+      suite_id_(suite.name + "@" + suite.version),
+      combinations_(combinations_of(suite)),
+      arms_(arms_of(suite)),
+      clips_(static_cast<std::int64_t>(bodies.clips(suite.controllers.front().name).size())) {
+  require_sane_size(suite, clips_);
+  const std::vector<PairedMotion>& clips = bodies.clips(suite.controllers.front().name);
+  for (const EpisodeArm& arm : arms_)
+    for (const PairedMotion& clip : clips)
+      if (arm.shuffled) static_cast<void>(next_of_task(clips, clip, arm.policy));
 }
 
-EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const RobotModel& robot) {
+std::int64_t EpisodePlan::size() const {
+  return static_cast<std::int64_t>(combinations_.size() * arms_.size()) * clips_ * suite_.episodes_per_clip;
+}
+
+EpisodeSpec EpisodePlan::at(std::int64_t i) const {
+  const auto arms = static_cast<std::int64_t>(arms_.size());
+  const std::int64_t per_clip = arms * suite_.episodes_per_clip;
+  const EpisodeArm& arm = arms_[i % arms];
+  EpisodeSpec spec = combinations_[i / (per_clip * clips_)];
+  const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller);
+  spec.clip = &clips[i / per_clip % clips_];
+  spec.episode = static_cast<int>(i / arms % suite_.episodes_per_clip);
+  spec.seen = arm.shuffled ? &next_of_task(clips, *spec.clip, arm.policy) : nullptr;
+  spec.policy = arm.policy;
+  spec.arm = arm.name;
+  spec.seed = seed(*spec.clip, spec.episode, "episode");
+  spec.perturbation_seed = seed(*spec.clip, spec.episode, "perturbation");
+  return spec;
+}
+
+std::uint64_t EpisodePlan::seed(const PairedMotion& clip, int episode, const char* stream) const {
+  return suite_.seed + stream_key({suite_id_, to_string(clip.task), clip.clip_id, std::to_string(episode), stream});
+}
+
+std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies) {
+  const EpisodePlan plan(suite, bodies);
+  std::vector<EpisodeSpec> all;
+  for (std::int64_t i = 0; i < plan.size(); ++i) all.push_back(plan.at(i));
+  return all;
+}
+
+bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
+  return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller) &&
+         (spec.arm == "null" || chosen(part.policies, spec.policy)) && chosen(part.tasks, to_string(task)) &&
+         (spec.engine == kPlayback || chosen(part.perturbations, spec.perturbation));
+}
+
+std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
+  std::int64_t total = 0;
+  for (EpisodeSpec spec : combinations_of(suite)) {
+    for (const EpisodeArm& arm : arms_of(suite)) {
+      spec.policy = arm.policy;
+      spec.arm = arm.name;
+      total += std::count_if(clips.begin(), clips.end(), [&](Task task) {
+        return std::any_of(parts.begin(), parts.end(), [&](const RunPart& part) { return belongs(spec, task, part); });
+      });
+    }
+  }
+  return total * suite.episodes_per_clip;
+}
+
+void require_sane_size(const Suite& suite, std::int64_t clips) {
+  const std::size_t combinations = combinations_of(suite).size();
+  const double episodes = static_cast<double>(combinations) * static_cast<double>(suite.policies.size() + 1) *
+                          static_cast<double>(clips) * suite.episodes_per_clip;
+  if (episodes > static_cast<double>(kMostEpisodes))
+    throw InputError(fmt::format("{}: expected at most {} episodes, found {:.0f} ({} clips, {} episodes per clip)",
+                                 suite.file, kMostEpisodes, episodes, clips, suite.episodes_per_clip));
+}
+
+namespace {
+
+std::string digest_of(const std::map<std::string, std::string>& digests, const std::string& name) {
+  const auto found = digests.find(name);
+  return found == digests.end() ? "" : found->second;
+}
+
+}  // namespace
+
+EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& run, const RobotModel& robot) {
   EpisodeRow row;
   row.suite = suite.name;
   row.suite_version = suite.version;
-  row.suite_hash = hash;
+  row.suite_hash = run.suite_hash;
   row.task = to_string(spec.clip->task);
   row.clip = spec.clip->clip_id;
   row.episode = spec.episode;
@@ -133,7 +187,10 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::strin
     row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
   }
   row.controller = spec.controller;
+  row.controller_digest = digest_of(run.controllers, spec.controller);
   row.policy = spec.policy;
+  row.policy_digest = digest_of(run.policies, spec.policy);
+  row.detectors = kDetectorsVersion;
   row.perturbation = spec.perturbation;
   row.arm = spec.arm;
   row.robot_digest = robot.digest;

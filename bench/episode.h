@@ -6,10 +6,12 @@
 #include <vector>
 
 #include "bench/bodies.h"
+#include "bench/run_identity.h"
 #include "bench/suite.h"
 #include "motion/paired_motion.h"
 #include "policies/phase_adaptation.h"
 #include "results/episode_row.h"
+#include "results/run_info.h"
 
 namespace duet {
 
@@ -27,13 +29,52 @@ struct EpisodeSpec {
 // Where episodes of one of the suite's controllers begin.
 StartMode start_mode(const Suite& suite, const SuiteController& controller);
 
-// Every episode of the suite, the null arm included, in a fixed order. The null arm is run once per engine, controller
-// and perturbation. Playback is always clean and, as no controller acts in it, run under the first alone, or under each
-// where they differ in robot or start. A policy with a shuffled partner sees that of the next clip of its task, the
-// last one that of the first; throws InputError where a task has one clip alone.
+// More episodes than that are a mistake in a suite.
+inline constexpr std::int64_t kMostEpisodes = 10'000'000;
+
+// Throws InputError where a suite of so many clips has more than kMostEpisodes.
+void require_sane_size(const Suite& suite, std::int64_t clips);
+
+struct EpisodeArm {
+  std::string policy, name;  // name: EpisodeSpec::arm
+  bool shuffled = false;
+};
+
+// Every episode of the suite, the null arm included, in a fixed order: the arms of one clip follow one another, so that
+// a part of the work has pairs. The null arm is run once per engine, controller and perturbation. Playback is always
+// clean and, as no controller acts in it, run under the first alone, or under each where they differ in robot or start.
+// A policy with a shuffled partner sees that of the next clip of its task, the last one that of the first. Each episode
+// is made when it is asked for. Suite and bodies must outlive it.
+class EpisodePlan {
+ public:
+  // Throws InputError where a task with a shuffled partner has one clip alone, and for more than kMostEpisodes.
+  EpisodePlan(const Suite& suite, const Bodies& bodies);
+
+  [[nodiscard]] std::int64_t size() const;
+  [[nodiscard]] EpisodeSpec at(std::int64_t i) const;
+
+ private:
+  [[nodiscard]] std::uint64_t seed(const PairedMotion& clip, int episode, const char* stream) const;
+
+  const Suite& suite_;
+  const Bodies& bodies_;
+  std::string suite_id_;
+  std::vector<EpisodeSpec> combinations_;  // engine, controller and perturbation alone
+  std::vector<EpisodeArm> arms_;
+  std::int64_t clips_ = 0;  // the same on every body
+};
+
+// All of it at once.
 std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies);
 
+// Whether the episode, of a clip of this task, belongs to the part; playback to every choice of perturbations, the null
+// arm to every choice of policies.
+bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part);
+
+// How many episodes of a suite, over clips of these tasks, belong to one of these parts.
+std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts);
+
 // A row with everything that is known before the episode runs, its key included.
-EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const RobotModel& robot);
+EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& run, const RobotModel& robot);
 
 }  // namespace duet

@@ -22,6 +22,7 @@ void on_signal(int signal) {
 void catch_interrupts() {
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // under nohup the run goes on
 }
 
 Interrupt interrupt() {
@@ -29,6 +30,7 @@ Interrupt interrupt() {
     case SIGINT:
       return Interrupt::kInterrupted;
     case SIGTERM:
+    case SIGHUP:
       return Interrupt::kTerminated;
     default:
       return Interrupt::kNone;

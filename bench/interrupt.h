@@ -1,11 +1,13 @@
-// Ctrl-C and SIGTERM as a question that loops ask. A second Ctrl-C ends the program at once.
+// Ctrl-C, SIGTERM and SIGHUP (a connection that is lost) as a question that loops ask. A second Ctrl-C ends the program
+// at once.
 #pragma once
 
 namespace duet {
 
-enum class Interrupt { kNone, kInterrupted, kTerminated };  // SIGINT (exit code 130), SIGTERM (exit code 75)
+enum class Interrupt { kNone, kInterrupted, kTerminated };  // SIGINT (exit code 130), SIGTERM or SIGHUP (75)
 
-// From now on the two signals set the answer of interrupt() instead of ending the program.
+// From now on the signals set the answer of interrupt() instead of ending the program. SIGHUP stays
+// ignored where it was (nohup).
 void catch_interrupts();
 Interrupt interrupt();
 

@@ -1,5 +1,5 @@
-// A partner who moves otherwise than the clip: of another size, faster, later, hesitating, thinking better of it. It is
-// the real partner who does: physics, policy, detectors and recording all have this one; the robot's reference stays.
+// A partner who moves otherwise than the clip: of another size, faster, later, hesitating, or turning back. Physics,
+// policy, detectors and recording all have this partner; the robot's reference stays that of the clip.
 #pragma once
 
 #include <optional>

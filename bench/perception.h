@@ -43,7 +43,7 @@ std::vector<std::string> yaml_parts(const PerceptionPlan& plan);
 // A plan at work in one episode. Nothing allocates after construction; not thread-safe.
 class Perception {
  public:
-  using Joints = Eigen::Matrix<double, 3, 24>;
+  using Joints = Eigen::Matrix<double, 3, kSmplJoints>;
 
   // The seed's streams are its own: other perturbations of the episode draw the same with and without it.
   Perception(const PerceptionPlan& plan, std::uint64_t seed);

@@ -26,7 +26,7 @@ int whole_ticks(const YamlSection& section) {
   return static_cast<int>(value);
 }
 
-// What is not named has none, but an empty mapping is the default.
+// A quantity that the mapping does not name has no noise; an empty mapping stands for the default of each.
 StateNoise read_noise(const YamlSection& section) {
   const bool named = section.has("q") || section.has("v") || section.has("w") || section.has("gravity");
   const StateNoise defaults = named ? StateNoise{0.0, 0.0, 0.0, 0.0} : StateNoise{};

@@ -19,6 +19,7 @@ namespace duet {
 namespace {
 
 constexpr std::string_view kSchema = "duet.profile/1";
+constexpr double kShortestStep = 1e-6;  // [s]; 20,000 steps a control period, far below what any engine asks for
 
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
@@ -68,8 +69,8 @@ bool is_available(const std::string& engine) {
 
 void check_step(double dt) {
   const double steps = kTick / dt;
-  require(dt > 0.0 && std::abs(steps - std::round(steps)) < 1e-9,
-          fmt::format("expected a step [s] that divides {}, found {}", kTick, dt));
+  require(dt >= kShortestStep && dt <= kTick && std::abs(steps - std::round(steps)) < 1e-9,
+          fmt::format("expected a step [s] of {} or more that divides {}, found {}", kShortestStep, kTick, dt));
 }
 
 EngineSettings Profile::settings(const std::string& engine) const {
@@ -98,7 +99,7 @@ Profile read_profile(const YAML::Node& document, const std::string& file) {
 
 Profile load_profile(const std::string& profile) {
   const auto load = [](const std::string& file) {
-    const YAML::Node document = parse_yaml(read_file(file), file);
+    const YAML::Node document = parse_yaml(read_text(file), file);
     if (!document.IsMap() || !document["schema"])
       throw InputError(fmt::format("{}:1: expected an engine profile with 'schema: {}', found {}", file, kSchema,
                                    document.IsMap() ? "no schema" : describe(document)));
@@ -119,13 +120,17 @@ std::vector<std::string> profile_names() {
   return names;
 }
 
-std::string resolved_settings(const std::string& engine, const EngineSettings& settings) {
+std::string settings_yaml(const EngineSettings& settings) {
   std::string text = fmt::format("{{dt: {}", settings.dt);
-  EngineOptions all = settings.options;
-  if (is_available(engine) && engine != "playback")
-    for (const EngineOption& option : engine_module(engine).options) all.try_emplace(option.name, option.value);
-  for (const auto& [name, value] : all) text += fmt::format(", {}: {}", name, value);
+  for (const auto& [name, value] : settings.options) text += fmt::format(", {}: {}", name, value);
   return text + "}";
+}
+
+std::string resolved_settings(const std::string& engine, const EngineSettings& settings) {
+  EngineSettings all = settings;
+  if (is_available(engine) && engine != "playback")
+    for (const EngineOption& option : engine_module(engine).options) all.options.try_emplace(option.name, option.value);
+  return settings_yaml(all);
 }
 
 std::string settings_digest(const std::string& engine, const EngineSettings& settings) {

@@ -43,8 +43,9 @@ void check_step(double dt);
 // Names of the profiles that ship with duet.
 std::vector<std::string> profile_names();
 
-// One line of YAML, "{dt: 0.002, iterations: 20}", with every option of the engine written out where it is present; and
-// its SHA-256, what rows carry.
+// One line of YAML, "{dt: 0.002, iterations: 20}", with what the settings say.
+std::string settings_yaml(const EngineSettings& settings);
+// The same with every option of the engine written out where it is present; and its SHA-256, what rows carry.
 std::string resolved_settings(const std::string& engine, const EngineSettings& settings);
 std::string settings_digest(const std::string& engine, const EngineSettings& settings);
 

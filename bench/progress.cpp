@@ -18,6 +18,12 @@ double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::ste
 
 }  // namespace
 
+void print_error(const std::string& text) {
+  std::fputs(text.c_str(),
+             stderr);  // nobody may be there to read it: the terminal is gone, the disk of the log is full
+  std::fflush(stderr);
+}
+
 std::string format_duration(double seconds) {
   const long whole = static_cast<long>(seconds + 0.5);
   if (whole < 60) return fmt::format("{} s", whole);
@@ -38,7 +44,7 @@ void Progress::start(const std::string& title, int total, const std::string& uni
   done_ = 0;
   active_ = true;
   begin_ = drawn_ = Clock::now();
-  if (style_ == Style::kLines) fmt::print(stderr, "{}: {} {}\n", title_, total_, unit_);
+  if (style_ == Style::kLines) print_error(fmt::format("{}: {} {}\n", title_, total_, unit_));
 }
 
 void Progress::advance(int items) {
@@ -52,6 +58,11 @@ void Progress::finish() {
   if (!active_) return;
   draw(true);
   active_ = false;
+}
+
+void Progress::note(const std::string& sentence) {
+  const std::lock_guard lock(mutex_);
+  if (style_ != Style::kQuiet) print_error(sentence + "\n");
 }
 
 std::string Progress::line(double elapsed) const {
@@ -70,14 +81,12 @@ void Progress::draw(bool last) {
   drawn_ = now;
   const double elapsed = seconds_between(begin_, now);
   if (style_ == Style::kLines) {
-    fmt::print(stderr, "{}{}\n", line(elapsed), last ? fmt::format(" in {}", format_duration(elapsed)) : "");
+    print_error(fmt::format("{}{}\n", line(elapsed), last ? fmt::format(" in {}", format_duration(elapsed)) : ""));
     return;
   }
   const int filled = total_ > 0 ? kBarWidth * done_ / total_ : kBarWidth;
   const std::string bar = std::string(filled, '#') + std::string(kBarWidth - filled, '.');
-  fmt::print(stderr, "\r[{}] {}{}", bar, line(elapsed), "\x1b[K");
-  if (last) fmt::print(stderr, "\n");
-  std::fflush(stderr);
+  print_error(fmt::format("\r[{}] {}\x1b[K{}", bar, line(elapsed), last ? "\n" : ""));
 }
 
 }  // namespace duet

@@ -16,6 +16,8 @@ class Progress {
   // Starts a stage of `total` items ("retargeting", 30, "clips"); ends the stage before.
   void start(const std::string& title, int total, const std::string& unit);
   void advance(int items = 1);
+  // A line of its own, between stages.
+  void note(const std::string& sentence);
   // Prints the stage's last line: items, seconds, rate.
   void finish();
 
@@ -31,6 +33,9 @@ class Progress {
   bool active_ = false;
   Clock::time_point begin_, drawn_;
 };
+
+// Writes to standard error; never throws, whatever became of it.
+void print_error(const std::string& text);
 
 // "4 s", "2 min 05 s", "1 h 02 min".
 std::string format_duration(double seconds);

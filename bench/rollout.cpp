@@ -76,12 +76,18 @@ class Planner {
  public:
   explicit Planner(Policy& policy) : policy_(policy) {}
 
-  void plan(const Observation& observation, Scheduler& scheduler) {
+  // Returns how long that took: a wait that is no part of the simulation.
+  Clock::duration plan(const Observation& observation, Scheduler& scheduler) {
     const Clock::time_point begin = Clock::now();
     std::vector<Reference> plan = policy_.plan(observation);
-    milliseconds_.push_back(std::chrono::duration<double, std::milli>(Clock::now() - begin).count());
+    const Clock::duration took = Clock::now() - begin;
+    milliseconds_.push_back(std::chrono::duration<double, std::milli>(took).count());
     if (!plan.empty()) scheduler.push(std::move(plan), observation.tick);
+    dead_ = policy_.faults().dead;
+    return took;
   }
+
+  [[nodiscard]] bool dead() const { return dead_; }
 
   [[nodiscard]] PlanTimes times() const {
     return {quantile(milliseconds_, 0.5), quantile(milliseconds_, 0.95), quantile(milliseconds_, 1.0)};
@@ -89,11 +95,34 @@ class Planner {
 
  private:
   Policy& policy_;
+  bool dead_ = false;
   std::vector<double> milliseconds_;
 };
 
-Outcome advance(Backend& backend, const Disturbance& disturbance, int steps, StepMeter& meter) {
+// Whether a rollout has to end though nothing happened in it: the wall-clock limit, or somebody asked.
+class Deadline {
+ public:
+  explicit Deadline(const RolloutSetup& setup)
+      : stop_asked_(setup.stop_asked),
+        end_(Clock::now() +
+             std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(setup.wall_limit))) {}
+  [[nodiscard]] bool stop_asked() const { return stop_asked_ && stop_asked_(); }
+  [[nodiscard]] bool passed() const { return Clock::now() > end_; }
+  void extend(Clock::duration time) { end_ += time; }
+
+ private:
+  const std::function<bool()>& stop_asked_;
+  Clock::time_point end_;
+};
+
+// Steps between two looks at the clock within a control period: only a step far below the usual ones has so many.
+constexpr int kStepsPerLook = 64;
+
+Outcome advance(Backend& backend, const Disturbance& disturbance, int steps, StepMeter& meter,
+                const Deadline& deadline) {
   for (int i = 0; i < steps; ++i) {
+    if (i % kStepsPerLook == kStepsPerLook - 1 && (deadline.passed() || deadline.stop_asked()))
+      return Outcome::kTimedOut;
     const Outcome outcome = backend.step(disturbance.in_effect(i));
     if (outcome != Outcome::kOk) return outcome;
     meter.add();
@@ -161,8 +190,6 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   const PointTracks people = episode_partner(setup).joints;
   const int ticks = episode_ticks(setup);
   const int steps_per_tick = static_cast<int>(std::lround(1.0 / (kTickRate * backend.scene().dt)));
-  const Clock::time_point deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(setup.wall_limit));
 
   Rollout rollout;
   Recording& recording = rollout.recording;
@@ -173,7 +200,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   backend.reset(setup.start);
   controller.reset(setup.start);
   policy.reset({setup.clip->task, setup.prompt.empty() ? std::string(task_prompt(setup.clip->task)) : setup.prompt,
-                setup.start, &setup.reference.motion, setup.seed});
+                setup.start, &setup.reference.motion, setup.seed, setup.stop_asked});
+  Deadline deadline(setup);  // from here on: a program that starts is no part of the simulation
   Scheduler scheduler({.fuse_ticks = setup.fuse_ticks});
   scheduler.reset({setup.start.X_WB, setup.start.q});
   ObservationHistory history;
@@ -191,7 +219,11 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     const HumanJoints velocities = partner_velocities(people, tick, kTickRate);
     const bool own = setup.seen_partner.empty();
     history.add({perception.seen(tick, own ? partner : partner_joints(setup.seen_partner, tick)), backend.state()});
-    if (tick % kTicksPerPlan == 0) planner.plan(history.at(tick), scheduler);
+    if (tick % kTicksPerPlan == 0) deadline.extend(planner.plan(history.at(tick), scheduler));
+    if (planner.dead()) {
+      recording.outcome = Outcome::kError;
+      break;
+    }
     const Reference& reference = scheduler.at(tick);
     controller.act(disturbance.seen(backend.state()), reference, command);
     disturbance.send(command);
@@ -201,9 +233,9 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     backend.set_partner(partner, velocities);
     backend.follow(reference);
     disturbance.push(tick, backend);
-    recording.outcome = advance(backend, disturbance, steps_per_tick, meter);
-    if (recording.outcome == Outcome::kOk && Clock::now() > deadline) recording.outcome = Outcome::kTimedOut;
-    if (setup.stop_asked && setup.stop_asked()) {
+    recording.outcome = advance(backend, disturbance, steps_per_tick, meter, deadline);
+    if (recording.outcome == Outcome::kOk && deadline.passed()) recording.outcome = Outcome::kTimedOut;
+    if (deadline.stop_asked()) {
       rollout.interrupted = true;
       recording.outcome = Outcome::kTimedOut;
     }
@@ -213,6 +245,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   recording.message = describe(recording.outcome, tick, backend.name());
   rollout.late_plans = scheduler.late_ticks();
   rollout.policy_faults = policy.faults();
+  if (planner.dead()) recording.message = rollout.policy_faults.message;
   rollout.plan_times = planner.times();
   rollout.faults = controller.faults();
   rollout.state_hash = hash.hex();

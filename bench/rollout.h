@@ -63,8 +63,8 @@ struct Rollout {
 };
 
 // Runs until the reference ends (and the partner with it, where it is varied: episode_ticks), the robot falls (base
-// below 0.45 m or tilted past acos 0.7), the state diverges or the wall limit passes. Never throws for what the
-// experiment may measure.
+// below 0.45 m or tilted past acos 0.7), the state diverges, the wall limit passes (waiting for plans is not counted)
+// or the policy is dead (kError, with its message). Never throws for what the experiment may measure.
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
 
 // What the partner does from tick 0 on, one frame more than the episode has ticks; and the number of those.

@@ -6,13 +6,17 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <mutex>
 
 #include "backends/factory.h"
 #include "bench/clips.h"
+#include "bench/episode_recording.h"
 #include "bench/interrupt.h"
-#include "bench/parallel.h"
+#include "bench/prepared_clips.h"
+#include "bench/run_inputs.h"
+#include "bench/run_work.h"
 #include "bench/scoring.h"
+#include "bench/trust.h"
+#include "core/file.h"
 #include "core/require.h"
 #include "metrics/contact_limits.h"
 #include "results/environment.h"
@@ -30,11 +34,8 @@ bool chosen(const std::vector<std::string>& filter, const std::string& name) {
   return filter.empty() || std::find(filter.begin(), filter.end(), name) != filter.end();
 }
 
-bool selected(const RunOptions& options, const EpisodeSpec& spec) {
-  return chosen(options.engines, spec.engine) && chosen(options.controllers, spec.controller) &&
-         (spec.arm == "null" || chosen(options.policies, spec.policy)) &&
-         chosen(options.tasks, std::string(to_string(spec.clip->task))) &&
-         (spec.engine == kPlayback || chosen(options.perturbations, spec.perturbation));
+RunPart part_of(const RunOptions& options) {
+  return {options.engines, options.controllers, options.policies, options.tasks, options.perturbations};
 }
 
 // The part of a filter that the suite does not have is a mistake of the user, not an empty run.
@@ -91,6 +92,11 @@ void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& op
     throw MissingError(bodies.absent().begin()->second);
 }
 
+std::string no_locks_warning(const std::string& folder, const std::string& reason) {
+  return fmt::format("'{}' is on a file system without locks ({}): let no other run work in it at the same time",
+                     folder, reason);
+}
+
 EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
   row.started_at = utc_now();
   row.robot_digest.clear();
@@ -109,6 +115,12 @@ bool keep_trajectory(const Suite& suite, const EpisodeRow& row) {
   return suite.record == RecordTrajectories::kFailures && !row.success.value_or(false);
 }
 
+void keep_episode(const Recording& recording, const RolloutSetup& setup, const Suite& suite, const EpisodeRow& row,
+                  const std::string& path) {
+  const ScoringRules rules{suite.detector, suite.thresholds, readings_of(suite), setup.foot_trace};
+  save_episode_recording({recording, KeptEpisode{row, rules, act_source(recording, setup)}}, path);
+}
+
 // Playback needs none: anything that fits the robot fills its place.
 std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Suite& suite,
                                                const std::shared_ptr<const RobotModel>& robot) {
@@ -120,44 +132,29 @@ std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Su
 std::unique_ptr<Policy> episode_policy(const EpisodeSpec& spec, const Suite& suite,
                                        const std::shared_ptr<const RobotModel>& robot) {
   const SuitePolicy policy = policy_of(suite, spec.policy);
+  require_allowed(programs_of(policy), suite.allow_programs);
   return make_policy(policy.use, robot, policy.options);
 }
 
 void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-              const std::string& trajectory_folder, const PolicyMaker& make, EpisodeRow& row) {
+              const std::string& trajectory_folder, const PolicyMaker& make, const std::function<bool()>& stop_asked,
+              EpisodeRow& row) {
   const std::unique_ptr<Backend> backend = make_backend(spec.engine, episode_scene(spec, suite, robot));
   const std::unique_ptr<Controller> controller = episode_controller(spec, suite, robot);
   const std::unique_ptr<Policy> policy = make ? make() : episode_policy(spec, suite, robot);
   row.engine_version = backend->version();
-  const RolloutSetup setup = episode_setup(spec, suite, *robot);
+  RolloutSetup setup = episode_setup(spec, suite, *robot);
+  if (stop_asked) setup.stop_asked = stop_asked;
   const Rollout rollout = roll_out(setup, *backend, *controller, *policy);
   if (rollout.interrupted) throw EpisodeInterrupted();
+  if (const PolicyFaults& faults = rollout.policy_faults; faults.dead) {
+    row.policy_faults = {faults.late, faults.invalid, true, faults.message};
+    throw std::runtime_error(faults.message);
+  }
   score_rollout(rollout, setup, suite, readings_of(suite), *robot, row);
   if (!trajectory_folder.empty() && keep_trajectory(suite, row))
-    save_recording(rollout.recording, trajectory_path(trajectory_folder, row));
+    keep_episode(rollout.recording, setup, suite, row, trajectory_path(trajectory_folder, row));
 }
-
-// What stops a run early, asked between episodes and at every tick.
-class StopSign {
- public:
-  explicit StopSign(double time_limit) : limit_(time_limit), begin_(Clock::now()) {}
-  [[nodiscard]] RunEnd end() const {
-    switch (interrupt()) {
-      case Interrupt::kInterrupted:
-        return RunEnd::kInterrupted;
-      case Interrupt::kTerminated:
-        return RunEnd::kTerminated;
-      case Interrupt::kNone:
-        break;
-    }
-    const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
-    return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
-  }
-
- private:
-  double limit_;
-  Clock::time_point begin_;
-};
 
 }  // namespace
 
@@ -203,14 +200,16 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
   return setup;
 }
 
-EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
+EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
                        const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder,
-                       const PolicyMaker& policy) {
-  EpisodeRow row = row_for(spec, suite, hash, *robot);
+                       const PolicyMaker& policy, const std::function<bool()>& stop_asked) {
+  EpisodeRow row = row_for(spec, suite, identity, *robot);
   row.started_at = utc_now();
   const Clock::time_point begin = Clock::now();
   try {
-    simulate(spec, suite, robot, trajectory_folder, policy, row);
+    simulate(spec, suite, robot, trajectory_folder, policy, stop_asked, row);
+  } catch (const StorageError&) {
+    throw;
   } catch (const MissingError& error) {
     row.outcome = Outcome::kUnsupported;
     row.message = error.what();
@@ -226,31 +225,108 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::s
 
 namespace {
 
-EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const std::string& hash, const Bodies& bodies,
-                         const std::string& trajectory_folder) {
+EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
+                         const std::string& trajectory_folder, const std::function<bool()>& stop_asked) {
   const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
   const auto absent = bodies.absent().find(spec.controller);
   if (absent != bodies.absent().end() && spec.engine != kPlayback)
-    return unsupported_row(row_for(spec, suite, hash, *robot), absent->second);
+    return unsupported_row(row_for(spec, suite, identity, *robot), absent->second);
   const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
-  if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, hash, *robot), policy.refusal);
-  return run_episode(spec, suite, hash, robot, trajectory_folder, policy.make);
+  if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, identity, *robot), policy.refusal);
+  return run_episode(spec, suite, identity, robot, trajectory_folder, policy.make, stop_asked);
 }
 
-// Those that are asked for and not in the run yet; counts all and those that are.
-std::vector<EpisodeSpec> missing_episodes(const Suite& suite, const std::string& hash, const Bodies& bodies,
-                                          const RunOptions& options, const RunDirectory& run, RunSummary& summary) {
-  std::vector<EpisodeSpec> missing;
-  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
-    if (!selected(options, spec)) continue;
-    ++summary.planned;
-    if (run.has(row_for(spec, suite, hash, *bodies.robot(spec.controller)).key)) {
+// For people: what profile_digest is of. The suite says less, and another machine's engines may add other defaults.
+std::string settings_here(const Suite& suite) {
+  std::string text;
+  for (const std::string& engine : suite.engines)
+    if (engine != kPlayback && is_available(engine))
+      text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
+  return text;
+}
+
+// Places in the plan of those that are asked for and not in the folder yet; counts those that are.
+std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPart& part, const RunDirectory& run,
+                                            const std::function<std::string(const EpisodeSpec&)>& key_of,
+                                            const StopSign& stop, RunSummary& summary) {
+  std::vector<std::uint32_t> missing;
+  for (std::int64_t i = 0; i < plan.size(); ++i) {
+    if (i % 256 == 0 && stop.asked()) throw Stopped();
+    const EpisodeSpec spec = plan.at(i);
+    if (!belongs(spec, spec.clip->task, part)) continue;
+    if (run.size() > 0 && run.has(key_of(spec))) {
       ++summary.already_there;
     } else {
-      missing.push_back(spec);
+      missing.push_back(static_cast<std::uint32_t>(i));
     }
   }
   return missing;
+}
+
+// Tasks of the clips that the suite makes itself; those of files are known when they are read.
+std::vector<Task> tasks_of_clips(const Suite& suite) {
+  std::vector<Task> tasks;
+  const std::size_t per_task = suite.clips.synth_per_task * std::max<std::size_t>(1, suite.clips.variants.size());
+  for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
+  return tasks;
+}
+
+std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
+  std::vector<Task> tasks;
+  for (const PairedMotion& clip : clips) tasks.push_back(clip.task);
+  return tasks;
+}
+
+// Says in the folder and in the summary what was asked for.
+void ask_for(const Suite& suite, const std::vector<Task>& clips, const RunOptions& options, RunDirectory& run,
+             RunSummary& summary) {
+  const auto count = [&](const std::vector<RunPart>& parts) { return count_episodes(suite, clips, parts); };
+  summary.planned = count({part_of(options)});
+  run.ask_for(part_of(options), count({RunPart()}), count);
+}
+
+// Plans and runs what is missing.
+void run_missing(const Suite& suite, const RunIdentity& identity, const Bodies& bodies, const RunOptions& options,
+                 const StopSign& stop, Progress& progress, RunDirectory& run, RunSummary& summary) {
+  const EpisodePlan plan(suite, bodies);
+  const auto key_of = [&](const EpisodeSpec& spec) {
+    return row_for(spec, suite, identity, *bodies.robot(spec.controller)).key;
+  };
+  const std::vector<std::uint32_t> missing = missing_episodes(plan, part_of(options), run, key_of, stop, summary);
+  const std::string trajectories = suite.record == RecordTrajectories::kNone ? "" : inside(run.path(), "trajectories");
+  SharedWork work(run, stop);
+  progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
+  const auto key_at = [&](int i) { return key_of(plan.at(missing[i])); };
+  const auto run_at = [&](int i) {
+    return run_or_refuse(plan.at(missing[i]), suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+  };
+  work.run(static_cast<int>(missing.size()), options.threads, key_at, run_at, progress);
+  progress.finish();
+  summary.run = work.done();
+  summary.outcomes = work.outcomes();
+  summary.already_there += work.done_by_others();
+}
+
+}  // namespace
+
+namespace {
+
+// The suite hash says nothing of policies and engines; a folder is of those that its suite.yaml names.
+void require_names_of(const std::string& directory, const Suite& suite) {
+  const std::string path = (std::filesystem::path(directory) / "suite.yaml").string();
+  if (!has_inputs(directory)) return;  // a run that was killed before its first episode, or none
+  const Suite there = parse_suite(read_text(path), path);
+  const auto require_all = [&](const char* kind, const std::vector<std::string>& known,
+                               const std::vector<std::string>& wanted) {
+    for (const std::string& name : wanted)
+      if (!chosen(known, name))
+        throw InputError(
+            fmt::format("'{}' holds a run of the {} {}, not of '{}': choose another folder (`duet merge` "
+                        "joins two)",
+                        directory, kind, fmt::join(known, ", "), name));
+  };
+  require_all("policies", policy_names_of(there), policy_names_of(suite));
+  require_all("engines", there.engines, suite.engines);
 }
 
 }  // namespace
@@ -259,36 +335,42 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   check_filters(options, suite);
   RunSummary summary;
   summary.absent_engines = absent_engines(suite, options);
-  const std::string hash = suite_hash(suite);
+  const RunIdentity identity = identity_of(suite);
   Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
                 left_out(options.policies, policy_names_of(suite)));
   check_actors(bodies, suite, options);
   summary.absent_controllers = bodies.absent();
   summary.absent_policies = bodies.absent_policies();
-  RunDirectory run = RunDirectory::open(directory, {suite.name, suite.version, hash, resolved_yaml(suite), options.argv,
-                                                    utc_now(), capture_environment(), options.certificate});
-  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), options.threads, progress));
-  const std::vector<EpisodeSpec> missing = missing_episodes(suite, hash, bodies, options, run, summary);
-  const std::string trajectories =
-      suite.record == RecordTrajectories::kNone ? "" : (std::filesystem::path(directory) / "trajectories").string();
-  const StopSign stop(options.time_limit);
-  std::mutex mutex;
-  progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
-  parallel_for_each(static_cast<int>(missing.size()), options.threads, [&](int i) {
-    if (stop.end() != RunEnd::kComplete) return;
-    try {
-      const EpisodeRow row = run_or_refuse(missing[i], suite, hash, bodies, trajectories);
-      const std::lock_guard lock(mutex);
-      run.append(row);
-      ++summary.run;
-      ++summary.outcomes[std::string(to_string(row.outcome))];
-      progress.advance();
-    } catch (const EpisodeInterrupted&) {
-      return;
-    }
-  });
-  progress.finish();
+  const KeptSuite kept = kept_suite(suite, directory);
+  const RunInfo info{.suite = suite.name,
+                     .suite_version = suite.version,
+                     .suite_hash = identity.suite_hash,
+                     .suite_yaml = resolved_yaml(kept.suite) + settings_here(suite),
+                     .argv = options.argv,
+                     .created_at = utc_now(),
+                     .environment = capture_environment(),
+                     .policies = identity.policies,
+                     .controllers = identity.controllers,
+                     .certificate = options.certificate,
+                     .plan = {}};
+  require_names_of(directory, suite);
+  RunDirectory run = RunDirectory::open(directory, info, options.retry_errors);
+  keep_inputs(kept, directory);
+  if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
+  const StopSign stop(options.time_limit, options.begin);
+  try {
+    if (suite.clips.files.empty()) ask_for(suite, tasks_of_clips(suite), options, run, summary);
+    const PrepareOptions prepare{.keep_in = directory, .stop = &stop};
+    std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress, prepare);
+    if (!suite.clips.files.empty()) ask_for(suite, tasks_of(clips), options, run, summary);
+    bodies.take_clips(std::move(clips));
+    run_missing(suite, identity, bodies, options, stop, progress, run, summary);
+  } catch (const Stopped&) {
+    summary.end = stop.end();
+    return summary;
+  }
   if (summary.already_there + summary.run < summary.planned) summary.end = stop.end();
+  if (run.is_finished()) remove_prepared_clips(directory);
   return summary;
 }
 

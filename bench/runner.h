@@ -1,6 +1,8 @@
 // Runs a suite on all cores into a run directory: resumable, with time limits; a stopped run has lost nothing.
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -9,6 +11,8 @@
 #include "bench/episode.h"
 #include "bench/progress.h"
 #include "bench/rollout.h"
+#include "bench/run_work.h"
+#include "bench/stop_sign.h"
 #include "bench/suite.h"
 #include "results/run_directory.h"
 
@@ -16,38 +20,39 @@ namespace duet {
 
 struct RunOptions {
   int threads = 1;
-  double time_limit = 0.0;                                  // of the whole run [s]; 0 = none
-  std::vector<std::string> engines, controllers, policies;  // where not empty: only these
+  double time_limit = 0.0;                                     // of the whole run [s]; 0 = none
+  StopSign::Clock::time_point begin = StopSign::Clock::now();  // of the command: where the time limit counts from
+  bool retry_errors = false;                                   // runs episodes again that ended with an error before
+  std::vector<std::string> engines, controllers, policies;     // where not empty: only these
   std::vector<std::string> tasks, perturbations;
   std::vector<std::string> argv;
   nlohmann::json certificate;  // parity certificate that the run keeps; null: none
 };
 
-enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
-
 struct RunSummary {
-  int planned = 0, already_there = 0, run = 0;
+  // Of the part that was asked for; planned is 0 where the run was stopped before its clips were ready.
+  std::int64_t planned = 0, already_there = 0, run = 0;
   std::map<std::string, int> outcomes;  // of those run now
   // Name -> reason; their episodes are rows with `unsupported`.
   std::map<std::string, std::string> absent_engines, absent_controllers, absent_policies;
+  std::vector<std::string> warnings;  // sentences
   RunEnd end = RunEnd::kComplete;
 };
 
-// Throws InputError (suite, clips, run directory, a full disk), MissingError (none of its engines, of its policies or,
-// but for playback, of its controllers is there), std::invalid_argument.
+// Several processes may run one suite into one folder at once: each episode is run by one of them. Throws InputError
+// (suite, clips, run directory, a full disk), MissingError (none of its engines, of its policies or, but for playback,
+// of its controllers is there), std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 // The scene with the perturbation's ground and robot; `robot` is the controller's nominal one.
 Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot);
 
-// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`. Without `policy` the
-// suite's own is loaded for this episode alone.
+// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`, but StorageError (a full
+// disk): it says nothing of the episode. Without `policy` the suite's own is loaded for this episode alone; without
+// `stop_asked` signals alone stop it.
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot);
-EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const std::string& hash,
+EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
                        const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "",
-                       const PolicyMaker& policy = {});
-
-// Thrown by run_episode when the user stopped the run: the episode leaves no row and runs again on resume.
-struct EpisodeInterrupted {};
+                       const PolicyMaker& policy = {}, const std::function<bool()>& stop_asked = {});
 
 }  // namespace duet

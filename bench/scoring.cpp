@@ -5,6 +5,7 @@
 #include <limits>
 #include <tuple>
 
+#include "core/digest.h"
 #include "metrics/detector.h"
 #include "metrics/diagnostics.h"
 #include "metrics/onset.h"
@@ -133,20 +134,24 @@ Verdict to_verdict(const DetectorResult& result, DetectorVersion version, Thresh
   return verdict;
 }
 
-PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, const RobotModel& robot) {
-  const Recording& recording = rollout.recording;
+ActSource act_source(const Recording& recording, const RolloutSetup& setup) {
+  const int begin = setup.reference.clip_frame + std::min(recording.phases.act_begin, recording.frames());
+  const int end = setup.reference.clip_frame + std::min(recording.phases.act_end, recording.frames());
+  const PairedMotion& clip = *setup.clip;
+  return {slice(clip.source_partner, begin, end), slice(clip.source_reactor, begin, end),
+          clip.reshaped.empty() ? PointTracks() : clip.reshaped.slice(begin, end)};
+}
+
+PairedMotion executed_act(const Recording& recording, const ActSource& source, const RobotModel& robot) {
   const int begin = std::min(recording.phases.act_begin, recording.frames());
   const int frames = std::min(recording.phases.act_end, recording.frames()) - begin;
-  const int clip_begin = setup.reference.clip_frame + begin;
   PairedMotion motion;
-  motion.clip_id = setup.clip->clip_id;
-  motion.task = setup.clip->task;
+  motion.task = recording.task;
   motion.phases = {0, frames};
-  motion.reactor = setup.clip->reactor;
-  motion.partner = slice(episode_partner(setup), begin, begin + frames);
-  motion.source_partner = slice(setup.clip->source_partner, clip_begin, clip_begin + frames);
-  motion.source_reactor = slice(setup.clip->source_reactor, clip_begin, clip_begin + frames);
-  motion.reshaped = setup.clip->reshaped.slice(clip_begin, clip_begin + frames);
+  motion.partner.joints = recording.partner.slice(begin, begin + frames);
+  motion.source_partner = source.partner;
+  motion.source_reactor = source.reactor;
+  motion.reshaped = source.reshaped;
   motion.robot.joint_names = robot.joint_names();
   motion.robot.q.resize(robot.dof(), frames);
   for (int t = 0; t < frames; ++t) {
@@ -156,9 +161,22 @@ PairedMotion executed_act(const Rollout& rollout, const RolloutSetup& setup, con
   return motion;
 }
 
-void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
-                   const RobotModel& robot, EpisodeRow& row) {
-  const Recording& recording = rollout.recording;
+std::string state_hash(const Recording& recording) {
+  Sha256 hash;
+  for (const RobotState& state : recording.robot) hash.update(state);
+  return hash.hex();
+}
+
+std::vector<std::string> measured_metrics() {
+  ContactSafetyResult result;
+  result.worst_ratio = 0.0;
+  std::vector<std::string> names;
+  for (const auto& [name, value] : contact_safety_metrics(result)) names.push_back(name);
+  return names;
+}
+
+void score_recording(const Recording& recording, const ActSource& source, const ScoringRules& rules,
+                     const RobotModel& robot, EpisodeRow& row) {
   const Agent human = human_agent(recording.partner);
   const Agent machine = robot_agent(robot, recording.robot);
   row.outcome = recording.outcome;
@@ -166,30 +184,37 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.fell = recording.outcome == Outcome::kFell;
   row.frames = recording.frames();
   row.sim_s = recording.frames() / recording.rate_hz;
-  row.late_plans = rollout.late_plans;
-  row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
-                       rollout.policy_faults.message};
-  row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
-  add_contacts(rollout, *setup.clip, robot, row);
   row.trace = state_trace(recording, robot);
-  if (setup.foot_trace) row.feet = foot_trace(recording, robot);
-  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
-  row.state_hash = rollout.state_hash;
+  if (rules.feet) row.feet = foot_trace(recording, robot);
   row.success = false;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {
     for (const ThresholdSet set : {ThresholdSet::kPaper, ThresholdSet::kStrict}) {
-      const DetectorResult result = detect(recording.task, human, machine, version, set, readings.detectors);
+      const DetectorResult result = detect(recording.task, human, machine, version, set, rules.readings.detectors);
       row.verdicts.push_back(to_verdict(result, version, set));
-      if (version == suite.detector && set == suite.thresholds)
+      if (version == rules.detector && set == rules.thresholds)
         row.success = result.success && recording.outcome == Outcome::kOk;
     }
   }
   add_finite(onsets(recording, robot), row.metrics);
   constexpr int kShortest = 8;  // third differences at both ends
   if (recording.frames() < kShortest) return;
-  add_finite(controller_diagnostics(recording, readings.diagnostics), row.metrics);
-  const PairedMotion executed = executed_act(rollout, setup, robot);
-  if (executed.frames() >= kShortest) add_finite(retargeting_metrics(executed, robot, readings.metrics), row.metrics);
+  add_finite(controller_diagnostics(recording, rules.readings.diagnostics), row.metrics);
+  const PairedMotion executed = executed_act(recording, source, robot);
+  if (executed.frames() >= kShortest)
+    add_finite(retargeting_metrics(executed, robot, rules.readings.metrics), row.metrics);
+}
+
+void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
+                   const RobotModel& robot, EpisodeRow& row) {
+  row.late_plans = rollout.late_plans;
+  row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
+                       rollout.policy_faults.message};
+  row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
+  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
+  row.state_hash = rollout.state_hash;
+  add_contacts(rollout, *setup.clip, robot, row);
+  const ScoringRules rules{suite.detector, suite.thresholds, readings, setup.foot_trace};
+  score_recording(rollout.recording, act_source(rollout.recording, setup), rules, robot, row);
 }
 
 }  // namespace duet

@@ -2,11 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "bench/clips.h"
 #include "bench/parallel.h"
 #include "bench/progress.h"
 #include "bench/scoring.h"
-#include "bench/suite_names.h"
 #include "core/require.h"
 #include "core/share.h"
 #include "metrics/catalogue.h"
@@ -56,9 +57,7 @@ MetricColumn column_of(const MetricInfo& metric) {
 std::vector<MetricColumn> metric_columns() {
   std::vector<MetricColumn> columns;
   for (const MetricInfo& metric : metric_catalogue()) columns.push_back(column_of(metric));
-  columns.insert(columns.end(), {{"jpe.pelvis", "Joint position error, pelvis-aligned", "m", "lower"},
-                                 {"large_angle_ratio.entry", "Large-angle ratio, per joint", "1", "lower"},
-                                 {"source_detected", "Task detected, people", "1", "higher"},
+  columns.insert(columns.end(), {{"source_detected", "Task detected, people", "1", "higher"},
                                  {"robot_detected", "Task detected, robot", "1", "higher"},
                                  {"paper_detected", "Task detected, as printed", "1", "higher"},
                                  {"clips", "Clips", "", ""}});
@@ -66,7 +65,7 @@ std::vector<MetricColumn> metric_columns() {
 }
 
 std::vector<std::string> notes_of(const Suite& suite) {
-  return {
+  std::vector<std::string> notes = {
       fmt::format(
           "Suite {} {}: start \"{}\", partner \"{}\", engine profile \"{}\", headline detector version \"{}\" with "
           "\"{}\" thresholds.",
@@ -78,6 +77,13 @@ std::vector<std::string> notes_of(const Suite& suite) {
       "same episodes.",
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",
   };
+  if (suite.partner == PartnerMode::kGhost)
+    notes.emplace_back("A ghost partner touches nothing: the robot passes through it.");
+  if (std::ranges::find(suite.engines, kPlaybackEngine) != suite.engines.end())
+    notes.emplace_back(
+        "Playback moves the robot along its reference without physics. It is no upper bound for policies that look at "
+        "the robot.");
+  return notes;
 }
 
 }  // namespace
@@ -101,34 +107,21 @@ CrossEngine across_engines(const std::vector<EpisodeRow>& rows) {
   return cross_engine(rows, columns);
 }
 
-std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files, const Suite& suite) {
+std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files) {
   std::vector<TrainingCurves> curves;
   curves.reserve(files.size());
   for (const std::string& file : files) curves.push_back(load_curves(file));
-  for (const SuiteController& controller : suite.controllers) {
-    if (!is_plain_name(controller.use)) continue;
-    try {
-      const std::string relative = fmt::format("controllers/{}/curves.csv", controller.use);
-      TrainingCurves kept = load_curves(share_file("training curves", relative));
-      kept.title = relative;
-      if (std::none_of(curves.begin(), curves.end(), [&](const TrainingCurves& c) { return c.title == relative; }))
-        curves.push_back(std::move(kept));
-    } catch (const MissingError&) {
-      continue;  // most have none
-    }
-  }
   return curves;
 }
 
-ReportContent report_content(const std::vector<Run>& runs, bool with_clips, const std::vector<std::string>& curve_files,
-                             int threads, Progress& progress) {
+ReportContent report_content(const Run& run, bool with_clips, const std::vector<std::string>& curve_files, int threads,
+                             Progress& progress) {
   ReportContent content;
-  std::vector<EpisodeRow> rows;
-  for (const Run& run : runs) rows.insert(rows.end(), run.rows.begin(), run.rows.end());
-  const Suite suite = parse_suite(runs.front().info.suite_yaml, "suite.yaml");
-  content.curves = training_curves(curve_files, suite);
+  const std::vector<EpisodeRow>& rows = run.rows;
+  const Suite suite = parse_suite(run.info.suite_yaml, run.path + "/suite.yaml");
+  content.curves = training_curves(curve_files);
   content.title = fmt::format("{} {}", suite.name, suite.version);
-  content.environment = runs.front().info.environment;
+  content.environment = run.info.environment;
   content.notes = notes_of(suite);
   content.entries = leaderboard(rows);
   content.columns = metric_columns();
@@ -136,7 +129,7 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, cons
   content.contacts = contact_table(rows);
   content.controllers = controller_table(rows);
   content.foot_plots = foot_plots(rows);
-  content.certificate = runs.front().info.certificate;
+  content.certificate = run.info.certificate;
   if (!with_clips) return content;
 
   const auto robot = load_shared_robot(suite.robot);
@@ -146,7 +139,7 @@ ReportContent report_content(const std::vector<Run>& runs, bool with_clips, cons
   content.stories.resize(clips.size());
   progress.start("drawing", static_cast<int>(clips.size()), "clips");
   parallel_for_each(static_cast<int>(clips.size()), threads, [&](int i) {
-    scores[i] = score_clip(clips[i], robot, readings);
+    scores[i] = score_clip(clips[i], robot, {.readings = readings});
     content.stories[i] = clip_story(clips[i], scores[i], *robot);
     progress.advance();
   });

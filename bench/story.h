@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/score.h"
+#include "bench/motion_scores.h"
 #include "bench/suite.h"
 #include "results/cross_engine.h"
 #include "results/html_report.h"
@@ -21,13 +21,12 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
 // The cross-engine tables of rows, with the 18 retargeting metrics.
 CrossEngine across_engines(const std::vector<EpisodeRow>& rows);
 
-// The curves of the files given and, where the suite runs one of duet's own controllers that was trained with its
-// curves kept (controllers/<name>/curves.csv), of those. Throws InputError for a file that is broken.
-std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files, const Suite& suite);
+// Throws InputError for a file that is broken.
+std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files);
 
 // Everything that the report says of runs: leaderboard, notes, retargeting figures and stories of their clips, which
 // are made again from the first run's suite (`with_clips`), on `threads` threads.
-ReportContent report_content(const std::vector<Run>& runs, bool with_clips, const std::vector<std::string>& curve_files,
-                             int threads, Progress& progress);
+ReportContent report_content(const Run& run, bool with_clips, const std::vector<std::string>& curve_files, int threads,
+                             Progress& progress);
 
 }  // namespace duet

@@ -4,11 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "bench/suite_actors.h"
 #include "bench/suite_names.h"
-#include "core/digest.h"
 #include "core/names.h"
 #include "core/require.h"
 
@@ -89,11 +87,13 @@ std::string variants_yaml(const std::vector<ClipVariant>& variants) {
   return fmt::format(", variants: [{}]", fmt::join(texts, ", "));
 }
 
-// Puts the content of files in the place of their paths: a descriptor's, and those that options name.
-void use_contents(std::string& use, std::map<std::string, std::string>& options) {
-  if (use.ends_with(".yaml")) use = sha256_file(use);
-  for (auto& [name, value] : options)
-    if (is_path_option(name) && std::filesystem::is_regular_file(value)) value = sha256_file(value);
+// As the profile says it; what it leaves to an engine's defaults is left to them here too.
+std::string profile_yaml(const Profile& profile) {
+  std::string text =
+      fmt::format("profile:\n  name: {}\n  engines:{}\n", profile.name, profile.engines.empty() ? " {}" : "");
+  for (const auto& [engine, settings] : profile.engines)
+    text += fmt::format("    {}: {}\n", engine, settings_yaml(settings));
+  return text;
 }
 
 }  // namespace
@@ -200,13 +200,7 @@ std::string resolved_yaml(const Suite& suite) {
   text += fmt::format("episodes_per_clip: {}\nstart: {}\nstart_radius: {}\npartner: {}\nfuse_ticks: {}\n",
                       suite.episodes_per_clip, to_string(suite.start), suite.start_radius, to_string(suite.partner),
                       suite.fuse_ticks);
-  std::vector<std::string> settings;
-  for (const std::string& engine : suite.engines)
-    if (engine != "playback")
-      settings.push_back(
-          fmt::format("\n    {}: {}", engine, resolved_settings(engine, suite.profile.settings(engine))));
-  text += fmt::format("profile:\n  name: {}\n  engines:{}\n", suite.profile.name,
-                      settings.empty() ? " {}" : fmt::format("{}", fmt::join(settings, "")));
+  text += profile_yaml(suite.profile);
   if (!suite.contact_limits.empty()) text += fmt::format("contact_limits: \"{}\"\n", suite.contact_limits);
   if (!suite.robot.empty()) text += fmt::format("robot: \"{}\"\n", suite.robot);
   text += fmt::format("detector: {{version: {}, thresholds: {}}}\n", to_string(suite.detector),
@@ -221,16 +215,6 @@ std::string resolved_yaml(const Suite& suite) {
   add_map("retarget", suite.retarget);
   add_map("readings", suite.readings);
   return text;
-}
-
-std::string suite_hash(const Suite& suite) {
-  Suite by_content = suite;  // where a file lies does not matter, what is in it does
-  for (std::string& file : by_content.clips.files) file = sha256_file(file);
-  if (!suite.contact_limits.empty()) by_content.contact_limits = sha256_file(suite.contact_limits);
-  if (std::filesystem::is_regular_file(suite.robot)) by_content.robot = sha256_file(suite.robot);
-  for (SuiteController& controller : by_content.controllers) use_contents(controller.use, controller.options);
-  for (SuitePolicy& policy : by_content.policies) use_contents(policy.use, policy.options);
-  return sha256_hex(resolved_yaml(by_content));
 }
 
 }  // namespace duet

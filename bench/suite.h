@@ -80,6 +80,7 @@ struct Suite {
   double wall_limit = 120.0;                    // per episode [s]
   RecordTrajectories record = RecordTrajectories::kNone;
   bool null_arm = true;
+  bool allow_programs = false;  // the user's word, never a file's: policies may start programs (bench/trust.h)
 };
 
 using Overrides =
@@ -105,11 +106,9 @@ void set_policy_option(Suite& suite, const std::string& policy, const std::strin
 Suite load_suite(const std::string& path, const Overrides& overrides = {});
 Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides = {});
 
-// All keys written out, in a fixed order: what the hash covers and a run directory keeps.
+// All keys written out, in a fixed order: what a run directory keeps. Settings of engines are those that the profile
+// says; the rest is an engine's own (resolved_settings).
 std::string resolved_yaml(const Suite& suite);
-// SHA-256 of resolved_yaml, with the content of files (clips, limits, descriptors, networks) in the place of their
-// paths.
-std::string suite_hash(const Suite& suite);
 
 std::string_view to_string(SuiteStart start);
 std::string_view to_string(PartnerMode partner);

@@ -34,11 +34,18 @@ Options read_options(const YamlSection& item, const Suite& suite) {
   return options;
 }
 
-// What controllers and policies share: a name, a descriptor's path, or a mapping with name, use and options.
+std::string name_in_descriptor(const SuiteController& controller) { return controller_info(controller.use).name; }
+std::string name_in_descriptor(const SuitePolicy& policy) { return policy_info(policy.use).name; }
+
+// What controllers and policies share: a name, a descriptor's path, or a mapping with name, use and options. Where the
+// suite gives no name of its own, that of the descriptor holds.
 template <typename Actor>
 void finish_names(const Suite& suite, Actor& actor) {
   if (actor.use.ends_with(kDescriptor)) actor.use = from_folder_of(suite, actor.use);
-  if (actor.name.ends_with(kDescriptor)) actor.name = std::filesystem::path(actor.name).stem().string();
+  if (actor.name.ends_with(kDescriptor)) {
+    actor.name = name_in_descriptor(actor);
+    require(is_plain_name(actor.name), fmt::format("{}: name: {}", actor.use, plain_name_message(actor.name)));
+  }
   require(is_plain_name(actor.name), plain_name_message(actor.name));
 }
 
@@ -66,7 +73,9 @@ bool reads_shuffled(const YamlSection& item) {
 
 SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
   SuitePolicy policy;
-  if (node.IsScalar()) {
+  if (node.IsNull()) {  // the word null without quotes, which YAML takes for nothing
+    policy.name = policy.use = kNullPolicy;
+  } else if (node.IsScalar()) {
     policy.name = policy.use = node.Scalar();
   } else {
     const YamlSection item(suite.file, node, "policy", {"name", "use", "options", "network", "prompt", "partner"});
@@ -87,7 +96,7 @@ SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
 template <typename Actor>
 void require_new_name(const std::vector<Actor>& actors, const std::string& name) {
   require(std::none_of(actors.begin(), actors.end(), [&](const Actor& other) { return other.name == name; }),
-          fmt::format("'{}' is there twice; names tell rows apart", name));
+          fmt::format("'{}' is there twice; names tell rows apart ({{name: ..., use: ...}} gives another)", name));
 }
 
 // Runs `add` on each item of a list that must not be empty; a std::invalid_argument becomes file and line.

@@ -5,15 +5,19 @@
 #include <cmath>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <utility>
 
 #include "backends/factory.h"
+#include "bench/clips.h"
+#include "bench/episode.h"
 #include "bench/suite.h"
 #include "bench/suite_actors.h"
 #include "bench/suite_names.h"
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "metrics/readings.h"
 #include "policies/scheduler.h"
 #include "retarget/options.h"
@@ -45,8 +49,9 @@ void get_integer(const YamlSection& section, const char* key, Integer lowest, In
   if (!section.has(key)) return;
   const double value = section.number(key);
   checked(section, key, [&] {
-    require(value == std::floor(value) && value >= static_cast<double>(lowest) && value < 9.0e15,
-            fmt::format("expected a whole number, {} or more, found {}", lowest, value));
+    const double most = std::min(9.0e15, static_cast<double>(std::numeric_limits<Integer>::max()));
+    require(value == std::floor(value) && value >= static_cast<double>(lowest) && value <= most,
+            fmt::format("expected a whole number, {} to {:.0f}, found {}", lowest, most, value));
   });
   out = static_cast<Integer>(value);
 }
@@ -133,6 +138,22 @@ void read_variants(const YamlSection& synth, Suite& suite) {
   }
 }
 
+// Paths from the suite's folder; a folder is the files in it. That a file is there is asked when it is read.
+void use_clip_files(const YamlSection& clips, Suite& suite) {
+  std::vector<std::string> files;
+  for (const std::string& file : suite.clips.files) {
+    const std::string path = from_folder_of(suite, file);
+    try {
+      const bool folder = std::filesystem::is_directory(path);
+      for (std::string& found : folder ? find_motion_files({path}) : std::vector{path})
+        files.push_back(std::move(found));
+    } catch (const InputError& error) {
+      clips.fail(clips.line("files"), fmt::format("files: {}", error.what()));
+    }
+  }
+  suite.clips.files = std::move(files);
+}
+
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = below(top, suite.file, "clips", {"synth", "files"});
   const YamlSection synth = below(clips, suite.file, "synth", {"per_task", "seed", "variants"});
@@ -146,7 +167,7 @@ void read_clips(const YamlSection& top, Suite& suite) {
                fmt::format("clips: expected either synth.per_task or files, found {}", synthetic ? "both" : "neither"));
   if (!synthetic && !suite.clips.variants.empty())
     clips.fail(synth.line("variants"), "variants: expected per_task, as only synthesised clips have variants");
-  for (std::string& file : suite.clips.files) file = from_folder_of(suite, file);
+  use_clip_files(clips, suite);
 }
 
 // `all`: playback and every engine that this machine has.
@@ -190,10 +211,9 @@ void read_profile_key(const YamlSection& top, Suite& suite) {
   if (!top.has("dt")) return;
   const double dt = top.number("dt");
   checked(top, "dt", [&] { check_step(dt); });
-  for (const std::string& engine : suite.engines) {
-    const EngineSettings settings = suite.profile.settings(engine);
-    suite.profile.engines[engine] = {dt, settings.options};
-  }
+  // Of every engine that duet knows, not of those that `engines: all` is on this machine: the suite's hash says it.
+  for (const EngineInfo& engine : engines())
+    if (engine.physics) suite.profile.engines[engine.name] = {dt, suite.profile.settings(engine.name).options};
 }
 
 void read_episode(const YamlSection& top, Suite& suite) {
@@ -208,7 +228,10 @@ void read_episode(const YamlSection& top, Suite& suite) {
   get_integer(top, "fuse_ticks", 1, suite.fuse_ticks);
   checked(top, "fuse_ticks", [&] { static_cast<void>(Scheduler({.fuse_ticks = suite.fuse_ticks})); });
   get(top, "robot", suite.robot);
-  if (is_plain_name(suite.robot) && !suite.robot.ends_with(".yaml")) suite.robot = card_path(suite.robot);
+  if (is_plain_name(suite.robot) && !suite.robot.ends_with(".yaml"))
+    suite.robot = card_path(suite.robot);
+  else if (!suite.robot.empty())
+    suite.robot = from_folder_of(suite, suite.robot);
   if (top.has("contact_limits")) suite.contact_limits = from_folder_of(suite, top.text("contact_limits"));
   if (top.has("null_arm")) suite.null_arm = top.flag_or("null_arm", true);
   const YamlSection detector = below(top, suite.file, "detector", {"version", "thresholds"});
@@ -216,8 +239,10 @@ void read_episode(const YamlSection& top, Suite& suite) {
   get_enum(detector, "thresholds", threshold_names(), suite.thresholds);
   const YamlSection limits = below(top, suite.file, "limits", {"wall_s_per_episode"});
   get(limits, "wall_s_per_episode", suite.wall_limit);
-  checked(limits, "wall_s_per_episode",
-          [&] { require(suite.wall_limit > 0.0, fmt::format("expected more than 0 s, found {}", suite.wall_limit)); });
+  checked(limits, "wall_s_per_episode", [&] {
+    require(suite.wall_limit > 0.0 && suite.wall_limit <= 1.0e6,
+            fmt::format("expected more than 0 s and at most 1000000 s, found {}", suite.wall_limit));
+  });
   const YamlSection record = below(top, suite.file, "record", {"trajectories"});
   get_enum(record, "trajectories", record_names(), suite.record);
 }
@@ -281,6 +306,9 @@ Suite read_suite(const YAML::Node& document, const std::string& file) {
   read_lists(top, suite);
   read_profile_key(top, suite);
   read_episode(top, suite);
+  const std::size_t variants = std::max<std::size_t>(1, suite.clips.variants.size());
+  const std::size_t made = suite.clips.synth_per_task * suite.tasks.size() * variants;
+  require_sane_size(suite, static_cast<std::int64_t>(made + suite.clips.files.size()));
   PairOptions pair;
   Readings readings;
   read_choices(
@@ -304,12 +332,10 @@ void apply_override(const YAML::Node& document, const std::string& key, const st
     rest = rest.substr(dot + 1);
     if (head == "readings") break;
   }
-  node[rest] = parse_yaml(value, fmt::format("{} (override of '{}')", file, key));
+  node[rest] = parse_yaml(value, file);
 }
 
-}  // namespace
-
-Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides) {
+Suite read_with(const std::string& yaml, const std::string& name, const Overrides& overrides) {
   const YAML::Node document = parse_yaml(yaml, name);
   if (!document.IsMap())
     throw InputError(fmt::format("{}:1: expected a suite (a mapping), found {}", name, describe(document)));
@@ -317,14 +343,55 @@ Suite parse_suite(const std::string& yaml, const std::string& name, const Overri
     try {
       apply_override(document, key, value, name);
     } catch (const YAML::Exception& error) {
-      throw InputError(fmt::format("{}: cannot override '{}': {}", name, key, error.msg));
+      throw InputError(fmt::format("{}:1: {}", name, error.msg));
     }
   }
   return read_suite(document, name);
 }
 
+// The message of the suite without one of its overrides; "" where it is in order.
+std::string message_without(std::size_t left_out, const std::string& yaml, const std::string& name,
+                            Overrides overrides) {
+  overrides.erase(overrides.begin() + static_cast<std::ptrdiff_t>(left_out));
+  try {
+    static_cast<void>(read_with(yaml, name, overrides));
+    return "";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+// Without "FILE:LINE: " at its head.
+std::string without_place(const std::string& message, const std::string& file) {
+  if (!message.starts_with(file + ":")) return message;
+  const std::size_t digits = message.find_first_not_of("0123456789", file.size() + 1);
+  if (digits == std::string::npos || digits == file.size() + 1 || !message.substr(digits).starts_with(": "))
+    return message;
+  return message.substr(digits + 2);
+}
+
+// An override has no line in the file: the one without which the message goes away or changes takes its place.
+std::string blamed(const std::string& message, const std::string& yaml, const std::string& name,
+                   const Overrides& overrides) {
+  for (std::size_t i = overrides.size(); i-- > 0;)
+    if (message_without(i, yaml, name, overrides) != message)
+      return fmt::format("override '{}={}': {}", overrides[i].first, shown(overrides[i].second),
+                         without_place(message, name));
+  return message;
+}
+
+}  // namespace
+
+Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides) {
+  try {
+    return read_with(yaml, name, overrides);
+  } catch (const InputError& error) {
+    throw InputError(blamed(error.what(), yaml, name, overrides));
+  }
+}
+
 Suite load_suite(const std::string& path, const Overrides& overrides) {
-  return parse_suite(read_file(path), path, overrides);
+  return parse_suite(read_text(path), path, overrides);
 }
 
 }  // namespace duet

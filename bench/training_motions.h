@@ -1,5 +1,5 @@
 // Motions for a controller to learn on: synthesised clips of the six tasks through PAIR, with the approach of A.4.4.
-// The seeds are none that a suite uses: what is tested on is never learnt.
+// No suite that ships draws its clips from this seed (a test of ShippedSuites).
 #pragma once
 
 #include <vector>

@@ -23,7 +23,10 @@ struct Entry {
   const char* name;
   ControllerInfo (*info)(const std::string& name);
   std::unique_ptr<Controller> (*make)(const std::string& name, Robot robot, const ControllerOptions& options);
+  LoadedFiles (*files)(const std::string& name, const ControllerOptions& options);
 };
+
+LoadedFiles no_files(const std::string&, const ControllerOptions&) { return {}; }
 
 ControllerInfo pd_info(const std::string& name) {
   return {name, "The card's gains around the reference's joint angles, without balance", "g1", false, {}};
@@ -45,19 +48,23 @@ std::unique_ptr<Controller> make_wbc_sim(const std::string&, Robot robot, const 
   return make_wbc_sim_controller(std::move(robot), options);
 }
 
+LoadedFiles wbc_sim_files(const std::string&, const ControllerOptions& options) {
+  return {{"network", wbc_sim_network_path(options)}};
+}
+
 ControllerInfo published_info(const std::string& name) { return descriptor_info(load_descriptor(name)); }
 
-constexpr Entry kControllers[] = {{"pd", pd_info, make_pd},
-                                  {"vmc", vmc_info, make_vmc},
-                                  {"wbc_sim", wbc_sim_entry, make_wbc_sim},
-                                  {"homie", published_info, make_published},
-                                  {"twist2", published_info, make_published},
-                                  {"playground", published_info, make_published},
-                                  {"rl_gym", published_info, make_published},
-                                  {"gmt", published_info, make_published},
-                                  {"beyond_mimic", published_info, make_published}};
+constexpr Entry kControllers[] = {{"pd", pd_info, make_pd, no_files},
+                                  {"vmc", vmc_info, make_vmc, no_files},
+                                  {"wbc_sim", wbc_sim_entry, make_wbc_sim, wbc_sim_files},
+                                  {"homie", published_info, make_published, published_files},
+                                  {"twist2", published_info, make_published, published_files},
+                                  {"playground", published_info, make_published, published_files},
+                                  {"rl_gym", published_info, make_published, published_files},
+                                  {"gmt", published_info, make_published, published_files},
+                                  {"beyond_mimic", published_info, make_published, published_files}};
 // A name that is the path of an IO descriptor.
-constexpr Entry kDescriptor = {"", published_info, make_published};
+constexpr Entry kDescriptor = {"", published_info, make_published, published_files};
 
 const Entry& find_entry(const std::string& name) {
   if (name.ends_with(".yaml")) return kDescriptor;
@@ -81,6 +88,10 @@ std::vector<std::string> controller_names() {
 }
 
 ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
+
+LoadedFiles controller_files(const std::string& name, const ControllerOptions& options) {
+  return find_entry(name).files(name, options);
+}
 
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {
   std::vector<std::string> known;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/loaded_file.h"
 #include "core/robot_state.h"
 #include "robots/robot_model.h"
 
@@ -26,8 +27,6 @@ class Controller {
  public:
   virtual ~Controller() = default;
   [[nodiscard]] virtual std::string_view name() const = 0;
-  // Whether it can move the feet. Where not, episodes start at the act position (an option of the suite, printed).
-  [[nodiscard]] virtual bool walks() const = 0;
   // Starts an episode in `state`, which it is to keep upright.
   virtual void reset(const RobotState& state) = 0;
   // Fills `command` (sized by the first call or by RobotModel::default_command). No allocation after the first call.
@@ -52,6 +51,9 @@ struct ControllerInfo {
 std::vector<ControllerInfo> controllers();
 std::vector<std::string> controller_names();
 ControllerInfo controller_info(const std::string& name);
+// Every file that such a controller loads, its card aside, in a fixed order. Throws as make_controller for a name that
+// is unknown, a descriptor that is broken and a network that is not on this machine; the files are not read.
+LoadedFiles controller_files(const std::string& name, const ControllerOptions& options = {});
 // Throws std::invalid_argument for an option that it does not have, with the nearest and all known.
 void check_controller_options(const ControllerInfo& info, const ControllerOptions& options);
 

@@ -59,6 +59,6 @@ std::string Descriptor::input_layout(const DescriptorInput& input) const {
   return text;
 }
 
-Descriptor read_descriptor(const std::string& path) { return parse_descriptor(read_file(path), path); }
+Descriptor read_descriptor(const std::string& path) { return parse_descriptor(read_text(path), path); }
 
 }  // namespace duet

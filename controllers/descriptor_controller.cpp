@@ -87,7 +87,6 @@ class DescriptorController final : public Controller {
                        const ControllerOptions& options)
       : robot_(std::move(robot)),
         name_(descriptor.name),
-        walks_(descriptor.walks),
         clip_(static_cast<float>(descriptor.action_clip)),
         around_reference_(descriptor.around_reference),
         joints_(bind_joints(descriptor, *robot_, waist_is_locked(descriptor, options))),
@@ -106,7 +105,6 @@ class DescriptorController final : public Controller {
   }
 
   [[nodiscard]] std::string_view name() const override { return name_; }
-  [[nodiscard]] bool walks() const override { return walks_; }
 
   void reset(const RobotState&) override {
     tick_ = 0;
@@ -171,8 +169,8 @@ class DescriptorController final : public Controller {
     const std::vector<std::string> names = robot.joint_names();
     const auto it = std::ranges::find(names, name);
     require(it != names.end(),
-            fmt::format("controller '{}' with robot '{}': {} (it was made for '{}')", descriptor.name, robot.name,
-                        unknown_name_message("joint", name, names), descriptor.robot));
+            fmt::format("{}: controller '{}' with robot '{}': {} (it was made for '{}')", descriptor.file,
+                        descriptor.name, robot.name, unknown_name_message("joint", name, names), descriptor.robot));
     return static_cast<int>(it - names.begin());
   }
 
@@ -183,9 +181,9 @@ class DescriptorController final : public Controller {
       if (std::ranges::none_of(joints, [&](const BoundJoint& joint) { return joint.robot == r; }))
         unknown.push_back(robot.joints[r].name);
     require(unknown.empty(),
-            fmt::format("controller '{}' with robot '{}': expected joints of its descriptor, found also "
+            fmt::format("{}: controller '{}' with robot '{}': expected joints of its descriptor, found also "
                         "{} (it was made for '{}')",
-                        descriptor.name, robot.name, fmt::join(unknown, ", "), descriptor.robot));
+                        descriptor.file, descriptor.name, robot.name, fmt::join(unknown, ", "), descriptor.robot));
   }
 
   [[nodiscard]] std::vector<int> first_joints(size_t count) const {
@@ -237,7 +235,6 @@ class DescriptorController final : public Controller {
 
   std::shared_ptr<const RobotModel> robot_;
   std::string name_;
-  bool walks_;
   float clip_;
   bool around_reference_;
   std::vector<BoundJoint> joints_;

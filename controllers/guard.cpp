@@ -28,7 +28,6 @@ class Guard final : public Controller {
       : controller_(std::move(controller)), card_(robot->default_command(robot->neutral)), held_(card_) {}
 
   [[nodiscard]] std::string_view name() const override { return controller_->name(); }
-  [[nodiscard]] bool walks() const override { return controller_->walks(); }
   [[nodiscard]] ControllerFaults faults() const override { return faults_; }
 
   void reset(const RobotState& state) override {

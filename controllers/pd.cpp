@@ -8,7 +8,6 @@ class Pd final : public Controller {
   explicit Pd(const std::shared_ptr<const RobotModel>& robot) : gains_(robot->default_command(robot->neutral)) {}
 
   [[nodiscard]] std::string_view name() const override { return "pd"; }
-  [[nodiscard]] bool walks() const override { return false; }
   void reset(const RobotState&) override {}
 
   void act(const RobotState&, const Reference& reference, JointCommand& command) override {

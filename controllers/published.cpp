@@ -18,14 +18,13 @@ std::string setting(const char* name) {
   return value == nullptr ? "" : value;
 }
 
-std::vector<std::string> network_places(const std::string& file) {
+std::vector<std::string> network_places(const Descriptor& descriptor) {
   namespace fs = std::filesystem;
-  std::vector<std::string> places;
+  std::vector<std::string> places = {(fs::path(descriptor.file).parent_path() / descriptor.network).string()};
   if (const std::string models = setting("DUET_MODELS"); !models.empty())
-    places.push_back((fs::path(models) / file).string());
-  const std::string shared = setting("DUET_SHARED");
-  const fs::path root = shared.empty() ? fs::path(DUET_SOURCE_DIR) / ".." / "shared" : fs::path(shared);
-  places.push_back((root / "models" / file).lexically_normal().string());
+    places.push_back((fs::path(models) / descriptor.network).string());
+  if (const std::string shared = setting("DUET_SHARED"); !shared.empty())
+    places.push_back((fs::path(shared) / "models" / descriptor.network).string());
   return places;
 }
 
@@ -39,12 +38,17 @@ Descriptor load_descriptor(const std::string& name) {
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options) {
   const auto given = options.find("network");
   const std::vector<std::string> places =
-      given == options.end() ? network_places(descriptor.network) : std::vector<std::string>{given->second};
+      given == options.end() ? network_places(descriptor) : std::vector<std::string>{given->second};
   try {
     return first_existing(fmt::format("network of the controller '{}'", descriptor.name), places);
   } catch (const MissingError& error) {
     throw MissingError(fmt::format("{} (the option 'network' or DUET_MODELS says where it is)", error.what()));
   }
+}
+
+LoadedFiles published_files(const std::string& name, const ControllerOptions& options) {
+  const Descriptor descriptor = load_descriptor(name);
+  return {{"descriptor", descriptor.file}, {"network", find_network(descriptor, options)}};
 }
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,

@@ -13,11 +13,13 @@ namespace duet {
 // one that is not there, InputError for one that is broken.
 Descriptor load_descriptor(const std::string& name);
 
-// The file that the option `network` names; else the descriptor's in $DUET_MODELS, else in $DUET_SHARED/models, else in
-// ../shared/models of the source tree. Throws MissingError naming the places.
-std::string find_network(const Descriptor& descriptor, const ControllerOptions& options);
+// The file that the option `network` names; else the descriptor's: beside it, in $DUET_MODELS, in $DUET_SHARED/models.
+// Throws MissingError naming the places.
+std::string find_network(const Descriptor& descriptor, const ControllerOptions& options = {});
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
                                            const ControllerOptions& options);
+// The descriptor and its network.
+LoadedFiles published_files(const std::string& name, const ControllerOptions& options);
 
 }  // namespace duet

@@ -20,6 +20,7 @@
 namespace duet {
 namespace {
 
+// Found by hand on a G1 that follows clips and is pushed (tests/controllers/vmc_test.cpp). Nobody has swept them.
 constexpr int kIterations = 120;                // of the contact forces
 constexpr double kRegularisation = 1e-6;        // of contact forces: of two that do the same, the even one
 constexpr double kSoleDamping = 10.0;           // of a sole that moves although it should not [1/s]
@@ -64,7 +65,6 @@ class Vmc final : public Controller {
   }
 
   [[nodiscard]] std::string_view name() const override { return "vmc"; }
-  [[nodiscard]] bool walks() const override { return false; }
 
   void reset(const RobotState& state) override {
     kinematics_.update(state.X_WB, state.q);

@@ -17,11 +17,18 @@
 namespace duet {
 namespace {
 
+constexpr std::int64_t kMostStreamBytes = std::int64_t{256} << 20;  // of a device or a pipe, which may have no end
+
 std::string reason(int error) { return std::generic_category().message(error); }
 
-[[noreturn]] void fail(const char* action, const std::string& path, int error) {
-  throw InputError(fmt::format("cannot {} '{}': {}", action, path, reason(error)));
+[[noreturn]] void fail_to_read(const std::string& path, int error) {
+  throw InputError(fmt::format("cannot read '{}': {}", path, reason(error)));
 }
+
+[[noreturn]] void fail_to_write(const std::string& path, const std::string& reason) {
+  throw StorageError(fmt::format("cannot write '{}': {}", path, reason));
+}
+[[noreturn]] void fail_to_write(const std::string& path, int error) { fail_to_write(path, reason(error)); }
 
 class Descriptor {
  public:
@@ -69,7 +76,7 @@ std::filesystem::path parent_folder(const std::string& path) {
 void create_parent(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(parent_folder(path), error);
-  if (error) fail("write", path, error.value());
+  if (error) fail_to_write(path, error.value());
 }
 
 // Makes a rename or a new name durable. Some file systems cannot sync a folder: the file's content is safe by then.
@@ -81,9 +88,9 @@ void sync_parent(const std::string& path) {
 // A device or a pipe (/dev/stdout) must be written to, not replaced by a file of that name.
 void write_in_place(const std::string& path, std::string_view bytes) {
   Descriptor file(open_file(path, O_WRONLY));
-  if (file.get() < 0) fail("write", path, errno);
-  if (const int error = write_all(file.get(), bytes); error != 0) fail("write", path, error);
-  if (const int error = file.close(); error != 0) fail("write", path, error);
+  if (file.get() < 0) fail_to_write(path, errno);
+  if (const int error = write_all(file.get(), bytes); error != 0) fail_to_write(path, error);
+  if (const int error = file.close(); error != 0) fail_to_write(path, error);
 }
 
 struct TemporaryFile {
@@ -97,7 +104,7 @@ TemporaryFile create_beside(const std::string& path) {
     std::string candidate = fmt::format("{}.part-{}-{}", path, ::getpid(), n);
     const int descriptor = open_file(candidate, O_WRONLY | O_CREAT | O_EXCL, 0666);
     if (descriptor >= 0) return {std::move(candidate), descriptor};
-    if (errno != EEXIST) fail("write", path, errno);
+    if (errno != EEXIST) fail_to_write(path, errno);
   }
 }
 
@@ -116,7 +123,7 @@ void replace_file(const std::string& path, std::string_view bytes, std::optional
   Descriptor file(temporary.descriptor);
   if (const int error = fill_and_rename(file, temporary.path, path, bytes, mode); error != 0) {
     ::unlink(temporary.path.c_str());
-    fail("write", path, error);
+    fail_to_write(path, error);
   }
   sync_parent(path);
 }
@@ -137,19 +144,23 @@ off_t complete_size(int descriptor, off_t size) {
 
 }  // namespace
 
-std::string read_file(const std::string& path) {
+std::string read_file(const std::string& path, std::int64_t most) {
   const Descriptor file(open_file(path, O_RDONLY));
-  if (file.get() < 0) fail("read", path, errno);
+  if (file.get() < 0) fail_to_read(path, errno);
   std::string bytes;
   struct stat status {};
-  if (::fstat(file.get(), &status) == 0 && S_ISREG(status.st_mode)) bytes.reserve(status.st_size);
+  const bool regular = ::fstat(file.get(), &status) == 0 && S_ISREG(status.st_mode);
+  const std::int64_t limit = regular ? most : std::min(most, kMostStreamBytes);
+  if (regular && status.st_size <= limit) bytes.reserve(status.st_size);
   char buffer[1 << 16];
   for (;;) {
     const ssize_t count = ::read(file.get(), buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail("read", path, errno);
+    if (count < 0) fail_to_read(path, errno);
     if (count == 0) return bytes;
     bytes.append(buffer, static_cast<std::size_t>(count));
+    if (static_cast<std::int64_t>(bytes.size()) > limit)
+      throw InputError(fmt::format("cannot read '{}': expected at most {} bytes, found more", path, limit));
   }
 }
 
@@ -159,22 +170,35 @@ void write_file(const std::string& path, std::string_view bytes) {
     create_parent(path);
     return replace_file(path, bytes, std::nullopt);
   }
-  if (S_ISDIR(status.st_mode)) fail("write", path, EISDIR);
+  if (S_ISDIR(status.st_mode)) fail_to_write(path, EISDIR);
   if (!S_ISREG(status.st_mode)) return write_in_place(path, bytes);
   // Through a link the file that it points to is replaced, not the link.
   replace_file(std::filesystem::canonical(path).string(), bytes, status.st_mode & 07777);
 }
 
+std::string inside(const std::string& folder, const std::string& name) {
+  namespace fs = std::filesystem;
+  fs::path path = folder;
+  for (const fs::path& part : fs::path(name)) {
+    path /= part;
+    std::error_code error;
+    if (fs::is_symlink(fs::symlink_status(path, error)))
+      fail_to_write((fs::path(folder) / name).string(),
+                    fmt::format("'{}' is a symbolic link and may lead out of the folder; remove it", path.string()));
+  }
+  return path.string();
+}
+
 LineAppender::LineAppender(const std::string& path) : path_(path) {
   create_parent(path);
   Descriptor file(open_file(path, O_RDWR | O_CREAT | O_APPEND, 0666));
-  if (file.get() < 0) fail("write", path, errno);
+  if (file.get() < 0) fail_to_write(path, errno);
   struct stat status {};
-  if (::fstat(file.get(), &status) != 0) fail("write", path, errno);
+  if (::fstat(file.get(), &status) != 0) fail_to_write(path, errno);
   regular_ = S_ISREG(status.st_mode);
   if (regular_) {
     size_ = complete_size(file.get(), status.st_size);
-    if (size_ != status.st_size && ::ftruncate(file.get(), size_) != 0) fail("write", path, errno);
+    if (size_ != status.st_size && ::ftruncate(file.get(), size_) != 0) fail_to_write(path, errno);
     sync_parent(path);
   }
   descriptor_ = file.release();
@@ -191,15 +215,38 @@ void LineAppender::append(std::string_view line) {
   if (error == 0) error = sync_data(descriptor_);
   if (error != 0) {
     if (regular_ && ::ftruncate(descriptor_, size_) == 0) complete_ = true;
-    fail("write", path_, error);
+    fail_to_write(path_, error);
   }
   complete_ = true;
   size_ += static_cast<std::int64_t>(text.size());
 }
 
+std::string LineAppender::read_appended(bool cut) {
+  struct stat status {};
+  if (!regular_) return "";
+  if (::fstat(descriptor_, &status) != 0) fail_to_write(path_, errno);
+  if (status.st_nlink == 0) fail_to_write(path_, "it was removed while rows were written to it");
+  if (status.st_size < size_) fail_to_write(path_, "it was made shorter while rows were written to it");
+  std::string text(static_cast<std::size_t>(status.st_size - size_), '\0');
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t count =
+        ::pread(descriptor_, text.data() + done, text.size() - done, static_cast<off_t>(size_ + done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail_to_read(path_, errno);
+    if (count == 0) text.resize(done);
+    done += static_cast<std::size_t>(count);
+  }
+  const std::size_t whole = text.rfind('\n') + 1;  // 0 where there is none
+  if (cut && whole < text.size() && ::ftruncate(descriptor_, size_ + static_cast<off_t>(whole)) != 0)
+    fail_to_write(path_, errno);
+  text.resize(whole);
+  size_ += static_cast<std::int64_t>(whole);
+  return text;
+}
+
 // A part of a line that could not be cut off when its write failed.
 void LineAppender::cut_back() {
-  if (regular_ && ::ftruncate(descriptor_, size_) != 0) fail("write", path_, errno);
+  if (regular_ && ::ftruncate(descriptor_, size_) != 0) fail_to_write(path_, errno);
   complete_ = true;
 }
 

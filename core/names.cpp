@@ -6,10 +6,16 @@
 #include <algorithm>
 #include <cctype>
 #include <numeric>
+#include <ranges>
 #include <stdexcept>
+#include <utility>
+
+#include "core/text.h"
 
 namespace duet {
 namespace {
+
+constexpr std::size_t kAtAGlance = 24, kNearest = 5;
 
 std::string folded(std::string_view name) {
   std::string text(name);
@@ -35,6 +41,27 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return previous[b.size()];
 }
 
+// The candidates in the order of their distance to the name, those of one distance as they were given.
+std::vector<std::string> by_distance(std::string_view name, std::span<const std::string> candidates) {
+  const std::string wanted = folded(name);
+  std::vector<std::pair<std::size_t, std::string>> ranked;
+  for (const std::string& candidate : candidates)
+    ranked.emplace_back(edit_distance(wanted, folded(candidate)), candidate);
+  std::ranges::stable_sort(ranked, {}, &std::pair<std::size_t, std::string>::first);
+  std::vector<std::string> names;
+  for (auto& [distance, candidate] : ranked) names.push_back(std::move(candidate));
+  return names;
+}
+
+// All of a list that a person can read at a glance, the nearest ones of a longer one.
+std::string known_names(std::string_view name, std::span<const std::string> candidates) {
+  if (candidates.empty()) return "Known: none";
+  if (candidates.size() <= kAtAGlance) return fmt::format("Known: {}", fmt::join(candidates, ", "));
+  std::vector<std::string> nearest = by_distance(name, candidates);
+  nearest.resize(kNearest);
+  return fmt::format("Nearest of {}: {}", candidates.size(), fmt::join(nearest, ", "));
+}
+
 }  // namespace
 
 std::string closest_name(std::string_view name, std::span<const std::string> candidates) {
@@ -55,8 +82,7 @@ std::string unknown_name_message(std::string_view kind, std::string_view name,
                                  std::span<const std::string> candidates) {
   const std::string closest = closest_name(name, candidates);
   const std::string question = closest.empty() ? "." : fmt::format(": did you mean '{}'?", closest);
-  const std::string known = candidates.empty() ? "none" : fmt::format("{}", fmt::join(candidates, ", "));
-  return fmt::format("unknown {} '{}'{} Known: {}", kind, name, question, known);
+  return fmt::format("unknown {} '{}'{} {}", kind, shown(name), question, known_names(name, candidates));
 }
 
 std::string option_or(const std::map<std::string, std::string>& options, const std::string& name,

@@ -10,6 +10,7 @@
 
 #include "core/npy_header.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -215,20 +216,12 @@ std::string npy_bytes(const NpyArray& array) {
 std::u32string decode_utf8(std::string_view text) {
   std::u32string codes;
   for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead < 0x80 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-    bool valid = lead != 0 && (lead < 0x80 || (lead >= 0xc2 && lead <= 0xf4)) && i + length <= text.size();
-    char32_t code = length == 1 ? lead : lead & (0xffu >> (length + 1));
-    for (std::size_t k = 1; valid && k < length; ++k) {
-      const auto next = static_cast<unsigned char>(text[i + k]);
-      valid = (next & 0xc0) == 0x80;
-      code = (code << 6) | (next & 0x3f);
-    }
-    const char32_t smallest = length == 4 ? 0x10000 : length == 3 ? 0x800 : 0;  // shorter forms exist below it
-    if (!valid || !is_code_point(code) || code < smallest)
-      throw std::invalid_argument(fmt::format("expected UTF-8 text without NUL, found byte {:#04x} at {}", lead, i));
-    codes += code;
-    i += length;
+    const std::optional<CodePoint> point = code_point_at(text, i);
+    if (!point || point->code == U'\0')
+      throw std::invalid_argument(fmt::format("expected UTF-8 text without NUL, found byte {:#04x} at {}",
+                                              static_cast<unsigned char>(text[i]), i));
+    codes += point->code;
+    i += point->length;
   }
   return codes;
 }

@@ -9,6 +9,7 @@
 
 #include "core/npy.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -19,8 +20,8 @@ constexpr std::size_t kMaxDimensions = 32;  // NumPy's own limit
 NpyType parse_type(std::string_view text) {
   const auto refuse = [&]() -> InputError {
     if (text.find('O') != std::string_view::npos)
-      return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", text));
-    return InputError(fmt::format("expected type f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", text));
+      return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", shown(text)));
+    return InputError(fmt::format("expected type f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", shown(text)));
   };
   if (text.size() < 3 || std::string_view("<>|=").find(text[0]) == std::string_view::npos) throw refuse();
   NpyType type{text[1], text[0] == '>', 0};
@@ -48,7 +49,7 @@ class HeaderParser {
     expect('{');
     while (!accept('}')) {
       const std::string_view key = quoted();
-      if (!seen.insert(key).second) throw InputError(fmt::format("header names '{}' twice", key));
+      if (!seen.insert(key).second) throw InputError(fmt::format("header names '{}' twice", shown(key)));
       expect(':');
       parse_value(key);
       if (accept('}')) break;
@@ -70,7 +71,7 @@ class HeaderParser {
     } else if (key == "shape") {
       header_.shape = sizes();
     } else {
-      throw InputError(fmt::format("header has the unknown key '{}'", key));
+      throw InputError(fmt::format("header has the unknown key '{}'", shown(key)));
     }
   }
 

@@ -9,12 +9,15 @@
 #include "core/npy.h"
 #include "core/npy_header.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "core/zip.h"
 
 namespace duet {
 namespace {
 
 constexpr std::string_view kSuffix = ".npy";
+constexpr std::size_t kShownKeys = 400;  // of all names together
+constexpr std::size_t kMaxArchiveBytes = std::size_t{1} << 30;
 
 const char* type_name(const NpyArray& array) {
   constexpr const char* kNames[] = {"numbers", "integers", "strings"};
@@ -41,8 +44,20 @@ std::vector<std::size_t> index_of(std::size_t flat, const std::vector<std::size_
   return index;
 }
 
+// What the values take in memory.
+std::size_t bytes_of(const NpyArray& array) {
+  return std::visit(
+      [](const auto& values) {
+        std::size_t bytes = values.size() * sizeof(values[0]);
+        if constexpr (std::is_same_v<std::decay_t<decltype(values[0])>, std::string>)
+          for (const std::string& value : values) bytes += value.size();
+        return bytes;
+      },
+      array.values);
+}
+
 [[noreturn]] void refuse(const Npz& npz, const std::string& key, const std::string& problem) {
-  throw InputError(fmt::format("'{}': array '{}': {}", npz.name(), key, problem));
+  throw InputError(fmt::format("'{}': array '{}': {}", npz.name(), shown(key), problem));
 }
 
 const NpyArray& shaped_array(const Npz& npz, const std::string& key, const std::vector<long>& shape) {
@@ -73,15 +88,23 @@ Npz Npz::load(const std::string& path) { return parse(read_file(path), path); }
 Npz Npz::parse(std::string_view bytes, const std::string& name) {
   Npz npz;
   npz.name_ = name;
-  read_zip(bytes, name, kMaxEntryBytes, [&](const std::string& entry, const std::string& content) {
+  std::size_t held = 0;
+  const ZipLimits limits{.entry_bytes = kMaxEntryBytes, .total_bytes = kMaxArchiveBytes};
+  read_zip(bytes, name, limits, [&](const std::string& entry, const std::string& content) {
     if (!entry.ends_with(kSuffix) || entry.size() == kSuffix.size())
-      throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name, entry));
+      throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name, shown(entry)));
     const std::string key = entry.substr(0, entry.size() - kSuffix.size());
     try {
-      if (!npz.arrays_.emplace(key, parse_npy(content)).second) throw InputError("stands in the archive twice");
+      const auto [added, is_new] = npz.arrays_.emplace(key, parse_npy(content));
+      if (!is_new) throw InputError("stands in the archive twice");
+      held += bytes_of(added->second);
     } catch (const InputError& error) {
       refuse(npz, key, error.what());
     }
+    // One byte in the file may become eight in memory, and a string of no characters 32.
+    if (held > kMaxArchiveBytes)
+      throw InputError(
+          fmt::format("'{}': expected arrays of at most {} bytes together, found more", name, kMaxArchiveBytes));
   });
   return npz;
 }
@@ -110,7 +133,8 @@ std::vector<std::string> Npz::keys() const {
 const NpyArray& Npz::array(const std::string& key) const {
   const auto found = arrays_.find(key);
   if (found == arrays_.end())
-    throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key, fmt::join(keys(), ", ")));
+    throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key,
+                                 shown(fmt::format("{}", fmt::join(keys(), ", ")), kShownKeys)));
   return found->second;
 }
 

@@ -25,7 +25,8 @@ struct NpyArray {
 class Npz {
  public:
   // Throws InputError naming `path`, the entry and what is wrong: not a zip, truncated, an object array (never
-  // executed), an unknown type, a size that does not match the shape, an entry above 1 GiB.
+  // executed), an unknown type, a size that does not match the shape, more than 1 GiB in one entry or in all arrays
+  // together (two people and a robot at 120 Hz for an hour take half of it).
   static Npz load(const std::string& path);
   static Npz parse(std::string_view bytes, const std::string& name);  // `name` stands in messages
   // Atomic (core/file.h). Throws InputError.

@@ -1,5 +1,5 @@
 // Counter-based random numbers (Philox4x32-10): value n of stream (seed, stream) does not depend on any other stream,
-// on the thread or on the order of work. ARCHITECTURE decision 8.
+// on the thread or on the order of work. docs/architecture.md, 8.
 #pragma once
 
 #include <array>

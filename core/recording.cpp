@@ -7,6 +7,7 @@
 #include "core/npz.h"
 #include "core/require.h"
 #include "core/skeleton.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -121,7 +122,7 @@ class Reader {
 };
 
 [[noreturn]] void refuse(const Npz& npz, const std::string& problem) {
-  throw InputError(fmt::format("'{}': {}", npz.name(), problem));
+  throw InputError(fmt::format("'{}': {}", npz.name(), shown(problem, kShownSentence)));
 }
 
 // Unit to 1e-6, or not a number (a diverged run: the reader has refused it in any other).
@@ -204,7 +205,7 @@ void get_scalars(const Npz& npz, Recording& recording) {
 
 }  // namespace
 
-void save_recording(const Recording& recording, const std::string& path) {
+Npz recording_npz(const Recording& recording) {
   check_sizes(recording);
   const std::size_t joints = recording.robot.empty() ? 0 : static_cast<std::size_t>(recording.robot.front().q.size());
   Npz npz;
@@ -219,11 +220,10 @@ void save_recording(const Recording& recording, const std::string& path) {
   if (!recording.partner.empty())
     npz.set("partner", recording.partner.data(), {recording.robot.size(), kSmplJoints, 3});
   put_contacts(npz, recording.contacts);
-  npz.save(path);
+  return npz;
 }
 
-Recording load_recording(const std::string& path) {
-  const Npz npz = Npz::load(path);
+Recording read_recording(const Npz& npz) {
   Recording recording;
   get_scalars(npz, recording);
   const Reader reader(npz, recording.outcome != Outcome::kDiverged);
@@ -236,5 +236,9 @@ Recording load_recording(const std::string& path) {
                             recording.phases.act_end));
   return recording;
 }
+
+void save_recording(const Recording& recording, const std::string& path) { recording_npz(recording).save(path); }
+
+Recording load_recording(const std::string& path) { return read_recording(Npz::load(path)); }
 
 }  // namespace duet

@@ -23,7 +23,7 @@ struct Reference {
   Eigen::VectorXd q;  // [rad]
 };
 
-// Torque at every physics step: clamp(kp (q_target - q) - kd v + tau_ff, +-effort). ARCHITECTURE decision 3.
+// Torque at every physics step: clamp(kp (q_target - q) - kd v + tau_ff, +-effort). docs/architecture.md, 3.
 struct JointCommand {
   Eigen::VectorXd q_target;  // [rad]
   Eigen::VectorXd kp;        // [N m / rad], >= 0

@@ -15,11 +15,11 @@ std::string share_file(std::string_view what, std::string_view relative) {
   std::vector<std::string> places;
   if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0')
     places.push_back((fs::path(share) / relative).string());
-  places.push_back((fs::path(DUET_SOURCE_DIR) / relative).string());
   std::error_code ignored;
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
   if (!program.empty())
     places.push_back((program.parent_path() / ".." / "share" / "duet" / relative).lexically_normal().string());
+  places.push_back((fs::path(DUET_SOURCE_DIR) / relative).string());
   return first_existing(what, places);
 }
 

@@ -7,8 +7,8 @@
 
 namespace duet {
 
-// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in the source tree, else in ../share/duet beside
-// the program. Throws MissingError naming `what` ("robot card") and the places looked at.
+// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in ../share/duet beside the program, else in the
+// source tree of the machine that built it. Throws MissingError naming `what` ("robot card") and the places looked at.
 std::string share_file(std::string_view what, std::string_view relative);
 
 // The first of `places` that exists; throws MissingError naming them all where none does.

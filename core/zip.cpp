@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -63,9 +64,43 @@ std::string read_entry(zip_t* archive, zip_uint64_t index, const std::string& wh
   }
 }
 
+[[noreturn]] void refuse_total(const std::string& name, const ZipLimits& limits) {
+  fail(name, fmt::format("expected entries of at most {} bytes together, found more", limits.total_bytes));
+}
+
+// What the archive says of its entries; the sizes need not be true.
+struct Claim {
+  zip_uint64_t index;
+  std::string entry;
+  std::size_t bytes;
+};
+
+Claim claim_of(zip_t* archive, zip_uint64_t index, const std::string& name, const ZipLimits& limits) {
+  zip_stat_t status;
+  if (zip_stat_index(archive, index, 0, &status) != 0) fail(name, zip_strerror(archive));
+  Claim claim{index, status.name == nullptr ? "" : status.name, (status.valid & ZIP_STAT_SIZE) != 0 ? status.size : 0};
+  if (claim.bytes > limits.entry_bytes)
+    fail(name, fmt::format("entry '{}': above {} bytes", shown(claim.entry), limits.entry_bytes));
+  return claim;
+}
+
+std::vector<Claim> claims(zip_t* archive, const std::string& name, const ZipLimits& limits) {
+  const auto count = static_cast<zip_uint64_t>(zip_get_num_entries(archive, 0));
+  if (count > limits.entries) fail(name, fmt::format("expected at most {} entries, found {}", limits.entries, count));
+  std::vector<Claim> claims;
+  std::size_t total = 0;
+  for (zip_uint64_t index = 0; index < count; ++index) {
+    claims.push_back(claim_of(archive, index, name, limits));
+    total += claims.back().bytes;  // no overflow: at most 10^4 entries, each below its limit
+    if (total > limits.total_bytes) refuse_total(name, limits);
+  }
+  return claims;
+}
+
 void add_entry(zip_t* archive, const ZipEntry& entry) {
   const auto check = [&](bool ok) {
-    if (!ok) throw InputError(fmt::format("cannot put '{}' in an archive: {}", entry.name, zip_strerror(archive)));
+    if (!ok)
+      throw InputError(fmt::format("cannot put '{}' in an archive: {}", shown(entry.name), zip_strerror(archive)));
   };
   Source source(zip_source_buffer(archive, entry.content.data(), entry.content.size(), 0));
   check(source != nullptr);
@@ -91,20 +126,17 @@ std::string read_source(zip_source_t* source) {
 
 }  // namespace
 
-void read_zip(std::string_view bytes, const std::string& name, std::size_t limit,
+void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
               const std::function<void(const std::string& entry, const std::string& content)>& take) {
   if (bytes.empty()) fail(name, "empty, expected a zip archive");  // libzip takes it for an archive of nothing
   const Archive archive = open_archive(bytes, name);
-  const zip_int64_t count = zip_get_num_entries(archive.get(), 0);
-  for (zip_int64_t i = 0; i < count; ++i) {
-    const auto index = static_cast<zip_uint64_t>(i);
-    zip_stat_t status;
-    if (zip_stat_index(archive.get(), index, 0, &status) != 0) fail(name, zip_strerror(archive.get()));
-    const std::string entry(status.name == nullptr ? "" : status.name);
-    const std::string what = fmt::format("'{}': entry '{}'", name, entry);
-    if ((status.valid & ZIP_STAT_SIZE) != 0 && status.size > limit)
-      throw InputError(fmt::format("{}: above {} bytes", what, limit));
-    take(entry, read_entry(archive.get(), index, what, limit));
+  std::size_t total = 0;
+  for (const Claim& claim : claims(archive.get(), name, limits)) {
+    const std::string what = fmt::format("'{}': entry '{}'", name, shown(claim.entry));
+    const std::string content = read_entry(archive.get(), claim.index, what, limits.entry_bytes);
+    total += content.size();
+    if (total > limits.total_bytes) refuse_total(name, limits);
+    take(claim.entry, content);
   }
 }
 

@@ -13,9 +13,17 @@ struct ZipEntry {
   std::string content;
 };
 
+// What an archive may grow to. A few kilobytes can hold a terabyte of zeros; the sizes that the archive claims are
+// compared before anything is inflated, and what comes out is counted again.
+struct ZipLimits {
+  std::size_t entry_bytes = 0;
+  std::size_t total_bytes = 0;
+  std::size_t entries = 10'000;
+};
+
 // Calls `take` for each entry in the archive's order. Throws InputError naming `name`, the entry and what is wrong: not
-// a zip, truncated, a checksum that does not match, an entry above `limit` bytes.
-void read_zip(std::string_view bytes, const std::string& name, std::size_t limit,
+// a zip, truncated, a checksum that does not match, above one of the limits.
+void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
               const std::function<void(const std::string& entry, const std::string& content)>& take);
 
 // Deflated, in the order given, with the time stamp 1980-01-01: the same entries give the same bytes.

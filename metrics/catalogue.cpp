@@ -14,6 +14,7 @@ constexpr auto kDown = Direction::kLower;
 constexpr auto kUp = Direction::kHigher;
 constexpr auto kPlain = Direction::kNone;
 constexpr auto kRetarget = MetricGroup::kRetargeting;
+constexpr auto kOther = MetricGroup::kOtherReading;
 constexpr auto kControl = MetricGroup::kController;
 constexpr auto kEpisode = MetricGroup::kEpisode;
 constexpr std::string_view kC21 = "supplement C.2.1";
@@ -42,6 +43,9 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"angle_std", "rad", kDown, kRetarget, "Angle standard deviation", kC21},
     {"jerk_mean", "m/s^3", kDown, kRetarget, "Jerk, mean", kC21},
     {"jerk_std", "m/s^3", kDown, kRetarget, "Jerk, standard deviation", kC21},
+
+    {"jpe.pelvis", "m", kDown, kOther, "Joint position error, pelvis-aligned", kC21},
+    {"large_angle_ratio.entry", "1", kDown, kOther, "Large-angle ratio, per joint", kC21},
 
     {"hf_ratio", "1", kDown, kControl, "Joint-velocity energy above 5 Hz", kS4},
     {"dof_jerk", "rad/s^3", kDown, kControl, "Joint jerk", kS4},
@@ -82,6 +86,15 @@ const MetricInfo& metric_info(std::string_view name) {
   names.reserve(kCatalogue.size());
   for (const MetricInfo& info : kCatalogue) names.emplace_back(info.name);
   throw std::invalid_argument(unknown_name_message("metric", name, names));
+}
+
+const MetricInfo& metric_of_reading(std::string_view name) {
+  const MetricInfo* found = nullptr;
+  for (const MetricInfo& info : kCatalogue) {
+    const bool fits = name == info.name || (name.starts_with(info.name) && name[info.name.size()] == '.');
+    if (fits && (found == nullptr || info.name.size() > found->name.size())) found = &info;
+  }
+  return found != nullptr ? *found : metric_info(name);
 }
 
 }  // namespace duet

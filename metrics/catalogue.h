@@ -1,4 +1,6 @@
-// Every figure that duet prints: name, unit, direction, source. One table; names in files and reports come from here.
+// Every metric that duet prints: name, unit, direction, source. One table; names in files and reports come from here.
+// The detectors' figures are in metrics/detector_catalogue.h; forces of contacts carry their unit in their name
+// (docs/file-formats.md, "Row").
 #pragma once
 
 #include <span>
@@ -7,7 +9,8 @@
 namespace duet {
 
 enum class Direction { kLower, kHigher, kNone };
-enum class MetricGroup { kRetargeting, kController, kEpisode };
+// kOtherReading: of retargeting, under another reading than the default, printed beside it.
+enum class MetricGroup { kRetargeting, kOtherReading, kController, kEpisode };
 
 struct MetricInfo {
   std::string_view name;  // "jpe", "contact_f1_0.35", "hf_ratio", ...
@@ -21,5 +24,7 @@ struct MetricInfo {
 std::span<const MetricInfo> metric_catalogue();
 // Throws std::invalid_argument for an unknown name, with the nearest.
 const MetricInfo& metric_info(std::string_view name);
+// Of a figure of retargeting_metrics_all_readings: "jerk_mean.links.diff" is a jerk_mean. Throws likewise.
+const MetricInfo& metric_of_reading(std::string_view name);
 
 }  // namespace duet

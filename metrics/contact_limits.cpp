@@ -104,7 +104,7 @@ ContactLimits parse_contact_limits(const std::string& text, const std::string& f
   return limits;
 }
 
-ContactLimits load_contact_limits(const std::string& path) { return parse_contact_limits(read_file(path), path); }
+ContactLimits load_contact_limits(const std::string& path) { return parse_contact_limits(read_text(path), path); }
 
 std::string default_contact_limits_path() {
   return share_file("table of contact limits", "metrics/limits/iso_ts_15066.yaml");

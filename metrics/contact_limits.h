@@ -40,8 +40,8 @@ struct ContactLimits {
 ContactLimits parse_contact_limits(const std::string& text, const std::string& file);
 ContactLimits load_contact_limits(const std::string& path);
 
-// The table that ships with duet, metrics/limits/iso_ts_15066.yaml: in $DUET_SHARE, in the source tree, or in
-// ../share/duet beside the program. Throws MissingError naming the places looked at.
+// The table that ships with duet, metrics/limits/iso_ts_15066.yaml: in $DUET_SHARE, in ../share/duet beside
+// the program, or in the source tree. Throws MissingError naming the places looked at.
 std::string default_contact_limits_path();
 
 }  // namespace duet

@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
 #include "core/names.h"
 #include "core/require.h"
+#include "metrics/detector_catalogue.h"
 #include "metrics/task_detectors.h"
 
 namespace duet {
@@ -85,44 +85,16 @@ Thresholds completed(Task task, const Thresholds& given) {
   return complete;
 }
 
-Thresholds printed_thresholds(Task task) {
-  switch (task) {
-    case Task::kHug:
-      return {{"hand_dist", 0.5}, {"body", 0.45}, {"shoulder", 0.4}, {"min_frames", 3}};
-    case Task::kHandshake:
-      return {{"contact", 0.3},  {"min_contact", 10},   {"min_dist", 0.4},
-              {"max_dist", 1.5}, {"std_contact", 0.15}, {"mean_contact", 0.45}};
-    case Task::kHighFive:
-      return {{"contact", 0.4}, {"min_approach", 1}, {"max_sustained", 1000}, {"height", 0.3}};
-    case Task::kWave:
-      return {{"motion_dist", 0.5}, {"min_changes", 3}, {"amplitude", 0.3},
-              {"angle", 0.785},     {"height", 0.45},   {"displacement", 0.005}};
-    case Task::kBend:
-      return {{"min_angle", 0.349}, {"min_frames", 5}};
-    case Task::kFlyKiss:
-      return {{"hand2head", 0.3}, {"forward_thresh", 0.1}, {"min_forward", 5}};
-  }
-  throw std::invalid_argument("thresholds: not a task");
-}
-
-void make_strict(Task task, Thresholds& tau) {
-  if (task == Task::kHug) tau["min_frames"] = 25;
-  if (task == Task::kHighFive) {
-    tau["contact"] = 0.15;
-    tau["max_sustained"] = 50;
-  }
-  if (task == Task::kBend) tau["min_angle"] = std::numbers::pi / 6;
-  if (task == Task::kFlyKiss) tau["hand2head"] = 0.2;
-}
-
 }  // namespace
 
 std::string_view to_string(DetectorVersion version) { return version == DetectorVersion::kPaper ? "paper" : "robot"; }
 std::string_view to_string(ThresholdSet set) { return set == ThresholdSet::kPaper ? "paper" : "strict"; }
 
 Thresholds thresholds(Task task, ThresholdSet set) {
-  Thresholds tau = printed_thresholds(task);
-  if (set == ThresholdSet::kStrict) make_strict(task, tau);
+  Thresholds tau;
+  for (const ThresholdInfo& info : threshold_catalogue())
+    if (info.task == task) tau[std::string(info.name)] = set == ThresholdSet::kStrict ? info.strict : info.paper;
+  require(!tau.empty(), "thresholds: not a task");
   return tau;
 }
 

@@ -1,6 +1,6 @@
 // The six detectors of Algorithms 1-6 with Table S11. Each judges a *performer* and a *partner*; version `paper` takes
-// them as printed (performer = human H, partner = robot R), version `robot` makes the robot the performer. ARCHITECTURE
-// decision 6.
+// them as printed (performer = human H, partner = robot R), version `robot` makes the robot the performer
+// (docs/architecture.md, 6).
 #pragma once
 
 #include <map>
@@ -23,11 +23,15 @@ struct Agent {
   Eigen::Matrix3Xd lhand, rhand, head, root, torso, lshoulder, rshoulder;
 };
 
+// Of the code of all detectors: rows carry it, and rows of two versions are never in one table. Raised whenever a
+// verdict, a value or a margin of any clip changes (DetectorsVersion.StandsForTheseVerdicts says when).
+inline constexpr std::string_view kDetectorsVersion = "1";
+
 enum class DetectorVersion { kPaper, kRobot };
 enum class ThresholdSet {
   kPaper,
   kStrict
-};  // Table S11 | the stricter set of reference/metrics.md (also sets its readings)
+};  // Table S11 | the stricter set, which also sets readings (docs/detectors.md)
 std::string_view to_string(DetectorVersion version);  // "paper", "robot"
 std::string_view to_string(ThresholdSet set);         // "paper", "strict"
 

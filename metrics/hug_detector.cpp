@@ -90,8 +90,10 @@ double margin_of(const Mode& mode, int k) {
 void add_values(const HandDistances& d, DetectorResult& result) {
   result.values["hands_distance_min"] = d.hands.minCoeff();
   result.values["torso_distance_min"] = d.left_torso.min(d.right_torso).minCoeff();
-  if (d.left_shoulder.size() > 0)
-    result.values["shoulder_distance_min"] = d.left_shoulder.min(d.right_shoulder).minCoeff();
+  result.values["torso_distance_both_min"] = d.left_torso.max(d.right_torso).minCoeff();
+  if (d.left_shoulder.size() == 0) return;
+  result.values["shoulder_distance_min"] = d.left_shoulder.min(d.right_shoulder).minCoeff();
+  result.values["shoulder_distance_both_min"] = d.left_shoulder.max(d.right_shoulder).minCoeff();
 }
 
 // The double embrace uses both thresholds; `body` is the single embrace's unless that is off.

@@ -1,5 +1,5 @@
-// The named readings of reference/metrics.md: one struct of choices per family, the first value of each the default.
-// Text names are exactly those of that page ("independent_frame", "closest_pair", ...).
+// The named readings of what the supplement leaves open (docs/deviations.md): one struct of choices per family, the
+// first value of each the default. Text names are those of `duet list readings` ("independent_frame", ...).
 #pragma once
 
 #include <string>
@@ -100,7 +100,7 @@ struct Readings {
 };
 
 // Sets "family.option" (families: metrics, hug, handshake, high_five, wave, bend, fly_kiss, diagnostics; options as in
-// reference/metrics.md) to a reading by its text name. Throws std::invalid_argument for an unknown option or reading
+// `duet list readings`) to a reading by its text name. Throws std::invalid_argument for an unknown option or reading
 // and lists the known ones. Numbers are written as such: "metrics.ddof" takes "0" or "1", "metrics.min_frames" every
 // whole number from 1 on (reading_values then names only the default).
 void set_reading(Readings& readings, const std::string& option, const std::string& value);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <limits>
+
 #include "core/require.h"
 #include "robots/kinematics.h"
 
@@ -27,7 +29,7 @@ void check_frames(const PairedMotion& motion, const RobotModel& robot) {
   check(motion.partner.frames(), "partner");
   check(motion.source_partner.frames(), "source_partner");
   check(motion.source_reactor.frames(), "source_reactor");
-  check(motion.reshaped.frames(), "reshaped");
+  if (!motion.reshaped.empty()) check(motion.reshaped.frames(), "reshaped");
   require(motion.robot.joint_names.empty() || motion.robot.joint_names == robot.joint_names(),
           fmt::format("retargeting metrics: the joints of the motion are not those of {} in its order", robot.name));
 }
@@ -55,6 +57,12 @@ ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) 
   tracks.source_responder = motion.source_reactor.joints.select(human_points);
   tracks.initiator = motion.partner.joints.select(human_points);
   return tracks;
+}
+
+// Motions of other retargeters say nothing of a reshaped person: there is nothing to be in error against.
+double jpe_of(const ScoredTracks& tracks, const PairedMotion& motion, JpeFrame frame) {
+  return motion.reshaped.empty() ? std::numeric_limits<double>::quiet_NaN()
+                                 : jpe(tracks.robot_pairs, motion.reshaped, frame);
 }
 
 double awd_of(const ScoredTracks& tracks, const std::vector<int>& points, AwdEntries entries) {
@@ -132,12 +140,24 @@ std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, co
   const ScoredTracks tracks = scored_tracks(motion, robot);
   const Eigen::MatrixXd magnitudes = hinge_magnitudes(motion.robot.q);
   std::map<std::string, double> out;
-  out["jpe"] = jpe(tracks.robot_pairs, motion.reshaped, readings.jpe_frame);
+  out["jpe"] = jpe_of(tracks, motion, readings.jpe_frame);
   out["awd"] = awd_of(tracks, tracks.awd_points, readings.awd_entries);
   add_contacts(tracks, readings, "", out);
   out["large_angle_ratio"] = large_angle_ratio(magnitudes, readings.large_angle);
   out["angle_std"] = angle_std(magnitudes, readings.angle_std, readings.ddof);
   add_jerk(tracks.robot_pairs, motion.robot.rate_hz, "", readings, out);
+  return out;
+}
+
+std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,
+                                             const MetricReadings& readings) {
+  std::vector<int> pairs;
+  for (const RetargetPair& pair : robot.pairs) pairs.push_back(pair.frame);
+  const Eigen::MatrixXd magnitudes = hinge_magnitudes(motion.q);
+  std::map<std::string, double> out;
+  out["large_angle_ratio"] = large_angle_ratio(magnitudes, readings.large_angle);
+  out["angle_std"] = angle_std(magnitudes, readings.angle_std, readings.ddof);
+  add_jerk(frame_tracks(robot, motion, pairs), motion.rate_hz, "", readings, out);
   return out;
 }
 
@@ -155,7 +175,7 @@ std::map<std::string, double> retargeting_metrics_all_readings(const PairedMotio
 
   std::map<std::string, double> out;
   for_each_reading(readings, "metrics.jpe_frame", [&](const std::string& name, const MetricReadings& r) {
-    out["jpe." + name] = jpe(tracks.robot_pairs, motion.reshaped, r.jpe_frame);
+    out["jpe." + name] = jpe_of(tracks, motion, r.jpe_frame);
   });
   for_each_reading(readings, "metrics.awd_entries", [&](const std::string& name, const MetricReadings& r) {
     out["awd." + name] = awd_of(tracks, tracks.awd_points, r.awd_entries);

@@ -61,10 +61,13 @@ Jerk jerk(const PointTracks& positions, double rate_hz, JerkScheme scheme = Jerk
 std::vector<HingeGroup> hinge_groups(const RobotModel& robot);
 
 // All 18, by catalogue name: jpe, awd, contact_{precision,recall,f1,accuracy}_{0.2,0.35,0.5}, large_angle_ratio,
-// angle_std, jerk_mean, jerk_std. NaN where undefined (no contact in the source). Jerk is of the robot's 16 pair
-// points.
+// angle_std, jerk_mean, jerk_std. NaN where undefined (no contact in the source, nothing reshaped to compare with).
+// Jerk is of the robot's 16 pair points.
 std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
                                                   const MetricReadings& readings = {});
+// Those of them that a robot's motion has by itself: large_angle_ratio, angle_std, jerk_mean, jerk_std.
+std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,
+                                             const MetricReadings& readings = {});
 // The contact counts behind them per threshold, to be added over clips (micro average).
 std::array<ContactCounts, 3> retargeting_contact_counts(const PairedMotion& motion, const RobotModel& robot,
                                                         const MetricReadings& readings = {});

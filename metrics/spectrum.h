@@ -1,4 +1,4 @@
-// How much of a signal's energy lies above a frequency, by the four estimates of reference/metrics.md. Thread-safe.
+// How much of a signal's energy lies above a frequency, by four estimates (docs/deviations.md, M19). Thread-safe.
 #pragma once
 
 #include <Eigen/Core>

@@ -10,11 +10,14 @@
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
 
 constexpr std::size_t kMostJoints = 10'000;
+constexpr std::size_t kShownWord = 40;
+constexpr std::size_t kMostMotionBytes = std::size_t{1} << 30;  // hours of one person
 const std::array<std::string_view, 6> kChannelNames = {"Xposition", "Yposition", "Zposition",
                                                        "Xrotation", "Yrotation", "Zrotation"};
 
@@ -53,7 +56,7 @@ class Words {
     const std::string_view digits = word.starts_with('+') ? word.substr(1) : word;
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error == std::errc::result_out_of_range || (error == std::errc() && !std::isfinite(value)))
-      fail(fmt::format("{}: '{}' is not finite", what, shown(word)));
+      fail(fmt::format("{}: '{}' is not finite", what, shown(word, kShownWord)));
     if (word.empty() || error != std::errc() || end != digits.data() + digits.size())
       fail(fmt::format("{}: expected a number, found {}", what, found(word)));
     return value;
@@ -63,17 +66,10 @@ class Words {
     if (word != expected) fail(fmt::format("{}: expected '{}', found {}", where, expected, found(word)));
   }
   [[noreturn]] void fail(const std::string& fault) const {
-    throw InputError(fmt::format("{}:{}: {}", name_, line_, fault));
+    throw InputError(fmt::format("{}:{}: {}", name_, line_, shown(fault, kShownSentence)));
   }
   static std::string found(std::string_view word) {
-    return word.empty() ? "the end of the text" : "'" + shown(word) + "'";
-  }
-  // Not more of a word than a message can show, and nothing that a terminal would act on.
-  static std::string shown(std::string_view word) {
-    std::string text(word.substr(0, 40));
-    std::replace_if(
-        text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
-    return text;
+    return word.empty() ? "the end of the text" : fmt::format("'{}'", shown(word, kShownWord));
   }
 
  private:
@@ -90,10 +86,9 @@ class Words {
   int line_ = 1;
 };
 
-std::string channel_fault(const Words& words, std::string_view word) {
+std::string channel_fault(std::string_view word) {
   if (word.empty()) return "expected a channel, found the end of the text";
-  return unknown_name_message("channel", words.shown(word),
-                              std::vector<std::string>(kChannelNames.begin(), kChannelNames.end()));
+  return unknown_name_message("channel", word, std::vector<std::string>(kChannelNames.begin(), kChannelNames.end()));
 }
 
 void read_offset(Words& words, BvhJoint& joint) {
@@ -109,10 +104,10 @@ void read_channels(Words& words, BvhJoint& joint) {
   for (int i = 0; i < static_cast<int>(count); ++i) {
     const std::string_view word = words.next();
     const auto known = std::find(kChannelNames.begin(), kChannelNames.end(), word);
-    if (known == kChannelNames.end()) words.fail(where + ": " + channel_fault(words, word));
+    if (known == kChannelNames.end()) words.fail(where + ": " + channel_fault(word));
     const int channel = static_cast<int>(known - kChannelNames.begin());
     if (std::find(joint.channels.begin(), joint.channels.end(), channel) != joint.channels.end())
-      words.fail(fmt::format("{}: '{}' is there twice", where, word));
+      words.fail(fmt::format("{}: '{}' is there twice", where, shown(word, kShownWord)));
     joint.channels.push_back(channel);
   }
 }
@@ -166,9 +161,9 @@ class HierarchyReader {
     if (name.empty() || name == "{") words_.fail("expected the name of a joint, found " + Words::found(name));
     const auto same = [&](const BvhJoint& joint) { return joint.name == name; };
     if (std::any_of(joints_.begin(), joints_.end(), same))
-      words_.fail(fmt::format("joint '{}' is there twice", Words::shown(name)));
+      words_.fail(fmt::format("joint '{}' is there twice", shown(name, kShownWord)));
     if (joints_.size() >= kMostJoints) words_.fail(fmt::format("more than {} joints", kMostJoints));
-    words_.expect("{", "joint '" + Words::shown(name) + "'");
+    words_.expect("{", "joint '" + shown(name, kShownWord) + "'");
     const int parent = open_.empty() ? -1 : open_.back().index;
     open_.push_back({.index = static_cast<int>(joints_.size()), .end_site = end_site});
     joints_.push_back({.name = name, .parent = parent, .offset = Eigen::Vector3d::Zero(), .channels = {}});
@@ -222,6 +217,6 @@ Bvh parse_bvh(std::string_view text, const std::string& name) {
   return bvh;
 }
 
-Bvh read_bvh(const std::string& path) { return parse_bvh(read_file(path), path); }
+Bvh read_bvh(const std::string& path) { return parse_bvh(read_file(path, kMostMotionBytes), path); }
 
 }  // namespace duet

@@ -8,29 +8,17 @@
 
 #include "core/require.h"
 #include "motion/bvh_kinematics.h"
+#include "motion/plausibility.h"
 
 namespace duet {
 namespace {
 
-constexpr double kUprightCosine = 0.8;                    // of the mean direction head above ankles with the up axis
 constexpr double kWholeRate = 5e-4;                       // relative; 29.97 Hz is 1e-3 from 30 Hz
 constexpr double kLowestRate = 0.01, kHighestRate = 1e5;  // [Hz]
 constexpr double kHorizontalSine = 0.34;                  // arms within 20 degrees of horizontal
 constexpr double kStraightArm = 0.95;                     // shoulder to wrist, of the arm's length
 constexpr double kJump = 5.0;                             // first step of the motion, in steps that follow
 constexpr double kJumpOfStature = 0.05;                   // and never less than this
-constexpr double kShortest = 1.2, kTallest = 2.1;  // bones from head to ankle [m]; the head joint is not the crown
-
-struct Unit {
-  const char* name;
-  double metres;
-};
-// No two differ by less than the factor kTallest / kShortest, so at most one fits.
-constexpr std::array<Unit, 5> kUnits = {{{"metre", 1.0},
-                                         {"CMU unit (1 inch / 0.45)", 0.056444},
-                                         {"inch", 0.0254},
-                                         {"centimetre", 0.01},
-                                         {"millimetre", 0.001}}};
 
 SmplPositions positions_at(const BvhPerson& person, int frame) {
   return smpl_positions(person.skeleton, global_poses(person.bvh, local_poses(person.bvh, frame)));
@@ -125,14 +113,14 @@ BvhFinding<double> find_metres_per_unit(const BvhPerson& a, const BvhPerson& b, 
             fmt::format("BVH import: expected a positive unit of length, found {} m", metres));
     return {metres, fmt::format("unit: {} m (as told; head to ankle {:.2f} m)", metres, metres * mean)};
   }
-  for (const Unit& unit : kUnits)
-    if (const double length = mean * unit.metres; kShortest <= length && length <= kTallest)
+  for (const LengthUnit& unit : kLengthUnits)
+    if (const double length = mean * unit.metres; kShortestPerson <= length && length <= kTallestPerson)
       return {unit.metres, fmt::format("unit: {} m, {} (mean bone length from head to ankle {:.4g} units = {:.2f} m)",
                                        unit.metres, unit.name, mean, length)};
   throw InputError(
       fmt::format("'{}': cannot tell the unit of length: the bones from head to ankle measure {:.4g} units, which is "
                   "{} to {} m in none of metre, CMU unit, inch, centimetre, millimetre; state the metres per unit",
-                  a.bvh.name, mean, kShortest, kTallest));
+                  a.bvh.name, mean, kShortestPerson, kTallestPerson));
 }
 
 }  // namespace duet

@@ -9,6 +9,7 @@
 #include "motion/bvh_detection.h"
 #include "motion/bvh_kinematics.h"
 #include "motion/phase_proposal.h"
+#include "motion/plausibility.h"
 
 namespace duet {
 namespace {
@@ -140,6 +141,9 @@ BvhImport import_bvh_pair(const Bvh& bvh_a, const Bvh& bvh_b, Task task, const B
                                        lowest_toe(clip.a), lowest_toe(clip.b)));
   result.verdict.push_back(fmt::format("phases: act [{}, {}) of {} frames (proposed)", clip.phases.act_begin,
                                        clip.phases.act_end, clip.frames()));
+  const Plausibility found = judge_people(clip);
+  for (const auto* sentences : {&found.faults, &found.oddities})
+    for (const std::string& sentence : *sentences) result.verdict.push_back("not as expected: " + sentence);
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "motion/bvh_kinematics.h"
 
 namespace duet {
@@ -31,10 +32,10 @@ class JointFinder {
     for (const std::string& name : alternatives)
       if (const int found = find(name); found >= 0) return found;
     const std::string nearest = closest_name(alternatives.front(), names_);
-    throw InputError(fmt::format("'{}': no joint '{}' (for {}); {}", bvh_.name, fmt::join(alternatives, "' or '"),
-                                 kSmplNames[joint],
-                                 nearest.empty() ? fmt::format("joints found: {}", fmt::join(names_, ", "))
-                                                 : fmt::format("nearest found: '{}'", nearest)));
+    throw InputError(
+        fmt::format("'{}': no joint '{}' (for {}); {}", bvh_.name, fmt::join(alternatives, "' or '"), kSmplNames[joint],
+                    nearest.empty() ? shown(fmt::format("joints found: {}", fmt::join(names_, ", ")), kShownSentence)
+                                    : fmt::format("nearest found: '{}'", shown(nearest))));
   }
 
  private:

@@ -5,6 +5,7 @@
 #include "core/file.h"
 #include "core/require.h"
 #include "motion/npz_fields.h"
+#include "motion/phase_proposal.h"
 
 namespace duet {
 namespace {
@@ -49,23 +50,14 @@ std::vector<ContactWindow> get_contacts(const Npz& npz, const std::vector<int>& 
   return contacts;
 }
 
-InteractionClip read(const Npz& npz) {
-  check_schema(npz, kSchema, kSchemaVersion,
-               {"id", "task", "reactor", "phases", "rate_hz", "human_joint_names", "a_joints", "a_rotations_wxyz",
-                "b_joints", "b_rotations_wxyz", "contacts", "source_names", "source_values"},
-               {});
-  const double rate_hz = get_rate(npz);
-  const std::vector<int> columns = get_joint_columns(npz);
-  InteractionClip clip{.id = npz.text("id"),
-                       .task = get_task(npz),
-                       .a = get_motion(npz, "a", rate_hz, columns),
-                       .b = get_motion(npz, "b", rate_hz, columns),
-                       .phases = get_phases(npz),
-                       .reactor = get_reactor(npz),
-                       .contacts = get_contacts(npz, columns),
-                       .source = get_texts(npz, "source")};
-  check_archive(npz, [&] { validate(clip); });
-  return clip;
+// Those of the file, or a proposal, which is said in `source`. Two lengths are left to validate().
+void take_phases(const Npz& npz, InteractionClip& clip) {
+  if (npz.contains("phases")) {
+    clip.phases = get_phases(npz);
+  } else if (clip.a.frames() == clip.b.frames()) {
+    clip.phases = propose_phases(clip.a, clip.b, clip.task);
+    clip.source["phases"] = "proposed";
+  }
 }
 
 HumanMotion mirrored(const HumanMotion& motion) {
@@ -102,6 +94,26 @@ void validate(const InteractionClip& clip) {
   for (std::size_t i = 0; i < clip.contacts.size(); ++i) check_contact(clip, clip.contacts[i], i);
 }
 
+InteractionClip read_clip(const Npz& npz) {
+  check_schema(npz, kSchema, kSchemaVersion,
+               {"id", "task", "reactor", "phases", "rate_hz", "human_joint_names", "a_joints", "a_rotations_wxyz",
+                "b_joints", "b_rotations_wxyz", "contacts", "source_names", "source_values"},
+               {});
+  const double rate_hz = get_rate(npz);
+  const std::vector<int> columns = get_joint_columns(npz);
+  InteractionClip clip{.id = npz.text("id"),
+                       .task = get_task(npz),
+                       .a = get_motion(npz, "a", rate_hz, columns),
+                       .b = get_motion(npz, "b", rate_hz, columns),
+                       .phases = {},
+                       .reactor = get_reactor(npz),
+                       .contacts = get_contacts(npz, columns),
+                       .source = get_texts(npz, "source")};
+  take_phases(npz, clip);
+  check_archive(npz, [&] { validate(clip); });
+  return clip;
+}
+
 std::string clip_bytes(const InteractionClip& clip) {
   validate(clip);
   Npz npz;
@@ -116,11 +128,24 @@ std::string clip_bytes(const InteractionClip& clip) {
   return npz.bytes();
 }
 
-InteractionClip parse_clip(std::string_view bytes, const std::string& name) { return read(Npz::parse(bytes, name)); }
+InteractionClip parse_clip(std::string_view bytes, const std::string& name) {
+  return read_clip(Npz::parse(bytes, name));
+}
 
 void save_clip(const InteractionClip& clip, const std::string& path) { write_file(path, clip_bytes(clip)); }
 
-InteractionClip load_clip(const std::string& path) { return read(Npz::load(path)); }
+InteractionClip load_clip(const std::string& path) { return read_clip(Npz::load(path)); }
+
+void set_reactor(InteractionClip& clip, Person reactor) {
+  if (clip.reactor == reactor) return;
+  const std::string before = clip.reactor == Person::kA ? "-A" : "-B", after = reactor == Person::kA ? "-A" : "-B";
+  if (clip.id.size() > before.size() && clip.id.ends_with(before)) {
+    clip.id.resize(clip.id.size() - before.size());
+  } else {
+    clip.id += after;
+  }
+  clip.reactor = reactor;
+}
 
 InteractionClip mirrored(const InteractionClip& clip) {
   InteractionClip result = clip;

@@ -11,6 +11,8 @@
 
 namespace duet {
 
+class Npz;
+
 enum class Person { kA, kB };
 
 // Frames [begin, end) during which two joints are meant to be in touch; joints are SMPL-24 indices.
@@ -42,13 +44,19 @@ struct InteractionClip {
 // contact windows outside the clip.
 void validate(const InteractionClip& clip);
 
-// NPZ with the keys of docs/file-formats.md. Loading validates. Throw InputError naming the file, the key and the
+// NPZ with the keys of docs/file-formats.md. Loading validates, and proposes the phases where the file has none
+// (motion/phase_proposal.h; `source` then has "phases": "proposed"). Throw InputError naming the file, the key and the
 // fault. Saving validates first (std::invalid_argument).
 void save_clip(const InteractionClip& clip, const std::string& path);
 InteractionClip load_clip(const std::string& path);
 // The same without a file; `name` stands in messages.
 std::string clip_bytes(const InteractionClip& clip);
 InteractionClip parse_clip(std::string_view bytes, const std::string& name);
+InteractionClip read_clip(const Npz& npz);
+
+// Who the robot replaces. Another person than before gives another id, "-A" or "-B" at its end, and back the first one:
+// the two are different clips and may be in one run.
+void set_reactor(InteractionClip& clip, Person reactor);
 
 // Mirror image in the plane y = 0 with left and right joints (also of the contact windows) exchanged.
 InteractionClip mirrored(const InteractionClip& clip);

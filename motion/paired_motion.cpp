@@ -60,7 +60,9 @@ RobotMotion get_robot(const Npz& npz, double rate_hz) {
   return robot;
 }
 
-PairedMotion read(const Npz& npz) {
+}  // namespace
+
+PairedMotion read_paired_motion(const Npz& npz) {
   check_schema(npz, kSchema, kSchemaVersion,
                {"clip_id", "task", "reactor", "phases", "rate_hz", "robot_joint_names", "robot_root_position",
                 "robot_root_quat_wxyz", "robot_q", "human_joint_names", "partner_joints", "partner_rotations_wxyz",
@@ -86,8 +88,6 @@ PairedMotion read(const Npz& npz) {
   check_archive(npz, [&] { check_same_time(motion); });
   return motion;
 }
-
-}  // namespace
 
 void validate(const PairedMotion& motion) {
   const std::string what = fmt::format("paired motion of clip '{}'", motion.clip_id);
@@ -116,13 +116,13 @@ std::string paired_motion_bytes(const PairedMotion& motion) {
 }
 
 PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name) {
-  return read(Npz::parse(bytes, name));
+  return read_paired_motion(Npz::parse(bytes, name));
 }
 
 void save_paired_motion(const PairedMotion& motion, const std::string& path) {
   write_file(path, paired_motion_bytes(motion));
 }
 
-PairedMotion load_paired_motion(const std::string& path) { return read(Npz::load(path)); }
+PairedMotion load_paired_motion(const std::string& path) { return read_paired_motion(Npz::load(path)); }
 
 }  // namespace duet

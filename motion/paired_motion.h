@@ -21,7 +21,7 @@ struct PairedMotion {
   HumanMotion partner;         // adapted H_p
   HumanMotion source_partner;  // H_p as in the clip
   HumanMotion source_reactor;  // H_s as in the clip
-  PointTracks reshaped;        // (T, 16, 3): Reshaped(H_s) at the 16 pairs of A.1.1
+  PointTracks reshaped;        // (T, 16, 3): Reshaped(H_s) at the 16 pairs of A.1.1; empty: not known, no JPE then
   std::map<std::string, std::vector<double>>
       loss;  // per term ("total", "kin", "con", "hum", "temp", "pose"), one per iteration
   std::map<std::string, std::string> settings;  // every option of the solver, kernel and robot, as text
@@ -40,5 +40,6 @@ PairedMotion load_paired_motion(const std::string& path);
 // The same without a file; `name` stands in messages.
 std::string paired_motion_bytes(const PairedMotion& motion);
 PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name);
+PairedMotion read_paired_motion(const Npz& npz);
 
 }  // namespace duet

@@ -10,11 +10,13 @@
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "motion/pickle_machine.h"
 
 namespace duet {
 namespace {
 
+constexpr std::size_t kMostMotionBytes = std::size_t{1} << 30;  // hours of one robot
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kRepairable = 0.1;  // deviation of a quaternion's length from 1 that is renormalised
 const std::array<std::string, 6> kKeys = {"fps", "root_pos", "root_rot", "dof_pos", "local_body_pos", "link_body_list"};
@@ -38,7 +40,8 @@ class MotionDict {
     if (const PickleNode* node = find(key)) return *node;
     std::vector<std::string> found;
     for (const auto& [name, node] : values_) found.push_back(name);
-    throw InputError(fmt::format("'{}': missing key '{}'; keys found: {}", pickle_.name, key, fmt::join(found, ", ")));
+    throw InputError(fmt::format("'{}': missing key '{}'; keys found: {}", pickle_.name, key,
+                                 shown(fmt::format("{}", fmt::join(found, ", ")), kShownSentence)));
   }
 
  private:
@@ -47,8 +50,9 @@ class MotionDict {
       pickle_.fail(key.offset, fmt::format("expected a string as key, found {}", to_string(key.kind)));
     const std::string name(key.text);
     if (std::find(kKeys.begin(), kKeys.end(), name) == kKeys.end())
-      pickle_.fail(key.offset, unknown_name_message("key", name.substr(0, 60), kKeys));
-    if (!values_.emplace(name, value).second) pickle_.fail(key.offset, fmt::format("key '{}' is there twice", name));
+      pickle_.fail(key.offset, unknown_name_message("key", name, kKeys));
+    if (!values_.emplace(name, value).second)
+      pickle_.fail(key.offset, fmt::format("key '{}' is there twice", shown(name)));
   }
 
   const Pickle& pickle_;
@@ -182,6 +186,8 @@ PickledMotion parse_motion_pickle(std::string_view bytes, const std::string& nam
   return result;
 }
 
-PickledMotion read_motion_pickle(const std::string& path) { return parse_motion_pickle(read_file(path), path); }
+PickledMotion read_motion_pickle(const std::string& path) {
+  return parse_motion_pickle(read_file(path, kMostMotionBytes), path);
+}
 
 }  // namespace duet

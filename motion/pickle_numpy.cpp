@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/text.h"
+
 namespace duet {
 namespace {
 
@@ -28,14 +30,6 @@ constexpr std::array<KnownCallable, 9> kCallables = {
      {"numpy", "ndarray", PickleCallable::kNdarray},
      {"numpy", "dtype", PickleCallable::kDtype},
      {"_codecs", "encode", PickleCallable::kEncode}}};
-
-// What a message can show of the file's text.
-std::string shown(std::string_view text) {
-  std::string result(text.substr(0, 60));
-  std::replace_if(
-      result.begin(), result.end(), [](unsigned char c) { return c < 0x20 || c >= 0x7f; }, '?');
-  return result;
-}
 
 // The objects of one opcode.
 class Objects {

@@ -9,9 +9,12 @@
 
 namespace duet {
 
-// How gemv_half wants its weights: row and column filled up with zeros to multiples of these, and element (row, c) at
-// half_index.
+// How gemv_half wants its weights: half_size of them, rows and columns filled up with zeros to multiples of these, and
+// element (row, c) at half_index. `cols` is a multiple of kHalfColumns.
 inline constexpr int kHalfRows = 4, kHalfColumns = 16;
+constexpr std::size_t half_size(int rows, int cols) {
+  return static_cast<std::size_t>((rows + kHalfRows - 1) / kHalfRows * kHalfRows) * static_cast<std::size_t>(cols);
+}
 constexpr std::size_t half_index(int row, int c, int cols) {
   const int block = row / kHalfRows * (cols / kHalfColumns) + c / kHalfColumns;
   return (static_cast<std::size_t>(block) * kHalfRows + row % kHalfRows) * kHalfColumns + c % kHalfColumns;

@@ -8,12 +8,14 @@
 namespace duet {
 namespace {
 
-int filled_up(Eigen::Index n, int to) { return static_cast<int>((n + to - 1) / to) * to; }
+int filled_up(Eigen::Index columns) {
+  return static_cast<int>((columns + kHalfColumns - 1) / kHalfColumns) * kHalfColumns;
+}
 
 // Empty where a weight would change.
 std::vector<std::uint16_t> in_half(const decltype(MlpLayer::W)& W) {
-  const int columns = filled_up(W.cols(), kHalfColumns);
-  std::vector<std::uint16_t> halves(static_cast<size_t>(filled_up(W.rows(), kHalfRows)) * columns, 0);
+  const int columns = filled_up(W.cols());
+  std::vector<std::uint16_t> halves(half_size(static_cast<int>(W.rows()), columns), 0);
   for (int row = 0; row < W.rows(); ++row)
     for (int c = 0; c < W.cols(); ++c) {
       const Eigen::half half(W(row, c));
@@ -44,12 +46,12 @@ Mlp random_mlp(const std::vector<int>& sizes, float output_scale, Random& random
   return mlp;
 }
 
-MlpRunner::MlpRunner(const Mlp& mlp) : mlp_(mlp), input_(Eigen::VectorXf::Zero(filled_up(mlp.inputs(), kHalfColumns))) {
+MlpRunner::MlpRunner(const Mlp& mlp) : mlp_(mlp), input_(Eigen::VectorXf::Zero(filled_up(mlp.inputs()))) {
   for (const MlpLayer& layer : mlp.layers) {
     Layer& runs = layers_.emplace_back();
     runs.half = in_half(layer.W);
-    runs.columns = runs.half.empty() ? static_cast<int>(layer.W.cols()) : filled_up(layer.W.cols(), kHalfColumns);
-    runs.value.setZero(filled_up(layer.W.rows(), kHalfColumns));
+    runs.columns = runs.half.empty() ? static_cast<int>(layer.W.cols()) : filled_up(layer.W.cols());
+    runs.value.setZero(filled_up(layer.W.rows()));
   }
 }
 

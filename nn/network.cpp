@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "nn/mlp_file.h"
 #include "nn/network_engines.h"
 #include "nn/onnx_network.h"
@@ -42,7 +43,7 @@ std::unique_ptr<Network> mlp_network(const SafeTensors& content, const std::stri
     if (name.ends_with(kFirst)) prefixes.push_back(name.substr(0, name.size() - kFirst.size()));
   if (prefixes.size() != 1)
     throw InputError(fmt::format("'{}': expected one multilayer perceptron ('<name>.0.weight'), found {} [{}]", file,
-                                 prefixes.size(), fmt::join(prefixes, ", ")));
+                                 prefixes.size(), shown(fmt::format("{}", fmt::join(prefixes, ", ")))));
   return std::make_unique<MlpNetwork>(read_mlp(content, prefixes[0], file));
 }
 
@@ -60,7 +61,6 @@ bool is_safetensors(std::string_view bytes) {
 
 std::vector<std::string> network_engines() {
   std::vector<std::string> engines = {"duet"};
-  if (onnxruntime_built_in()) engines.emplace_back("onnxruntime");
   if (libtorch_built_in()) engines.emplace_back("libtorch");
   return engines;
 }
@@ -69,7 +69,6 @@ std::unique_ptr<Network> load_network(const std::string& path, const std::string
   const std::vector<std::string> engines = network_engines();
   require(std::ranges::find(engines, engine) != engines.end(),
           fmt::format("no network engine '{}' in this build. It has: {}", engine, fmt::join(engines, ", ")));
-  if (engine == "onnxruntime") return onnxruntime_network(path);
   if (engine == "libtorch") return libtorch_network(path);
   const std::string bytes = read_file(path);
   if (is_zip(bytes)) return torch_script_network(bytes, path);

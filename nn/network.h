@@ -30,7 +30,7 @@ class Network {
 // By content, not by name: ONNX, TorchScript of the kinds in nn/torch_script.h, safetensors of nn/mlp_file.h. Throws
 // InputError (file, place, expected, found) for a file that is not readable, truncated, of another kind, with an
 // operator or a shape that is not supported (by name), or with weights that are not finite. `engine`: "duet" (ours), or
-// "onnxruntime" or "libtorch" where they were built in (std::invalid_argument otherwise, naming those present).
+// "libtorch" where it was built in (std::invalid_argument otherwise, naming those present).
 std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine = "duet");
 std::vector<std::string> network_engines();
 

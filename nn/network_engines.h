@@ -1,5 +1,5 @@
-// Evaluation by libraries that a build may lack. Each has one source that is compiled where the library was found and
-// one that says so otherwise; a vendor's header appears only there. Internal to nn/.
+// Evaluation by a library that a build may lack: one source is compiled where the library was found and one that says
+// so otherwise; the vendor's header appears only there. Internal to nn/.
 #pragma once
 
 #include <memory>
@@ -9,11 +9,9 @@
 
 namespace duet {
 
-bool onnxruntime_built_in();
 bool libtorch_built_in();
 
-// Throw InputError as load_network does; MissingError where the library is not built in.
-std::unique_ptr<Network> onnxruntime_network(const std::string& path);
+// Throws InputError as load_network does; MissingError where the library is not built in.
 std::unique_ptr<Network> libtorch_network(const std::string& path);
 
 }  // namespace duet

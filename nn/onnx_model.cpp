@@ -12,6 +12,7 @@
 #include <set>
 
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -59,7 +60,7 @@ class Parser {
 
  private:
   [[noreturn]] void refuse(const std::string& problem) const {
-    throw InputError(fmt::format("'{}': {}", graph_.file, problem));
+    throw InputError(fmt::format("'{}': {}", graph_.file, shown(problem, kShownSentence)));
   }
 
   [[nodiscard]] int opset(const onnx::ModelProto& model) const {

@@ -11,7 +11,9 @@
 #include <optional>
 
 #include "core/file.h"
+#include "core/json.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
@@ -102,13 +104,13 @@ class Reader {
 
  private:
   [[noreturn]] void refuse(const std::string& tensor, const std::string& problem) const {
-    throw InputError(tensor.empty() ? fmt::format("'{}': safetensors: {}", file_, problem)
-                                    : fmt::format("'{}': tensor '{}': {}", file_, tensor, problem));
+    throw InputError(tensor.empty()
+                         ? fmt::format("'{}': safetensors: {}", file_, shown(problem, kShownSentence))
+                         : fmt::format("'{}': tensor '{}': {}", file_, shown(tensor), shown(problem, kShownSentence)));
   }
 
   [[nodiscard]] Json parsed(std::string_view text) const {
-    Json header = Json::parse(text.begin(), text.end(), nullptr, false);
-    if (header.is_discarded()) refuse("", "expected a header in JSON, found text that is not");
+    Json header = parse_json(text, fmt::format("'{}': safetensors: header", file_));
     if (!header.is_object()) refuse("", fmt::format("expected a JSON object as header, found {}", header.type_name()));
     return header;
   }
@@ -117,7 +119,8 @@ class Reader {
     std::map<std::string, std::string> metadata;
     if (!value.is_object()) refuse(kMetadata, fmt::format("expected an object, found {}", value.type_name()));
     for (const auto& [key, text] : value.items()) {
-      if (!text.is_string()) refuse(kMetadata, fmt::format("'{}': expected a string, found {}", key, text.type_name()));
+      if (!text.is_string())
+        refuse(kMetadata, fmt::format("'{}': expected a string, found {}", shown(key), text.type_name()));
       metadata[key] = text.get<std::string>();
     }
     return metadata;
@@ -149,7 +152,7 @@ class Reader {
       known.push_back(type.name);
     }
     refuse(name, fmt::format("dtype: expected one of {}, found '{}'", fmt::join(known, ", "),
-                             found->get_ref<const std::string&>()));
+                             shown(found->get_ref<const std::string&>())));
   }
 
   [[nodiscard]] std::vector<std::uint64_t> naturals(const std::string& name, const Json& value, const char* key) const {

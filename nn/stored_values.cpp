@@ -5,11 +5,12 @@
 
 #include "core/number.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
 
-constexpr std::size_t kShown = 200;  // characters of what was found
+constexpr std::size_t kShownText = 200;  // of a text that was expected to be another
 
 }  // namespace
 
@@ -43,7 +44,7 @@ Eigen::MatrixXf columns_of(const SafeTensors& content, const std::string& name, 
   const Tensor& found = tensor_named(content, name, file);
   if (found.shape != std::vector<std::int64_t>{columns, rows})
     throw InputError(fmt::format("{}: tensor '{}': expected shape ({}, {}), found ({})", file, name, columns, rows,
-                                 fmt::join(found.shape, ", ")));
+                                 shown(fmt::format("{}", fmt::join(found.shape, ", ")))));
   return Eigen::Map<const Eigen::MatrixXf>(found.values.data(), rows, columns);
 }
 
@@ -56,8 +57,7 @@ std::string text_of(const SafeTensors& content, const std::string& key, const st
 double number_of(const SafeTensors& content, const std::string& key, const std::string& file) {
   const std::string text = text_of(content, key, file);
   const std::optional<double> value = parse_number(text);
-  if (!value)
-    throw InputError(fmt::format("{}: '{}': expected a number, found '{}'", file, key, text.substr(0, kShown)));
+  if (!value) throw InputError(fmt::format("{}: '{}': expected a number, found '{}'", file, key, shown(text)));
   return *value;
 }
 
@@ -65,7 +65,7 @@ void expect_text(const SafeTensors& content, const std::string& key, const std::
                  const std::string& file) {
   const std::string found = text_of(content, key, file);
   if (found != expected)
-    throw InputError(fmt::format("{}: {}: expected '{}', found '{}'", file, key, expected, found.substr(0, kShown)));
+    throw InputError(fmt::format("{}: {}: expected '{}', found '{}'", file, key, expected, shown(found, kShownText)));
 }
 
 }  // namespace duet

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "core/require.h"
+#include "core/text.h"
 #include "core/zip.h"
 #include "nn/dense_kernels.h"
 #include "nn/mlp.h"
@@ -17,7 +18,7 @@
 namespace duet {
 namespace {
 
-constexpr std::size_t kMaxEntry = std::size_t{1} << 28;
+constexpr ZipLimits kLimits{.entry_bytes = std::size_t{1} << 28, .total_bytes = std::size_t{1} << 29};
 
 // The parts of the archive that matter: the tensors by number, the module's pickle, all code in one text.
 struct Archive {
@@ -36,7 +37,7 @@ class ArchiveReader {
   explicit ArchiveReader(const std::string& file) : file_(file) {}
 
   Module read(std::string_view bytes) {
-    read_zip(bytes, file_, kMaxEntry, [&](const std::string& entry, const std::string& content) {
+    read_zip(bytes, file_, kLimits, [&](const std::string& entry, const std::string& content) {
       // "policy/data/0", "policy/data.pkl", "policy/code/..." : the first folder has any name.
       take(entry.substr(std::min(entry.find('/') + 1, entry.size())), content);
     });
@@ -46,7 +47,7 @@ class ArchiveReader {
 
  private:
   [[noreturn]] void refuse(const std::string& problem) const {
-    throw InputError(fmt::format("'{}': TorchScript: {}", file_, problem));
+    throw InputError(fmt::format("'{}': TorchScript: {}", file_, shown(problem, kShownSentence)));
   }
 
   [[noreturn]] void refuse_kind(const std::string& found) const {

@@ -1,4 +1,4 @@
-// The control arm (ARCHITECTURE decision 6): stands where it is, in the neutral pose, whatever the partner does.
+// The control arm (docs/architecture.md, 6): stands where it is, in the neutral pose, whatever the partner does.
 #pragma once
 
 #include "policies/policy.h"

@@ -24,6 +24,7 @@ struct Entry {
   const char* name;
   PolicyInfo (*info)(const std::string& name);
   PolicyMaker (*maker)(const std::string& name, Robot robot, const PolicyOptions& options);
+  LoadedFiles (*files)(const std::string& name, const PolicyOptions& options);
 };
 
 template <typename T>
@@ -35,16 +36,19 @@ PolicyMaker of(const std::string& name, Robot robot, const PolicyOptions&) {
 PolicyInfo replay_info(const std::string& name) {
   return {name, "The retargeted motion with hindsight, as anchors", {}};
 }
+LoadedFiles no_files(const std::string&, const PolicyOptions&) { return {}; }
 PolicyInfo dense_info(const std::string& name) { return {name, "The same at 50 Hz, past the anchors", {}}; }
 PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral pose where it stands", {}}; }
 
-constexpr Entry kPolicies[] = {
-    {"replay", replay_info, of<ReplayPolicy>}, {"replay_dense", dense_info, of<DenseReplayPolicy>},
-    {"null", null_info, of<NullPolicy>},       {"dstar", dstar_info, dstar_maker},
-    {"dp", dstar_info, dstar_maker},           {"retrieval", retrieval_info, retrieval_maker}};
+constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files},
+                               {"replay_dense", dense_info, of<DenseReplayPolicy>, no_files},
+                               {"null", null_info, of<NullPolicy>, no_files},
+                               {"dstar", dstar_info, dstar_maker, dstar_files},
+                               {"dp", dstar_info, dstar_maker, dstar_files},
+                               {"retrieval", retrieval_info, retrieval_maker, retrieval_files}};
 
 // A name that is the path of a policy descriptor.
-constexpr Entry kDescriptor = {"", external_info, external_maker};
+constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};
 
 const Entry& find_entry(const std::string& name) {
   if (name.ends_with(".yaml")) return kDescriptor;
@@ -100,6 +104,10 @@ std::vector<std::string> policy_names() {
 }
 
 PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }
+
+LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) {
+  return find_entry(name).files(name, options);
+}
 
 PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
   const Entry& entry = find_entry(name);

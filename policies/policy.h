@@ -12,10 +12,12 @@
 #include <string_view>
 #include <vector>
 
+#include "core/loaded_file.h"
 #include "core/point_tracks.h"
+#include "core/robot_motion.h"
 #include "core/robot_state.h"
+#include "core/skeleton.h"
 #include "core/task.h"
-#include "motion/paired_motion.h"
 #include "robots/robot_model.h"
 
 namespace duet {
@@ -29,7 +31,7 @@ inline constexpr int kObservationSize = 149;  // human root 3, SMPL joints 72, r
 
 // One frame as sensed. The 149-D vector of supplement A.2.1 is built from it by to_vector.
 struct ObservationFrame {
-  Eigen::Matrix<double, 3, 24> partner;  // SMPL-24 joints [m], frame W; column 0 is the root
+  Eigen::Matrix<double, 3, kSmplJoints> partner;  // SMPL-24 joints [m], frame W; column 0 is the root
   RobotState robot;
 };
 
@@ -58,6 +60,7 @@ struct EpisodeContext {
   RobotState start;
   const RobotMotion* hindsight = nullptr;  // the reference motion of this episode at 50 Hz, frame 0 = tick 0
   std::uint64_t seed = 0;
+  std::function<bool()> stop_asked = {};  // asked while a policy waits for a program; true: give up, no fault
 };
 
 // What went wrong since reset, of policies that can fail: a process that is late or dies, a network whose numbers are
@@ -105,6 +108,9 @@ struct PolicyInfo {
 std::vector<PolicyInfo> policies();
 std::vector<std::string> policy_names();
 PolicyInfo policy_info(const std::string& name);
+// Every file that such a policy loads, in a fixed order. Throws as policy_maker for a name that is unknown and a
+// descriptor that is broken, MissingError for a file that is not on this machine; the files are not read.
+LoadedFiles policy_files(const std::string& name, const PolicyOptions& options = {});
 
 // Makes one policy per episode of what it has loaded once. Thread-safe.
 using PolicyMaker = std::function<std::unique_ptr<Policy>()>;

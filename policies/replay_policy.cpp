@@ -10,8 +10,6 @@
 #include "core/require.h"
 
 namespace duet {
-namespace {}  // namespace
-
 ReplayPolicy::ReplayPolicy(std::shared_ptr<const RobotModel> robot) : robot_(std::move(robot)) {
   require(robot_ != nullptr, "policy 'replay' needs a robot");
 }

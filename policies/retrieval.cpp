@@ -142,14 +142,17 @@ PolicyInfo retrieval_info(const std::string& name) {
           {{"library", "policies/dstar/retrieval.safetensors", "file of windows, made by `duet train retrieval`"}}};
 }
 
+LoadedFiles retrieval_files(const std::string&, const PolicyOptions& options) {
+  const char* what = "library of 'retrieval' (option `library`)";
+  const auto given = options.find("library");
+  return {{"library", given != options.end() ? first_existing(what, {given->second})
+                                             : share_file(what, "policies/dstar/retrieval.safetensors")}};
+}
+
 PolicyMaker retrieval_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
                             const PolicyOptions& options) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
-  const auto given = options.find("library");
-  const std::string path = given != options.end() ? given->second
-                                                  : share_file("library of 'retrieval' (option `library`)",
-                                                               "policies/dstar/retrieval.safetensors");
-  const auto library = load_retrieval_library(path, *robot);
+  const auto library = load_retrieval_library(retrieval_files(name, options).front().path, *robot);
   return [robot = std::move(robot), library] { return std::make_unique<RetrievalPolicy>(robot, library); };
 }
 

@@ -40,5 +40,6 @@ std::shared_ptr<const RetrievalLibrary> load_retrieval_library(const std::string
 PolicyInfo retrieval_info(const std::string& name);  // option `library`
 PolicyMaker retrieval_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
                             const PolicyOptions& options);
+LoadedFiles retrieval_files(const std::string& name, const PolicyOptions& options);
 
 }  // namespace duet

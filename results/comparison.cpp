@@ -9,6 +9,7 @@
 
 #include "core/require.h"
 #include "results/comparison_parts.h"
+#include "results/distinct_episodes.h"
 #include "results/leaderboard_rows.h"
 #include "results/row_groups.h"
 
@@ -96,7 +97,7 @@ std::set<std::string> episodes_of(const RowList& rows) {
 
 RowList main_arm(const std::vector<EpisodeRow>& rows, const char* run) {
   RowList list;
-  for (const EpisodeRow* row : in_episode_order(rows)) {
+  for (const EpisodeRow* row : distinct_episodes(rows)) {
     if (row->arm == "main") list.push_back(row);
   }
   if (list.empty()) throw InputError(fmt::format("nothing pairs: run {} has no episodes of the main arm", run));

@@ -9,6 +9,7 @@
 
 #include "results/contact_table_parts.h"
 #include "results/cross_engine.h"
+#include "results/distinct_episodes.h"
 #include "results/order_statistics.h"
 #include "results/row_groups.h"
 
@@ -137,13 +138,13 @@ bool is_over_limit(const EpisodeRow& row) {
 }
 
 ContactTable contact_table(const std::vector<EpisodeRow>& rows, const std::string& arm) {
-  require_one_suite(rows);
   std::map<std::pair<std::string, std::string>, std::map<std::string, Episodes>> groups;
   std::map<std::pair<std::string, std::string>, long> diverged;
   std::map<std::tuple<std::string, std::string, std::string, std::string, EpisodeId>, const EpisodeRow*> seen;
   ContactTable table;
   table.limits_verified = true;
-  for (const EpisodeRow& row : rows) {
+  for (const EpisodeRow* distinct : distinct_episodes(rows)) {
+    const EpisodeRow& row = *distinct;
     if (row.arm != arm || row.engine == kPlaybackEngine || !has_solid_partner(row)) continue;
     const auto [other, first] =
         seen.try_emplace({row.engine, row.controller, row.policy, row.perturbation, episode_id(row)}, &row);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "results/cross_engine.h"
+#include "results/distinct_episodes.h"
 #include "results/row_groups.h"
 
 namespace duet {
@@ -88,9 +89,8 @@ bool has_figures(const ControllerEntry& entry) {
 std::span<const PaperController> paper_controllers() { return kPaper; }
 
 ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const ControllerTableOptions& options) {
-  require_one_suite(rows);
   std::map<GroupKey, RowList> groups;
-  for (const EpisodeRow* row : in_episode_order(rows)) {
+  for (const EpisodeRow* row : distinct_episodes(rows)) {
     if (row->arm != options.arm || row->engine == kPlaybackEngine) continue;
     RowList& group =
         groups[{row->perturbation != "clean", row->perturbation, row->policy, row->controller, row->engine}];

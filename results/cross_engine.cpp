@@ -8,6 +8,7 @@
 
 #include "core/require.h"
 #include "results/cross_engine_parts.h"
+#include "results/distinct_episodes.h"
 
 namespace duet {
 namespace {
@@ -226,14 +227,14 @@ std::vector<RunEngine> engine_infos(const std::vector<EpisodeRow>& rows, const s
 }  // namespace
 
 EngineRows::EngineRows(const std::vector<EpisodeRow>& rows, const std::string& arm) {
-  for (const EpisodeRow& row : rows) {
-    if (row.arm != arm) continue;
+  for (const EpisodeRow* row : distinct_episodes(rows)) {
+    if (row->arm != arm) continue;
     const EpisodeRow*& place =
-        row.engine == kPlaybackEngine
-            ? playback_[{row.perturbation, row.policy, episode_id(row)}][row.controller]
-            : physics_[{row.perturbation, row.controller, row.policy}][episode_id(row)][row.engine];
-    if (place != nullptr) require_distinct(*place, row);
-    place = &row;
+        row->engine == kPlaybackEngine
+            ? playback_[{row->perturbation, row->policy, episode_id(*row)}][row->controller]
+            : physics_[{row->perturbation, row->controller, row->policy}][episode_id(*row)][row->engine];
+    if (place != nullptr) require_distinct(*place, *row);
+    place = row;
   }
 }
 
@@ -271,7 +272,6 @@ std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& succ
 
 CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<MetricColumn>& metrics,
                          const CrossEngineOptions& options) {
-  require_one_suite(rows);
   const EngineRows by_engine(rows, options.arm);
   CrossEngine result;
   result.engines = engine_infos(rows, options.arm);

@@ -1,6 +1,6 @@
 // What changes when only the physics engine does: success, ranks, metrics against kinematic playback, when states part
 // and contact forces. From the rows of one arm; "playback" is no physics engine, it is shown apart and is in no mean.
-// Nothing depends on the order of rows. reference/suite.md 3 (5, 6).
+// Nothing depends on the order of rows (docs/reading-the-leaderboard.md, "Across engines").
 #pragma once
 
 #include <map>

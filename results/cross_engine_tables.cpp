@@ -295,18 +295,18 @@ std::string too_few_engines(const CrossEngine& result) {
 }
 
 std::string markdown_of(const TitledTable& titled) {
-  std::string text = "### " + titled.title + "\n\n";
-  if (!titled.caption.empty()) text += titled.caption + "\n\n";
+  std::string text = "### " + escape_markdown(titled.title) + "\n\n";
+  if (!titled.caption.empty()) text += escape_markdown(titled.caption) + "\n\n";
   if (!titled.table.rows.empty()) text += markdown_table(titled.table);
   if (!titled.table.rows.empty() && !titled.notes.empty()) text += "\n";
-  for (const std::string& note : titled.notes) text += note + "\n";
+  for (const std::string& note : titled.notes) text += escape_markdown(note) + "\n";
   return text;
 }
 
 std::string latex_of(const TitledTable& titled) {
-  std::string text = fmt::format("% {}\n", titled.title);
-  if (!titled.caption.empty()) text += fmt::format("% {}\n", titled.caption);
-  for (const std::string& note : titled.notes) text += fmt::format("% {}\n", note);
+  std::string text = latex_comment(titled.title);
+  if (!titled.caption.empty()) text += latex_comment(titled.caption);
+  for (const std::string& note : titled.notes) text += latex_comment(note);
   if (!titled.table.rows.empty()) text += latex_table(titled.table);
   return text;
 }

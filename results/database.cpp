@@ -19,9 +19,9 @@ CREATE TABLE episodes (
   key TEXT PRIMARY KEY, suite TEXT NOT NULL, suite_version TEXT NOT NULL, suite_hash TEXT NOT NULL,
   task TEXT NOT NULL, clip TEXT NOT NULL, episode INTEGER NOT NULL, seed TEXT NOT NULL,
   engine TEXT NOT NULL, engine_version TEXT NOT NULL, engine_profile TEXT NOT NULL, profile_digest TEXT NOT NULL,
-  controller TEXT NOT NULL, policy TEXT NOT NULL,
+  controller TEXT NOT NULL, controller_digest TEXT NOT NULL, policy TEXT NOT NULL, policy_digest TEXT NOT NULL,
   perturbation TEXT NOT NULL, robot_digest TEXT NOT NULL, arm TEXT NOT NULL,
-  outcome TEXT NOT NULL, message TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
+  outcome TEXT NOT NULL, message TEXT NOT NULL, detectors TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
   fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
   contact_peak_n REAL, contact_impulse_ns REAL, contacts_total INTEGER NOT NULL, late_plans INTEGER NOT NULL,
   faults_observations INTEGER NOT NULL, faults_actions INTEGER NOT NULL, faults_stopped INTEGER NOT NULL,
@@ -44,6 +44,7 @@ CREATE TABLE verdict_values (
   kind TEXT NOT NULL CHECK (kind IN ('part', 'value', 'margin')), name TEXT NOT NULL, value REAL,
   PRIMARY KEY (key, version, thresholds, kind, name),
   FOREIGN KEY (key, version, thresholds) REFERENCES verdicts(key, version, thresholds));
+CREATE TABLE notes (text TEXT NOT NULL);
 CREATE VIEW leaderboard AS
   SELECT engine, controller, policy, perturbation, arm, task, COUNT(*) AS n, SUM(headline) AS k,
          AVG(headline) AS success, SUM(fell) AS fell, SUM(outcome = 'diverged') AS diverged,
@@ -127,9 +128,9 @@ class RowWriter {
  public:
   explicit RowWriter(Database& database)
       : database_(database),
-        episode_(
-            database.prepare("INSERT INTO episodes VALUES "
-                             "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
+        episode_(database.prepare(
+            "INSERT INTO episodes VALUES "
+            "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
         metric_(database.prepare("INSERT INTO metrics VALUES (?,?,?)")),
         force_(database.prepare("INSERT INTO forces VALUES (?,?,?)")),
         contact_(database.prepare("INSERT INTO contacts VALUES (?,?,?,?,?,?,?,?,?,?,?)")),
@@ -161,12 +162,15 @@ class RowWriter {
         .text(row.engine_profile)
         .text(row.profile_digest)
         .text(row.controller)
+        .text(row.controller_digest)
         .text(row.policy)
+        .text(row.policy_digest)
         .text(row.perturbation)
         .text(row.robot_digest)
         .text(row.arm)
         .text(std::string(to_string(row.outcome)))
         .text(row.message)
+        .text(row.detectors)
         .optional_flag(row.success)
         .integer(headline_success(row) ? 1 : 0)
         .integer(row.fell || row.outcome == Outcome::kFell ? 1 : 0)
@@ -246,7 +250,16 @@ class RowWriter {
   StatementHandle episode_, metric_, force_, contact_, verdict_, value_;
 };
 
-void fill(const std::vector<EpisodeRow>& rows, const std::string& file, const std::string& shown_path) {
+void write_notes(const std::vector<std::string>& notes, Database& database) {
+  const StatementHandle insert = database.prepare("INSERT INTO notes VALUES (?)");
+  for (const std::string& note : notes) {
+    Parameters(insert.get()).text(note);
+    database.step(insert.get());
+  }
+}
+
+void fill(const std::vector<EpisodeRow>& rows, const std::vector<std::string>& notes, const std::string& file,
+          const std::string& shown_path) {
   Database database(file, shown_path);
   database.execute("PRAGMA foreign_keys = ON; BEGIN");
   database.execute(kSchemaSql);
@@ -254,12 +267,14 @@ void fill(const std::vector<EpisodeRow>& rows, const std::string& file, const st
     RowWriter writer(database);
     for (const EpisodeRow* row : in_episode_order(rows)) writer.write(*row);
   }
+  write_notes(notes, database);
   database.execute("COMMIT");
 }
 
 }  // namespace
 
-void write_database(const std::vector<EpisodeRow>& rows, const std::string& path) {
+void write_database(const std::vector<EpisodeRow>& rows, const std::string& path,
+                    const std::vector<std::string>& notes) {
   const std::filesystem::path parent = std::filesystem::path(path).parent_path();
   std::error_code error;
   if (!parent.empty()) std::filesystem::create_directories(parent, error);
@@ -273,7 +288,7 @@ void write_database(const std::vector<EpisodeRow>& rows, const std::string& path
   };
   discard();
   try {
-    fill(rows, temporary, path);
+    fill(rows, notes, temporary, path);
   } catch (...) {
     discard();
     throw;

@@ -1,5 +1,5 @@
 // results.sqlite, derived from rows and rebuildable: tables episodes, metrics, forces, contacts,
-// verdicts (schema in docs/file-formats.md); traces stay in the rows.
+// verdicts, notes (schema in docs/file-formats.md); traces stay in the rows.
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace duet {
 
-// Replaces the file. Throws InputError.
-void write_database(const std::vector<EpisodeRow>& rows, const std::string& path);
+// Replaces the file. `notes` are what has to be said of the rows (table notes). Throws InputError.
+void write_database(const std::vector<EpisodeRow>& rows, const std::string& path,
+                    const std::vector<std::string>& notes = {});
 
 }  // namespace duet

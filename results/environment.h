@@ -1,4 +1,4 @@
-// What a result depends on: program, compiler, processor, libraries. reference/suite.md 4.4. No host or user name.
+// What a result depends on: program, compiler, processor, libraries. No host or user name.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -258,10 +258,10 @@ RowPolicyTime policy_time_from_json(const nlohmann::json& json) {
   return time;
 }
 
-std::int64_t read_schema(JsonFields& fields) {
+void check_schema(JsonFields& fields) {
   const std::int64_t schema = fields.integer("schema");
-  if (schema >= 1 && schema <= kRowSchema) return schema;
-  throw InputError(fmt::format("episode row: expected schema 1 to {}, found {}", kRowSchema, schema));
+  if (schema != kRowSchema)
+    throw InputError(fmt::format("episode row: expected schema {}, found {}", kRowSchema, schema));
 }
 
 void read_identity(JsonFields& fields, EpisodeRow& row) {
@@ -276,8 +276,12 @@ void read_identity(JsonFields& fields, EpisodeRow& row) {
   row.seed = fields.unsigned_integer("seed");
   row.engine = fields.text("engine");
   row.engine_version = fields.text("engine_version");
+  row.engine_profile = fields.text("engine_profile");
+  row.profile_digest = fields.text("profile_digest");
   row.controller = fields.text("controller");
+  row.controller_digest = fields.text("controller_digest");
   row.policy = fields.text("policy");
+  row.policy_digest = fields.text("policy_digest");
   row.perturbation = fields.text("perturbation");
   row.robot_digest = fields.text("robot_digest");
   row.arm = arm_from(fields.text("arm"));
@@ -286,6 +290,7 @@ void read_identity(JsonFields& fields, EpisodeRow& row) {
 void read_result(JsonFields& fields, EpisodeRow& row) {
   row.outcome = outcome_from(fields.text("outcome"));
   row.message = fields.text("message");
+  row.detectors = fields.text("detectors");
   if (!fields.at("success").is_null()) row.success = fields.boolean("success");
   row.verdicts = items_from_json(fields.at("verdicts"), "verdicts", "verdict", verdict_from_json);
   row.metrics = fields.numbers("metrics", false);
@@ -300,26 +305,13 @@ void read_result(JsonFields& fields, EpisodeRow& row) {
   row.started_at = fields.text("started_at");
 }
 
-// New in schema 2.
-void read_engine_details(JsonFields& fields, EpisodeRow& row) {
-  row.engine_profile = fields.text("engine_profile");
-  row.profile_digest = fields.text("profile_digest");
+void read_details(JsonFields& fields, EpisodeRow& row) {
   row.forces = fields.numbers("forces", false);
-  if (fields.has("contacts")) {
-    row.contacts = items_from_json(fields.at("contacts"), "contacts", "contact", contact_from_json);
-  }
-  if (fields.has("contacts_total")) row.contacts_total = small_integer(fields, "contacts_total", "episode row");
+  row.contacts = items_from_json(fields.at("contacts"), "contacts", "contact", contact_from_json);
+  row.contacts_total = small_integer(fields, "contacts_total", "episode row");
   row.trace = trace_from_json(fields.at("trace"));
-}
-
-// New in schema 3.
-void read_controller_details(JsonFields& fields, EpisodeRow& row) {
   row.feet = feet_from_json(fields.at("feet"));
   row.faults = faults_from_json(fields.at("faults"));
-}
-
-// New in schema 4.
-void read_policy_details(JsonFields& fields, EpisodeRow& row) {
   row.policy_faults = policy_faults_from_json(fields.at("policy_faults"));
   row.policy_ms = policy_time_from_json(fields.at("policy_ms"));
 }
@@ -329,8 +321,9 @@ void read_policy_details(JsonFields& fields, EpisodeRow& row) {
 std::string episode_key(const EpisodeRow& row) {
   Sha256 hash;
   const std::string episode = fmt::format("{}", row.episode);
-  for (const std::string* part : {&row.suite_hash, &row.task, &row.clip, &row.policy, &row.controller, &row.engine,
-                                  &row.perturbation, &episode}) {
+  for (const std::string* part :
+       {&row.suite_hash, &row.detectors, &row.task, &row.clip, &episode, &row.arm, &row.policy, &row.policy_digest,
+        &row.controller, &row.controller_digest, &row.engine, &row.perturbation}) {
     // The length first, so that no two different lists of parts read the same.
     hash.update(fmt::format("{}:", part->size()));
     hash.update(std::string_view(*part));
@@ -353,12 +346,15 @@ nlohmann::json to_json(const EpisodeRow& row) {
           {"engine_profile", row.engine_profile},
           {"profile_digest", row.profile_digest},
           {"controller", row.controller},
+          {"controller_digest", row.controller_digest},
           {"policy", row.policy},
+          {"policy_digest", row.policy_digest},
           {"perturbation", row.perturbation},
           {"robot_digest", row.robot_digest},
           {"arm", row.arm},
           {"outcome", std::string(to_string(row.outcome))},
           {"message", row.message},
+          {"detectors", row.detectors},
           {"success", row.success.has_value() ? nlohmann::json(*row.success) : nlohmann::json(nullptr)},
           {"verdicts", list_json(row.verdicts)},
           {"metrics", finite_only(row.metrics)},
@@ -384,12 +380,10 @@ nlohmann::json to_json(const EpisodeRow& row) {
 EpisodeRow row_from_json(const nlohmann::json& json) {
   JsonFields fields(json, "episode row");
   EpisodeRow row;
-  const std::int64_t schema = read_schema(fields);
+  check_schema(fields);
   read_identity(fields, row);
   read_result(fields, row);
-  if (schema >= 2) read_engine_details(fields, row);
-  if (schema >= 3) read_controller_details(fields, row);
-  if (schema >= 4) read_policy_details(fields, row);
+  read_details(fields, row);
   fields.refuse_unknown();
   return row;
 }

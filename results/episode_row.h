@@ -1,5 +1,5 @@
-// One episode as one JSON line: the only thing that is stored; every table is derived from rows.
-// reference/suite.md 4.3.
+// One episode as one JSON line: the only thing that is stored; every table is derived from rows
+// (docs/file-formats.md, "Episode row").
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace duet {
 
-inline constexpr int kRowSchema = 4;  // rows of schemas 1 to 3 are read too; what they lack stays empty
+inline constexpr int kRowSchema = 5;  // the only one that is read
 
 struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"
@@ -76,17 +76,20 @@ struct RowContact {
 inline constexpr std::size_t kMostRowContacts = 16;
 
 struct EpisodeRow {
-  std::string key;  // SHA-256 of what makes the episode what it is (episode_key)
+  std::string key;  // episode_key of the row
   std::string suite, suite_version, suite_hash;
   std::string task, clip;
   int episode = 0;
   std::uint64_t seed = 0;
   std::string engine, engine_version;
-  std::string engine_profile, profile_digest;  // "parity"; SHA-256 of the engine's resolved profile
-  std::string controller, policy, perturbation = "clean", robot_digest;
+  std::string engine_profile, profile_digest;    // "parity"; SHA-256 of the engine's resolved profile
+  std::string controller, policy;                // as the suite names them
+  std::string controller_digest, policy_digest;  // SHA-256 of what they are; "" where their files were absent
+  std::string perturbation = "clean", robot_digest;
   std::string arm = "main";  // "main", "null", "oracle", "shuffled"
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
+  std::string detectors;        // version of the detectors' code (metrics/detector.h)
   std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok and fell
   std::vector<Verdict> verdicts;
   std::map<std::string, double> metrics;  // finite values only; undefined ones are absent
@@ -109,8 +112,8 @@ struct EpisodeRow {
   std::string started_at;  // UTC, ISO 8601
 };
 
-// SHA-256 over suite hash, task, clip, policy, controller, engine, perturbation, episode. The profiles of the engines
-// are in the suite hash.
+// SHA-256 over what makes the episode what it is: suite hash, detectors, task, clip, episode, arm, policy and
+// controller with their digests, engine and perturbation. What the profile says of the engine is in the suite hash.
 std::string episode_key(const EpisodeRow& row);
 
 // NaN and infinity are never written: such metrics and forces are left out, all other such numbers become null.

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "core/text.h"
 #include "results/leaderboard_rows.h"
 #include "results/report_parts.h"
 
@@ -96,7 +97,7 @@ std::string navigation(const std::vector<Section>& sections) {
 std::string escape_html(std::string_view text) {
   std::string escaped;
   escaped.reserve(text.size());
-  for (const char c : text) {
+  for (const char c : printable(text)) {
     switch (c) {
       case '&':
         escaped += "&amp;";
@@ -133,8 +134,8 @@ std::string html_report(const ReportContent& content) {
   add("engines", "Across engines", cross_engine_html(content));
   add("contacts", "Contact with people", contacts_html(content.contacts));
   add("retargeting", "Retargeting", retargeting_html(content));
-  add("training", "Training", training_html(content));
   add("clips", "Clips", stories_section(content));
+  add("training", "Training", training_html(content));
   add("environment", "Environment", environment_section(content));
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"

@@ -82,6 +82,9 @@ std::string drawn(const Line& line, int left, int y) {
                            escape_html(percent(entry.success, entry.interval)));
 }
 
+// Room for "mean 100.0 [100.0, 100.0]" beside the plot.
+int rate_width(const char* before) { return 16 + label_width(std::string_view(before).size() + 20); }
+
 // Lines of one combination: its name, its engines, playback.
 int line_count(const EngineSuccess& success) {
   return 1 + static_cast<int>(success.engines.size()) + (success.playback.has_value() ? 1 : 0);
@@ -137,7 +140,7 @@ Drawing engine_drawing(const CrossEngine& result) {
   for (const RunEngine& engine : result.engines) longest = std::max(longest, engine.name.size());
   longest += longest / 6;  // combinations are set bold
   const int left = label_width(std::max(longest, kPlaybackEngine.size()));
-  Drawing drawing{.width = left + kPlotWidth + 170, .height = kTop + 8, .body = ""};
+  Drawing drawing{.width = left + kPlotWidth + rate_width("mean "), .height = kTop + 8, .body = ""};
   std::string blocks;
   for (std::size_t i = 0; i < result.success.size(); ++i) {
     blocks += combination_block(result.success[i], names[i], left, drawing.height - 8);
@@ -173,7 +176,7 @@ std::string interval_plot_svg(const std::vector<LeaderboardEntry>& entries, cons
   for (const Line& line : lines) longest = std::max(longest, line.label.size());
   const int left = label_width(longest);
   const int height = kTop + kRowHeight * static_cast<int>(lines.size()) + 8;
-  const int width = left + kPlotWidth + 140;
+  const int width = left + kPlotWidth + rate_width("");
   std::string svg = fmt::format(
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="{2}: success with intervals">)",
       width, height, escape_html(task_title(task)));

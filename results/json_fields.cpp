@@ -8,16 +8,9 @@
 
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
-
-nlohmann::json parse_json(std::string_view text, const std::string& what) {
-  try {
-    return nlohmann::json::parse(text);
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not valid JSON: {}", what, error.what()));
-  }
-}
 
 nlohmann::json number_or_null(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
@@ -97,9 +90,9 @@ void JsonFields::refuse_unknown() const {
 }
 
 void JsonFields::wrong_type(const std::string& key, std::string_view expected, const nlohmann::json& found) const {
-  std::string shown = found.dump();
-  if (shown.size() > 40) shown = shown.substr(0, 37) + "...";
-  throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, key, expected, shown));
+  constexpr std::size_t kShownValue = 40;
+  throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, shown(key), expected,
+                               shown(found.dump(), kShownValue)));
 }
 
 double JsonFields::number_of(const std::string& key, const nlohmann::json& value, bool null_is_nan) const {

@@ -9,10 +9,9 @@
 #include <string>
 #include <string_view>
 
-namespace duet {
+#include "core/json.h"
 
-// Parses text; the InputError of a fault starts with `what` ("golden baseline").
-nlohmann::json parse_json(std::string_view text, const std::string& what);
+namespace duet {
 
 // null for a number that is not finite: JSON has no NaN.
 nlohmann::json number_or_null(double value);

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "core/require.h"
+#include "results/distinct_episodes.h"
 #include "results/leaderboard_rows.h"
 #include "results/row_groups.h"
 
@@ -39,6 +40,13 @@ std::map<Counterpart, const EpisodeRow*> null_arm(const RowList& rows) {
   return index;
 }
 
+void count_policy_faults(const RowPolicyFaults& faults, LeaderboardEntry& entry) {
+  entry.plans_late += faults.late;
+  entry.plans_invalid += faults.invalid;
+  entry.policy_dead += faults.dead ? 1 : 0;
+  if (entry.policy_fault.empty()) entry.policy_fault = faults.message;
+}
+
 void count_outcome(const EpisodeRow& row, LeaderboardEntry& entry) {
   ++entry.n;
   if (headline_success(row)) ++entry.k;
@@ -49,6 +57,7 @@ void count_outcome(const EpisodeRow& row, LeaderboardEntry& entry) {
   if (row.outcome == Outcome::kUnsupported) ++entry.unsupported;
   const bool ended = row.outcome == Outcome::kOk || row.outcome == Outcome::kFell;
   if (ended && !row.success.has_value()) ++entry.unjudged;
+  count_policy_faults(row.policy_faults, entry);
 }
 
 // Rates over all episodes of the entry: one without the verdict has failed, as in the headline.
@@ -113,8 +122,7 @@ LeaderboardEntry summarise(const GroupKey& group, const std::string& task, const
 }  // namespace
 
 std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options) {
-  require_one_suite(rows);
-  const RowList sorted = in_episode_order(rows);
+  const RowList sorted = distinct_episodes(rows);
   const std::map<Counterpart, const EpisodeRow*> null_rows = null_arm(sorted);
   std::map<GroupKey, RowList> groups;
   for (const EpisodeRow* row : sorted) {

@@ -32,7 +32,10 @@ struct LeaderboardEntry {
   double level = 0.95;                    // of both intervals
   long pairs = 0;  // episodes that the null arm has too: null_success, lift and its interval are over these
   long unsupported = 0;
-  long unjudged = 0;  // ended well but no detector ruled on it; counted as a failure
+  long unjudged = 0;                       // ended well but no detector ruled on it; counted as a failure
+  long plans_late = 0, plans_invalid = 0;  // plans of the policy that were left out, over all its episodes
+  long policy_dead = 0;                    // episodes in which the policy gave no plan any more
+  std::string policy_fault = {};           // message of the first of those, by episode; it is another program's text
 };
 
 // Sorted by engine, controller, policy, perturbation, task (order of kTasks, "all" last); arms of one policy in turn.

@@ -4,13 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 #include <tuple>
 
 #include "core/task.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
+
+constexpr std::size_t kLongestFault = 240;  // of a policy's message in a note [bytes]
 
 int arm_rank(const std::string& arm) { return arm == "main" ? 0 : arm == "null" ? 2 : 1; }
 
@@ -59,6 +63,10 @@ long total(const std::vector<LeaderboardEntry>& entries, long LeaderboardEntry::
     if (entry.task == "all") sum += entry.*field;
   }
   return sum;
+}
+
+bool loses_plans(const LeaderboardEntry& entry) {
+  return entry.plans_late > 0 || entry.plans_invalid > 0 || entry.policy_dead > 0;
 }
 
 std::string null_arm_note(const std::vector<LeaderboardEntry>& entries) {
@@ -182,6 +190,38 @@ std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& 
   }
   if (const long count = total(entries, &LeaderboardEntry::unjudged); count > 0) {
     notes.push_back(fmt::format("{} episodes have no headline verdict and count as failures.", count));
+  }
+  for (std::string& note : policy_fault_notes(entries)) notes.push_back(std::move(note));
+  return notes;
+}
+
+bool loses_plans(const std::vector<LeaderboardEntry>& entries) {
+  return std::any_of(entries.begin(), entries.end(), [](const LeaderboardEntry& entry) { return loses_plans(entry); });
+}
+
+std::string plans_lost(const LeaderboardEntry& entry) {
+  std::vector<std::string> parts;
+  if (entry.plans_late > 0) parts.push_back(fmt::format("{} late", entry.plans_late));
+  if (entry.plans_invalid > 0) parts.push_back(fmt::format("{} invalid", entry.plans_invalid));
+  if (entry.policy_dead > 0) parts.push_back(fmt::format("dead in {}", entry.policy_dead));
+  return parts.empty() ? "0" : joined(parts, ", ");
+}
+
+std::vector<std::string> policy_fault_notes(const std::vector<LeaderboardEntry>& entries) {
+  std::map<std::string, LeaderboardEntry> policies;  // sums over engines, controllers, perturbations and arms
+  for (const LeaderboardEntry& entry : entries) {
+    if (entry.task != "all" || !loses_plans(entry)) continue;
+    LeaderboardEntry& sum = policies[entry.policy];
+    for (const auto field : {&LeaderboardEntry::n, &LeaderboardEntry::plans_late, &LeaderboardEntry::plans_invalid,
+                             &LeaderboardEntry::policy_dead})
+      sum.*field += entry.*field;
+    if (sum.policy_fault.empty()) sum.policy_fault = entry.policy_fault;
+  }
+  std::vector<std::string> notes;
+  for (const auto& [name, sum] : policies) {
+    const char* dead = sum.policy_dead > 0 ? ", which are errors and count as failures" : "";
+    notes.push_back(fmt::format("Policy '{}' lost plans (in {} episodes: {}{}). The first fault: {}", shown(name),
+                                sum.n, plans_lost(sum), dead, shown(sum.policy_fault, kLongestFault)));
   }
   return notes;
 }

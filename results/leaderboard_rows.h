@@ -42,8 +42,17 @@ struct RowLabels {
 };
 RowLabels row_labels(const std::vector<LeaderboardRow>& rows);
 
-// Sentences that belong under a leaderboard: what the figures are, small samples, episodes without a null pair.
+// Sentences that belong under a leaderboard: what the figures are, small samples, episodes without a null pair,
+// policies that did not play.
 std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& entries);
+
+// Whether any policy left out a plan or died: only then do tables have a column for it, under this title.
+inline constexpr const char* kPlansLost = "Plans lost";
+bool loses_plans(const std::vector<LeaderboardEntry>& entries);
+std::string plans_lost(const LeaderboardEntry& entry);  // "13 late, 2 invalid, dead in 4", "0" where none is
+
+// A sentence for each policy that left out a plan or died, with the first message of it; none where none did.
+std::vector<std::string> policy_fault_notes(const std::vector<LeaderboardEntry>& entries);
 
 std::string task_title(const std::string& task);                  // "high_five" -> "High-five", "all" -> "Overall"
 std::string percent(double fraction);                             // "84.9", "-" for NaN

@@ -39,8 +39,8 @@ std::string success_cell(const LeaderboardRow& row, const std::string& task) {
   return entry != nullptr ? percent(entry->success, entry->interval) : "-";
 }
 
-void add_row(const LeaderboardRow& row, const std::vector<std::string>& tasks, std::vector<std::string> cells,
-             TextTable& table) {
+void add_row(const LeaderboardRow& row, const std::vector<std::string>& tasks, bool with_plans,
+             std::vector<std::string> cells, TextTable& table) {
   const LeaderboardEntry* overall = row.find("all");
   cells.push_back(overall != nullptr ? fmt::format("{}", overall->n) : "-");
   cells.push_back(success_cell(row, "all"));
@@ -49,6 +49,7 @@ void add_row(const LeaderboardRow& row, const std::vector<std::string>& tasks, s
   for (const CountColumn& count : kCounts) {
     cells.push_back(overall != nullptr ? fmt::format("{}", overall->*count.field) : "-");
   }
+  if (with_plans) cells.push_back(overall != nullptr ? plans_lost(*overall) : "-");
   table.rows.push_back(std::move(cells));
 }
 
@@ -58,7 +59,9 @@ TextTable success_table(const Entries& entries, const std::vector<LeaderboardRow
   for (const char* title : {"n", "Overall", "Lift"}) table.header.emplace_back(title);
   for (const std::string& task : tasks) table.header.push_back(task_heading(rows, task));
   for (const CountColumn& count : kCounts) table.header.emplace_back(count.title);
-  for (std::size_t i = 0; i < rows.size(); ++i) add_row(rows[i], tasks, labels.cells[i], table);
+  const bool with_plans = loses_plans(entries);
+  if (with_plans) table.header.emplace_back(kPlansLost);
+  for (std::size_t i = 0; i < rows.size(); ++i) add_row(rows[i], tasks, with_plans, labels.cells[i], table);
   return table;
 }
 
@@ -124,7 +127,10 @@ std::vector<std::string> csv_cells(const LeaderboardEntry& entry) {
           fmt::format("{}", entry.timed_out),
           fmt::format("{}", entry.errors),
           fmt::format("{}", entry.unsupported),
-          fmt::format("{}", entry.unjudged)};
+          fmt::format("{}", entry.unjudged),
+          fmt::format("{}", entry.plans_late),
+          fmt::format("{}", entry.plans_invalid),
+          fmt::format("{}", entry.policy_dead)};
 }
 
 nlohmann::json json_of(const Interval& interval) {
@@ -160,6 +166,10 @@ nlohmann::json json_of(const LeaderboardEntry& entry) {
           {"errors", entry.errors},
           {"unsupported", entry.unsupported},
           {"unjudged", entry.unjudged},
+          {"plans_late", entry.plans_late},
+          {"plans_invalid", entry.plans_invalid},
+          {"policy_dead", entry.policy_dead},
+          {"policy_fault", entry.policy_fault},
           {"metrics", json_of(entry.metrics)}};
 }
 
@@ -168,9 +178,9 @@ nlohmann::json json_of(const LeaderboardEntry& entry) {
 std::string leaderboard_markdown(const Entries& entries, bool with_metrics) {
   const std::vector<LeaderboardRow> rows = leaderboard_rows(entries);
   const RowLabels labels = row_labels(rows);
-  std::string text = labels.caption.empty() ? "" : labels.caption + "\n\n";
+  std::string text = labels.caption.empty() ? "" : escape_markdown(labels.caption) + "\n\n";
   if (!rows.empty()) text += markdown_table(success_table(entries, rows, labels)) + "\n";
-  for (const std::string& note : leaderboard_notes(entries)) text += note + "\n";
+  for (const std::string& note : leaderboard_notes(entries)) text += escape_markdown(note) + "\n";
   if (!other_verdicts(entries).empty()) {
     text += "\nSuccess in % under each detector version / threshold set, all tasks:\n\n";
     text += markdown_table(verdict_table(entries, rows, labels));
@@ -180,7 +190,8 @@ std::string leaderboard_markdown(const Entries& entries, bool with_metrics) {
     const std::vector<std::vector<LeaderboardRow>> engines = rows_by_engine(rows);
     for (const std::vector<LeaderboardRow>& of_engine : engines) {
       if (engines.size() > 1)
-        text += fmt::format("{}Engine {}:\n\n", &of_engine == &engines.front() ? "" : "\n", of_engine.front().engine);
+        text += fmt::format("{}Engine {}:\n\n", &of_engine == &engines.front() ? "" : "\n",
+                            escape_markdown(of_engine.front().engine));
       text += markdown_table(metric_table(entries, of_engine));
     }
   }
@@ -189,10 +200,10 @@ std::string leaderboard_markdown(const Entries& entries, bool with_metrics) {
 
 std::string leaderboard_csv(const Entries& entries) {
   TextTable table;
-  table.header = {"engine",      "controller", "policy",    "perturbation", "arm",      "task",      "n",
-                  "k",           "success",    "ci_low",    "ci_high",      "level",    "pairs",     "null_success",
-                  "lift",        "lift_low",   "lift_high", "fell",         "diverged", "timed_out", "errors",
-                  "unsupported", "unjudged"};
+  table.header = {"engine",      "controller", "policy",     "perturbation",  "arm",        "task",      "n",
+                  "k",           "success",    "ci_low",     "ci_high",       "level",      "pairs",     "null_success",
+                  "lift",        "lift_low",   "lift_high",  "fell",          "diverged",   "timed_out", "errors",
+                  "unsupported", "unjudged",   "plans_late", "plans_invalid", "policy_dead"};
   const std::vector<std::string> verdicts = other_verdicts(entries);
   const std::vector<std::string> metrics = metric_names(entries);
   for (const std::string& name : verdicts) table.header.push_back(fmt::format("success:{}", name));
@@ -214,8 +225,8 @@ std::string leaderboard_latex(const Entries& entries) {
   const std::vector<LeaderboardRow> rows = leaderboard_rows(entries);
   const RowLabels labels = row_labels(rows);
   std::string text = "% \\usepackage{booktabs}\n";
-  for (const std::string& note : leaderboard_notes(entries)) text += "% " + note + "\n";
-  if (!labels.caption.empty()) text += "% " + labels.caption + "\n";
+  for (const std::string& note : leaderboard_notes(entries)) text += latex_comment(note);
+  if (!labels.caption.empty()) text += latex_comment(labels.caption);
   return text + latex_table(success_table(entries, rows, labels));
 }
 

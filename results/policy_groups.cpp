@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "results/distinct_episodes.h"
 #include "results/json_fields.h"
 
 namespace duet {
@@ -21,13 +22,12 @@ const Verdict* verdict_of(const EpisodeRow& row, std::string_view version, std::
 }  // namespace
 
 std::map<PolicyKey, PerturbedRows> rows_of_policies(const std::vector<EpisodeRow>& rows) {
-  require_one_suite(rows);
   std::map<PolicyKey, PerturbedRows> policies;
-  for (const EpisodeRow& row : rows) {
-    if (row.arm == "null" || row.outcome == Outcome::kUnsupported) continue;
-    EpisodeRows& episodes = policies[{row.engine, row.controller, row.arm, row.policy}][row.perturbation];
-    const auto [found, is_new] = episodes.try_emplace(episode_id(row), &row);
-    if (!is_new) require_distinct(*found->second, row);
+  for (const EpisodeRow* row : distinct_episodes(rows)) {
+    if (row->arm == "null" || row->outcome == Outcome::kUnsupported) continue;
+    EpisodeRows& episodes = policies[{row->engine, row->controller, row->arm, row->policy}][row->perturbation];
+    const auto [found, is_new] = episodes.try_emplace(episode_id(*row), row);
+    if (!is_new) require_distinct(*found->second, *row);
   }
   return policies;
 }

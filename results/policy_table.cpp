@@ -10,6 +10,7 @@
 #include "results/comparison_parts.h"
 #include "results/contact_table_parts.h"
 #include "results/cross_engine.h"
+#include "results/leaderboard_rows.h"
 
 namespace duet {
 namespace {
@@ -185,7 +186,7 @@ OverEngines over_engines(const PolicyLine& line, const PolicyFigure& figure) {
 }
 
 PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options) {
-  PolicyTable table{.level = options.level, .lines = {}, .pairs = {}, .could_not_run = {}};
+  PolicyTable table{.level = options.level, .lines = {}, .pairs = {}, .could_not_run = {}, .faults = {}};
   const LeaderboardOptions paired{options.level, options.resamples, options.seed};
   const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);
   if (std::all_of(policies.begin(), policies.end(), [](const auto& of) { return of.first.policy == kReplay; }))
@@ -198,6 +199,7 @@ PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableO
   }
   table.pairs = all_pairs(policies, paired);
   table.could_not_run = policies_that_never_ran(entries);
+  table.faults = policy_fault_notes(entries);
   return table;
 }
 

@@ -66,6 +66,7 @@ struct PolicyTable {
   std::vector<PolicyLine> lines;              // by controller, arm, policy
   std::vector<Comparison> pairs;              // "mujoco/wbc_sim: dstar vs replay", p_holm over all of them
   std::map<std::string, long> could_not_run;  // policy -> its episodes, all of them unsupported
+  std::vector<std::string> faults;            // a sentence for each policy that lost plans or died
 };
 
 // Empty where the only policy is `replay`, which decides nothing. Throws InputError as leaderboard() does.

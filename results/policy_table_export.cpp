@@ -74,6 +74,7 @@ void add_notes(const PolicyTable& table, TitledTable& titled) {
   for (const auto& [policy, episodes] : table.could_not_run)
     titled.notes.push_back(
         fmt::format("{} could not run ({} episodes) and is in no figure; its rows say why.", policy, episodes));
+  titled.notes.insert(titled.notes.end(), table.faults.begin(), table.faults.end());
 }
 
 // One engine: a column per figure.
@@ -315,6 +316,7 @@ nlohmann::json policy_table_json(const PolicyTable& table) {
           {"lines", std::move(lines)},
           {"pairs", comparison_json(table.pairs).at("comparisons")},
           {"could_not_run", table.could_not_run},
+          {"faults", table.faults},
           {"paper", std::move(paper)},
           {"note", paper_detector_sentence()}};
 }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -9,6 +10,7 @@
 #include "core/digest.h"
 #include "core/file.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "results/json_fields.h"
 #include "results/run_directory.h"
 
@@ -20,6 +22,7 @@ namespace fs = std::filesystem;
 constexpr const char* kSchema = "duet.published/1";
 constexpr const char* kManifest = "manifest.json";
 constexpr const char* kRows = "episodes.jsonl";
+constexpr const char* kInputs = "inputs";  // what the run was made from, where it keeps it
 constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // where they are
 
 std::string in(const std::string& folder, const std::string& name) { return (fs::path(folder) / name).string(); }
@@ -32,6 +35,11 @@ std::string lean_rows(const Run& run) {
     text += to_json(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
   }
   return text;
+}
+
+// A path that leads nowhere but below the folder.
+bool stays_below(const fs::path& path) {
+  return !path.empty() && path.is_relative() && std::ranges::find(path, fs::path("..")) == path.end();
 }
 
 // A run names files by their places on its machine; what is published names them from the folder that it is published
@@ -51,8 +59,9 @@ std::string without_places(std::string text) {
 // Everything but the manifest is in `folder` by now.
 nlohmann::json manifest_of(const Run& run, const std::string& folder) {
   nlohmann::json files = nlohmann::json::object();
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
-    files[entry.path().filename().string()] = sha256_file(entry.path().string());
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file())
+      files[entry.path().lexically_relative(folder).generic_string()] = sha256_file(entry.path().string());
   return {{"schema", kSchema},
           {"suite", run.info.suite},
           {"suite_version", run.info.suite_version},
@@ -66,6 +75,8 @@ void fill(const std::string& folder, const std::string& source, const Run& run) 
   write_file(in(folder, kRows), lean_rows(run));
   for (const char* name : kFiles)
     if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
+  if (const std::string inputs = in(source, kInputs); fs::exists(inputs))
+    fs::copy(inputs, in(folder, kInputs), fs::copy_options::recursive);
   write_file(in(folder, kManifest), manifest_of(run, folder).dump(2) + "\n");
 }
 
@@ -93,18 +104,21 @@ bool is_published(const std::string& folder) { return fs::exists(in(folder, kMan
 void check_published(const std::string& folder) {
   if (!is_published(folder)) return;
   const std::string path = in(folder, kManifest);
-  const nlohmann::json json = parse_json(read_file(path), path);
+  const nlohmann::json json = parse_json(read_text(path), path);
   JsonFields fields(json, path);
   if (const std::string schema = fields.text("schema"); schema != kSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, schema));
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, shown(schema)));
   const nlohmann::json& files = fields.at("files");
   if (!files.is_object() || !files.contains(kRows))
     throw InputError(fmt::format("{}: key 'files': expected the SHA-256 of {} and others", path, kRows));
   for (const auto& [name, digest] : files.items()) {
+    if (!stays_below(name))
+      throw InputError(
+          fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, shown(name)));
     const std::string found = sha256_file(in(folder, name));
     if (digest != found)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", in(folder, name),
-                                   digest.dump(), found));
+                                   shown(digest.dump()), found));
   }
 }
 

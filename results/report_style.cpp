@@ -44,6 +44,7 @@ td.zero{color:var(--source)}
 td.over{color:var(--null);font-weight:600}
 section>p.warning{color:var(--ink);border-left:3px solid var(--null);padding-left:10px;font-weight:600}
 .ci{color:var(--soft);font-size:12px;display:block}
+.where{display:none;color:var(--soft);font-size:11.5px;font-weight:400}
 .rate{font-weight:600}
 .unit{color:var(--soft);font-weight:400}
 .gain{color:var(--robot)}
@@ -115,6 +116,9 @@ pre{overflow:auto;font:12.5px/1.5 ui-monospace,"DejaVu Sans Mono",Menlo,Consolas
 overflow-wrap:anywhere}
 footer{max-width:1360px;margin:40px auto 30px;padding:0 28px;color:var(--soft);font-size:13px}
 [hidden]{display:none!important}
+@media(max-width:600px){main,header,nav ul{padding-left:12px;padding-right:12px}
+.context{display:none}.where{display:block}
+.sortable tbody th{position:sticky;left:0;background:var(--panel)}}
 @media print{nav,.filter{display:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
 main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}
 )css";

@@ -11,20 +11,30 @@
 namespace duet {
 namespace {
 
-std::string sortable_heading(const std::string& title, bool left) {
-  return fmt::format(R"(<th scope="col"{}><button type="button">{}</button></th>)", left ? R"( class="l")" : "",
-                     escape_html(title));
+std::string heading(const std::string& title, const char* classes) {
+  return fmt::format(R"(<th scope="col"{}><button type="button">{}</button></th>)", classes, escape_html(title));
+}
+
+std::string sortable_heading(const std::string& title) { return heading(title, ""); }
+
+// The last label is the policy, which heads the row. On a narrow screen the others give up their columns and stand
+// below it (report_style), so that the success is in sight.
+std::string label_headings(const std::vector<std::string>& titles) {
+  std::string html;
+  for (std::size_t i = 0; i < titles.size(); ++i)
+    html += heading(titles[i], i + 1 == titles.size() ? R"( class="l")" : R"( class="l context")");
+  return html;
 }
 
 std::string label_cells(const std::vector<std::string>& cells) {
-  std::string html;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    const bool last = i + 1 == cells.size();  // the policy heads the row
+  std::string html, where;
+  for (std::size_t i = 0; i + 1 < cells.size(); ++i) {
     const std::string text = escape_html(cells[i]);
-    html += last ? fmt::format(R"(<th scope="row" class="l">{}</th>)", text)
-                 : fmt::format(R"(<td class="l">{}</td>)", text);
+    html += fmt::format(R"(<td class="l context">{}</td>)", text);
+    where.append(where.empty() ? "" : ", ").append(text);
   }
-  return html;
+  if (!where.empty()) where = fmt::format(R"(<span class="where">{}</span>)", where);
+  return html + fmt::format(R"(<th scope="row" class="l">{}{}</th>)", escape_html(cells.back()), where);
 }
 
 std::string success_cell(const LeaderboardEntry* entry, int width_px) {
@@ -49,6 +59,13 @@ std::string lift_cell(const LeaderboardEntry* entry) {
 std::string count_cell(const LeaderboardEntry* entry, long LeaderboardEntry::*field) {
   const long count = entry != nullptr ? entry->*field : 0;
   return fmt::format(R"(<td data-v="{0}"{1}>{0}</td>)", count, count == 0 ? R"( class="zero")" : "");
+}
+
+// Sorted by the number of plans.
+std::string plans_cell(const LeaderboardEntry* entry) {
+  if (entry == nullptr) return R"(<td class="zero" data-v="0">0</td>)";
+  const long count = entry->plans_late + entry->plans_invalid + entry->policy_dead;
+  return fmt::format(R"(<td data-v="{}"{}>{}</td>)", count, count == 0 ? R"( class="zero")" : "", plans_lost(*entry));
 }
 
 const MetricColumn* column_of(const std::vector<MetricColumn>& columns, const std::string& name) {
@@ -148,10 +165,12 @@ std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries) {
   std::string html =
       fmt::format(R"(<div class="scroll" tabindex="0"><table class="sortable board"><caption>{}</caption><thead><tr>)",
                   escape_html(labels.caption));
-  for (const std::string& title : labels.columns) html += sortable_heading(title, true);
-  for (const char* title : {"n", "Overall", "Lift"}) html += sortable_heading(title, false);
-  for (const std::string& task : tasks) html += sortable_heading(task_title(task), false);
-  for (const char* title : {"Fell", "Div.", "Time", "Err."}) html += sortable_heading(title, false);
+  html += label_headings(labels.columns);
+  for (const char* title : {"n", "Overall", "Lift"}) html += sortable_heading(title);
+  for (const std::string& task : tasks) html += sortable_heading(task_title(task));
+  for (const char* title : {"Fell", "Div.", "Time", "Err."}) html += sortable_heading(title);
+  const bool with_plans = loses_plans(entries);
+  if (with_plans) html += sortable_heading(kPlansLost);
   html += "</tr></thead><tbody>\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const LeaderboardEntry* overall = rows[i].find("all");
@@ -162,6 +181,7 @@ std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries) {
                              &LeaderboardEntry::errors}) {
       html += count_cell(overall, field);
     }
+    if (with_plans) html += plans_cell(overall);
     html += "</tr>\n";
   }
   html += "</tbody></table></div>" + bar_legend(entries.front().level);
@@ -176,8 +196,8 @@ std::string detector_table_html(const std::vector<LeaderboardEntry>& entries) {
   const RowLabels labels = row_labels(rows);
   std::string html =
       R"(<div class="scroll" tabindex="0"><table class="sortable compact"><caption>Success in % under each detector version / threshold set, all tasks</caption><thead><tr>)";
-  for (const std::string& title : labels.columns) html += sortable_heading(title, true);
-  for (const std::string& name : names) html += sortable_heading(name, false);
+  html += label_headings(labels.columns);
+  for (const std::string& name : names) html += sortable_heading(name);
   html += "</tr></thead><tbody>\n";
   for (std::size_t i = 0; i < rows.size(); ++i) {
     html += fmt::format("<tr{}>", rows[i].arm == "main" ? "" : R"( class="control")") + label_cells(labels.cells[i]);

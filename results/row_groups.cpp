@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "core/require.h"
+#include "results/name_digests.h"
 
 namespace duet {
 
@@ -28,10 +29,16 @@ std::vector<const EpisodeRow*> in_episode_order(const std::vector<EpisodeRow>& r
 void require_one_suite(const std::vector<EpisodeRow>& rows) {
   for (const EpisodeRow& row : rows) {
     const EpisodeRow& first = rows.front();
-    if (row.suite == first.suite && row.suite_version == first.suite_version) continue;
-    throw InputError(fmt::format("rows of suites {}@{} and {}@{}: results are comparable only within one version",
-                                 first.suite, first.suite_version, row.suite, row.suite_version));
+    if (row.suite != first.suite || row.suite_version != first.suite_version)
+      throw InputError(fmt::format("rows of suites {}@{} and {}@{}: results are comparable only within one version",
+                                   first.suite, first.suite_version, row.suite, row.suite_version));
+    if (row.detectors != first.detectors)
+      throw InputError(fmt::format("rows judged by detectors {} and {}: results are comparable only within one version",
+                                   first.detectors, row.detectors));
   }
+  NameDigests digests;
+  for (const EpisodeRow& row : rows)
+    digests.add(row, fmt::format("the row of {} {} {}", row.task, row.clip, row.episode));
 }
 
 void require_distinct(const EpisodeRow& a, const EpisodeRow& b) {

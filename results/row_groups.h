@@ -23,7 +23,8 @@ bool headline_success(const EpisodeRow& row);
 // Rows by task, clip and episode, so that sums do not depend on the order in which episodes ended.
 std::vector<const EpisodeRow*> in_episode_order(const std::vector<EpisodeRow>& rows);
 
-// Throws InputError that names both: results are comparable only within one suite version.
+// Throws InputError that names both: results are comparable only within one suite version and one version of the
+// detectors, and each policy, controller and engine's profile is one.
 void require_one_suite(const std::vector<EpisodeRow>& rows);
 // Throws InputError where two rows of one group are the same episode.
 void require_distinct(const EpisodeRow& a, const EpisodeRow& b);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/text.h"
+
 namespace duet {
 namespace {
 
@@ -18,20 +20,17 @@ bool opens_tag(std::string_view rest) {
   return (next >= 'a' && next <= 'z') || (next >= 'A' && next <= 'Z') || next == '/' || next == '!' || next == '?';
 }
 
-std::string escape_markdown(std::string_view text) {
+// Line breaks become spaces, other control characters are spelt out.
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return shown(line, std::string::npos);
+}
+
+std::string escape_markdown_cell(std::string_view text) {
   std::string escaped;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (c == '|') {
-      escaped += "\\|";
-    } else if (c == '\n' || c == '\r') {
-      escaped += ' ';
-    } else if (c == '<' && opens_tag(text.substr(i))) {
-      escaped += "&lt;";
-    } else {
-      escaped += c;
-    }
-  }
+  for (const char c : escape_markdown(text)) escaped += c == '|' ? std::string("\\|") : std::string{c};
   return escaped;
 }
 
@@ -76,8 +75,19 @@ std::string joined(const std::vector<std::string>& cells, const char* separator)
 
 }  // namespace
 
+std::string escape_markdown(std::string_view text) {
+  const std::string line = one_line(text);
+  std::string escaped;
+  for (std::size_t i = 0; i < line.size(); ++i)
+    escaped +=
+        line[i] == '<' && opens_tag(std::string_view(line).substr(i)) ? std::string("&lt;") : std::string{line[i]};
+  return escaped;
+}
+
+std::string latex_comment(std::string_view text) { return "% " + one_line(text) + "\n"; }
+
 std::string markdown_table(const TextTable& table) {
-  const auto lines = escaped_lines(table, escape_markdown);
+  const auto lines = escaped_lines(table, escape_markdown_cell);
   std::vector<std::size_t> widths(table.header.size(), 3);
   for (const auto& line : lines) {
     for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], width(line[i]));

@@ -18,5 +18,9 @@ std::string csv_table(const TextTable& table);    // lines end with CR LF
 std::string latex_table(const TextTable& table);  // tabular with booktabs rules; cells are escaped
 
 std::string escape_latex(std::string_view text);
+// On one line, without tags and without characters that move a terminal's cursor: for prose, not for cells.
+std::string escape_markdown(std::string_view text);
+// A comment of LaTeX, whatever the text is; ends its line.
+std::string latex_comment(std::string_view text);
 
 }  // namespace duet

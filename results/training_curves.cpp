@@ -5,13 +5,25 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 
 #include "core/file.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
+
+constexpr std::size_t kMostColumns = 1000;
+constexpr std::string_view kClockColumn = "minutes";
+
+// Two values or more, all the same.
+bool is_level(const std::vector<double>& values) {
+  std::vector<double> finite;
+  std::ranges::copy_if(values, std::back_inserter(finite), [](double value) { return std::isfinite(value); });
+  return finite.size() > 1 && std::ranges::count(finite, finite.front()) == std::ssize(finite);
+}
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(" \t\r");
@@ -33,10 +45,12 @@ std::vector<std::string> read_header(std::string_view line, const std::string& n
   std::vector<std::string> columns = split(line);
   if (columns.size() < 2)
     throw InputError(fmt::format("{}:1: expected two or more columns, found {}", name, columns.size()));
+  if (columns.size() > kMostColumns)
+    throw InputError(fmt::format("{}:1: expected at most {} columns, found {}", name, kMostColumns, columns.size()));
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty()) throw InputError(fmt::format("{}:1: column {} has no name", name, i + 1));
     if (std::count(columns.begin(), columns.end(), columns[i]) > 1)
-      throw InputError(fmt::format("{}:1: column '{}' is there twice", name, columns[i]));
+      throw InputError(fmt::format("{}:1: column '{}' is there twice", name, shown(columns[i])));
   }
   return columns;
 }
@@ -46,7 +60,7 @@ double read_cell(const std::string& cell, const std::string& column, const std::
   char* end = nullptr;
   const double value = std::strtod(cell.c_str(), &end);
   if (*end != '\0')
-    throw InputError(fmt::format("{}: column '{}': expected a number, found '{}'", place, column, cell));
+    throw InputError(fmt::format("{}: column '{}': expected a number, found '{}'", place, shown(column), shown(cell)));
   return value;
 }
 
@@ -78,11 +92,12 @@ TrainingCurves parse_curves(std::string_view csv, const std::string& name) {
   return curves;
 }
 
-TrainingCurves load_curves(const std::string& path) { return parse_curves(read_file(path), path); }
+TrainingCurves load_curves(const std::string& path) { return parse_curves(read_text(path), path); }
 
 std::vector<LinePlot> curve_plots(const TrainingCurves& curves) {
   std::vector<LinePlot> plots;
   for (std::size_t i = 1; i < curves.columns.size(); ++i) {
+    if (curves.columns[i] == kClockColumn || is_level(curves.values[i])) continue;
     plots.push_back({.title = fmt::format("{} against {}", curves.columns[i], curves.columns[0]),
                      .x_label = curves.columns[0],
                      .y_label = curves.columns[i],

@@ -21,7 +21,7 @@ struct TrainingCurves {
 TrainingCurves parse_curves(std::string_view csv, const std::string& name);
 TrainingCurves load_curves(const std::string& path);
 
-// One plot per column but the first.
+// One plot per column that says something: not the axis, not "minutes" (a second clock), not one value throughout.
 std::vector<LinePlot> curve_plots(const TrainingCurves& curves);
 
 }  // namespace duet

@@ -323,11 +323,11 @@ class Loader {
 }  // namespace
 
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path) {
-  const std::string card_text = read_file(card_path);
+  const std::string card_text = read_text(card_path);
   const RobotCard card = parse_card(card_text, card_path);
   const std::string path =
       urdf_path.empty() ? (std::filesystem::path(card_path).parent_path() / card.urdf).string() : urdf_path;
-  const std::string urdf_text = read_file(path);
+  const std::string urdf_text = read_text(path);
   const UrdfModel urdf = parse_urdf(urdf_text, path);
   RobotModel model = Loader(card, card_path, urdf, path).load();
   Sha256 digest;

@@ -9,14 +9,19 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <mutex>
 #include <numbers>
 #include <set>
 
 #include "core/require.h"
+#include "core/text.h"
+#include "robots/xml_nesting.h"
 
 namespace duet {
 namespace {
+
+constexpr int kMostJoints = 1000;  // a humanoid with two hands that have fingers has about 100
 
 // urdfdom reports through a process-wide handler that prints to the console. Its errors are collected here instead.
 class Collector final : public console_bridge::OutputHandler {
@@ -37,10 +42,46 @@ void remove_children(TiXmlElement& element, const char* name) {
   while (TiXmlElement* child = element.FirstChildElement(name)) element.RemoveChild(child);
 }
 
+std::string attribute(const TiXmlElement& joint, const char* child) {
+  const TiXmlElement* const element = joint.FirstChildElement(child);
+  const char* const link = element == nullptr ? nullptr : element->Attribute("link");
+  return link == nullptr ? "" : link;
+}
+
+// Where links follow each other in a circle urdfdom builds links that hold each other for ever; where the chain is very
+// long, it ends the program by recursion.
+void check_joints(const TiXmlElement& robot, const std::string& file) {
+  std::map<std::string, std::vector<std::string>> children;
+  std::map<std::string, int> parents;  // how many joints end in a link and have not been walked through
+  int joints = 0;
+  for (const TiXmlElement* joint = robot.FirstChildElement("joint"); joint != nullptr;
+       joint = joint->NextSiblingElement("joint")) {
+    if (++joints > kMostJoints)
+      throw InputError(fmt::format("{}: expected at most {} joints, found more", file, kMostJoints));
+    const std::string parent = attribute(*joint, "parent"), child = attribute(*joint, "child");
+    if (parent.empty() || child.empty()) continue;  // urdfdom says what is missing
+    children[parent].push_back(child);
+    ++parents[child];
+  }
+  std::vector<std::string> roots;
+  for (const auto& [link, ends] : children)
+    if (!parents.contains(link)) roots.push_back(link);
+  while (!roots.empty()) {
+    const std::string link = roots.back();
+    roots.pop_back();
+    for (const std::string& child : children[link])
+      if (--parents[child] == 0) roots.push_back(child);
+  }
+  for (const auto& [link, left] : parents)
+    if (left > 0)
+      throw InputError(fmt::format("{}: link '{}': expected joints that form a tree, found a cycle", file, link));
+}
+
 // The text without what duet does not look at: a shape or material that urdfdom does not know is then no error.
 std::string without_geometry(const std::string& text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
+  check_xml_nesting(text, file);
   TiXmlDocument document;
   document.Parse(text.c_str());
   if (document.Error())
@@ -48,6 +89,7 @@ std::string without_geometry(const std::string& text, const std::string& file) {
                                  document.ErrorDesc()));
   TiXmlElement* const robot = document.FirstChildElement("robot");
   if (robot == nullptr) throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+  check_joints(*robot, file);
   for (const char* name : {"material", "transmission", "gazebo", "mujoco", "sensor"}) remove_children(*robot, name);
   for (TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link"))
     for (const char* name : {"visual", "collision"}) remove_children(*link, name);
@@ -63,8 +105,6 @@ std::string reworded(std::string error) {
   constexpr std::string_view kTwo = "Two root links found: ";
   if (const size_t at = error.find(kTwo); at != std::string::npos)
     return "expected one root (a link that is no joint's child), found two: " + error.substr(at + kTwo.size());
-  if (error.find("No root link found") != std::string::npos)
-    return "expected one root (a link that is no joint's child), found none: the joints form a cycle";
   return error;
 }
 
@@ -76,7 +116,8 @@ std::string reworded(std::string error) {
     if (sentence.find("xml is not initialized correctly") != std::string::npos && !sentences.empty()) continue;
     if (std::find(sentences.begin(), sentences.end(), sentence) == sentences.end()) sentences.push_back(sentence);
   }
-  throw InputError(fmt::format("{}: not a valid URDF: {}", file, fmt::join(sentences, "; ")));
+  throw InputError(fmt::format("{}: not a valid URDF: {}", file,
+                               shown(fmt::format("{}", fmt::join(sentences, "; ")), kShownSentence)));
 }
 
 urdf::ModelInterfaceSharedPtr parse(const std::string& text, const std::string& file) {
@@ -218,7 +259,7 @@ UrdfModel parse_urdf(const std::string& text, const std::string& file) {
   std::set<std::string> visited;
   const std::function<void(const urdf::Link&)> visit = [&](const urdf::Link& link) {
     if (!visited.insert(link.name).second)
-      throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, link.name));
+      throw InputError(fmt::format("{}: link '{}': expected one parent, found two", file, shown(link.name)));
     const int index = static_cast<int>(model.links.size());
     model.links.push_back(to_link(link, file));
     for (const urdf::JointSharedPtr& child : link.child_joints) {
@@ -230,10 +271,6 @@ UrdfModel parse_urdf(const std::string& text, const std::string& file) {
     }
   };
   visit(*source->getRoot());
-  for (const auto& [name, link] : source->links_)
-    if (!visited.contains(name))
-      throw InputError(fmt::format("{}: link '{}': expected a path to the root '{}', found a cycle of joints", file,
-                                   name, source->getRoot()->name));
   return model;
 }
 

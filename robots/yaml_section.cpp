@@ -8,6 +8,7 @@
 
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 
@@ -21,7 +22,7 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
 
 std::string describe(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return "nothing";
-  if (node.IsScalar()) return fmt::format("'{}'", node.Scalar());
+  if (node.IsScalar()) return fmt::format("'{}'", shown(node.Scalar()));
   return node.IsSequence() ? fmt::format("a list of {}", node.size()) : "a mapping";
 }
 
@@ -36,7 +37,7 @@ YamlSection::YamlSection(std::string file, const YAML::Node& node, std::string w
     if (std::find(names.begin(), names.end(), key) == names.end())
       fail(line_of(entry.first), unknown_name_message("key", key, names));
     if (!lines_.emplace(key, line_of(entry.first)).second)
-      fail(line_of(entry.first), fmt::format("expected each key once, found '{}' again", key));
+      fail(line_of(entry.first), fmt::format("expected each key once, found '{}' again", shown(key)));
   }
 }
 
@@ -46,7 +47,7 @@ int YamlSection::line(const char* key) const {
 }
 
 void YamlSection::fail(int line, const std::string& message) const {
-  throw InputError(fmt::format("{}:{}: {}: {}", file_, line, where_, message));
+  throw InputError(fmt::format("{}:{}: {}: {}", file_, line, shown(where_), shown(message, kShownSentence)));
 }
 
 YAML::Node YamlSection::node(const char* key) const {

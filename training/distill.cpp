@@ -108,7 +108,7 @@ Distillation::Distillation(const std::shared_ptr<const RobotModel>& robot, const
   targets_.resize(robot->dof(), options.buffer);
   const int each = options.environments / options.threads;
   for (int t = 0; t < options.threads; ++t)
-    workers_.push_back(std::make_shared<Worker>(teacher_, state_.student, state_.seed, t, state_.round));
+    workers_.push_back(std::make_unique<Worker>(teacher_, state_.student, state_.seed, t, state_.round));
   on_threads(options.threads, [&](int t) {
     Worker& worker = *workers_[t];
     for (int i = 0; i < each; ++i) {
@@ -122,6 +122,8 @@ Distillation::Distillation(const std::shared_ptr<const RobotModel>& robot, const
     worker.seen.resize(layout.student(), each);
   });
 }
+
+Distillation::~Distillation() = default;
 
 IterationReport Distillation::iterate() {
   const auto begin = std::chrono::steady_clock::now();

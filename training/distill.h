@@ -50,6 +50,7 @@ class Distillation {
   // `rounds`: after how many the learning rate has reached its last value.
   Distillation(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, const DistillOptions& options,
                WbcAgent teacher, StudentState state, long rounds);
+  ~Distillation();  // where Worker is complete
   IterationReport iterate();
   [[nodiscard]] const StudentState& state() const { return state_; }
 
@@ -62,8 +63,8 @@ class Distillation {
   WbcAgent teacher_;
   StudentState state_;
   long rounds_;
-  std::vector<std::shared_ptr<Worker>> workers_;  // shared_ptr: Worker is incomplete here
-  Eigen::MatrixXf inputs_, targets_;              // the buffer, a ring; columns are samples
+  std::vector<std::unique_ptr<Worker>> workers_;
+  Eigen::MatrixXf inputs_, targets_;  // the buffer, a ring; columns are samples
   int filled_ = 0, next_ = 0;
 };
 

@@ -3,6 +3,11 @@
 #include "controllers/wbc_sim/network.h"
 
 namespace duet {
+namespace {
+
+constexpr float kLeastDeviation = 1e-2F;
+
+}  // namespace
 
 void Normaliser::update(const Eigen::MatrixXf& x) {
   Normaliser batch(static_cast<int>(x.rows()));
@@ -21,12 +26,6 @@ void Normaliser::merge(const Normaliser& other) {
   variance = rest * variance + share * other.variance + rest * share * delta.cwiseAbs2();
   count = total;
 }
-
-namespace {
-
-constexpr float kLeastDeviation = 1e-2F;
-
-}  // namespace
 
 Eigen::VectorXf Normaliser::deviation() const { return variance.cwiseSqrt().array() + kLeastDeviation; }
 

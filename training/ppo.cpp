@@ -97,10 +97,10 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
               state_.agent.critic.inputs() == critic_mirror_.size() && state_.agent.actor.outputs() == robot->dof(),
           fmt::format("ppo: networks of {} and {} inputs for a robot that needs {} and {}", state_.agent.actor.inputs(),
                       state_.agent.critic.inputs(), actor_mirror_.size(), critic_mirror_.size()));
-  batch_ = std::make_shared<Batch>(actor_mirror_.size(), critic_mirror_.size(), robot->dof(), samples);
+  batch_ = std::make_unique<Batch>(actor_mirror_.size(), critic_mirror_.size(), robot->dof(), samples);
   const int each = options.environments / options.threads;
   for (int t = 0; t < options.threads; ++t)
-    workers_.push_back(std::make_shared<Worker>(state_.agent, state_.seed, t, state_.iteration));
+    workers_.push_back(std::make_unique<Worker>(state_.agent, state_.seed, t, state_.iteration));
   on_threads(options.threads, [&](int t) {
     Worker& worker = *workers_[t];
     Random start(state_.seed, stream_key({"ppo start", std::to_string(t)}));
@@ -115,6 +115,8 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
     worker.critic_raw[0].resize(critic_mirror_.size(), each);
   });
 }
+
+Ppo::~Ppo() = default;
 
 IterationReport Ppo::iterate() {
   const Clock::time_point begin = Clock::now();

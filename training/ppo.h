@@ -31,6 +31,7 @@ class Ppo {
   // Throws std::invalid_argument for options out of range and a state of another robot's sizes.
   Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, const PpoOptions& options,
       TrainingState state);
+  ~Ppo();  // where Worker and Batch are complete
   IterationReport iterate();
   [[nodiscard]] const TrainingState& state() const { return state_; }
 
@@ -58,8 +59,8 @@ class Ppo {
   PpoOptions options_;
   TrainingState state_;
   Mirror actor_mirror_, critic_mirror_, action_mirror_;
-  std::vector<std::shared_ptr<Worker>> workers_;  // shared_ptr: Worker is incomplete here
-  std::shared_ptr<Batch> batch_;
+  std::vector<std::unique_ptr<Worker>> workers_;
+  std::unique_ptr<Batch> batch_;
 };
 
 }  // namespace duet

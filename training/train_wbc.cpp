@@ -3,24 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
-#include <fstream>
 
 #include "controllers/stance.h"
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "training/pace.h"
 
 namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
-constexpr double kReportEvery = 10.0, kCheckpointEvery = 60.0;  // [s]
-constexpr double kFirstStd = 0.6;                               // of an action; training leaves it near this
-constexpr long kCriticAlone = 40;                               // iterations
+constexpr double kFirstStd = 0.6;  // of an action; training leaves it near this
+constexpr long kCriticAlone = 40;  // iterations
 constexpr const char* kColumns =
     "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
     "action_rate,clock,lift_m,rate,std,loss\n";
@@ -29,12 +26,6 @@ std::vector<std::string> stage_names() {
   std::vector<std::string> names;
   for (const WbcStage& stage : wbc_plan()) names.push_back(stage.name);
   return names;
-}
-
-const WbcStage& find_stage(const std::string& name) {
-  for (const WbcStage& stage : wbc_plan())
-    if (stage.name == name) return stage;
-  throw std::invalid_argument(unknown_name_message("stage", name, stage_names()));
 }
 
 std::string file_of(const std::string& folder, const std::string& stage, const char* name) {
@@ -63,8 +54,8 @@ void check_robot(const TrainingState& state, const RobotModel& robot, const std:
                                  state.robot_digest.substr(0, 12), robot.name, robot.digest.substr(0, 12)));
 }
 
-TrainingState load_state(const std::string& file, const RobotModel& robot) {
-  TrainingState state = training_state(read_safetensors(file), file);
+TrainingState state_of_checkpoint(const SafeTensors& tensors, const std::string& file, const RobotModel& robot) {
+  TrainingState state = training_state(tensors, file);
   check_robot(state, robot, file);
   return state;
 }
@@ -93,8 +84,9 @@ TrainingState state_of_network(const std::string& file, const RobotModel& robot,
 }
 
 TrainingState load_beginning(const std::string& file, const RobotModel& robot, std::uint64_t seed) {
-  if (is_wbc_network(read_safetensors(file))) return state_of_network(file, robot, seed);
-  TrainingState state = load_state(file, robot);
+  const SafeTensors tensors = read_safetensors(file);
+  if (is_wbc_network(tensors)) return state_of_network(file, robot, seed);
+  TrainingState state = state_of_checkpoint(tensors, file, robot);
   state.adam = {};
   state.critic_alone = 0;
   return state;
@@ -103,7 +95,7 @@ TrainingState load_beginning(const std::string& file, const RobotModel& robot, s
 TrainingState first_state(const WbcRun& run, const RobotModel& robot) {
   const std::string here = wbc_checkpoint(run.folder, run.stage);
   if (fs::exists(here)) {
-    TrainingState state = load_state(here, robot);
+    TrainingState state = state_of_checkpoint(read_safetensors(here), here, robot);
     if (state.seed != run.seed)
       throw InputError(fmt::format("{}: a checkpoint of seed {}, asked for is {}: choose another folder", here,
                                    state.seed, run.seed));
@@ -123,7 +115,7 @@ TrainingState first_state(const WbcRun& run, const RobotModel& robot) {
 class Log {
  public:
   Log(const WbcRun& run, long steps_before, long steps_wanted)
-      : path_(wbc_curves(run.folder, run.stage)), steps_before_(steps_before), begin_(Clock::now()) {
+      : path_(wbc_curves(run.folder, run.stage)), steps_before_(steps_before) {
     progress_.stage = run.stage;
     progress_.steps_wanted = steps_wanted;
     fs::create_directories(fs::path(path_).parent_path());
@@ -138,12 +130,12 @@ class Log {
     progress_.tracking.add(iteration.tracking);
   }
 
-  [[nodiscard]] bool report_due() const { return since(reported_) > kReportEvery; }
-  [[nodiscard]] bool save_due() const { return since(saved_) > kCheckpointEvery; }
-  void saved() { saved_ = Clock::now(); }
+  [[nodiscard]] bool report_due() const { return pace_.report_due(); }
+  [[nodiscard]] bool save_due() const { return pace_.save_due(); }
+  void saved() { pace_.saved(); }
 
   WbcProgress report(const IterationReport& last, double minutes) {
-    const double n = std::max(1, episodes_), elapsed = since(begin_);
+    const double n = std::max(1, episodes_), elapsed = pace_.seconds();
     progress_.steps = last.steps;
     progress_.steps_per_second = static_cast<double>(last.steps - steps_before_) / std::max(1e-9, elapsed);
     progress_.seconds_left =
@@ -157,34 +149,32 @@ class Log {
     progress_.tracking = {};
     episodes_ = falls_ = 0;
     returns_ = seconds_ = 0.0;
-    reported_ = Clock::now();
+    pace_.reported();
     return reported;
   }
 
  private:
-  static double since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
   void append(double minutes, double rate, double std) const {
     const TrackingStatistics& t = progress_.tracking;
     const double ticks = static_cast<double>(std::max(1L, t.ticks)),
                  stepping = static_cast<double>(std::max(1L, t.stepping_ticks));
-    std::ofstream(path_, std::ios::app) << fmt::format(
-        "{},{:.3f},{:.3f},{:.4f},{:.3f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f},{:.3f},{:.4f},{:.2e},{:.3f},{:.5f}\n",
+    LineAppender(path_).append(fmt::format(
+        "{},{:.3f},{:.3f},{:.4f},{:.3f},{:.4f},{:.4f},{:.4f},{:.4f},{:.3f},{:.3f},{:.4f},{:.2e},{:.3f},{:.5f}",
         progress_.steps, minutes, progress_.episode_return, progress_.fall_share, progress_.episode_seconds,
         t.root_xy / ticks, t.heading / ticks, t.upper_body / ticks, t.joints / ticks, t.action_rate / ticks,
-        t.clock / stepping, t.swing_lift / static_cast<double>(std::max(1L, t.swings)), rate, std, progress_.loss);
+        t.clock / stepping, t.swing_lift / static_cast<double>(std::max(1L, t.swings)), rate, std, progress_.loss));
   }
 
   std::string path_;
   long steps_before_;
-  Clock::time_point begin_, reported_ = begin_, saved_ = begin_;
+  Pace pace_;
   WbcProgress progress_;
   int episodes_ = 0, falls_ = 0;
   double returns_ = 0.0, seconds_ = 0.0;
 };
 
-WbcTask task_of(const std::string& stage, const WbcRun& run) {
-  WbcTask task = wbc_stage(stage == "student" ? "interact" : stage);
+WbcTask task_of(const WbcRun& run) {
+  WbcTask task = wbc_stage(find_wbc_stage(run.stage).task);
   task.stream.data = run.motions;
   if (!run.motions || run.motions->empty()) task.stream.motions = 0.0;
   return task;
@@ -212,7 +202,7 @@ bool train_stage(Trainer& trainer, const RobotModel& robot, const WbcRun& run, l
 }
 
 Ppo oracle_trainer(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run) {
-  const WbcTask task = task_of(run.stage, run);
+  const WbcTask task = task_of(run);
   PpoOptions options;
   options.threads = run.threads;
   options.environments = run.environments;
@@ -236,7 +226,7 @@ Distillation student_trainer(const std::shared_ptr<const RobotModel>& robot, con
   options.environments = run.environments;
   const long rounds = steps_wanted / (static_cast<long>(options.environments) * options.horizon);
   const TrainingState teacher = load_beginning(beginning(run), *robot, run.seed);
-  return {robot, task_of(run.stage, run), options, teacher.agent, first_student(run, *robot), rounds};
+  return {robot, task_of(run), options, teacher.agent, first_student(run, *robot), rounds};
 }
 
 WbcNetwork named(const RobotModel& robot) {
@@ -254,12 +244,30 @@ WbcNetwork named(const RobotModel& robot) {
 }  // namespace
 
 const std::vector<WbcStage>& wbc_plan() {
-  static const std::vector<WbcStage> plan = {{"stand", 5'700'000},
-                                             {"walk", 3'600'000},
-                                             {.name = "brace", .steps = 7'000'000, .extra = true},
-                                             {.name = "interact", .steps = 8'000'000, .extra = true},
-                                             {"student", 1'200'000}};
+  static const std::vector<WbcStage> plan = {
+      {.name = "stand", .steps = 5'700'000, .task = "stand"},
+      {.name = "walk", .steps = 3'600'000, .task = "walk"},
+      {.name = "brace", .steps = 7'000'000, .task = "brace", .extra = true},
+      {.name = "interact", .steps = 8'000'000, .task = "interact", .extra = true, .follows = true},
+      {.name = "student", .steps = 1'200'000, .task = "interact", .follows = true, .distils = true}};
   return plan;
+}
+
+const WbcStage& find_wbc_stage(const std::string& name) {
+  for (const WbcStage& stage : wbc_plan())
+    if (stage.name == name) return stage;
+  throw std::invalid_argument(unknown_name_message("stage", name, stage_names()));
+}
+
+std::vector<WbcRun> wbc_runs(const WbcRun& run) {
+  std::vector<WbcRun> runs;
+  for (const WbcStage& stage : wbc_plan()) {
+    if (stage.extra) continue;
+    WbcRun& next = runs.emplace_back(run);
+    next.stage = stage.name;
+    if (runs.size() > 1) next.from.clear();
+  }
+  return runs;
 }
 
 std::string wbc_checkpoint(const std::string& folder, const std::string& stage) {
@@ -298,10 +306,10 @@ WbcNetwork network_of(const RobotModel& robot, const StudentState& state) {
 
 bool train_wbc(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run,
                const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
-  const WbcStage& stage = find_stage(run.stage);
+  const WbcStage& stage = find_wbc_stage(run.stage);
   require(run.steps >= 0, fmt::format("train wbc: {} steps, expected a positive number", run.steps));
   const long steps = run.steps > 0 ? run.steps : stage.steps;
-  if (run.stage == "student") {
+  if (stage.distils) {
     Distillation student = student_trainer(robot, run, steps);
     return train_stage(student, *robot, run, steps, report, stop);
   }

@@ -13,24 +13,33 @@
 
 namespace duet {
 
-// What a stage is given unless the caller says otherwise. "student" is the distillation of what came before it.
+// A stage of the training, with what it is given unless the caller says otherwise.
 struct WbcStage {
   std::string name;
-  long steps = 0;      // of the environment
-  bool extra = false;  // is run when asked for by name; what comes after it goes without where it was not
+  long steps = 0;        // of the environment
+  std::string task;      // what it trains on (wbc_stage)
+  bool extra = false;    // is run when asked for by name; what comes after it goes without where it was not
+  bool follows = false;  // motions are followed in part
+  bool distils = false;  // a student learns from the oracle before it; else PPO
 };
 const std::vector<WbcStage>& wbc_plan();  // stand, walk, brace, interact, student
+// Throws std::invalid_argument for an unknown name, with the known ones.
+const WbcStage& find_wbc_stage(const std::string& name);
 
 struct WbcRun {
   std::string stage;   // of wbc_plan()
   std::string folder;  // runs/wbc: this stage writes into <folder>/<stage>/
-  std::string from;    // checkpoint or oracle's network to begin with; empty: the stage before in `folder`, or nothing
+  std::string from;    // checkpoint or oracle's network to begin with; empty: the stage before in `folder`, or new
   long steps = 0;      // 0: the plan's
   std::uint64_t seed = 1;
   int threads = 2;
   int environments = 128;
-  std::shared_ptr<const std::vector<RobotMotion>> motions;  // that "interact" and "student" follow in part; may be none
+  std::shared_ptr<const std::vector<RobotMotion>> motions;  // for the stages that follow motions; may be none
 };
+
+// All stages in turn but the extra ones. `run.from` is what the first begins with; each other one has the one before
+// it.
+std::vector<WbcRun> wbc_runs(const WbcRun& run);
 
 struct WbcProgress {
   std::string stage;

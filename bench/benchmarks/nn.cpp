@@ -1,11 +1,9 @@
 // Published policies: one evaluation at batch 1, and what it costs above the bare matrix products of the same sizes.
 #include <fmt/format.h>
 
-#include <cstdlib>
-
 #include "bench/benchmarks/parts.h"
 #include "bench/benchmarks/timer.h"
-#include "core/share.h"
+#include "controllers/published.h"
 #include "nn/dense_kernels.h"
 #include "nn/network.h"
 
@@ -17,19 +15,17 @@ struct Layer {
 };
 
 struct Policy {
-  const char *name, *file;
-  double most_us;  // what it may cost; 0: no target
+  const char* name;  // of a published controller
+  double most_us;    // what it may cost; 0: no target
   std::vector<Layer> layers;
 };
 
 const std::vector<Policy>& policies() {
   static const std::vector<Policy> list = {
       {"homie",
-       "homie_deploy.onnx",
        40.0,
        {{456, 256, 1}, {256, 256, 1}, {256, 35, 1}, {111, 512, 1}, {512, 256, 1}, {256, 256, 1}, {256, 12, 1}}},
       {"twist2",
-       "twist2_1017_20k.onnx",
        170.0,
        {{35, 60, 1},
         {60, 128, 1},
@@ -45,19 +41,10 @@ const std::vector<Policy>& policies() {
         {512, 256, 1},
         {256, 128, 1},
         {128, 29, 1}}},
-      {"playground", "playground_g1_policy.onnx", 0.0, {{103, 512, 1}, {512, 256, 1}, {256, 128, 1}, {128, 58, 1}}},
-      {"rl_gym", "unitree_rl_gym_g1_motion.pt", 0.0, {{47, 256, 1}, {64, 256, 1}, {64, 32, 1}, {32, 12, 1}}},
+      {"playground", 0.0, {{103, 512, 1}, {512, 256, 1}, {256, 128, 1}, {128, 58, 1}}},
+      {"rl_gym", 0.0, {{47, 256, 1}, {64, 256, 1}, {64, 32, 1}, {32, 12, 1}}},
   };
   return list;
-}
-
-// $DUET_MODELS, $DUET_SHARED/models, ../shared/models. Throws MissingError.
-std::string model_path(const std::string& file) {
-  std::vector<std::string> places;
-  if (const char* models = std::getenv("DUET_MODELS")) places.push_back(fmt::format("{}/{}", models, file));
-  if (const char* shared = std::getenv("DUET_SHARED")) places.push_back(fmt::format("{}/models/{}", shared, file));
-  places.push_back("../shared/models/" + file);
-  return first_existing("published policy", places);
 }
 
 // CPU seconds of one evaluation.
@@ -88,7 +75,7 @@ double bare_seconds(const std::vector<Layer>& layers, double seconds) {
 }
 
 std::vector<Figure> time_policy(const Policy& policy, const BenchmarkOptions& options) {
-  const auto network = load_network(model_path(policy.file));
+  const auto network = load_network(find_network(load_descriptor(policy.name)));
   const double ours = network_seconds(*network, options.seconds / 2);
   const double bare = bare_seconds(policy.layers, options.seconds / 2);
   const std::string name = fmt::format("nn/{}", policy.name);

@@ -19,6 +19,7 @@ struct BenchArguments {
   BenchmarkOptions options;
   int clips = 200;
   bool strict = false;
+  bool gate = false;
 };
 
 // A name stands for itself and for everything below it: "pair" is every benchmark "pair/...".
@@ -73,7 +74,7 @@ void print_confusion(const Session& session, const BenchArguments& arguments) {
   print(session, text, json);
 }
 
-void run_bench(const Session& session, const BenchArguments& arguments) {
+void run_bench(Session& session, const BenchArguments& arguments) {
   check_names(arguments.names);
   if (arguments.names == std::vector<std::string>{"detectors"}) return print_confusion(session, arguments);
   nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
@@ -85,6 +86,7 @@ void run_bench(const Session& session, const BenchArguments& arguments) {
     note(session, "measuring " + benchmark.name);
     for (const Figure& figure : benchmark.run(arguments.options)) {
       json["benchmarks"].push_back(to_json(figure));
+      if (arguments.gate && !figure.reached) session.exit_code = kExitGate;
       if (!session.json) fmt::print("{}", line(figure));
     }
   }
@@ -100,10 +102,14 @@ void add_bench(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<BenchArguments>();
   arguments->options.threads = default_threads();
   command->add_option("names", arguments->names, "which, by path; `duet list benchmarks` shows all (default: all)");
-  command->add_option("--seconds", arguments->options.seconds, "measuring time of one figure")->capture_default_str();
-  command->add_option("-j,--threads", arguments->options.threads, "threads of the scaling figures")
-      ->capture_default_str();
-  command->add_option("--clips", arguments->clips, "synthetic clips a task for `detectors`")->capture_default_str();
+  command->add_option("--seconds", arguments->options.seconds, "measuring time of one figure, up to an hour")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 3600.0));
+  add_threads(command, arguments->options.threads, "threads of the scaling figures");
+  command->add_option("--clips", arguments->clips, "synthetic clips a task for `detectors`")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  command->add_flag("--gate", arguments->gate, "exit code 1 where a figure does not reach its target");
   command->add_flag("--strict", arguments->strict, "the strict thresholds for `detectors`");
   command->callback([&session, arguments] { run_bench(session, *arguments); });
 }

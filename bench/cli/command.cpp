@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet::cli {
 
@@ -21,14 +22,32 @@ void print(const Session& session, const std::string& text, const nlohmann::json
   if (session.json) {
     fmt::print("{}\n", json.dump(2));
   } else {
-    fmt::print("{}", text);
+    fmt::print("{}", printable(text));
     if (!text.empty() && text.back() != '\n') fmt::print("\n");
   }
   if (std::fflush(stdout) != 0) throw InputError("cannot write to standard output");
 }
 
 void note(const Session& session, const std::string& text) {
-  if (!session.quiet) fmt::print(stderr, "{}\n", text);
+  if (!session.quiet) print_error(printable(text) + "\n");
+}
+
+void warn(const std::string& text) { print_error(fmt::format("duet: warning: {}\n", printable(text))); }
+
+void add_threads(CLI::App* command, int& threads, const std::string& what) {
+  command->add_option("-j,--threads", threads, what)->capture_default_str()->check(CLI::Range(1, 1024));
+}
+
+void add_allow_programs(CLI::App& command, bool& allowed) {
+  command.add_flag("--allow-programs", allowed,
+                   "start the programs, and connect to the servers, that policy descriptors name (docs/trust.md)");
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  return names;
 }
 
 std::pair<std::string, std::string> split_assignment(const std::string& text) {

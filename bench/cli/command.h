@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -17,7 +18,7 @@ enum ExitCode : int {
   kExitErrors = 3,         // finished, with errored episodes
   kExitMissing = 4,        // engine, asset or device that is not there
   kExitDeterminism = 5,    // verify: other hashes
-  kExitResumable = 75,     // stopped early (time limit, SIGTERM): the same command goes on
+  kExitResumable = 75,     // stopped early (time limit, SIGTERM, SIGHUP): the same command goes on
   kExitInterrupted = 130,  // Ctrl-C: the same command goes on
 };
 
@@ -26,6 +27,7 @@ struct Session {
   bool quiet = false;  // no progress
   int exit_code = kExitOk;
   std::vector<std::string> argv;
+  std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
 
   [[nodiscard]] Progress::Style progress() const { return quiet ? Progress::Style::kQuiet : Progress::Style::kAuto; }
 };
@@ -39,8 +41,23 @@ void print(const Session& session, const std::string& text, const nlohmann::json
 // A message for the person, on standard error, unless quiet.
 void note(const Session& session, const std::string& text);
 
+// The option --allow-programs (docs/trust.md).
+void add_allow_programs(CLI::App& command, bool& allowed);
+
+// A warning on standard error, also with --quiet.
+void warn(const std::string& text);
+
+// The option -j,--threads, 1 to 1024.
+void add_threads(CLI::App* command, int& threads, const std::string& what = "threads");
+
+// Of the program or of a command that has commands, in the order of its help.
+std::vector<std::string> command_names(const CLI::App& app);
+
 // "a=b" -> {a, b}; throws std::invalid_argument.
 std::pair<std::string, std::string> split_assignment(const std::string& text);
+
+// What `duet list` takes.
+std::vector<std::string> listing_names();
 
 void add_doctor(CLI::App& app, Session& session);
 void add_list(CLI::App& app, Session& session);
@@ -53,11 +70,14 @@ void add_report(CLI::App& app, Session& session);
 void add_compare(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
+void add_policy_check(CLI::App& app, Session& session);  // `policy check`
+void add_merge(CLI::App& app, Session& session);
 void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
 void add_train(CLI::App& app, Session& session);
+void add_completion(CLI::App& app, Session& session);
 void add_train_dstar(CLI::App& train, Session& session);  // below `train`: one command per policy, and `split`
 
 }  // namespace duet::cli

@@ -2,7 +2,11 @@
 #include <fmt/format.h>
 
 #include "bench/cli/command.h"
+#include "bench/cli/run_notes.h"
+#include "core/naming_file.h"
+#include "results/distinct_episodes.h"
 #include "results/leaderboard.h"
+#include "results/name_digests.h"
 #include "results/run_directory.h"
 
 namespace duet::cli {
@@ -13,12 +17,42 @@ struct CompareArguments {
   LeaderboardOptions options;
 };
 
+using Digests = std::map<std::string, std::string>;
+
+// Names that stand for something else in B: what is compared is then that.
+void add_other_digests(const char* kind, const Digests& a, const Digests& b, std::vector<std::string>& notes) {
+  for (const auto& [name, digest] : a)
+    if (const auto other = b.find(name); other != b.end() && other->second != digest)
+      notes.push_back(
+          fmt::format("{} '{}' is {} in A and {} in B", kind, name, short_digest(digest), short_digest(other->second)));
+}
+
+std::vector<std::string> notes_of(const CompareArguments& arguments, const Run& a, const Run& b) {
+  std::vector<std::string> notes = completeness_notes({arguments.a, arguments.b}, {a, b});
+  if (a.info.suite_hash != b.info.suite_hash)
+    notes.push_back(fmt::format("the suite's hash is {} in A and {} in B: other settings, clips or detectors",
+                                short_digest(a.info.suite_hash), short_digest(b.info.suite_hash)));
+  add_other_digests("policy", a.info.policies, b.info.policies, notes);
+  add_other_digests("controller", a.info.controllers, b.info.controllers, notes);
+  for (const auto& [name, run] : {std::pair("A", &a), std::pair("B", &b)})
+    if (const std::string repeats = repeats_note(run->rows); !repeats.empty()) {
+      warn(fmt::format("{}: {}", name, repeats));
+      notes.push_back(fmt::format("{}: {}", name, repeats));
+    }
+  return notes;
+}
+
 void run_compare(const Session& session, const CompareArguments& arguments) {
-  const Run a = load_run(arguments.a);
-  const Run b = load_run(arguments.b);
-  const std::vector<Comparison> comparisons = compare_runs(a.rows, b.rows, arguments.options);
-  print(session, fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, comparison_markdown(comparisons)),
-        {{"a", arguments.a}, {"b", arguments.b}, {"comparisons", comparison_json(comparisons)}});
+  const Run a = open_run(arguments.a);
+  const Run b = open_run(arguments.b);
+  const std::vector<std::string> notes = notes_of(arguments, a, b);
+  const std::vector<Comparison> comparisons = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
+    return compare_runs(a.rows, b.rows, arguments.options);
+  });
+  const std::string text =
+      fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, comparison_markdown(comparisons));
+  print(session, with_notes("md", text, notes),
+        {{"a", arguments.a}, {"b", arguments.b}, {"comparisons", comparison_json(comparisons)}, {"notes", notes}});
 }
 
 }  // namespace
@@ -34,7 +68,9 @@ void add_compare(CLI::App& app, Session& session) {
   command->add_option("--level", arguments->options.level, "of intervals")
       ->capture_default_str()
       ->check(CLI::Range(0.5, 0.9999));
-  command->add_option("--resamples", arguments->options.resamples, "of the cluster bootstrap")->capture_default_str();
+  command->add_option("--resamples", arguments->options.resamples, "of the cluster bootstrap")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000000));
   command->add_option("--seed", arguments->options.seed, "of the cluster bootstrap")->capture_default_str();
   command->callback([&session, arguments] { run_compare(session, *arguments); });
 }

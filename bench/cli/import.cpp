@@ -41,12 +41,10 @@ void import_people(const Session& session, ImportArguments arguments) {
   if (arguments.keep_t_pose) arguments.bvh.drop_t_pose = false;
   BvhImport imported =
       import_bvh_pair(arguments.files[0], arguments.files[1], parse_task(arguments.task), arguments.bvh);
-  imported.clip.reactor = arguments.reactor == "A" ? Person::kA : Person::kB;
+  set_reactor(imported.clip, arguments.reactor == "A" ? Person::kA : Person::kB);
   save_clip(imported.clip, arguments.output);
   const Phases& phases = imported.clip.phases;
-  print(session,
-        fmt::format("{}  phases (proposed): act is frames {} to {} of {}\n{}: clip '{}'", bulleted(imported.verdict),
-                    phases.act_begin, phases.act_end, imported.clip.frames(), arguments.output, imported.clip.id),
+  print(session, fmt::format("{}{}: clip '{}'", bulleted(imported.verdict), arguments.output, imported.clip.id),
         {{"file", arguments.output},
          {"clip", imported.clip.id},
          {"verdict", imported.verdict},

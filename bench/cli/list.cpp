@@ -3,7 +3,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <functional>
 
 #include "backends/factory.h"
@@ -11,11 +10,14 @@
 #include "bench/cli/command.h"
 #include "bench/perturbation.h"
 #include "bench/profile.h"
+#include "bench/robot_cards.h"
+#include "bench/shipped_suites.h"
 #include "controllers/controller.h"
 #include "core/names.h"
 #include "core/require.h"
 #include "metrics/catalogue.h"
 #include "metrics/detector.h"
+#include "metrics/detector_catalogue.h"
 #include "metrics/readings.h"
 #include "policies/policy.h"
 #include "retarget/options.h"
@@ -28,6 +30,7 @@ namespace {
 struct Listed {
   std::string name, detail;
   std::vector<std::string> options = {};  // a line each
+  nlohmann::json more = {};               // keys besides, for machines
 };
 using Listing = std::function<std::vector<Listed>()>;
 
@@ -37,6 +40,32 @@ std::vector<Listed> list_tasks() {
     std::vector<std::string> limits;
     for (const auto& [name, value] : thresholds(task)) limits.push_back(fmt::format("{} {:g}", name, value));
     list.push_back({std::string(to_string(task)), fmt::format("thresholds: {}", fmt::join(limits, ", "))});
+  }
+  return list;
+}
+
+// One entry per detector: Table S11 beside the strict set, and what the detector prints.
+std::vector<Listed> list_detectors() {
+  std::vector<Listed> list;
+  for (const Task task : kTasks) {
+    Listed entry{std::string(to_string(task)), "thresholds of Table S11, strict in brackets; figures"};
+    for (const ThresholdInfo& info : threshold_catalogue()) {
+      if (info.task != task) continue;
+      const std::string strict = info.strict == info.paper ? "" : fmt::format(" (strict {:.4g})", info.strict);
+      entry.options.push_back(fmt::format("{} {:g} {}{}: {}", info.name, info.paper, info.unit, strict, info.meaning));
+      entry.more["thresholds"][std::string(info.name)] = {
+          {"paper", info.paper}, {"strict", info.strict}, {"unit", info.unit}, {"meaning", info.meaning}};
+    }
+    for (const auto& [option, value] : strict_choices(task)) {
+      entry.options.push_back(fmt::format("strict reads {}={}", option, value));
+      entry.more["strict_readings"][option] = value;
+    }
+    for (const DetectorFigure& figure : detector_figures()) {
+      if (figure.task != task) continue;
+      entry.options.push_back(fmt::format("prints {} [{}]: {}", figure.name, figure.unit, figure.meaning));
+      entry.more["figures"][std::string(figure.name)] = {{"unit", figure.unit}, {"meaning", figure.meaning}};
+    }
+    list.push_back(std::move(entry));
   }
   return list;
 }
@@ -127,14 +156,19 @@ std::vector<Listed> list_perturbations() {
 }
 
 std::vector<Listed> list_robots() {
-  std::vector<std::string> cards = {default_card_path()};
-  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(cards.front()).parent_path()))
-    if (entry.path().extension() == ".yaml" && entry.path() != cards.front()) cards.push_back(entry.path().string());
-  std::sort(cards.begin() + 1, cards.end());
   std::vector<Listed> list;
-  for (const std::string& card : cards) {
+  for (const std::string& card : shipped_cards()) {
     const RobotModel robot = load_robot(card);
     list.push_back({robot.name, fmt::format("{} joints, {:.4f} kg, {}", robot.dof(), robot.total_mass(), card)});
+  }
+  return list;
+}
+
+std::vector<Listed> list_suites() {
+  std::vector<Listed> list;
+  for (const std::string& name : shipped_suite_names()) {
+    const ShippedSuite suite = shipped_suite(name);
+    list.push_back({name, fmt::format("{}, {} episodes: {}", suite.version, suite.episodes, suite.question)});
   }
   return list;
 }
@@ -147,25 +181,18 @@ std::vector<Listed> list_benchmarks() {
 
 const std::vector<std::pair<std::string, Listing>>& listings() {
   static const std::vector<std::pair<std::string, Listing>> table = {
-      {"tasks", list_tasks},
-      {"engines", list_engines},
-      {"engine-options", list_engine_options},
-      {"profiles", list_profiles},
-      {"controllers", list_controllers},
-      {"perturbations", list_perturbations},
-      {"policies", list_policies},
-      {"metrics", list_metrics},
-      {"readings", list_readings},
-      {"pair-options", list_pair_options},
-      {"robots", list_robots},
-      {"benchmarks", list_benchmarks},
+      {"tasks", list_tasks},       {"detectors", list_detectors},
+      {"engines", list_engines},   {"engine-options", list_engine_options},
+      {"profiles", list_profiles}, {"controllers", list_controllers},
+      {"suites", list_suites},     {"perturbations", list_perturbations},
+      {"policies", list_policies}, {"metrics", list_metrics},
+      {"readings", list_readings}, {"pair-options", list_pair_options},
+      {"robots", list_robots},     {"benchmarks", list_benchmarks},
   };
   return table;
 }
 
 void run_list(const Session& session, const std::string& what) {
-  std::vector<std::string> known;
-  for (const auto& [name, listing] : listings()) known.push_back(name);
   for (const auto& [name, listing] : listings()) {
     if (name != what) continue;
     nlohmann::json json = nlohmann::json::array();
@@ -173,24 +200,31 @@ void run_list(const Session& session, const std::string& what) {
     for (const Listed& entry : listing()) {
       json.push_back({{"name", entry.name}, {"detail", entry.detail}});
       if (!entry.options.empty()) json.back()["options"] = entry.options;
+      if (!entry.more.is_null()) json.back().update(entry.more);
       text += entry.detail.empty() ? entry.name + "\n" : fmt::format("{:<32} {}\n", entry.name, entry.detail);
       for (const std::string& option : entry.options) text += fmt::format("{:<34} {}\n", "", option);
     }
     print(session, text, json);
     return;
   }
-  throw std::invalid_argument(unknown_name_message("list", what, known));
+  throw std::invalid_argument(unknown_name_message("list", what, listing_names()));
 }
 
 }  // namespace
+
+std::vector<std::string> listing_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, listing] : listings()) names.push_back(name);
+  return names;
+}
 
 void add_list(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
   auto what = std::make_shared<std::string>();
   command
       ->add_option("what", *what,
-                   "tasks, engines, engine-options, profiles, controllers, perturbations, policies, metrics, readings, "
-                   "pair-options, robots, benchmarks")
+                   "tasks, detectors, engines, engine-options, profiles, controllers, suites, perturbations, policies, "
+                   "metrics, readings, pair-options, robots, benchmarks")
       ->required();
   command->callback([&session, what] { run_list(session, *what); });
 }

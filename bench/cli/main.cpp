@@ -1,31 +1,63 @@
 // The `duet` program: parses the command line, runs one command, turns exceptions into one sentence and an exit code.
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
-#include <cstdio>
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
 #include <exception>
+#include <filesystem>
 
 #include "bench/cli/command.h"
 #include "bench/version.h"
+#include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace {
 
 namespace cli = duet::cli;
 
+// A message quotes what stands in files: it may neither fill the terminal nor command it.
+constexpr std::size_t kLongestMessage = 4000;
+
 int fail(int code, const std::string& message) {
-  fmt::print(stderr, "duet: {}\n", message);
+  duet::print_error(fmt::format("duet: {}\n", duet::shown(message, kLongestMessage)));
   return code;
+}
+
+// A standard stream that is closed would be the number of the next file that is opened, and a file that grows past the
+// limit (ulimit -f) would end the program: it is an error of writing.
+void prepare_process() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(stream, F_GETFD) == -1 && errno == EBADF && open("/dev/null", O_RDWR) != stream) std::_Exit(1);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// The parser itself only says that a command is required.
+void check_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  const std::vector<std::string> known = cli::command_names(app);
+  if (std::ranges::find(known, argv[1]) == known.end())
+    throw std::invalid_argument(duet::unknown_name_message("command", argv[1], known));
+  if (argc > 2 && argv[2][0] != '-' && app.get_subcommand(argv[1])->get_require_subcommand_min() > 0)
+    check_command(*app.get_subcommand(argv[1]), argc - 1, argv + 1);
 }
 
 int run_command(CLI::App& app, int argc, char** argv, cli::Session& session) {
   try {
+    check_command(app, argc, argv);
     app.parse(argc, argv);
     return session.exit_code;
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error);
-    return code == 0 ? cli::kExitOk : cli::kExitUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    return fail(cli::kExitUsage, fmt::format("{} (--help shows what there is)", error.what()));
   } catch (const duet::MissingError& error) {
     return fail(cli::kExitMissing, error.what());
+  } catch (const std::filesystem::filesystem_error& error) {
+    return fail(cli::kExitUsage, fmt::format("cannot use '{}': {}", error.path1().string(), error.code().message()));
   } catch (const std::exception& error) {
     return fail(cli::kExitUsage, error.what());
   }
@@ -34,6 +66,7 @@ int run_command(CLI::App& app, int argc, char** argv, cli::Session& session) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  prepare_process();
   duet::cli::Session session;
   session.argv.assign(argv, argv + argc);
   CLI::App app(
@@ -56,6 +89,8 @@ int main(int argc, char** argv) {
   add_score(app, session);
   add_run(app, session);
   add_report(app, session);
+  add_policy_check(app, session);
+  add_merge(app, session);
   add_publish(app, session);
   add_compare(app, session);
   add_check(app, session);
@@ -64,5 +99,6 @@ int main(int argc, char** argv) {
   add_verify(app, session);
   add_bench(app, session);
   add_train(app, session);
+  add_completion(app, session);
   return run_command(app, argc, argv, session);
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "bench/cli/command.h"
+#include "bench/cli/run_notes.h"
 #include "results/published.h"
 #include "results/run_directory.h"
 
@@ -10,15 +11,20 @@ namespace {
 
 struct PublishArguments {
   std::string run, folder;
+  bool partial = false;
 };
 
 void run_publish(Session& session, const PublishArguments& arguments) {
+  require_whole(open_run(arguments.run), arguments.run, arguments.partial, "publish");
   publish_run(arguments.run, arguments.folder);
   const Run run = load_run(arguments.folder);
+  const std::vector<std::string> notes = completeness_notes({arguments.folder}, {run});
   print(session,
-        fmt::format("{}: {} rows of {} {}; `duet report {}` builds its tables", arguments.folder, run.rows.size(),
-                    run.info.suite, run.info.suite_version, arguments.folder),
-        {{"published", arguments.folder}, {"rows", run.rows.size()}});
+        with_notes("md",
+                   fmt::format("{}: {} rows of {} {}; `duet report {}` builds its tables", arguments.folder,
+                               run.rows.size(), run.info.suite, run.info.suite_version, arguments.folder),
+                   notes),
+        {{"published", arguments.folder}, {"rows", run.rows.size()}, {"notes", notes}});
 }
 
 }  // namespace
@@ -31,6 +37,7 @@ void add_publish(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<PublishArguments>();
   command->add_option("run", arguments->run, "run directory")->required();
   command->add_option("-o,--output", arguments->folder, "folder to make")->required();
+  command->add_flag("--partial", arguments->partial, "also a run that lacks episodes that were asked for");
   command->callback([&session, arguments] { run_publish(session, *arguments); });
 }
 

@@ -7,13 +7,21 @@
 
 #include "bench/certificate.h"
 #include "bench/cli/command.h"
+#include "bench/cli/run_notes.h"
 #include "bench/cli/tables.h"
 #include "bench/clips.h"
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
+#include "bench/run_identity.h"
 #include "bench/runner.h"
+#include "bench/shipped_suites.h"
+#include "bench/trust.h"
+#include "core/file.h"
 #include "core/names.h"
+#include "core/number.h"
 #include "core/require.h"
+#include "metrics/contact_limits.h"
+#include "results/leaderboard_rows.h"
 
 namespace duet::cli {
 namespace {
@@ -21,7 +29,7 @@ namespace {
 struct RunArguments {
   std::string suite, output, start, partner, profile, certificate;
   std::vector<std::string> overrides, clips, networks;
-  bool dry_run = false;
+  bool dry_run = false, allow_programs = false;
   RunOptions options;
 };
 
@@ -53,25 +61,24 @@ Suite read_suite(const RunArguments& arguments) {
   if (!arguments.start.empty()) overrides.emplace_back("start", arguments.start);
   if (!arguments.partner.empty()) overrides.emplace_back("partner", arguments.partner);
   if (!arguments.profile.empty()) overrides.emplace_back("profile", arguments.profile);
-  Suite suite = load_suite(arguments.suite, overrides);
+  Suite suite = load_suite(suite_file(arguments.suite), overrides);
+  suite.allow_programs = arguments.allow_programs;
   use_clips(arguments.clips, suite);
   for (const std::string& text : arguments.networks) {
     const auto [actor, path] = split_assignment(text);
     set_network(suite, actor, std::filesystem::absolute(path).lexically_normal().string());
   }
+  // A table that is broken is told before the first episode.
+  if (!suite.contact_limits.empty()) static_cast<void>(load_contact_limits(suite.contact_limits));
   return suite;
 }
 
+int exit_code(RunEnd end) {
+  return end == RunEnd::kComplete ? kExitOk : end == RunEnd::kInterrupted ? kExitInterrupted : kExitResumable;
+}
+
 int exit_code(const RunSummary& summary) {
-  switch (summary.end) {
-    case RunEnd::kInterrupted:
-      return kExitInterrupted;
-    case RunEnd::kTerminated:
-    case RunEnd::kTimeLimit:
-      return kExitResumable;
-    case RunEnd::kComplete:
-      break;
-  }
+  if (summary.end != RunEnd::kComplete) return exit_code(summary.end);
   const bool faults = summary.outcomes.contains("error") || summary.outcomes.contains("unsupported");
   return faults ? kExitErrors : kExitOk;
 }
@@ -90,25 +97,71 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
   return text;
 }
 
+// How long what was asked to stop may go on [s]; it listens every few milliseconds, but a network that loads or a file
+// that is read does not.
+constexpr double kGrace = 1.0;
+
+// The folder is at any moment as good as after a kill: nothing that is finished is lost.
+[[noreturn]] void end_at_once(RunEnd end) {
+  print_error(
+      "duet: stopped in the middle of a step that cannot be stopped; the same command goes on where it stopped\n");
+  std::_Exit(exit_code(end));
+}
+
+RunSummary run_watched(const Suite& suite, const RunArguments& arguments, Progress& progress) {
+  const StopSign stop(arguments.options.time_limit, arguments.options.begin);
+  const StopWatch watch(stop, kGrace, end_at_once);
+  try {
+    return run_suite(suite, arguments.output, arguments.options, progress);
+  } catch (const StorageError& error) {
+    throw StorageError(
+        fmt::format("{}; the run has stopped and the same command goes on where it stopped", error.what()));
+  }
+}
+
+// A terminal that is gone does not change how a stopped run ends.
+void print_result(const Session& session, RunEnd end, const std::string& text, const nlohmann::json& json) {
+  try {
+    print(session, text, json);
+  } catch (const std::exception&) {
+    if (end == RunEnd::kComplete) throw;
+  }
+}
+
+// What would be run, and which programs would be started.
+void print_plan(const Session& session, const Suite& suite) {
+  const std::string hash = suite_hash(suite);
+  nlohmann::json programs = nlohmann::json::array();
+  std::string text;
+  for (const PolicyProgram& program : programs_of(suite)) {
+    programs.push_back(describe(program));
+    text += fmt::format("\n# program: {}", describe(program));
+  }
+  print(session, fmt::format("{}# hash: {}{}", resolved_yaml(suite), hash, text),
+        {{"suite", resolved_yaml(suite)}, {"hash", hash}, {"programs", programs}});
+}
+
 void run_run(Session& session, RunArguments arguments) {
+  catch_interrupts();
   const Suite suite = read_suite(arguments);
   if (arguments.dry_run) {
-    const std::string hash = suite_hash(suite);
-    print(session, fmt::format("{}# hash: {}", resolved_yaml(suite), hash),
-          {{"suite", resolved_yaml(suite)}, {"hash", hash}});
+    print_plan(session, suite);
     return;
   }
   require(!arguments.output.empty(), "--output is needed: the run directory");
-  catch_interrupts();
   arguments.options.argv = session.argv;
+  arguments.options.begin = session.begin;
   if (!arguments.certificate.empty())
     arguments.options.certificate = certificate_json(load_certificate(arguments.certificate));
   Progress progress(session.progress());
-  const RunSummary summary = run_suite(suite, arguments.output, arguments.options, progress);
+  const RunSummary summary = run_watched(suite, arguments, progress);
   session.exit_code = exit_code(summary);
+  for (const std::string& warning : summary.warnings) warn(warning);
   note(session, describe(summary, suite, arguments.output));
-  const Run run = load_run(arguments.output);
+  const Run run = open_run(arguments.output);
+  const std::vector<std::string> notes = notes_of({arguments.output}, {run}, run.rows);
   const Tables tables = make_tables(run.rows, run.info.certificate);
+  for (const std::string& fault : policy_fault_notes(tables.leaderboard)) warn(fault);
   nlohmann::json json = {{"run", arguments.output},
                          {"planned", summary.planned},
                          {"already_there", summary.already_there},
@@ -117,9 +170,21 @@ void run_run(Session& session, RunArguments arguments) {
                          {"absent_engines", summary.absent_engines},
                          {"absent_controllers", summary.absent_controllers},
                          {"absent_policies", summary.absent_policies},
-                         {"complete", summary.end == RunEnd::kComplete}};
+                         {"policy_faults", policy_fault_notes(tables.leaderboard)},
+                         {"complete", summary.end == RunEnd::kComplete},
+                         {"notes", notes}};
   add_tables(tables, json);
-  print(session, tables_text(tables), json);
+  print_result(session, summary.end, with_notes("md", tables_text(tables), notes), json);
+}
+
+// CLI::Range lets NaN through.
+CLI::Validator time_limit_check() {
+  return {[](const std::string& text) -> std::string {
+            const std::optional<double> seconds = parse_number(text);
+            if (seconds && *seconds >= 0.0 && *seconds <= 1.0e9) return "";
+            return fmt::format("expected 0 to 1e9 s, found '{}'", text);
+          },
+          "0 to 1e9"};
 }
 
 }  // namespace
@@ -133,7 +198,9 @@ void add_run(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<RunArguments>();
   arguments->options.threads = default_threads();
   RunOptions& options = arguments->options;
-  command->add_option("suite", arguments->suite, "suite file (YAML)")->required();
+  command
+      ->add_option("suite", arguments->suite, "suite file (YAML), or the name of one that ships (`duet list suites`)")
+      ->required();
   command->add_option("-o,--output", arguments->output,
                       "run directory; an unfinished run of the same suite is resumed");
   command->add_option("--clips", arguments->clips,
@@ -152,9 +219,14 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("--tasks", options.tasks, "only these")->delimiter(',');
   command->add_option("--perturbations", options.perturbations, "only these (playback is always clean)")
       ->delimiter(',');
-  command->add_option("-j,--threads", options.threads, "threads")->capture_default_str()->check(CLI::Range(1, 1024));
-  command->add_option("--time-limit", options.time_limit, "of the run [s]; stops resumable (exit code 75)");
-  command->add_flag("--dry-run", arguments->dry_run, "print the resolved suite and its hash, run nothing");
+  add_threads(command, options.threads);
+  command
+      ->add_option("--time-limit", options.time_limit, "of the command [s], 0 for none; stops resumable (exit code 75)")
+      ->check(time_limit_check());
+  command->add_flag("--retry-errors", options.retry_errors, "run episodes again that ended with an error");
+  command->add_flag("--dry-run", arguments->dry_run,
+                    "print the resolved suite, its hash and the programs that it would start; run nothing");
+  add_allow_programs(*command, arguments->allow_programs);
   command->callback([&session, arguments] { run_run(session, *arguments); });
 }
 

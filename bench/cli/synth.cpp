@@ -32,7 +32,9 @@ void run_synth(const Session& session, SynthArguments arguments) {
             fmt::format("--side: expected left or right, found '{}'", arguments.side));
     arguments.options.side = arguments.side == "left" ? Side::kLeft : Side::kRight;
   }
-  require(arguments.count >= 1, fmt::format("--count: expected 1 or more, found {}", arguments.count));
+  constexpr int kMost = 100000;
+  require(arguments.count >= 1 && arguments.count <= kMost,
+          fmt::format("--count: expected 1 to {} clips of each task, found {}", kMost, arguments.count));
   const std::vector<Task> tasks = chosen_tasks(arguments.task);
   const int total = static_cast<int>(tasks.size()) * arguments.count;
   std::vector<nlohmann::json> written(total);
@@ -66,7 +68,7 @@ void add_synth(CLI::App& app, Session& session) {
   command->add_option("-n,--count", arguments->count, "clips of each task")->capture_default_str();
   command->add_option("--seed", arguments->options.seed, "of everything that is drawn")->capture_default_str();
   command->add_option("--first", arguments->options.index, "index of the first clip")->capture_default_str();
-  command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
+  add_threads(command, arguments->threads);
   const auto fixed = [&](const std::string& name, std::optional<double>& value, const std::string& what) {
     command->add_option_function<double>(
         name, [&value](double v) { value = v; }, what + " (default: drawn)");

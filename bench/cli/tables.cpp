@@ -1,22 +1,32 @@
 #include "bench/cli/tables.h"
 
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
 #include "bench/story.h"
 #include "results/certificate.h"
 
 namespace duet::cli {
 
 Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate) {
-  return {leaderboard(rows), across_engines(rows), contact_table(rows), controller_table(rows), certificate};
+  return {.leaderboard = leaderboard(rows),
+          .engines = across_engines(rows),
+          .contacts = contact_table(rows),
+          .controllers = controller_table(rows),
+          .certificate = certificate};
 }
 
 std::string tables_text(const Tables& tables) {
-  std::string text = leaderboard_markdown(tables.leaderboard, !tables.has_engines());
-  if (tables.has_controllers()) text += "\n" + controller_table_markdown(tables.controllers);
-  if (tables.has_engines())
-    text += "\n" + cross_engine_markdown(tables.engines) + "\n" +
-            certificate_markdown(tables.certificate, tables.engines.engines);
-  if (tables.has_contacts()) text += "\n" + contact_table_markdown(tables.contacts);
-  return text;
+  std::vector<std::string> parts = {leaderboard_markdown(tables.leaderboard, !tables.has_engines())};
+  if (tables.has_controllers()) parts.push_back(controller_table_markdown(tables.controllers));
+  if (tables.has_engines()) {
+    parts.push_back(cross_engine_markdown(tables.engines));
+    parts.push_back(certificate_markdown(tables.certificate, tables.engines.engines));
+  }
+  if (tables.has_contacts()) parts.push_back(contact_table_markdown(tables.contacts));
+  return fmt::format("{}", fmt::join(parts, "\n"));
 }
 
 void add_tables(const Tables& tables, nlohmann::json& json) {

@@ -38,8 +38,8 @@ std::string line(const WbcProgress& progress) {
       fmt::format("{:<8} {:>6.2f} M of {:.2f} M steps, {:>5.0f}/s, {} left", progress.stage,
                   static_cast<double>(progress.steps) * 1e-6, static_cast<double>(progress.steps_wanted) * 1e-6,
                   progress.steps_per_second, format_duration(std::max(0.0, progress.seconds_left)));
-  text += progress.stage == "student" ? fmt::format("; loss {:.4f}", progress.loss)
-                                      : fmt::format("; return {:.1f}", progress.episode_return);
+  text += find_wbc_stage(progress.stage).distils ? fmt::format("; loss {:.4f}", progress.loss)
+                                                 : fmt::format("; return {:.1f}", progress.episode_return);
   return text + fmt::format(", falls {:.0f} %, root {:.1f} cm, upper body {:.1f} cm, action rate {:.2f}",
                             100.0 * progress.fall_share, 100.0 * t.root_xy / ticks, 100.0 * t.upper_body / ticks,
                             t.action_rate / ticks);
@@ -74,37 +74,37 @@ StageEnd train_stage(const Session& session, const std::shared_ptr<const RobotMo
   return end;
 }
 
-std::vector<std::string> stages_of(const TrainArguments& arguments) {
-  if (arguments.smoke) return {"stand", "student"};
-  if (arguments.stage != "all") return {arguments.stage};
-  std::vector<std::string> stages;
-  for (const WbcStage& stage : wbc_plan())
-    if (!stage.extra) stages.push_back(stage.name);
-  return stages;
-}
-
 // A small training whose outcome can be checked: the return of the oracle rises, and a student can be distilled from
 // it.
-WbcRun smoke_run(const TrainArguments& arguments, const std::string& stage) {
+std::vector<WbcRun> smoke_runs(const WbcRun& run) {
+  const long steps = run.steps > 0 ? run.steps : 400'000;
+  WbcRun stand = run;
+  stand.environments = kSmokeEnvironments;
+  WbcRun student = stand;
+  stand.stage = "stand";
+  stand.steps = steps;
+  student.stage = "student";
+  student.steps = steps / 4;
+  student.from = wbc_checkpoint(run.folder, "stand");
+  return {stand, student};
+}
+
+std::vector<WbcRun> runs_of(const TrainArguments& arguments) {
+  if (arguments.smoke) return smoke_runs(arguments.run);
+  if (arguments.stage == "all") return wbc_runs(arguments.run);
   WbcRun run = arguments.run;
-  run.stage = stage;
-  run.environments = kSmokeEnvironments;
-  const long scale = arguments.run.steps > 0 ? arguments.run.steps : 400'000;
-  run.steps = stage == "student" ? scale / 4 : scale;
-  if (stage == "student") run.from = wbc_checkpoint(run.folder, "stand");
-  return run;
+  run.stage = arguments.stage;
+  return {run};
 }
 
 void train(Session& session, TrainArguments& arguments) {
   catch_interrupts();
   const auto robot = load_shared_robot(arguments.card);
-  const std::vector<std::string> stages = stages_of(arguments);
+  std::vector<WbcRun> runs = runs_of(arguments);
   nlohmann::json json = nlohmann::json::array();
-  for (const std::string& stage : stages) {
-    WbcRun run = arguments.smoke ? smoke_run(arguments, stage) : arguments.run;
-    run.stage = stage;
-    if (!arguments.smoke && stage != stages.front()) run.from.clear();  // the others begin with the one before them
-    if (!arguments.smoke && (stage == "interact" || stage == "student")) {
+  for (WbcRun& run : runs) {
+    const std::string& stage = run.stage;
+    if (!arguments.smoke && find_wbc_stage(stage).follows) {
       Progress progress(session.progress());
       run.motions = std::make_shared<const std::vector<RobotMotion>>(
           training_motions(*robot, kMotionsPerTask, run.threads, progress));
@@ -125,7 +125,7 @@ void train(Session& session, TrainArguments& arguments) {
       return;
     }
   }
-  const std::string network = wbc_network_file(arguments.run.folder, stages.back());
+  const std::string network = wbc_network_file(runs.back().folder, runs.back().stage);
   const WbcNetwork made = load_wbc_network(network, *robot);
   print(session, fmt::format("{}: {} inputs, {} outputs\n", network, made.mlp.inputs(), made.mlp.outputs()),
         {{"network", network}, {"stages", json}});

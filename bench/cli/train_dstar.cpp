@@ -7,6 +7,7 @@
 #include "bench/demonstrations.h"
 #include "bench/interrupt.h"
 #include "bench/parallel.h"
+#include "bench/shipped_suites.h"
 #include "core/file.h"
 #include "core/names.h"
 #include "core/require.h"
@@ -130,10 +131,10 @@ void check_network(const Session& session, const DstarData& data, const DstarRun
 }
 
 void train(Session& session, TrainArguments& arguments, const std::string& name) {
-  if (!can_train_dstar()) train_dstar({}, {}, {}, {});  // says how to get it
+  need_dstar_trainer();
   set_variant(arguments.run, name);
   if (!arguments.config.empty())
-    arguments.run.config = parse_dstar_config(read_file(arguments.config), arguments.config);
+    arguments.run.config = parse_dstar_config(read_text(arguments.config), arguments.config);
   if (arguments.smoke) make_small(arguments);
   DstarData data = data_of(session, arguments);
   if (!arguments.from.empty()) arguments.run.from = load_dstar_network(arguments.from, *data.robot);
@@ -248,10 +249,10 @@ void add_split(CLI::App& train_command, Session& session) {
   CLI::App* command =
       add_command(train_command, session, "split", "Print the test split of a suite: a digest and a name per clip",
                   "duet train split suites/core.yaml > policies/dstar/test_split.txt");
-  command->add_option("suite", *file, "suite file")->required();
+  command->add_option("suite", *file, "suite file, or the name of one that ships")->required();
   command->callback([&session, file] {
     Progress progress(session.progress());
-    const std::string text = split_text(load_suite(*file), default_threads(), progress);
+    const std::string text = split_text(load_suite(suite_file(*file)), default_threads(), progress);
     print(session, text, {{"split", text}});
   });
 }

@@ -1,102 +1,91 @@
-// duet verify: runs episodes of a finished run again and compares the hashes of their state trajectories.
+// duet verify: whether a run's rows are what its suite makes, and episodes of it run again.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <random>
 
-#include "bench/bodies.h"
 #include "bench/cli/command.h"
-#include "bench/clips.h"
 #include "bench/parallel.h"
-#include "bench/runner.h"
-#include "core/random.h"
-#include "core/require.h"
+#include "bench/verification.h"
 
 namespace duet::cli {
 namespace {
 
 struct VerifyArguments {
   std::string run;
-  int episodes = 5;
-  std::uint64_t seed = 1;
-  int threads = default_threads();
+  std::optional<std::uint64_t> seed;
+  bool partial = false;
+  VerifyOptions options;
 };
 
-// `count` rows without replacement, from a seeded shuffle. Rows that ended with an error have no trajectory to compare.
-std::vector<EpisodeRow> sample_rows(const Run& run, int count, std::uint64_t seed) {
-  std::vector<EpisodeRow> rows;
-  std::copy_if(run.rows.begin(), run.rows.end(), std::back_inserter(rows),
-               [](const EpisodeRow& row) { return !row.state_hash.empty() && row.outcome != Outcome::kTimedOut; });
-  Random random(seed, stream_key({"verify"}));
-  for (size_t i = 0; i + 1 < rows.size(); ++i)
-    std::swap(rows[i], rows[i + random.below(static_cast<int>(rows.size() - i))]);
-  rows.resize(std::min<size_t>(rows.size(), count));
-  return rows;
+std::string line_of(const RepeatedEpisode& repeat) {
+  const EpisodeRow& row = repeat.row;
+  const bool same = repeat.differences.empty();
+  return fmt::format("{:<9} {} {}/{}/{} {} {:.12} {:.12}{}\n", same ? "same" : "DIFFERENT", row.clip, row.engine,
+                     row.controller, row.policy, row.arm, row.state_hash, repeat.state_hash,
+                     same ? "" : "; stored, now: " + differences_text(repeat.differences));
 }
 
-struct Check {
-  EpisodeRow before;
-  std::string now;  // state hash of the second run
-};
-
-std::vector<Check> run_again(const Run& run, const VerifyArguments& arguments, Progress& progress) {
-  const Suite suite = parse_suite(run.info.suite_yaml, arguments.run + "/suite.yaml");
-  if (suite_hash(suite) != run.info.suite_hash)
-    throw InputError(fmt::format("'{}': the suite's clips are not what they were (hash {:.8}, was {:.8})",
-                                 arguments.run, suite_hash(suite), run.info.suite_hash));
-  Bodies bodies(suite);
-  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), arguments.threads, progress));
-  const std::vector<EpisodeSpec> plan = plan_episodes(suite, bodies);
-  std::vector<Check> checks;
-  for (EpisodeRow& row : sample_rows(run, arguments.episodes, arguments.seed)) checks.push_back({std::move(row), ""});
-  progress.start("running again", static_cast<int>(checks.size()), "episodes");
-  parallel_for_each(static_cast<int>(checks.size()), arguments.threads, [&](int i) {
-    for (const EpisodeSpec& spec : plan) {
-      const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
-      if (row_for(spec, suite, run.info.suite_hash, *robot).key != checks[i].before.key) continue;
-      const PolicyMaker& policy = bodies.policy(spec.controller, spec.policy).make;
-      checks[i].now = run_episode(spec, suite, run.info.suite_hash, robot, "", policy).state_hash;
-    }
-    progress.advance();
-  });
-  progress.finish();
-  return checks;
+nlohmann::json json_of(const RepeatedEpisode& repeat) {
+  nlohmann::json fields = nlohmann::json::array();
+  for (const FieldDifference& difference : repeat.differences)
+    fields.push_back({{"field", difference.field}, {"before", difference.first}, {"now", difference.second}});
+  return {{"key", repeat.row.key},
+          {"same", repeat.differences.empty()},
+          {"before", repeat.row.state_hash},
+          {"now", repeat.state_hash},
+          {"differences", fields}};
 }
 
-void run_verify(Session& session, const VerifyArguments& arguments) {
-  const Run run = load_run(arguments.run);
-  Progress progress(session.progress());
-  const std::vector<Check> checks = run_again(run, arguments, progress);
-  nlohmann::json json = nlohmann::json::array();
+std::string text_of(const Verification& found, const VerifyArguments& arguments) {
   std::string text;
-  int different = 0;
-  for (const Check& check : checks) {
-    const bool same = check.now == check.before.state_hash;
-    different += same ? 0 : 1;
-    text += fmt::format("{:<9} {} {}/{}/{} {} {:.12} {:.12}\n", same ? "same" : "DIFFERENT", check.before.clip,
-                        check.before.engine, check.before.controller, check.before.policy, check.before.arm,
-                        check.before.state_hash, check.now);
-    json.push_back(
-        {{"key", check.before.key}, {"same", same}, {"before", check.before.state_hash}, {"now", check.now}});
-  }
-  require(!checks.empty(), fmt::format("'{}' has no episode to run again", arguments.run));
-  text += fmt::format("{} of {} episodes repeat bit for bit", checks.size() - different, checks.size());
-  print(session, text, {{"episodes", json}, {"different", different}});
-  if (different > 0) session.exit_code = kExitDeterminism;
+  for (const std::string& fault : found.faults) text += fmt::format("WRONG     {}\n", fault);
+  for (const std::string& missing : found.missing) text += fmt::format("MISSING   {}\n", missing);
+  for (const RepeatedEpisode& repeat : found.repeats) text += line_of(repeat);
+  text += fmt::format("{} of {} episodes repeat bit for bit", found.repeats.size() - found.different(),
+                      found.repeats.size());
+  if (static_cast<int>(found.repeats.size()) < found.repeatable)
+    text += fmt::format(" (drawn from {} by --seed {}; --all runs them all)", found.repeatable, arguments.options.seed);
+  if (found.not_repeatable > 0)
+    text += fmt::format("; {} timed out or need what this machine lacks and were not run", found.not_repeatable);
+  return text;
+}
+
+void run_verify(Session& session, VerifyArguments arguments) {
+  const Run run = load_run(arguments.run);
+  // A draw that is known beforehand is no check.
+  arguments.options.seed = arguments.seed.value_or(std::random_device()());
+  Progress progress(session.progress());
+  const Verification found = verify_run(run, arguments.options, progress);
+  nlohmann::json episodes = nlohmann::json::array();
+  for (const RepeatedEpisode& repeat : found.repeats) episodes.push_back(json_of(repeat));
+  print(session, text_of(found, arguments),
+        {{"episodes", episodes},
+         {"different", found.different()},
+         {"faults", found.faults},
+         {"missing", found.missing},
+         {"not_repeatable", found.not_repeatable},
+         {"seed", arguments.options.seed}});
+  const bool whole = found.missing.empty() || arguments.partial;
+  if (found.different() > 0 || !found.faults.empty() || !whole) session.exit_code = kExitDeterminism;
 }
 
 }  // namespace
 
 void add_verify(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(
-      app, session, "verify", "run episodes of a run again and compare state hashes (exit code 5 where they differ)",
-      "duet verify runs/core --episodes 10");
+  CLI::App* command = add_command(app, session, "verify",
+                                  "hold every row against the suite's plan, run episodes again and compare all fields "
+                                  "(exit code 5 where they differ)",
+                                  "duet verify runs/core --episodes 10");
   auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("run", arguments->run, "run directory")->required();
-  command->add_option("-k,--episodes", arguments->episodes, "how many, drawn at random")
+  command->add_option("-k,--episodes", arguments->options.episodes, "how many to run again, drawn at random")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));
-  command->add_option("--seed", arguments->seed, "of the draw")->capture_default_str();
-  command->add_option("-j,--threads", arguments->threads, "threads")->capture_default_str();
+  command->add_flag("--all", arguments->options.all, "run all of them again");
+  command->add_option("--seed", arguments->seed, "of the draw (default: another one each time, printed)");
+  command->add_flag("--partial", arguments->partial, "episodes may be missing: the run is not finished");
+  add_threads(command, arguments->options.threads);
+  add_allow_programs(*command, arguments->options.allow_programs);
   command->callback([&session, arguments] { run_verify(session, *arguments); });
 }
 

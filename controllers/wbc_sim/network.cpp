@@ -5,13 +5,20 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/clock.h"
+#include "core/json.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "nn/mlp_file.h"
 
 namespace duet {
 namespace {
 
 constexpr const char* kFormat = "duet.wbc-network/1";
+// How an output becomes a target: part of what a network is, so that one made for another rule is refused.
+constexpr const char* kAction = "target = base + scale * clip(action, 4); base: legs of the gait, upper body of u_t";
+constexpr const char* kRate = "50";
+static_assert(kTickRate == 50.0);
 
 std::string name_of(WbcKind kind) { return kind == WbcKind::kOracle ? "oracle" : "student"; }
 
@@ -63,7 +70,8 @@ class Reader {
     return found->second;
   }
   void expect(const std::string& what, const std::string& expected, const std::string& found) const {
-    if (expected != found) throw InputError(fmt::format("{}: {} is '{}', expected '{}'", file_, what, found, expected));
+    if (expected != found)
+      throw InputError(fmt::format("{}: {} is '{}', expected '{}'", file_, what, shown(found), expected));
   }
   [[nodiscard]] Eigen::VectorXf vector(const std::string& name, Eigen::Index size) const {
     const auto found = tensors_.tensors.find(name);
@@ -83,7 +91,7 @@ class Reader {
 };
 
 nlohmann::json parse_list(const Reader& reader, const std::string& key, const std::string& file) {
-  nlohmann::json json = nlohmann::json::parse(reader.text(key), nullptr, false);
+  nlohmann::json json = parse_json(reader.text(key), fmt::format("{}: '{}' in the header", file, key));
   if (!json.is_array()) throw InputError(fmt::format("{}: '{}' in the header is not a list", file, key));
   return json;
 }
@@ -123,7 +131,7 @@ long whole_number(const Reader& reader, const std::string& key, const std::strin
   try {
     return std::stol(text);
   } catch (const std::exception&) {
-    throw InputError(fmt::format("{}: '{}' in the header is '{}', expected a whole number", file, key, text));
+    throw InputError(fmt::format("{}: '{}' in the header is '{}', expected a whole number", file, key, shown(text)));
   }
 }
 
@@ -167,8 +175,8 @@ void save_wbc_network(const std::string& path, const WbcNetwork& network, Tensor
                       {"robot", network.robot},
                       {"joints", nlohmann::json(network.joints).dump()},
                       {"observation", channels_of(network.kind, network.mlp.outputs()).dump()},
-                      {"rate_hz", "50"},
-                      {"action", "target = base + scale * clip(action, 4); base: legs of the gait, upper body of u_t"},
+                      {"rate_hz", kRate},
+                      {"action", kAction},
                       {"seed", std::to_string(network.seed)},
                       {"steps", std::to_string(network.steps)},
                       {"note", network.note}};
@@ -193,11 +201,13 @@ WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   WbcNetwork network;
   const std::string kind = reader.text("kind");
   if (kind != "oracle" && kind != "student")
-    throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, kind));
+    throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, shown(kind)));
   network.kind = kind == "oracle" ? WbcKind::kOracle : WbcKind::kStudent;
   reader.expect("the robot", robot.name, reader.text("robot"));
   check_joints(reader, robot, path);
   check_channels(reader, network.kind, robot.dof(), path);
+  reader.expect("the rate_hz", kRate, reader.text("rate_hz"));
+  reader.expect("the action", kAction, reader.text("action"));
   network.robot = robot.name;
   network.joints = robot.joint_names();
   network.mlp = read_mlp(tensors, "mlp", path);

@@ -23,7 +23,6 @@ class WbcSim final : public Controller {
   }
 
   [[nodiscard]] std::string_view name() const override { return "wbc_sim"; }
-  [[nodiscard]] bool walks() const override { return true; }
 
   void reset(const RobotState&) override {
     action_.setZero();
@@ -74,18 +73,18 @@ class WbcSim final : public Controller {
   bool started_ = false;
 };
 
-std::string network_path(const ControllerOptions& options) {
-  std::string network = option_or(options, "network", "student");
-  if (network != "student" && network != "oracle") return network;
-  return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
-}
-
 }  // namespace
 
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
                                                     std::shared_ptr<const WbcNetwork> network) {
   require(network->joints == robot->joint_names(), "wbc_sim: the network was made for other joints than the robot's");
   return std::make_unique<WbcSim>(std::move(robot), std::move(network));
+}
+
+std::string wbc_sim_network_path(const ControllerOptions& options) {
+  std::string network = option_or(options, "network", "student");
+  if (network != "student" && network != "oracle") return network;
+  return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
 }
 
 ControllerInfo wbc_sim_info() {
@@ -98,7 +97,7 @@ ControllerInfo wbc_sim_info() {
 
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
                                                     const ControllerOptions& options) {
-  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(network_path(options), *robot));
+  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(wbc_sim_network_path(options), *robot));
   return make_wbc_sim_controller(std::move(robot), std::move(network));
 }
 

@@ -16,6 +16,7 @@ std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotM
 
 // Options: network: student | oracle | a path. Throws what controllers/controller.h says of make_controller.
 ControllerInfo wbc_sim_info();
+std::string wbc_sim_network_path(const ControllerOptions& options);  // MissingError where the shipped one is not there
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
                                                     const ControllerOptions& options);
 

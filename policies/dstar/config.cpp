@@ -6,13 +6,17 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/json.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 
 namespace duet {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kWhat = "configuration of D-STAR";
 
 struct Size {
   const char* name;
@@ -85,7 +89,7 @@ std::vector<std::string> known_names() {
 }
 
 [[noreturn]] void refuse(const std::string& file, const std::string& problem) {
-  throw InputError(fmt::format("{}: configuration of D-STAR: {}", file, problem));
+  throw InputError(fmt::format("{}: {}: {}", file, kWhat, problem));
 }
 
 const Json& field(const Json& json, const char* name, const std::string& file) {
@@ -99,13 +103,14 @@ int parse_size(const Json& json, const Size& size, const std::string& file) {
   const bool fits = value.is_number_integer() && value >= size.least && value <= size.most;
   if (!fits)
     refuse(file, fmt::format("'{}': expected a whole number from {} to {}, found {}", size.name, size.least, size.most,
-                             value.dump()));
+                             shown(value.dump())));
   return value.get<int>();
 }
 
 bool parse_switch(const Json& json, const Switch& one, const std::string& file) {
   const Json& value = field(json, one.name, file);
-  if (!value.is_boolean()) refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, value.dump()));
+  if (!value.is_boolean())
+    refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, shown(value.dump())));
   return value.get<bool>();
 }
 
@@ -136,8 +141,8 @@ std::string to_json_text(const DstarConfig& config) {
 }
 
 DstarConfig parse_dstar_config(const std::string& text, const std::string& file) {
-  const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) refuse(file, "expected a JSON object, found other text");
+  const Json json = parse_json(text, fmt::format("{}: {}", file, kWhat));
+  if (!json.is_object()) refuse(file, fmt::format("expected a JSON object, found {}", json.type_name()));
   const std::vector<std::string> known = known_names();
   for (const auto& item : json.items())
     if (std::ranges::find(known, item.key()) == known.end())

@@ -98,11 +98,16 @@ std::string network_path(const std::string& name, const PolicyOptions& options) 
                     fmt::format("policies/dstar/{}.safetensors", name));
 }
 
-std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const PolicyOptions& options) {
+// "" for the encoder that is built in.
+std::string language_path(const std::string& name, const PolicyOptions& options) {
   const std::string given = option_or(options, "language");
-  if (given.empty()) return built_in_language();
-  return load_language_table(
-      first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {given}));
+  if (given.empty()) return "";
+  return first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {given});
+}
+
+std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const PolicyOptions& options) {
+  const std::string path = language_path(name, options);
+  return path.empty() ? built_in_language() : load_language_table(path);
 }
 
 NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
@@ -155,6 +160,13 @@ PolicyInfo dstar_info(const std::string& name) {
            {"language", std::string(kBuiltInLanguage), "path of an NPZ table of prompts and their embeddings"},
            {"noise", "episode", "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan"},
            {"temperature", "0", "deviation of x_T, 0 (the most likely plan) to 1 (plans as they are distributed)"}}};
+}
+
+LoadedFiles dstar_files(const std::string& name, const PolicyOptions& options) {
+  LoadedFiles files = {{"network", network_path(name, options)}};
+  if (const std::string language = language_path(name, options); !language.empty())
+    files.push_back({"language", language});
+  return files;
 }
 
 PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& options) {

@@ -31,5 +31,6 @@ std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_p
 // throw; MissingError where the file is not there.
 PolicyInfo dstar_info(const std::string& name);
 PolicyMaker dstar_maker(const std::string& name, std::shared_ptr<const RobotModel> robot, const PolicyOptions& options);
+LoadedFiles dstar_files(const std::string& name, const PolicyOptions& options);
 
 }  // namespace duet

@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/json.h"
 #include "core/random.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "policies/dstar/network.h"
 #include "policies/dstar/tensors.h"
 
@@ -82,17 +84,17 @@ class Reader {
     return found->second;
   }
   void expect(const std::string& what, const std::string& expected, const std::string& found) const {
-    if (expected != found) refuse(fmt::format("{}: expected '{}', found '{}'", what, expected, found));
+    if (expected != found) refuse(fmt::format("{}: expected '{}', found '{}'", what, expected, shown(found)));
   }
   [[nodiscard]] std::vector<std::string> list(const std::string& key) const {
-    const nlohmann::json json = nlohmann::json::parse(text(key), nullptr, false);
+    const nlohmann::json json = parse_json(text(key), fmt::format("{}: '{}' in the header", file_, key));
     const bool texts =
         json.is_array() && std::ranges::all_of(json, [](const nlohmann::json& item) { return item.is_string(); });
     if (!texts) refuse(fmt::format("'{}' in the header: expected a JSON list of texts, found something else", key));
     return json.get<std::vector<std::string>>();
   }
   [[nodiscard]] std::map<std::string, std::string> notes() const {
-    const nlohmann::json json = nlohmann::json::parse(text("notes"), nullptr, false);
+    const nlohmann::json json = parse_json(text("notes"), fmt::format("{}: 'notes' in the header", file_));
     const bool texts =
         json.is_object() && std::ranges::all_of(json, [](const nlohmann::json& item) { return item.is_string(); });
     if (!texts) refuse("'notes' in the header: expected a JSON object of texts, found something else");

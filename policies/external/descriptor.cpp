@@ -87,7 +87,7 @@ int channel_size(const PolicyChannel& channel, int joints) {
 bool is_of_a_frame(PolicyChannelKind kind) { return kind < PolicyChannelKind::kLanguage; }
 
 PolicyDescriptor read_policy_descriptor(const std::string& path) {
-  return parse_policy_descriptor(read_file(path), path);
+  return parse_policy_descriptor(read_text(path), path);
 }
 
 }  // namespace duet

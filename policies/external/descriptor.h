@@ -87,8 +87,9 @@ struct PolicyDescriptor {
   // kProcess
   std::vector<std::string> command;  // program and arguments, run in the descriptor's folder; or else
   std::string socket;                // where a server listens: a path, from the descriptor's folder, or host:port
-  int deadline_ms = 200;             // for a plan
-  int start_ms = 10000;              // for the first answer and for that to a reset
+  int deadline_ms = 0;               // for a plan, which is left out where it is late; 0: none, duet waits
+  int hang_ms = 60000;               // for a plan where there is no deadline; later the policy is dead
+  int start_ms = 120000;             // for the first answer and for that to a reset
 
   [[nodiscard]] std::string folder() const;  // the descriptor's; never empty
 };

@@ -78,7 +78,7 @@ class Reader {
   Reader(const std::string& text, const std::string& file)
       : root_(file, parse_yaml(text, file), "policy descriptor",
               {"schema", "name", "about", "kind", "joints", "frame_of_reference", "output", "network", "inputs",
-               "command", "socket", "deadline_ms", "start_ms"}) {
+               "command", "socket", "deadline_ms", "hang_ms", "start_ms"}) {
     out_.file = file;
   }
 
@@ -139,7 +139,7 @@ class Reader {
   }
 
   void read_network() {
-    refuse_keys({"command", "socket", "deadline_ms", "start_ms"}, "onnx");
+    refuse_keys({"command", "socket", "deadline_ms", "hang_ms", "start_ms"}, "onnx");
     out_.network = root_.text("network");
     if (out_.joints.empty())
       root_.fail(out_.joints_line, "'joints': expected the joints in the network's order, found none");
@@ -210,7 +210,8 @@ class Reader {
     if (out_.command.empty() == out_.socket.empty())
       root_.fail(root_.line("command"), fmt::format("expected one of 'command' and 'socket', found {}",
                                                     out_.socket.empty() ? "none" : "both"));
-    out_.deadline_ms = whole_or(root_, "deadline_ms", out_.deadline_ms, 1, kMostMilliseconds);
+    if (root_.has("deadline_ms")) out_.deadline_ms = whole_or(root_, "deadline_ms", 1, 1, kMostMilliseconds);
+    out_.hang_ms = whole_or(root_, "hang_ms", out_.hang_ms, 1, kMostMilliseconds);
     out_.start_ms = whole_or(root_, "start_ms", out_.start_ms, 1, kMostMilliseconds);
   }
 

@@ -9,12 +9,15 @@
 namespace duet {
 
 // `name`: the path of a descriptor. Options of a network: `network`, `engine`, `language`; of a process: `deadline_ms`,
-// `start_ms`. Both throw InputError for a descriptor that is broken.
+// `hang_ms`, `start_ms`. Both throw InputError for a descriptor that is broken.
 PolicyInfo external_info(const std::string& name);
 // Throws InputError too for joints that are not the robot's and a network of other inputs or outputs,
 // std::invalid_argument for an option's value, MissingError where the network or the program is not there. Each policy
 // that it makes has its own network or process.
 PolicyMaker external_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
                            const PolicyOptions& options);
+// The descriptor; then of a network it and the language table that is given, of a process the files beside the
+// descriptor that its command names, with those of the same ending beside them. Not those of a server.
+LoadedFiles external_files(const std::string& name, const PolicyOptions& options);
 
 }  // namespace duet

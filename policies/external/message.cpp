@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "core/json.h"
 #include "core/names.h"
 #include "core/require.h"
+#include "core/text.h"
 #include "policies/external/channel_values.h"
 
 namespace duet {
@@ -18,22 +20,21 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::size_t kLengthBytes = 4;
-constexpr std::size_t kExcerpt = 40;  // of a message that is not JSON, in ours
+constexpr std::size_t kExcerpt = 40;  // of a value, in our message
+constexpr const char* kWhat = "message of the policy";
 
-[[noreturn]] void refuse(const std::string& message) { throw InputError("message of the policy: " + message); }
+[[noreturn]] void refuse(const std::string& message) { throw InputError(fmt::format("{}: {}", kWhat, message)); }
 
-std::string excerpt(std::string_view text) {
-  std::string shown;
-  for (const char c : text.substr(0, kExcerpt)) shown += c >= ' ' && c <= '~' ? c : '?';
-  return text.size() > kExcerpt ? shown + "..." : shown;
-}
+std::string excerpt(std::string_view text) { return shown(text, kExcerpt); }
 
-Json parse_json(std::string_view text) {
-  Json json = Json::parse(text, nullptr, false);
-  if (!json.is_discarded()) return json;
-  for (const char* word : {"NaN", "Infinity"})
-    if (text.find(word) != std::string_view::npos) refuse(fmt::format("expected finite numbers, found {}", word));
-  refuse(fmt::format("expected JSON, found '{}'", excerpt(text)));
+Json parse_text(std::string_view text) {
+  try {
+    return parse_json(text, kWhat);
+  } catch (const InputError&) {
+    for (const char* word : {"NaN", "Infinity"})
+      if (text.find(word) != std::string_view::npos) refuse(fmt::format("expected finite numbers, found {}", word));
+    throw;
+  }
 }
 
 const Json& member(const Json& json, const char* key) {
@@ -120,7 +121,7 @@ std::vector<double> joint_values(const RobotModel& robot, const std::vector<std:
 }  // namespace
 
 PolicyMessage parse_policy_message(std::string_view text) {
-  const Json json = parse_json(text);
+  const Json json = parse_text(text);
   if (!json.is_object()) refuse(fmt::format("expected an object, found {}", json.type_name()));
   const Json& type = member(json, "type");
   if (!type.is_string()) refuse(fmt::format("'type': expected a name, found {}", type.type_name()));
@@ -166,7 +167,7 @@ std::string hello_message(const PolicyDescriptor& descriptor, const RobotModel& 
                      {"ticks_per_anchor", output.ticks_per_anchor},
                      {"anchor_size", kPlanNumbersBeforeJoints + static_cast<int>(joints.size())},
                      {"anchor_frame", to_string(output.frame)},
-                     {"deadline_ms", descriptor.deadline_ms}};
+                     {"deadline_ms", descriptor.deadline_ms > 0 ? Json(descriptor.deadline_ms) : Json()}};
   return json.dump();
 }
 

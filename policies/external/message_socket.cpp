@@ -32,12 +32,14 @@ int milliseconds_until(Deadline deadline) {
   return static_cast<int>(std::clamp<std::int64_t>(rest.count(), 0, 1000000));
 }
 
-bool poll_until(int descriptor, short events, Deadline deadline) {
+bool poll_until(int descriptor, short events, Deadline deadline, const std::function<bool()>& stop_asked) {
+  constexpr int kSlice = 100;  // between two questions whether to stop [ms]
   while (true) {
     pollfd entry{.fd = descriptor, .events = events, .revents = 0};
-    const int count = poll(&entry, 1, milliseconds_until(deadline));
+    const int count = poll(&entry, 1, std::min(milliseconds_until(deadline), kSlice));
     if (count > 0) return true;
-    if (count == 0 || errno != EINTR) return false;
+    if (count < 0 && errno != EINTR) return false;
+    if (std::chrono::steady_clock::now() >= deadline || (stop_asked && stop_asked())) return false;
   }
 }
 
@@ -49,7 +51,7 @@ void connect_socket(int descriptor, const sockaddr* name, socklen_t size, const 
                     Deadline deadline) {
   if (connect(descriptor, name, size) == 0) return;
   if (errno != EINPROGRESS) refuse(address, std::strerror(errno));
-  if (!poll_until(descriptor, POLLOUT, deadline)) refuse(address, "no answer in time");
+  if (!poll_until(descriptor, POLLOUT, deadline, {})) refuse(address, "no answer in time");
   int error = 0;
   socklen_t length = sizeof error;
   getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &length);
@@ -112,7 +114,7 @@ MessageSocket::MessageSocket(int descriptor) : descriptor_(descriptor) {
 MessageSocket::~MessageSocket() { close(descriptor_); }
 
 Result MessageSocket::wait(short events, Deadline deadline) const {
-  return poll_until(descriptor_, events, deadline) ? Result::kDone : Result::kLate;
+  return poll_until(descriptor_, events, deadline, stop_asked_) ? Result::kDone : Result::kLate;
 }
 
 Result MessageSocket::flush(Deadline deadline) {

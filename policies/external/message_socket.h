@@ -3,8 +3,10 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "policies/external/message.h"
 
@@ -22,6 +24,8 @@ class MessageSocket {
 
   // Owns `descriptor` and makes it non-blocking.
   explicit MessageSocket(int descriptor);
+  // Asked several times a second while a call waits; where it is true the call ends with kLate.
+  void stop_when(std::function<bool()> stop_asked) { stop_asked_ = std::move(stop_asked); }
   ~MessageSocket();
   MessageSocket(const MessageSocket&) = delete;
   MessageSocket& operator=(const MessageSocket&) = delete;
@@ -36,6 +40,7 @@ class MessageSocket {
   [[nodiscard]] Result wait(short events, Deadline deadline) const;
 
   int descriptor_;
+  std::function<bool()> stop_asked_;
   std::string outgoing_;
   MessageBuffer incoming_;
 };

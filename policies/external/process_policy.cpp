@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -43,7 +44,7 @@ class ProcessPolicy final : public Policy {
         values_(robot, joints, descriptor.frame),
         decoder_(descriptor, robot, joints) {
     descriptor_.socket.empty() ? start() : connect();
-    if (!faults_.dead) greet(*robot);
+    hello_ = hello_message(descriptor_, *robot, joint_names_);
   }
 
   ~ProcessPolicy() override {
@@ -59,9 +60,13 @@ class ProcessPolicy final : public Policy {
   void reset(const EpisodeContext& context) override {
     held_ = {context.start.X_WB, context.start.q};
     values_.reset(context, {});
+    ready_ = false;
     if (faults_.dead) return;
     faults_ = {};
-    static_cast<void>(exchange(reset_message(context), Type::kReady, "to 'reset'"));
+    stop_asked_ = context.stop_asked;
+    socket_->stop_when(stop_asked_);
+    if (!hello_.empty() && !greet()) return;
+    ready_ = exchange(reset_message(context), Type::kReady, "reset").has_value();
   }
 
   // Where there is no plan: the pose of the last one, at first that of the start.
@@ -71,7 +76,7 @@ class ProcessPolicy final : public Policy {
   }
 
   std::vector<Reference> plan(const Observation& observation) override {
-    if (faults_.dead) return {};
+    if (!ready_ || faults_.dead) return {};
     const std::optional<std::string> message = observe(observation);
     if (!message) return invalid("observation: expected finite numbers, found others");
     const std::optional<PolicyMessage> answer = ask(*message, observation.tick);
@@ -108,13 +113,16 @@ class ProcessPolicy final : public Policy {
     }
   }
 
-  void greet(const RobotModel& robot) {
-    const auto answer = exchange(hello_message(descriptor_, robot, joint_names_), Type::kHello, "hello");
-    if (!answer) return;
+  // Once, when the first episode begins. Whether it may go on.
+  bool greet() {
+    const auto answer = exchange(hello_, Type::kHello, "hello");
+    if (!answer) return false;
     if (answer->version != kPolicyMessageVersion)
       die(fmt::format("hello: expected version {} of the messages, found {}", kPolicyMessageVersion, answer->version));
     else if (!answer->joints.empty() && answer->joints != joint_names_)
       die("hello: expected the joints of the descriptor in its order, found others");
+    hello_.clear();
+    return !faults_.dead;
   }
 
   // A message that the policy cannot do without an answer to. Plans that arrive before it are of an earlier episode.
@@ -130,16 +138,20 @@ class ProcessPolicy final : public Policy {
         return std::nullopt;
       }
     }
-    if (!faults_.dead) die(fmt::format("no answer to '{}'", question));
+    if (!faults_.dead && !stopped()) die(fmt::format("no answer to '{}'", question));
     return std::nullopt;
   }
 
   // The plan for `tick`. Those for earlier ticks come too late and are dropped.
   std::optional<PolicyMessage> ask(const std::string& message, int tick) {
-    const Deadline deadline = in(milliseconds(descriptor_.deadline_ms));
+    const bool waits = descriptor_.deadline_ms == 0;
+    const int limit = waits ? descriptor_.hang_ms : descriptor_.deadline_ms;
+    const Deadline deadline = in(milliseconds(limit));
     const auto late = [&] {
+      const std::string fault = fmt::format("no plan for tick {} within {} ms", tick, limit);
+      if (waits) return die(fault);
       ++faults_.late;
-      note(fmt::format("no plan for tick {} within {} ms", tick, descriptor_.deadline_ms));
+      note(fault);
     };
     const Result sent = socket_->send(message, deadline);
     while (std::optional<PolicyMessage> answer = next(sent, deadline, late)) {
@@ -166,7 +178,7 @@ class ProcessPolicy final : public Policy {
     }
     if (result == Result::kDone && std::chrono::steady_clock::now() > deadline) result = Result::kLate;
     if (result == Result::kClosed) lose_connection();
-    if (result == Result::kLate) late();
+    if (result == Result::kLate && !stopped()) late();
     if (result != Result::kDone) return std::nullopt;
     try {
       return parse_policy_message(text);
@@ -195,6 +207,8 @@ class ProcessPolicy final : public Policy {
     die(end ? fmt::format("its process ended with {}", *end) : "its connection was closed");
   }
 
+  [[nodiscard]] bool stopped() const { return stop_asked_ && stop_asked_(); }
+
   void die(const std::string& message) {
     faults_.dead = true;
     note(message);
@@ -220,6 +234,9 @@ class ProcessPolicy final : public Policy {
   std::vector<float> numbers_;  // of an observation
   Reference held_;
   PolicyFaults faults_;
+  std::string hello_;   // until it was answered
+  bool ready_ = false;  // the episode's reset was answered
+  std::function<bool()> stop_asked_;
   std::optional<MessageSocket> socket_;  // none once the policy is dead
   std::optional<ChildProcess> child_;    // none where a server is asked
 };

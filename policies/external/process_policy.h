@@ -9,8 +9,8 @@
 
 namespace duet {
 
-// Starts or connects and says hello; where the answer fails the policy is dead, with the reason. Throws InputError for
-// joints that are not the robot's, MissingError where the program is not there.
+// Starts or connects; hello is said at the first reset, and where its answer fails the policy is dead, with the reason.
+// Throws InputError for joints that are not the robot's, MissingError where the program is not there.
 std::unique_ptr<Policy> make_process_policy(const PolicyDescriptor& descriptor,
                                             const std::shared_ptr<const RobotModel>& robot);
 

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <sstream>
 
 #include "backends/conformance/deviations.h"
 #include "backends/factory.h"
+#include "core/file.h"
 #include "tests/support.h"
 
 namespace duet::conformance {
@@ -187,6 +189,22 @@ TEST(ConformanceSuite, EnginesAgreeOnFallAndHeldPush) {
     for (const SceneReport& scene : report.scenes)
       for (const Measurement& found : scene.run.measurements)
         if (verdict_on(report.engine, found) == Verdict::kFail) ADD_FAILURE() << sentence(report.engine, found);
+}
+
+// What the suite asks, line by line: nothing is asked less, and no closed form gives another figure.
+TEST(ConformanceSuite, AsksWhatItAsked) {
+  if (const std::string reason = absence("mujoco"); !reason.empty()) GTEST_SKIP() << "not run: " << reason;
+  std::vector<std::string> asked;
+  for (const SceneReport& scene : run_suite("mujoco", {}).scenes)
+    for (const Measurement& m : scene.run.measurements)
+      if (!m.across_engines)
+        asked.push_back(
+            fmt::format("{} | {} | {:g} | {:.3g} | {:.4g}", m.scene, m.quantity, m.dt, m.tolerance, m.expected));
+  std::vector<std::string> record;
+  std::istringstream lines(read_file(DUET_SOURCE_DIR "/tests/backends/conformance_record.txt"));
+  for (std::string line; std::getline(lines, line);)
+    if (!line.starts_with('#')) record.push_back(line);
+  EXPECT_EQ(asked, record);
 }
 
 }  // namespace

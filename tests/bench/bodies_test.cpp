@@ -128,7 +128,7 @@ TEST(Plan, PerturbationsAreAnAxisOfEnginesAndNotOfPlayback) {
   std::set<std::string> keys;
   for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
     ++count[spec.engine + " " + spec.perturbation + " " + spec.arm];
-    keys.insert(row_for(spec, suite, "hash", *bodies.nominal()).key);
+    keys.insert(row_for(spec, suite, {"hash"}, *bodies.nominal()).key);
     EXPECT_NE(spec.seed, spec.perturbation_seed);
   }
   EXPECT_EQ(count, (std::map<std::string, int>{{"playback clean main", 1},

@@ -1,44 +1,27 @@
 // The program as a user meets it: outputs, messages, exit codes. Runs the built `duet`.
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/npz.h"
+#include "robots/robot_model.h"
+#include "tests/bench/program.h"
 #include "tests/support.h"
 #include "training/dstar/trainer.h"
 
 namespace duet {
 namespace {
 
+using test::Answer;
+using test::duet_program;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-struct Answer {
-  int code = -1;
-  std::string out, err;
-};
-
-// Runs the program with `arguments` in a shell; standard error goes through a file.
-Answer duet_program(const std::string& arguments, const std::string& prefix = "") {
-  const test::ScratchFolder folder;
-  const std::string err = folder / "stderr";
-  const std::string command = prefix + " " + DUET_PROGRAM + " " + arguments + " 2>" + err;
-  FILE* pipe = popen(command.c_str(), "r");
-  Answer answer;
-  std::array<char, 4096> buffer{};
-  for (size_t n = fread(buffer.data(), 1, buffer.size(), pipe); n > 0; n = fread(buffer.data(), 1, buffer.size(), pipe))
-    answer.out.append(buffer.data(), n);
-  answer.code = WEXITSTATUS(pclose(pipe));
-  answer.err = read_file(err);
-  return answer;
-}
 
 TEST(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"doctor", "list", "synth", "import", "retarget", "score", "run", "report", "compare",
-                              "check", "bless", "verify", "validate", "bench"}) {
+                              "check", "bless", "merge", "verify", "validate", "bench", "completion"}) {
     const Answer answer = duet_program(std::string(command) + " --help");
     EXPECT_EQ(answer.code, 0) << command;
     EXPECT_THAT(answer.out, HasSubstr("Example:\n  duet " + std::string(command))) << command;
@@ -51,9 +34,61 @@ TEST(CommandLine, VersionNamesTheEngines) { EXPECT_THAT(duet_program("--version"
 TEST(CommandLine, UsageErrorsAreTwo) {
   EXPECT_EQ(duet_program("").code, 2);
   EXPECT_EQ(duet_program("dance").code, 2);
+  EXPECT_EQ(duet_program("--jsn").code, 2);
   EXPECT_EQ(duet_program("list taskz").code, 2);
   EXPECT_THAT(duet_program("list taskz").err, HasSubstr("did you mean 'tasks'"));
   EXPECT_EQ(duet_program("run").code, 2);
+}
+
+TEST(CommandLine, AMistypedCommandIsAskedAbout) {
+  const Answer answer = duet_program("runn suites/demo.yaml");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("duet: unknown command 'runn': did you mean 'run'?"));
+  EXPECT_THAT(duet_program("train wcb").err, HasSubstr("unknown command 'wcb': did you mean 'wbc'?"));
+  EXPECT_EQ(duet_program("train wcb").code, 2);
+}
+
+TEST(CommandLine, SuitesAreListedAndRunByName) {
+  const Answer list = duet_program("list suites");
+  EXPECT_EQ(list.code, 0);
+  EXPECT_THAT(list.out, AllOf(HasSubstr("reactivity"), HasSubstr("hhoi-reactivity"), HasSubstr("1134 episodes"),
+                              HasSubstr("Does the robot act when its partner does?")));
+  const Answer dry = duet_program("run spatial --dry-run");
+  EXPECT_EQ(dry.code, 0);
+  EXPECT_THAT(dry.out, HasSubstr("name: hhoi-spatial"));
+  const Answer unknown = duet_program("run spacial --dry-run");
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("unknown suite 'spacial': did you mean 'spatial'?"));
+}
+
+TEST(CommandLine, CompletionNamesCommandsOptionsAndSuites) {
+  const Answer bash = duet_program("completion bash");
+  EXPECT_EQ(bash.code, 0);
+  EXPECT_THAT(bash.out, AllOf(HasSubstr("complete -o default -F _duet duet"), HasSubstr("--certificate"),
+                              HasSubstr("controllers core"), HasSubstr("doctor list")));
+  EXPECT_EQ(duet_program("completion bash | bash -n").code, 0);
+  EXPECT_THAT(duet_program("completion zsh").out, HasSubstr("bashcompinit"));
+  EXPECT_EQ(duet_program("completion fish").code, 2);
+}
+
+// Of a program in a pipe: standard output is one document or empty, what went wrong is on standard error.
+TEST(CommandLine, ErrorsWithJsonLeaveStandardOutputEmpty) {
+  for (const char* arguments :
+       {"run nowhere.yaml --json -o x", "list taskz --json", "score nowhere.npz --json", "list --jsn", "run --json"}) {
+    const Answer answer = duet_program(arguments);
+    EXPECT_EQ(answer.code, 2) << arguments;
+    EXPECT_EQ(answer.out, "") << arguments;
+    EXPECT_THAT(answer.err, ::testing::StartsWith("duet: ")) << arguments;
+  }
+}
+
+TEST(CommandLine, BenchGatesWhatIsNotReached) {
+  const Answer answer = duet_program("bench kinematics/forward metrics/detectors --seconds 0.05 --gate --json -q");
+  bool reached = true;
+  for (const auto& figure : nlohmann::json::parse(answer.out)["benchmarks"])
+    reached = reached && figure.value("reached", true);
+  EXPECT_EQ(answer.code, reached ? 0 : 1);
+  EXPECT_EQ(duet_program("bench kinematics/forward --seconds 0.05 -q").code, 0);  // without it a figure is a figure
 }
 
 TEST(CommandLine, MissingEngineIsRefusedByName) {
@@ -122,6 +157,9 @@ TEST(CommandLine, SynthRetargetScoreRunReportVerify) {
        {"leaderboard.md", "leaderboard.csv", "leaderboard.json", "leaderboard.tex", "report.html", "results.sqlite"})
     EXPECT_TRUE(std::filesystem::exists(folder / ("report/" + std::string(name)))) << name;
   EXPECT_THAT(read_file(folder / "report/report.html"), HasSubstr("<svg"));
+  EXPECT_THAT(read_file(folder / "report/report.html"),
+              AllOf(::testing::Not(HasSubstr("id=\"training\"")), HasSubstr("It is no upper bound"),
+                    HasSubstr("the robot passes through it")));
   write_file(folder / "curves.csv", "steps,return\n0,1\n100,3\n");
   const std::string report = "report -q " + (folder / "run") + " -f html --no-clips -o " + (folder / "report");
   ASSERT_EQ(duet_program(report + " --curves " + (folder / "curves.csv")).code, 0);
@@ -151,6 +189,44 @@ TEST(CommandLine, TimeLimitIsResumable) {
   EXPECT_EQ(duet_program("run -q " + (folder / "suite.yaml") + " --time-limit 0.000001 -o " + (folder / "run")).code,
             75);
   EXPECT_EQ(duet_program("run -q " + (folder / "suite.yaml") + " -o " + (folder / "run")).code, 0);
+}
+
+// What is found to be wrong only after a file was read names the file all the same.
+TEST(CommandLine, EveryRefusalNamesItsFile) {
+  const test::ScratchFolder folder;
+  ASSERT_EQ(duet_program("synth hug -q -n 1 -o " + (folder / "clips")).code, 0);
+  const std::string clip = std::filesystem::directory_iterator(folder / "clips")->path().string();
+  const std::string suite =
+      "schema: duet.suite/1\nname: cli\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\nengines: [playback]\n"
+      "controllers: [pd]\npolicies: [replay]\nstart: clip\n";
+  for (const char* task : {"hug", "wave"}) {
+    write_file(folder / "suite.yaml", suite + "tasks: [" + task + "]\n");
+    ASSERT_EQ(duet_program("run -q " + (folder / "suite.yaml") + " -o " + (folder / task)).code, 0);
+  }
+  Npz slow = Npz::load(clip);
+  slow.set_number("rate_hz", 0.001);
+  slow.save(folder / "slow.npz");
+  write_file(folder / "golden.json", R"({"schema": "duet.golden/1"})");
+  const std::string g1 = default_card_path(), last = "  - {frame: pelvis, smpl: pelvis}\n";
+  std::string card = read_file(g1);
+  ASSERT_NE(card.find(last), std::string::npos);
+  write_file(folder / "fewer.yaml", card.erase(card.find(last), last.size()));
+  const auto refusal = [](const std::string& arguments) {
+    const Answer answer = duet_program(arguments);
+    EXPECT_EQ(answer.code, 2) << arguments;
+    return answer.err;
+  };
+  EXPECT_EQ(refusal("check -q " + (folder / "hug") + " -b " + (folder / "golden.json")),
+            "duet: " + (folder / "golden.json") + ": golden baseline: key 'suite' is missing\n");
+  for (const char* command : {"score -q ", "retarget -q -o x "})
+    EXPECT_THAT(refusal(command + (folder / "slow.npz")), HasSubstr("slow.npz: resample: "));
+  EXPECT_THAT(refusal("retarget -q -o x " + clip + " --card " + (folder / "fewer.yaml") + " --urdf " +
+                      std::filesystem::path(g1).replace_filename("g1.urdf").string()),
+              HasSubstr("fewer.yaml: robot 'g1': expected the 16 retarget pairs"));
+  EXPECT_EQ(refusal("run -q /dev/zero --dry-run -o x"),
+            "duet: cannot read '/dev/zero': expected at most 67108864 bytes, found more\n");
+  EXPECT_THAT(refusal("compare -q " + (folder / "hug") + " " + (folder / "wave")),
+              HasSubstr("B = " + (folder / "wave") + ": nothing pairs"));
 }
 
 TEST(CommandLine, BadInputIsOneSentenceAndTwo) {
@@ -196,6 +272,99 @@ TEST(CommandLine, FullDiskLosesNothingThatWasThere) {
     EXPECT_EQ(entry.path().extension(), ".npz");
   }
   EXPECT_EQ(files, 1);
+}
+
+// Two people run one suite, each with a policy of their own.
+class TwoPeople : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_file(folder_ / "suite.yaml",
+               "schema: duet.suite/1\nname: two\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+               "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\n");
+    const std::string run = "run -q " + (folder_ / "suite.yaml") + " -s policies=";
+    ASSERT_EQ(duet_program(run + "[replay] -o " + mine_).code, 0);
+    ASSERT_EQ(duet_program(run + "[replay_dense] -o " + yours_).code, 0);
+  }
+  // Changes a word of the null arm's row and nothing else.
+  void change_null_row(const std::string& from, const std::string& to) {
+    std::string text = read_file(yours_ + "/episodes.jsonl");
+    const std::size_t row = text.find("\"arm\":\"null\"");
+    const std::size_t at = text.find(from, row);
+    ASSERT_NE(at, std::string::npos);
+    write_file(yours_ + "/episodes.jsonl", text.replace(at, from.size(), to));
+  }
+
+  test::ScratchFolder folder_;
+  std::string mine_ = folder_ / "mine", yours_ = folder_ / "yours", ours_ = folder_ / "ours";
+};
+
+TEST_F(TwoPeople, StandInOneReport) {
+  const Answer report = duet_program("report -q --no-clips " + mine_ + " " + yours_ + " -o " + (folder_ / "report"));
+  EXPECT_EQ(report.code, 0) << report.err;
+  EXPECT_THAT(report.out, testing::AllOf(HasSubstr("replay_dense"), HasSubstr("| replay ")));
+}
+
+TEST_F(TwoPeople, MergeIntoOneRunThatIsVerifiedAndResumed) {
+  const Answer merge = duet_program("merge " + mine_ + " " + yours_ + " -o " + ours_);
+  ASSERT_EQ(merge.code, 0) << merge.err;
+  EXPECT_THAT(merge.out, HasSubstr("3 episodes of 2 runs; 1 that more than one had are equal and there once"));
+  const Answer verify = duet_program("verify -q --all " + ours_);
+  EXPECT_EQ(verify.code, 0) << verify.out << verify.err;
+  EXPECT_THAT(verify.out, HasSubstr("3 of 3 episodes repeat bit for bit"));
+  const Answer resumed =
+      duet_program("run -q --json " + (folder_ / "suite.yaml") + " -s policies=[replay,replay_dense] -o " + ours_);
+  EXPECT_EQ(nlohmann::json::parse(resumed.out).at("already_there"), 3) << resumed.err;
+  const Answer again = duet_program("merge " + mine_ + " " + yours_ + " -o " + ours_);
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("is there already"));
+}
+
+TEST_F(TwoPeople, MergeInAnyOrderAndGroupingIsTheSameRows) {
+  const std::string other = folder_ / "other", twice = folder_ / "twice";
+  ASSERT_EQ(duet_program("merge -q " + mine_ + " " + yours_ + " -o " + ours_).code, 0);
+  ASSERT_EQ(duet_program("merge -q " + yours_ + " " + mine_ + " -o " + other).code, 0);
+  ASSERT_EQ(duet_program("merge -q " + ours_ + " " + other + " " + mine_ + " -o " + twice).code, 0);
+  EXPECT_EQ(read_file(ours_ + "/episodes.jsonl"), read_file(other + "/episodes.jsonl"));
+  EXPECT_EQ(read_file(ours_ + "/episodes.jsonl"), read_file(twice + "/episodes.jsonl"));
+}
+
+TEST_F(TwoPeople, WhoDisagreeOnTheNullArmAreNotMerged) {
+  change_null_row("\"fell\":false", "\"fell\":true");
+  const Answer merge = duet_program("merge " + mine_ + " " + yours_ + " -o " + ours_);
+  EXPECT_EQ(merge.code, 1);
+  EXPECT_THAT(merge.out,
+              testing::AllOf(HasSubstr("is not the same in '" + mine_ + "' and '" + yours_ + "': fell: false, true"),
+                             HasSubstr("nothing was written")));
+  EXPECT_FALSE(std::filesystem::exists(ours_));
+  EXPECT_EQ(duet_program("report -q " + mine_ + " " + yours_ + " -o " + ours_).code, 2);
+  const Answer verify = duet_program("verify -q --all " + yours_);
+  EXPECT_EQ(verify.code, 5);
+  EXPECT_THAT(verify.out, HasSubstr("stored, now: fell: true, false"));
+}
+
+TEST_F(TwoPeople, CheckExactlyFindsOneChangedField) {
+  const std::string other = folder_ / "again";
+  ASSERT_EQ(duet_program("run -q " + (folder_ / "suite.yaml") + " -s policies=[replay_dense] -o " + other).code, 0);
+  EXPECT_EQ(duet_program("check -q --exact " + other + " -b " + yours_).code, 0);
+  change_null_row("\"fell\":false", "\"fell\":true");
+  const Answer check = duet_program("check -q --exact " + other + " -b " + yours_);
+  EXPECT_EQ(check.code, 1);
+  EXPECT_THAT(check.out, HasSubstr("expected, found: fell: true, false"));
+}
+
+TEST(CommandLine, RepeatsOfAnEpisodeCountOnceAndAreSaid) {
+  const test::ScratchFolder folder;
+  write_file(folder / "suite.yaml",
+             "schema: duet.suite/1\nname: cli\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+             "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\nepisodes_per_clip: 4\n");
+  const Answer run = duet_program("run " + (folder / "suite.yaml") + " -o " + (folder / "run"));
+  ASSERT_EQ(run.code, 0) << run.err;
+  const char* note = "6 of 8 episodes repeat another one of their clip bit for bit and count once";
+  EXPECT_THAT(run.err, HasSubstr(note));
+  EXPECT_THAT(run.out, HasSubstr(note));
+  ASSERT_EQ(duet_program("report -q --no-clips " + (folder / "run")).code, 0);
+  EXPECT_THAT(read_file(folder / "run/leaderboard.md"), HasSubstr(note));
+  EXPECT_THAT(read_file(folder / "run/report.html"), HasSubstr(note));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include "core/file.h"
 #include "results/run_directory.h"
+#include "tests/bench/program.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -28,14 +29,14 @@ class Faults : public testing::Test {
  protected:
   Faults() {
     fs::create_directory(engines());
-    for (const auto& entry : fs::directory_iterator(DUET_BUILT_ENGINES))
+    for (const auto& entry : fs::directory_iterator(test::built_engines()))
       fs::create_symlink(entry.path(), fs::path(engines()) / entry.path().filename());
     fs::create_symlink(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_faulty.so");
   }
   [[nodiscard]] std::string engines() const { return folder_ / "engines"; }
 
   [[nodiscard]] Ended run(const std::string& arguments) const {
-    const std::string command = "DUET_ENGINES='" + engines() + "' '" + DUET_PROGRAM + "' " + arguments + " 2>&1";
+    const std::string command = "DUET_ENGINES='" + engines() + "' '" + test::program() + "' " + arguments + " 2>&1";
     FILE* pipe = popen(command.c_str(), "r");
     Ended ended;
     std::array<char, 4096> buffer{};
@@ -173,6 +174,16 @@ TEST_F(Faults, ACertificateEditedByHandIsRefusedAndAGoodOneIsKept) {
 TEST_F(Faults, AModuleOfAnotherNameIsRefused) {
   fs::copy_file(DUET_FAULTY_ENGINE, fs::path(engines()) / "duet_other.so");
   EXPECT_THAT(run("list engines").text, HasSubstr("names itself 'faulty'"));
+}
+
+// What the filter leaves out cannot stand in for what is missing.
+TEST_F(Faults, ARunOfTheOneControllerThatIsMissingIsRefusedThoughTheSuiteHasOthers) {
+  const std::string controllers = std::string("pd, ") + kLost;
+  const Ended ended =
+      run("run " + suite("faulty", "none", controllers) + " --controllers lost -q -o " + (folder_ / "run"));
+  EXPECT_EQ(ended.code, 4) << ended.text;
+  EXPECT_THAT(ended.text, HasSubstr("controller 'lost' is absent"));
+  EXPECT_FALSE(fs::exists(folder_ / "run"));
 }
 
 }  // namespace

@@ -96,9 +96,9 @@ TEST(PartnerVariation, ScaleKeepsTheWayAndTheGround) {
   const HumanMotion motion = partner_motion(counting_clip(), taller, kPhases, kClipFrame, 30);
   EXPECT_NEAR(motion.joints.at(20, kPelvis).x(), 40.0, kRounding);
   EXPECT_NEAR(motion.joints.at(20, kPelvis).z(), 1.1, kRounding);
-  EXPECT_NEAR(motion.joints.at(20, kHead).z(), 1.1 * (1.0 + 0.01 * kHead), kRounding);
+  EXPECT_NEAR(motion.joints.at(20, kHead).z(), 1.1 * (1.0 + 0.01 * int{kHead}), kRounding);
   EXPECT_NEAR((motion.joints.at(20, kHead) - motion.joints.at(20, kPelvis)).norm(),
-              1.1 * 0.01 * kHead * std::hypot(10.0, 1.0), kRounding);
+              1.1 * 0.01 * int{kHead} * std::hypot(10.0, 1.0), kRounding);
 }
 
 std::vector<Perturbation> read(const std::string& list) {

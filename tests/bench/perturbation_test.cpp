@@ -91,6 +91,11 @@ TEST(Perturbation, LinksAreThoseOfTheRobot) {
   perturbation.push->link = "torso_lnik";
   EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); }),
               AllOf(HasSubstr("perturbation 'push' on robot"), HasSubstr("torso_link")));
+  perturbation.push->link = "base_to_torso";  // a link of another robot
+  const std::string refusal =
+      test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); });
+  EXPECT_THAT(refusal, AllOf(HasSubstr("unknown frame 'base_to_torso'"), HasSubstr("Nearest of")));
+  EXPECT_LT(refusal.size(), 250U);  // not the names of all frames
   perturbation = default_perturbation("mass");
   perturbation.mass->add = -90.0;
   EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); }),

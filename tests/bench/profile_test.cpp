@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "backends/factory.h"
+#include "bench/run_identity.h"
 #include "bench/suite.h"
 #include "core/file.h"
 #include "core/require.h"

@@ -23,6 +23,13 @@ TEST(Progress, PlainLinesSayWhatWasDone) {
   EXPECT_NE(text.find("retargeting: 3/3 clips"), std::string::npos) << text;
 }
 
+TEST(Progress, ANoteIsALineOfItsOwn) {
+  Progress progress(Progress::Style::kLines);
+  testing::internal::CaptureStderr();
+  progress.note("'clip.npz': phases: act [3, 9) of 20 frames (proposed)");
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "'clip.npz': phases: act [3, 9) of 20 frames (proposed)\n");
+}
+
 TEST(Progress, BarReturnsToTheStartOfTheLine) {
   Progress progress(Progress::Style::kBar);
   testing::internal::CaptureStderr();
@@ -36,6 +43,7 @@ TEST(Progress, BarReturnsToTheStartOfTheLine) {
 TEST(Progress, QuietIsSilent) {
   Progress progress(Progress::Style::kQuiet);
   testing::internal::CaptureStderr();
+  progress.note("said to nobody");
   progress.start("x", 1, "y");
   progress.advance();
   progress.finish();

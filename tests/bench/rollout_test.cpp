@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "backends/factory.h"
 #include "bench/runner.h"
 #include "bench/scoring.h"
@@ -101,7 +104,6 @@ class FaultyController final : public Controller {
  public:
   explicit FaultyController(const RobotModel& robot) : robot_(robot) {}
   [[nodiscard]] std::string_view name() const override { return "faulty"; }
-  [[nodiscard]] bool walks() const override { return false; }
   void reset(const RobotState&) override {}
   void act(const RobotState& state, const Reference&, JointCommand& command) override {
     seen.push_back(state.X_WB.p.x());
@@ -170,6 +172,71 @@ TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
   EXPECT_EQ(row.policy_ms.max, rollout.plan_times.max);
 }
 
+// Dead from its second plan on.
+class DyingPolicy final : public Policy {
+ public:
+  explicit DyingPolicy(std::unique_ptr<Policy> replay) : replay_(std::move(replay)) {}
+  [[nodiscard]] std::string_view name() const override { return "dying"; }
+  void reset(const EpisodeContext& context) override { replay_->reset(context); }
+  Anchors act(const Observation& observation) override {
+    dead_ = observation.tick > 0;
+    return replay_->act(observation);
+  }
+  [[nodiscard]] PolicyFaults faults() const override { return {0, 0, dead_, dead_ ? "its process ended" : ""}; }
+
+ private:
+  std::unique_ptr<Policy> replay_;
+  bool dead_ = false;
+};
+
+TEST(Rollout, ADeadPolicyEndsTheEpisodeAsAnErrorNotAsAFailureToAct) {
+  const Parts parts;
+  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const auto backend = make_backend("playback", episode_scene(parts.spec, parts.suite, parts.robot));
+  const auto controller = make_controller("pd", parts.robot);
+  DyingPolicy policy(make_policy("replay", parts.robot));
+  const Rollout rollout = roll_out(setup, *backend, *controller, policy);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
+  EXPECT_EQ(rollout.recording.message, "its process ended");
+  EXPECT_EQ(rollout.recording.frames(), kTicksPerPlan);
+  const PolicyMaker maker = [&] { return std::make_unique<DyingPolicy>(make_policy("replay", parts.robot)); };
+  const EpisodeRow row = run_episode(parts.spec, parts.suite, {"hash"}, parts.robot, "", maker);
+  EXPECT_EQ(row.outcome, Outcome::kError);
+  EXPECT_EQ(row.message, "its process ended");
+  EXPECT_TRUE(row.policy_faults.dead);
+  EXPECT_EQ(row.success, false);
+  EXPECT_TRUE(row.verdicts.empty());
+  EXPECT_EQ(row.state_hash, "");
+}
+
+// Waits longer for each plan than the whole episode may take.
+class SlowPolicy final : public Policy {
+ public:
+  explicit SlowPolicy(std::unique_ptr<Policy> replay) : replay_(std::move(replay)) {}
+  [[nodiscard]] std::string_view name() const override { return "slow"; }
+  void reset(const EpisodeContext& context) override { replay_->reset(context); }
+  Anchors act(const Observation& observation) override {
+    if (observation.tick == 0) std::this_thread::sleep_for(std::chrono::duration<double>(2.5));
+    return replay_->act(observation);
+  }
+
+ private:
+  std::unique_ptr<Policy> replay_;
+};
+
+TEST(Rollout, WaitingForPlansIsNotHeldAgainstTheWallLimit) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const Rollout expected = roll(parts, setup);
+  setup.wall_limit = 2.0;  // playback takes some milliseconds
+  const auto backend = make_backend("playback", episode_scene(parts.spec, parts.suite, parts.robot));
+  const auto controller = make_controller("pd", parts.robot);
+  SlowPolicy policy(make_policy("replay", parts.robot));
+  const Rollout rollout = roll_out(setup, *backend, *controller, policy);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
+  EXPECT_EQ(rollout.state_hash, expected.state_hash);
+}
+
 // The onset of a wave is the hand's, in the act; the policy's view of the partner changes nothing that is recorded.
 TEST(Rollout, ADisturbedViewIsThePolicysAlone) {
   const Parts parts;
@@ -206,6 +273,45 @@ TEST(Playback, RecordsTheMotionAsItIs) {
               play_back(parts.clip.robot, parts.clip.partner.joints.slice(0, 5), Task::kWave, {}, parts.robot);
             }).find("5 of the partner"),
             std::string::npos);
+}
+
+// The engine stands on the first frame already, so that its first step is the second frame's; a first step has no
+// velocity (playback.h), later ones have that of the frames.
+TEST(Playback, TakesItsFirstStepToTheSecondFrame) {
+  const Parts parts;
+  const PointTracks nobody;
+  const Recording recording = play_back(parts.clip.robot, nobody, Task::kWave, parts.clip.phases, parts.robot);
+  ASSERT_EQ(recording.frames(), parts.clip.frames());
+  EXPECT_EQ(recording.robot[0].v.norm(), 0.0);
+  EXPECT_EQ(recording.robot[1].v.norm(), 0.0);
+  for (const int t : {2, 3, 50})
+    EXPECT_EQ(recording.robot[t].v,
+              (parts.clip.robot.q.col(t) - parts.clip.robot.q.col(t - 1)) / (1.0 / parts.clip.robot.rate_hz))
+        << t;
+}
+
+// A robot that stands presses on the ground with its weight, over a tick never by less than that for long, and never by
+// many times of it.
+TEST(Rollout, TheGroundCarriesTheRobotAndThePeakIsOfOneTick) {
+  const Parts parts;
+  for (const EngineInfo& engine : engines()) {
+    if (!engine.available || !engine.physics) continue;
+    RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+    int ticks = 0;
+    setup.stop_asked = [&ticks] { return ++ticks > 50; };
+    Scene scene;
+    scene.robot = parts.robot;
+    scene.human = make_human_body(bone_lengths(parts.clip.partner));
+    const auto backend = make_backend(engine.name, scene);
+    const auto controller = make_controller("pd", parts.robot);
+    const auto policy = make_policy("null", parts.robot);
+    const GroundForce ground = roll_out(setup, *backend, *controller, *policy).ground;
+    const double weight = 9.81 * parts.robot->total_mass();
+    EXPECT_GT(ground.mean, 0.5 * weight) << engine.name;
+    EXPECT_LT(ground.mean, 1.5 * weight) << engine.name;
+    EXPECT_GT(ground.peak, ground.mean) << engine.name;
+    EXPECT_LT(ground.peak, 20.0 * weight) << engine.name;
+  }
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
   PairedMotion clip = test::paired(Task::kWave, *robot);
   clip.phases = {0, clip.frames() + 10};  // the adaptation refuses it
   const EpisodeRow row =
-      run_episode({&clip, "playback", "pd", "replay", "main", 0, 1}, test::playback_suite(), "hash", robot);
+      run_episode({&clip, "playback", "pd", "replay", "main", 0, 1}, test::playback_suite(), {"hash"}, robot);
   EXPECT_EQ(row.outcome, Outcome::kError);
   EXPECT_EQ(row.success, false);
   EXPECT_FALSE(row.message.empty());
@@ -130,8 +130,8 @@ TEST(Runner, MujocoEpisodesRepeatBitForBit) {
   const auto robot = test::g1();
   const PairedMotion clip = test::paired(Task::kWave, *robot);
   const EpisodeSpec spec{&clip, "mujoco", "vmc", "replay", "main", 0, 7};
-  const EpisodeRow first = run_episode(spec, suite, "hash", robot);
-  const EpisodeRow second = run_episode(spec, suite, "hash", robot);
+  const EpisodeRow first = run_episode(spec, suite, {"hash"}, robot);
+  const EpisodeRow second = run_episode(spec, suite, {"hash"}, robot);
   EXPECT_EQ(first.outcome, Outcome::kOk) << first.message;
   EXPECT_EQ(first.state_hash, second.state_hash);
   EXPECT_EQ(first.metrics, second.metrics);
@@ -154,13 +154,13 @@ TEST(Runner, PerturbedEpisodesDifferFromCleanAndRepeat) {
   std::map<std::string, std::string> by_hash;
   for (const Perturbation& perturbation : suite.perturbations) {
     spec.perturbation = perturbation.name;
-    const EpisodeRow row = run_episode(spec, suite, "hash", robot);
+    const EpisodeRow row = run_episode(spec, suite, {"hash"}, robot);
     EXPECT_TRUE(row.outcome == Outcome::kOk || row.outcome == Outcome::kFell) << row.message;
     EXPECT_EQ(row.perturbation, perturbation.name);
     EXPECT_TRUE(by_hash.emplace(row.state_hash, perturbation.name).second)
         << perturbation.name << " changes nothing: as " << by_hash[row.state_hash];
     if (!perturbation.push) continue;
-    EXPECT_EQ(run_episode(spec, suite, "hash", robot).state_hash, row.state_hash);
+    EXPECT_EQ(run_episode(spec, suite, {"hash"}, robot).state_hash, row.state_hash);
   }
 }
 

@@ -2,12 +2,16 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 
 #include "backends/factory.h"
 #include "bench/bodies.h"
 #include "bench/episode.h"
 #include "bench/rollout.h"
+#include "bench/run_identity.h"
 #include "bench/runner.h"
+#include "bench/trust.h"
 #include "core/file.h"
 #include "core/require.h"
 #include "tests/bench/fixtures.h"
@@ -55,7 +59,8 @@ TEST(SuitePolicies, AMappingSetsPromptAndPartner) {
   const Suite again = parse_suite(resolved_yaml(suite), "again.yaml");
   EXPECT_EQ(again.policies[1].prompt, suite.policies[1].prompt);
   EXPECT_EQ(resolved_yaml(again), resolved_yaml(suite));
-  EXPECT_NE(suite_hash(suite), suite_hash(with_policies("[replay, {name: blind, use: replay}]")));
+  EXPECT_NE(identity_of(suite.policies[1]).digest,
+            identity_of(with_policies("[replay, {name: blind, use: replay}]").policies[1]).digest);
 }
 
 TEST(SuitePolicies, WhatIsWrongIsNamedWithItsLine) {
@@ -74,6 +79,84 @@ TEST(SuitePolicies, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(refusal("[]"), HasSubstr("at least one policy"));
 }
 
+std::string process_descriptor(const std::string& name, const std::string& how = "command: [/bin/false]\n") {
+  return "schema: duet.policy/1\nname: " + name + "\nabout: a test\nkind: process\n" + how;
+}
+
+TEST(SuitePolicies, TheNameOfADescriptorIsWhatTablesShowUnlessTheSuiteNamesIt) {
+  const test::ScratchFolder folder;
+  write_file(folder / "file.yaml", process_descriptor("mywave"));
+  EXPECT_EQ(with_policies("[" + (folder / "file.yaml") + "]").policies.at(0).name, "mywave");
+  EXPECT_EQ(with_policies("[{name: other, use: " + (folder / "file.yaml") + "}]").policies.at(0).name, "other");
+  const Suite suite = with_policies("[" + (folder / "file.yaml") + "]");
+  EXPECT_EQ(parse_suite(resolved_yaml(suite), "again.yaml").policies.at(0).name, "mywave");
+  write_file(folder / "same.yaml", process_descriptor("mywave"));
+  EXPECT_THAT(refusal("[" + (folder / "file.yaml") + ", " + (folder / "same.yaml") + "]"),
+              HasSubstr("'mywave' is there twice; names tell rows apart ({name: ..., use: ...} gives another)"));
+  write_file(folder / "spaces.yaml", process_descriptor("my wave"));
+  EXPECT_THAT(refusal("[" + (folder / "spaces.yaml") + "]"),
+              HasSubstr("spaces.yaml: name: expected letters, digits and _ . + - only, found 'my wave'"));
+  EXPECT_THAT(refusal("[" + (folder / "nowhere.yaml") + "]"), HasSubstr("nowhere.yaml"));
+}
+
+TEST(SuitePolicies, TheNameOfAControllersDescriptorIsWhatTablesShow) {
+  const test::ScratchFolder folder;
+  std::string text = read_file(std::string(DUET_SOURCE_DIR) + "/controllers/descriptors/homie.yaml");
+  text.replace(text.find("name: homie"), 11, "name: mine\n");
+  write_file(folder / "file.yaml", text);
+  const Suite suite = parse_suite(
+      "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\ntasks: [wave]\n"
+      "engines: [playback]\ncontrollers: [" +
+          (folder / "file.yaml") + "]\npolicies: [replay]\n",
+      "p.yaml");
+  EXPECT_EQ(suite.controllers.at(0).name, "mine");
+}
+
+TEST(SuitePolicies, NullNeedsNoQuotes) {
+  for (const char* word : {"[null]", "['null']", "[~, replay]"}) {
+    const Suite suite = with_policies(word);
+    EXPECT_EQ(suite.policies.at(0).name, "null");
+    EXPECT_EQ(resolved_yaml(parse_suite(resolved_yaml(suite), "again.yaml")), resolved_yaml(suite));
+  }
+}
+
+TEST(SuitePolicies, ProgramsThatAreNotAllowedAreRefusedByNameAndNothingIsMade) {
+  const test::ScratchFolder folder;
+  write_file(folder / "evil.yaml", process_descriptor("evil", "command: [/bin/sh, -c, \"touch PWNED\"]\n"));
+  write_file(folder / "far.yaml", process_descriptor("far", "socket: example.org:7000\n"));
+  Suite suite = with_policies("[" + (folder / "evil.yaml") + ", " + (folder / "far.yaml") + ", replay]");
+  const std::string message = test::thrown_message<InputError>([&] { Bodies bodies(suite); });
+  EXPECT_THAT(message,
+              HasSubstr("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: policy 'evil' of " +
+                        (folder / "evil.yaml") + " runs '/bin/sh -c touch PWNED' in '"));
+  EXPECT_THAT(message, HasSubstr("; policy 'far' of " + (folder / "far.yaml") + " connects to 'example.org:7000'"));
+  EXPECT_NO_THROW(Bodies(suite, {}, {"evil", "far"}));  // what is not run needs no leave
+  suite.allow_programs = true;
+  EXPECT_NO_THROW(Bodies{suite});
+}
+
+TEST(SuitePolicies, ATrustedFolderAllowsWhatLiesInItAndNoLinkToIt) {
+  const test::ScratchFolder trusted, other;
+  std::filesystem::create_directory(trusted / "deep");
+  write_file(trusted / "deep/mine.yaml", process_descriptor("mine"));
+  write_file(other / "mine.yaml", process_descriptor("mine"));
+  std::filesystem::create_symlink(trusted / "deep/mine.yaml", other / "link.yaml");
+  std::filesystem::create_symlink(other / "mine.yaml", trusted / "link.yaml");
+  setenv("DUET_TRUSTED_FOLDERS", (":relative:" + (trusted / "")).c_str(), 1);
+  EXPECT_TRUE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  EXPECT_FALSE(in_trusted_folder(other / "mine.yaml"));
+  EXPECT_FALSE(in_trusted_folder(other / "link.yaml"));    // its program would run in the other folder
+  EXPECT_FALSE(in_trusted_folder(trusted / "link.yaml"));  // somebody else's text
+  EXPECT_FALSE(in_trusted_folder(trusted / "nowhere.yaml"));
+  EXPECT_NO_THROW(Bodies(with_policies("[" + (trusted / "deep/mine.yaml") + "]")));
+  setenv("DUET_TRUSTED_FOLDERS", (trusted / "deep").c_str(), 1);
+  EXPECT_TRUE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  setenv("DUET_TRUSTED_FOLDERS", (trusted / "dee").c_str(), 1);
+  EXPECT_FALSE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  unsetenv("DUET_TRUSTED_FOLDERS");
+  EXPECT_FALSE(in_trusted_folder(trusted / "deep/mine.yaml"));
+}
+
 TEST(SuitePolicies, NetworksAreFoundFromTheSuitesFolderAndCountByContent) {
   if (!has_dstar()) GTEST_SKIP() << "not run: policy dstar absent";
   const test::ScratchFolder folder;
@@ -88,9 +171,10 @@ TEST(SuitePolicies, NetworksAreFoundFromTheSuitesFolderAndCountByContent) {
   write_file(folder / "b.net", "one");
   const Suite a = read("a.yaml", "{name: d, use: dstar, network: a.net}");
   EXPECT_EQ(a.policies[0].options.at("network"), folder / "a.net");
-  EXPECT_EQ(suite_hash(a), suite_hash(read("b.yaml", "{name: d, use: dstar, options: {network: b.net}}")));
+  const Suite b = read("b.yaml", "{name: d, use: dstar, options: {network: b.net}}");
+  EXPECT_EQ(identity_of(a.policies[0]).digest, identity_of(b.policies[0]).digest);
   write_file(folder / "a.net", "two");
-  EXPECT_NE(suite_hash(a), suite_hash(read("b.yaml", "{name: d, use: dstar, network: b.net}")));
+  EXPECT_NE(identity_of(a.policies[0]).digest, identity_of(b.policies[0]).digest);
 }
 
 TEST(SuitePolicies, LibrariesOfRetrievalCountByContentToo) {
@@ -101,9 +185,9 @@ TEST(SuitePolicies, LibrariesOfRetrievalCountByContentToo) {
              "controllers: [pd]\npolicies: [{name: r, use: retrieval, options: {library: windows.st}}]\n");
   const Suite suite = load_suite(folder / "p.yaml");
   EXPECT_EQ(suite.policies[0].options.at("library"), folder / "windows.st");
-  const std::string before = suite_hash(suite);
+  const std::string before = identity_of(suite.policies[0]).digest;
   write_file(folder / "windows.st", "two");
-  EXPECT_NE(suite_hash(suite), before);
+  EXPECT_NE(identity_of(suite.policies[0]).digest, before);
 }
 
 TEST(SuitePolicies, APolicyWhoseNetworkIsNotHereIsAbsentAndOthersGoOn) {
@@ -186,7 +270,7 @@ TEST_F(ShuffledPartner, IsThatOfTheNextClipOfTheTask) {
     }
     ++shuffled;
     EXPECT_EQ(spec.seen, spec.clip == &clips[0] ? &clips[1] : &clips[0]);
-    EXPECT_EQ(row_for(spec, suite_, "hash", *robot_).arm, "shuffled");
+    EXPECT_EQ(row_for(spec, suite_, {"hash"}, *robot_).arm, "shuffled");
   }
   EXPECT_EQ(shuffled, 2);
 }
@@ -238,6 +322,11 @@ TEST_F(ShuffledPartner, PromptIsTheTasksUnlessTheSuiteSaysAnother) {
   suite_.policies[0].prompt = "hug them";
   watch(spec, suite_, robot_, watcher);
   EXPECT_EQ(watcher.prompt, "hug them");
+}
+
+TEST(SuitePolicies, AnOptionThatIsNoValueIsRefusedWithItsLine) {
+  EXPECT_THAT(refusal("\n  - replay\n  - {name: blind, use: replay,\n     options: {prompt: [1]}}"),
+              HasSubstr("p.yaml:11: policy: options.prompt: expected one value, found"));
 }
 
 }  // namespace

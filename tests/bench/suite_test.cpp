@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "bench/run_identity.h"
 #include "core/file.h"
 #include "core/require.h"
 #include "tests/support.h"
@@ -13,6 +14,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kMinimal = R"(schema: duet.suite/1
 name: small
@@ -105,12 +107,12 @@ TEST(Suite, UnknownEngineControllerAndPolicyAreRefused) {
 TEST(Suite, ValuesOutOfRangeAreRefused) {
   EXPECT_THAT(refusal("dt: 0.003\n"), HasSubstr("divides 0.02"));
   EXPECT_THAT(refusal("dt: -1\n"), HasSubstr("divides 0.02"));
-  EXPECT_THAT(refusal("episodes_per_clip: 0\n"), HasSubstr("1 or more"));
+  EXPECT_THAT(refusal("episodes_per_clip: 0\n"), HasSubstr("expected a whole number, 1 to 2147483647, found 0"));
   EXPECT_THAT(refusal("episodes_per_clip: 1.5\n"), HasSubstr("whole number"));
   EXPECT_THAT(refusal("start_radius: 9\n"), HasSubstr("0 to 5 m"));
   EXPECT_THAT(refusal("fuse_ticks: 91\n"), HasSubstr("expected fuse_ticks in 1..90, found 91"));
   EXPECT_THAT(refusal("limits: {wall_s_per_episode: 0}\n"), HasSubstr("more than 0 s"));
-  EXPECT_THAT(refusal("seed: -4\n"), HasSubstr("0 or more"));
+  EXPECT_THAT(refusal("seed: -4\n"), HasSubstr("expected a whole number, 0 to 9000000000000000, found -4"));
 }
 
 TEST(Suite, BrokenDocumentsAreRefused) {
@@ -213,6 +215,44 @@ TEST(Suite, APathThatOnlyTheWorkingFolderHasIsTakenFromThere) {
   const Suite suite = load_suite("suites/s.yaml", {{"policies", "[mine.yaml]"}});
   std::filesystem::current_path(before);
   EXPECT_TRUE(std::filesystem::equivalent(suite.policies.at(0).use, folder / "mine.yaml"));
+}
+
+TEST(Suite, AMistakeInAnOverrideIsSaidOfTheOverride) {
+  const auto message = [](const Overrides& overrides) {
+    return test::thrown_message<InputError>([&] { parse_suite(kMinimal, "s.yaml", overrides); });
+  };
+  EXPECT_THAT(message({{"dt", "fast"}}), testing::StartsWith("override 'dt=fast': suite: 'dt': expected"));
+  EXPECT_THAT(message({{"seed", "7"}, {"fuse_ticks", "0"}, {"start", "act"}}),
+              testing::StartsWith("override 'fuse_ticks=0': "));
+  EXPECT_THAT(message({{"perturbations", "[pussh]"}}), testing::StartsWith("override 'perturbations=[pussh]': "));
+  EXPECT_THAT(message({{"policies", "[replay"}}), testing::StartsWith("override 'policies=[replay': "));
+  EXPECT_THAT(message({{"seed.x", "1"}}), testing::StartsWith("override 'seed.x=1': "));
+  for (const char* key : {"dt", "fuse_ticks", "perturbations"})
+    EXPECT_THAT(message({{key, "[]]"}}), Not(HasSubstr("s.yaml:")));
+  // The file's own mistake stays the file's.
+  EXPECT_THAT(test::thrown_message<InputError>([] {
+                parse_suite(std::string(kMinimal) + "dt: fast\n", "s.yaml", {{"seed", "7"}});
+              }),
+              testing::StartsWith("s.yaml:"));
+}
+
+TEST(Suite, AFolderOfClipsIsTheFilesInIt) {
+  const test::ScratchFolder folder;
+  std::filesystem::create_directories(folder / "clips/more");
+  write_file(folder / "clips/b.npz", "b");
+  write_file(folder / "clips/more/a.npz", "a");
+  write_file(folder / "clips/readme.txt", "no clip");
+  std::filesystem::create_directory(folder / "empty");
+  std::string text = kMinimal;
+  const std::size_t at = text.find("clips:");
+  text.replace(at, text.find('\n', at) - at, "clips: {files: [clips]}");
+  write_file(folder / "s.yaml", text);
+  EXPECT_EQ(load_suite(folder / "s.yaml").clips.files,
+            (std::vector<std::string>{folder / "clips/b.npz", folder / "clips/more/a.npz"}));
+  EXPECT_THAT(test::thrown_message<InputError>([&] {
+                load_suite(folder / "s.yaml", {{"clips.files", "[empty]"}});
+              }),
+              HasSubstr("empty' holds no .npz file"));
 }
 
 TEST(Suite, ShippedSuitesLoad) {

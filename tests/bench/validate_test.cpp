@@ -1,9 +1,6 @@
 // The parity certificate: what is written is read back, what was edited is refused; `duet validate` as a user meets it.
 #include <gmock/gmock.h>
-#include <sys/wait.h>
 
-#include <array>
-#include <cstdio>
 #include <limits>
 
 #include "backends/factory.h"
@@ -11,6 +8,8 @@
 #include "bench/parity_page.h"
 #include "core/file.h"
 #include "core/require.h"
+#include "tests/bench/program.h"
+#include "tests/deep_json.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -122,6 +121,8 @@ TEST_F(CertificateFile, FaultsAreOneSentenceWithTheirPlace) {
   EXPECT_THAT(refusal(broken), HasSubstr("signed_by"));
   write_file(path, "{");
   EXPECT_THAT(test::thrown_message<InputError>([&] { load_certificate(path); }), HasSubstr("not valid JSON"));
+  write_file(path, "{\"schema\":" + test::deep_json() + "}");
+  EXPECT_THAT(test::thrown_message<InputError>([&] { load_certificate(path); }), HasSubstr(test::kTooDeep));
   EXPECT_THAT(test::thrown_message<InputError>([&] { load_certificate(folder / "none.json"); }),
               HasSubstr("cannot read"));
 }
@@ -148,23 +149,7 @@ TEST(ParityPage, PlotsOnlyWhatALogarithmHas) {
   EXPECT_THAT(one, Not(HasSubstr("inf")));
 }
 
-struct Answer {
-  int code = -1;
-  std::string out, err;
-};
-
-Answer validate(const std::string& arguments) {
-  const test::ScratchFolder folder;
-  const std::string err = folder / "stderr";
-  FILE* pipe = popen((std::string(DUET_PROGRAM) + " validate " + arguments + " 2>" + err).c_str(), "r");
-  Answer answer;
-  std::array<char, 4096> buffer{};
-  for (size_t n = fread(buffer.data(), 1, buffer.size(), pipe); n > 0; n = fread(buffer.data(), 1, buffer.size(), pipe))
-    answer.out.append(buffer.data(), n);
-  answer.code = WEXITSTATUS(pclose(pipe));
-  answer.err = read_file(err);
-  return answer;
-}
+test::Answer validate(const std::string& arguments) { return test::duet_program("validate " + arguments); }
 
 std::string any_engine() {
   for (const EngineInfo& engine : engines())
@@ -188,7 +173,8 @@ TEST(ValidateCommand, WritesACertificateThatReadsBackAndAPage) {
   const std::string engine = any_engine();
   if (engine.empty()) GTEST_SKIP() << "not run: no physics engine is there";
   const test::ScratchFolder folder;
-  const Answer answer = validate("-q --engine " + engine + " --scene pendulum,armature -o " + (folder / "parity"));
+  const test::Answer answer =
+      validate("-q --engine " + engine + " --scene pendulum,armature -o " + (folder / "parity"));
   EXPECT_EQ(answer.code, 0) << answer.out << answer.err;
   EXPECT_THAT(answer.out, Not(HasSubstr("| pendulum")));  // it passes: said in the count
   EXPECT_THAT(validate("-q --all --engine " + engine + " --scene pendulum").out, HasSubstr("| pendulum"));
@@ -197,7 +183,7 @@ TEST(ValidateCommand, WritesACertificateThatReadsBackAndAPage) {
   EXPECT_EQ(certificate.engines[0].name, engine);
   EXPECT_EQ(certificate.engines[0].profile, "parity");
   EXPECT_THAT(read_file(folder / "parity/parity.html"), HasSubstr("largest error of the energy"));
-  const Answer again = validate("-q --json --engine " + engine + " --scene pendulum,armature");
+  const test::Answer again = validate("-q --json --engine " + engine + " --scene pendulum,armature");
   EXPECT_EQ(nlohmann::json::parse(again.out).at("digest"), certificate.digest);
 }
 
@@ -210,7 +196,7 @@ TEST(ValidateCommand, FailedCheckIsFive) {
       profile,
       "schema: duet.profile/1\nname: coarse\nabout: too coarse for hands on the trunk and for a chain\nengines:\n  " +
           engine + ": {dt: 0.02}\n");
-  const Answer answer = validate("-q --engine " + engine + " --scene self-collision,chain --profile " + profile);
+  const test::Answer answer = validate("-q --engine " + engine + " --scene self-collision,chain --profile " + profile);
   EXPECT_EQ(answer.code, 5) << answer.out << answer.err;
   EXPECT_THAT(answer.out, HasSubstr("FAIL"));
 }
@@ -218,7 +204,7 @@ TEST(ValidateCommand, FailedCheckIsFive) {
 TEST(ValidateCommand, UnknownNamesAreTwoAndAnAbsentEngineIsFour) {
   EXPECT_EQ(validate("--engine warp9").code, 2);
   EXPECT_EQ(validate("--effort heroic").code, 2);
-  const Answer scene = validate("--scene pendulun");
+  const test::Answer scene = validate("--scene pendulun");
   EXPECT_EQ(scene.code, 2);
   EXPECT_THAT(scene.err, HasSubstr("did you mean 'pendulum'"));
   for (const EngineInfo& engine : engines()) {

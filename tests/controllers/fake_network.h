@@ -39,7 +39,7 @@ class FakeNetwork final : public Network {
 };
 
 inline std::shared_ptr<const RobotModel> body(const std::string& card) {
-  return load_shared_robot(std::string(DUET_SOURCE_DIR) + "/robots/g1/" + card + ".yaml");
+  return load_shared_robot(DUET_SOURCE_DIR "/robots/g1/" + card + ".yaml");
 }
 
 }  // namespace duet::test

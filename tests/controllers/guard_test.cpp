@@ -22,7 +22,6 @@ class Offset final : public Controller {
  public:
   Offset(const double& offset, int& calls) : offset_(offset), calls_(calls) {}
   [[nodiscard]] std::string_view name() const override { return "offset"; }
-  [[nodiscard]] bool walks() const override { return true; }
   void reset(const RobotState&) override {}
   void act(const RobotState&, const Reference& reference, JointCommand& command) override {
     ++calls_;
@@ -55,7 +54,6 @@ TEST_F(Guarded, PassesFiniteCommandsOnUnchanged) {
   EXPECT_DOUBLE_EQ(command.q_target[3], robot->neutral[3] + 0.25);
   EXPECT_EQ(command.kp[0], 77.0);
   EXPECT_EQ(controller->name(), "offset");
-  EXPECT_TRUE(controller->walks());
   EXPECT_EQ(controller->faults().observations + controller->faults().actions, 0);
 }
 

@@ -142,6 +142,13 @@ TEST(HomieLayout, YawScaleIsThatOfTrainingOrOfDeployment) {
   EXPECT_NEAR(l.shown(380 + 3), 0.74, kNear);
 }
 
+// One scale for all three stays that of the other two.
+TEST(PlaygroundLayout, YawScaleIsOfTheYawRateAlone) {
+  Layout l("playground", 103, 29, {{"command", "0.8,-0.1,0.5"}, {"yaw_scale", "0.25"}});
+  l.act();
+  l.expect_vector(9, {0.8, -0.1, 0.125}, "command");
+}
+
 TEST(HomieLayout, WaistIsHeldOrFreeOnABodyThatHasOne) {
   const Descriptor homie = load_descriptor("homie");
   const auto robot = test::body("g1");
@@ -340,8 +347,9 @@ TEST(Layouts, RefuseARobotOfOtherJoints) {
                                  "fake");
     });
   };
-  EXPECT_THAT(make("twist2", "g1_12dof", 1432, 29),
-              HasSubstr("controller 'twist2' with robot 'g1_12dof': unknown joint 'waist_yaw_joint'"));
+  EXPECT_THAT(
+      make("twist2", "g1_12dof", 1432, 29),
+      AllOf(HasSubstr("twist2.yaml: controller 'twist2' with robot 'g1_12dof': unknown joint 'waist_yaw_joint'")));
   EXPECT_THAT(make("twist2", "g1_27dof", 1432, 29), HasSubstr("it was made for 'g1_twist2'"));
 }
 

@@ -1,4 +1,5 @@
-// The published controllers as reference/controllers.md (section 7) measured them: commands, starts and references.
+// The published controllers as measured outside of duet, in MuJoCo with their own code: commands, starts and
+// references.
 #pragma once
 
 #include <algorithm>
@@ -10,10 +11,16 @@
 
 namespace duet::test {
 
+// With the network of the shared data.
+inline WalkSetup published(const std::string& name) {
+  return {.controller = name, .options = {{"network", shared_file("models/" + load_descriptor(name).network)}}};
+}
+
 // Of a velocity command, or of one with a height; "": the root of the reference commands.
 inline WalkSetup homie(const std::string& command) {
-  WalkSetup setup{.controller = "homie", .start = arms_down(*body("g1_27dof"))};
-  if (!command.empty()) setup.options = {{"command", command}};
+  WalkSetup setup = published("homie");
+  setup.start = arms_down(*body("g1_27dof"));
+  if (!command.empty()) setup.options["command"] = command;
   return setup;
 }
 
@@ -37,7 +44,8 @@ inline WalkSetup twist2_idle() {
   Eigen::VectorXd idle = robot->neutral;
   for (const DescriptorJoint& joint : load_descriptor("twist2").joints)
     idle[robot->joint_index(joint.name)] = joint.neutral;
-  WalkSetup setup{.controller = "twist2", .start = idle};
+  WalkSetup setup = published("twist2");
+  setup.start = idle;
   setup.reference = [](int, const Reference& neutral) {
     Reference reference = neutral;
     reference.X_WB.p.z() = 0.8;
@@ -50,13 +58,19 @@ constexpr const char* kRecordedWalk = "data/g1_motions/twist2/walk_001.pkl";
 
 inline WalkSetup twist2_recorded_walk() {
   const RobotMotion motion = resample(read_motion_pickle(shared_file(kRecordedWalk)).motion, 50.0);
-  WalkSetup setup{.controller = "twist2", .seconds = (motion.frames() - 1) / 50.0};
+  WalkSetup setup = published("twist2");
+  setup.seconds = (motion.frames() - 1) / 50.0;
   setup.reference = [motion](int tick, const Reference&) { return motion.reference(tick); };
   return setup;
 }
 
-inline WalkSetup playground() { return {.controller = "playground", .options = {{"command", "0.8,0,0"}}}; }
-inline WalkSetup rl_gym() { return {.controller = "rl_gym", .options = {{"command", "0.3,0,0"}}}; }
+inline WalkSetup commanded(const std::string& name, const std::string& command) {
+  WalkSetup setup = published(name);
+  setup.options["command"] = command;
+  return setup;
+}
+inline WalkSetup playground() { return commanded("playground", "0.8,0,0"); }
+inline WalkSetup rl_gym() { return commanded("rl_gym", "0.3,0,0"); }
 
 // MuJoCo's own default, which the reference measurements have: its contacts give way twice as slowly as duet's 0.01 s.
 inline WalkSetup on_soft_ground(WalkSetup setup) {

@@ -1,7 +1,10 @@
-// The published controllers with their own networks in MuJoCo, against the measurements of reference/controllers.md
+// The published controllers with their own networks in MuJoCo, against measurements of their own code
 // (section 7). The networks do not ship: without them nothing here runs.
+#include "controllers/published.h"
+
 #include <gmock/gmock.h>
 
+#include "core/file.h"
 #include "tests/backends/engine_names.h"
 #include "tests/controllers/published_cases.h"
 
@@ -14,6 +17,7 @@ using test::walk;
 using test::Walk;
 using test::WalkSetup;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // Skips where the engine or the network is absent.
 #define NEEDS(model)                                                      \
@@ -53,7 +57,7 @@ TEST(Homie, ReachesAGoalAMetreAwayAndStaysThere) {
   NEEDS("homie_deploy.onnx");
   for (const char* law : {"adopted", "direct"}) {
     WalkSetup setup = homie("");
-    setup.options = {{"conversion", law}};
+    setup.options["conversion"] = law;
     setup.seconds = 12.0;
     setup.reference = [](int tick, const Reference& neutral) {
       Reference reference = neutral;
@@ -116,9 +120,20 @@ TEST(Published, NamesThePlacesWhereItsNetworkWasLookedFor) {
   };
   const std::string message = make("gmt", {});
   EXPECT_THAT(message, HasSubstr("no network of the controller 'gmt': looked at "));
-  EXPECT_THAT(message, HasSubstr("models/gmt.onnx"));
+  EXPECT_THAT(message, HasSubstr("controllers/descriptors/gmt.onnx"));
+  EXPECT_THAT(message, Not(HasSubstr("../shared")));
   EXPECT_THAT(message, HasSubstr("option 'network' or DUET_MODELS"));
   EXPECT_THAT(make("homie", {{"network", "/nowhere/net.onnx"}}), HasSubstr("looked at /nowhere/net.onnx"));
+}
+
+TEST(Published, LooksForItsNetworkBesideTheDescriptorFirst) {
+  const test::ScratchFolder folder;
+  std::filesystem::copy(load_descriptor("gmt").file, folder / "mine.yaml");
+  const Descriptor mine = load_descriptor(folder / "mine.yaml");
+  EXPECT_THAT(thrown_message<MissingError>([&] { static_cast<void>(find_network(mine)); }),
+              HasSubstr("looked at " + (folder / "gmt.onnx")));
+  write_file(folder / "gmt.onnx", "");
+  EXPECT_EQ(find_network(mine), folder / "gmt.onnx");
 }
 
 TEST(Published, RefusesAnOptionItDoesNotHave) {

@@ -78,7 +78,7 @@ inline Walk walk(const WalkSetup& setup) {
   return result;
 }
 
-// The card's neutral legs with every other joint at 0, as the measurements of reference/controllers.md start.
+// The card's neutral legs with every other joint at 0, as the measurements of published_cases.h start.
 inline Eigen::VectorXd arms_down(const RobotModel& robot) {
   Eigen::VectorXd q = robot.neutral;
   q.tail(robot.dof() - 12).setZero();

@@ -5,11 +5,13 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "controllers/wbc_sim/leg_chain.h"
 #include "core/file.h"
 #include "core/require.h"
 #include "robots/kinematics.h"
+#include "tests/deep_json.h"
 
 namespace duet {
 namespace {
@@ -282,6 +284,33 @@ TEST(WbcNetwork, BadFilesAreRefusedByWhatIsWrong) {
   refused([](SafeTensors& t) { t.tensors["input.deviation"].values[5] = 0.0F; }, "values that are not positive");
   refused([](SafeTensors& t) { t.tensors["mlp.0.weight"].values[5] += 5.0F; }, "the golden output is missed by");
   refused([](SafeTensors& t) { t.metadata["steps"] = "many"; }, "'steps' in the header is 'many'");
+  refused([](SafeTensors& t) { t.metadata["rate_hz"] = "100"; }, "the rate_hz is '100', expected '50'");
+  refused([](SafeTensors& t) { t.metadata.erase("rate_hz"); }, "no 'rate_hz' in the header");
+  refused([](SafeTensors& t) { t.metadata["action"] = "target = action"; },
+          "the action is 'target = action', expected 'target = base + scale * clip(action, 4); base: ");
+  refused([](SafeTensors& t) { t.metadata["observation"] = test::deep_json(); },
+          std::string("'observation' in the header: ") + test::kTooDeep);
+  refused([](SafeTensors& t) { t.metadata["joints"] = "[" + test::deep_json() + "]"; },
+          std::string("'joints' in the header: ") + test::kTooDeep);
+  std::filesystem::remove(path);
+}
+
+TEST(WbcNetwork, AMessageShowsLittleOfTheFilesText) {
+  const std::string path = temporary("long");
+  save_wbc_network(path, small_network(WbcKind::kOracle), TensorType::kF32);
+  for (const char* key : {"robot", "steps", "kind", "rate_hz", "action"}) {
+    SafeTensors bad = read_safetensors(path);
+    const std::string good = bad.metadata[key];
+    bad.metadata[key] = "\x1b[31m" + std::string(400'000, 'x');
+    write_safetensors(path, bad);
+    EXPECT_THAT([&] { load_wbc_network(path, *g1()); },
+                ThrowsMessage<InputError>(testing::AllOf(
+                    HasSubstr("'\\x1b[31mxxx"),
+                    testing::ResultOf([](const std::string& m) { return m.size(); }, testing::Lt(400U)))))
+        << key;
+    bad.metadata[key] = good;
+    write_safetensors(path, bad);
+  }
   std::filesystem::remove(path);
 }
 
@@ -304,7 +333,7 @@ TEST(WbcSim, TargetsKeepWithinTheLimitsAndTheGainsAreTheNetworks) {
     for (int i = 0; i < 5; ++i) controller->act(g1()->standing_state(), standing_reference(), command);
     EXPECT_TRUE((command.q_target.array() <= g1()->upper().array()).all());
     EXPECT_EQ(command.kp, network.kp);
-    EXPECT_TRUE(controller->walks());
+    EXPECT_TRUE(controller_info("wbc_sim").walks);
   }
 }
 
@@ -319,6 +348,17 @@ TEST(WbcSim, AnEpisodeDoesNotDependOnTheOneBefore) {
   };
   const Eigen::VectorXd first = run();
   EXPECT_EQ(first, run());
+}
+
+TEST(Gait, AFootIsOnTheGroundWhereItsSwingBeginsAndEndsAndHighestInTheMiddle) {
+  Gait gait;
+  for (int i = 0; i < 300; ++i) gait.update({0.2, 0.0, 0.0}, Eigen::Vector3d::Zero());
+  for (int i = 0; i < 100; ++i) {
+    gait.update({0.2, 0.0, 0.0}, Eigen::Vector3d::Zero());
+    const double lift = gait.feet()[gait.swing_foot()].lift;
+    const double share = std::sin(std::numbers::pi * gait.swing_progress());
+    EXPECT_NEAR(lift, gait.options().swing_height * share * share, 1e-12) << gait.swing_progress();
+  }
 }
 
 }  // namespace

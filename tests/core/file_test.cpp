@@ -1,7 +1,9 @@
 #include "core/file.h"
 
+#include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -132,6 +134,65 @@ TEST(WriteFile, KeepsPermissionsAndLinks) {
   EXPECT_EQ(status.st_mode & 07777, 0640u);
 }
 
+TEST(ReadFile, RefusesMoreThanItsLimitByName) {
+  const ScratchFolder folder;
+  write_file(folder / "ten", "0123456789");
+  EXPECT_EQ(read_file(folder / "ten", 10), "0123456789");
+  EXPECT_EQ(thrown_message<InputError>([&] { read_file(folder / "ten", 9); }),
+            "cannot read '" + (folder / "ten") + "': expected at most 9 bytes, found more");
+  if (!std::filesystem::exists("/dev/zero")) GTEST_SKIP() << "not run: /dev/zero absent";
+  EXPECT_EQ(thrown_message<InputError>([&] { read_text("/dev/zero"); }),
+            "cannot read '/dev/zero': expected at most 67108864 bytes, found more");
+}
+
+TEST(Inside, RefusesLinksBelowTheFolderAndFollowsTheFolderItself) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder / "run/real");
+  write_file(folder / "outside", "mine");
+  std::filesystem::create_symlink(folder / "outside", folder / "run/table.md");
+  std::filesystem::create_symlink(folder / "nowhere", folder / "run/dangling.md");
+  std::filesystem::create_symlink(folder / "run/real", folder / "run/traces");
+  std::filesystem::create_symlink(folder / "run", folder / "link");
+  EXPECT_EQ(inside(folder / "run", "real/a.npz"), folder / "run/real/a.npz");
+  EXPECT_EQ(inside(folder / "link", "new.md"), folder / "link/new.md");
+  EXPECT_EQ(thrown_message<StorageError>([&] { static_cast<void>(inside(folder / "run", "table.md")); }),
+            "cannot write '" + (folder / "run/table.md") + "': '" + (folder / "run/table.md") +
+                "' is a symbolic link and may lead out of the folder; remove it");
+  for (const char* name : {"dangling.md", "traces/a.npz"})
+    EXPECT_NE(thrown_message<StorageError>([&] { static_cast<void>(inside(folder / "run", name)); }),
+              "(nothing was thrown)")
+        << name;
+}
+
+TEST(LineAppender, ReadsWhatOthersAppendedAndCutsARestOnlyWhenAsked) {
+  const ScratchFolder folder;
+  LineAppender a(folder / "lines"), b(folder / "lines");
+  a.append("one");
+  a.append("two");
+  EXPECT_EQ(b.read_appended(true), "one\ntwo\n");
+  EXPECT_EQ(b.read_appended(true), "");
+  const int descriptor = open((folder / "lines").c_str(), O_WRONLY | O_APPEND);
+  ASSERT_EQ(write(descriptor, "thr", 3), 3);
+  close(descriptor);
+  EXPECT_EQ(b.read_appended(false), "");
+  EXPECT_EQ(read_file(folder / "lines"), "one\ntwo\nthr");
+  EXPECT_EQ(b.read_appended(true), "");
+  b.append("three");
+  EXPECT_EQ(read_file(folder / "lines"), "one\ntwo\nthree\n");
+}
+
+TEST(LineAppender, NoticesAFileThatWasMadeShorterOrRemoved) {
+  const ScratchFolder folder;
+  LineAppender lines(folder / "lines");
+  lines.append("one");
+  std::filesystem::resize_file(folder / "lines", 0);
+  EXPECT_EQ(thrown_message<StorageError>([&] { lines.read_appended(true); }),
+            "cannot write '" + (folder / "lines") + "': it was made shorter while rows were written to it");
+  std::filesystem::remove(folder / "lines");
+  EXPECT_EQ(thrown_message<StorageError>([&] { lines.read_appended(true); }),
+            "cannot write '" + (folder / "lines") + "': it was removed while rows were written to it");
+}
+
 TEST(LineAppender, EachLineIsThereWhenAppendReturns) {
   const ScratchFolder folder;
   LineAppender lines(folder / "runs/episodes.jsonl");
@@ -172,7 +233,7 @@ TEST(LineAppender, CutsALineThatTheDiskDidNotTakeWhole) {
 TEST(LineAppender, NamesAFullDisk) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "not run: /dev/full absent";
   LineAppender lines("/dev/full");
-  EXPECT_EQ(thrown_message<InputError>([&] { lines.append("x"); }),
+  EXPECT_EQ(thrown_message<StorageError>([&] { lines.append("x"); }),
             "cannot write '/dev/full': No space left on device");
 }
 

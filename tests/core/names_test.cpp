@@ -46,6 +46,13 @@ TEST(UnknownNameMessage, AsksOnlyWhereANameIsNear) {
   EXPECT_EQ(unknown_name_message("engine", "x", {}), "unknown engine 'x'. Known: none");
 }
 
+TEST(UnknownNameMessage, OfALongListShowsTheNearest) {
+  std::vector<std::string> known;
+  for (int i = 0; i < 44; ++i) known.push_back("link_" + std::to_string(i));
+  EXPECT_EQ(unknown_name_message("frame", "lnk_43", known),
+            "unknown frame 'lnk_43': did you mean 'link_43'? Nearest of 44: link_43, link_3, link_4, link_13, link_23");
+}
+
 TEST(Names, OptionThatIsNotGivenFallsBack) {
   const std::map<std::string, std::string> options = {{"waist", "locked"}};
   EXPECT_EQ(option_or(options, "waist", "free"), "locked");

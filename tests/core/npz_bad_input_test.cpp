@@ -222,6 +222,30 @@ TEST(NpzInput, NamesTheEntryAtFault) {
             "'a.npz': expected entries named '<key>.npy', found '.npy'");
 }
 
+// What the directory claims is enough: nothing is inflated. (Zeros deflate to a thousandth.)
+TEST(NpzInput, RefusesArraysThatAreTooLargeTogether) {
+  const std::string array = npy_of("<f8", "(1,)", raw<double>({1.0}));
+  std::string bytes = zip_bytes({{"a.npy", array}, {"b.npy", array}});
+  for (std::size_t at = bytes.find("PK\x01\x02"); at != std::string::npos; at = bytes.find("PK\x01\x02", at + 1))
+    bytes.replace(at + 24, 4, raw<std::uint32_t>({600U << 20}));
+  EXPECT_EQ(thrown_message<InputError>([&] { Npz::parse(bytes, "bomb.npz"); }),
+            "'bomb.npz': expected entries of at most 1073741824 bytes together, found more");
+}
+
+// Strings of no characters take no byte in the file and 32 in memory.
+TEST(NpzInput, RefusesEmptyStringsThatAreTooLargeTogether) {
+  std::vector<ZipEntry> entries;
+  for (int i = 0; i < 9; ++i) entries.push_back({fmt::format("a{}.npy", i), npy_of("|S0", "(4194304,)", "")});
+  EXPECT_EQ(thrown_message<InputError>([&] { Npz::parse(zip_bytes(entries), "bomb.npz"); }),
+            "'bomb.npz': expected arrays of at most 1073741824 bytes together, found more");
+}
+
+TEST(NpzInput, NamesFromTheFileAreShownShort) {
+  const std::string bytes = zip_bytes({{std::string(1000, 'x'), ""}});
+  EXPECT_EQ(thrown_message<InputError>([&] { Npz::parse(bytes, "a.npz"); }),
+            "'a.npz': expected entries named '<key>.npy', found '" + std::string(77, 'x') + "...'");
+}
+
 TEST(NpzInput, ABadChecksumIsNamed) {
   std::string bytes = zip_bytes({{"a.npy", npy_of("<f8", "(1,)", raw<double>({1.0}))}});
   const std::size_t central = bytes.find("PK\x01\x02");

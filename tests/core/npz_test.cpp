@@ -143,7 +143,7 @@ TEST(NpzSet, RefusesWhatCannotBeWritten) {
 TEST(Zip, KeepsOrderNamesAndContent) {
   const std::vector<ZipEntry> entries = {{"b", "two"}, {"a/ü", std::string(100000, 'x')}, {"c", ""}};
   std::vector<ZipEntry> found;
-  read_zip(zip_bytes(entries), "z", 1 << 20, [&](const std::string& entry, const std::string& content) {
+  read_zip(zip_bytes(entries), "z", {1 << 20, 1 << 20}, [&](const std::string& entry, const std::string& content) {
     found.push_back({entry, content});
   });
   ASSERT_EQ(found.size(), entries.size());
@@ -153,10 +153,35 @@ TEST(Zip, KeepsOrderNamesAndContent) {
   }
 }
 
+std::string zip_refusal(const std::vector<ZipEntry>& entries, const ZipLimits& limits) {
+  return thrown_message<InputError>(
+      [&] { read_zip(zip_bytes(entries), "z", limits, [](const auto&, const auto&) {}); });
+}
+
 TEST(Zip, RefusesAnEntryAboveTheLimit) {
-  const std::string bytes = zip_bytes({{"a", std::string(1001, 'x')}});
-  EXPECT_EQ(thrown_message<InputError>([&] { read_zip(bytes, "z", 1000, [](const auto&, const auto&) {}); }),
-            "'z': entry 'a': above 1000 bytes");
+  EXPECT_EQ(zip_refusal({{"a", std::string(1001, 'x')}}, {1000, 10000}), "'z': entry 'a': above 1000 bytes");
+}
+
+TEST(Zip, RefusesEntriesThatAreTooLargeTogether) {
+  const std::vector<ZipEntry> three = {{"a", std::string(900, 'x')}, {"b", std::string(900, 'x')}, {"c", "yy"}};
+  EXPECT_EQ(zip_refusal(three, {1000, 1800}), "'z': expected entries of at most 1800 bytes together, found more");
+  EXPECT_EQ(zip_refusal(three, {1000, 1802}), "(nothing was thrown)");
+}
+
+// The directory at the end says 1 byte where 900 are: what comes out counts.
+TEST(Zip, CountsWhatComesOutAndNotOnlyWhatIsClaimed) {
+  std::string bytes = zip_bytes({{"a", std::string(900, 'x')}, {"b", std::string(900, 'x')}});
+  for (std::size_t at = bytes.find("PK\x01\x02"); at != std::string::npos; at = bytes.find("PK\x01\x02", at + 1))
+    bytes.replace(at + 24, 4, std::string("\x01\x00\x00\x00", 4));
+  EXPECT_NE(thrown_message<InputError>([&] {
+              read_zip(bytes, "z", {1000, 1000}, [](const auto&, const auto&) {});
+            }),
+            "");
+}
+
+TEST(Zip, RefusesAnArchiveOfTooManyEntries) {
+  EXPECT_EQ(zip_refusal({{"a", ""}, {"b", ""}, {"c", ""}}, {.entry_bytes = 1, .total_bytes = 1, .entries = 2}),
+            "'z': expected at most 2 entries, found 3");
 }
 
 }  // namespace

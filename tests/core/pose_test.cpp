@@ -52,7 +52,7 @@ TEST(Pose, InterpolationMeetsItsEnds) {
 
 TEST(Pose, InterpolationTakesTheShorterArc) {
   const Pose a;
-  Pose b{yaw_rotation(1.0), {}};
+  Pose b{yaw_rotation(1.0), Eigen::Vector3d::Zero()};
   b.R.coeffs() *= -1.0;  // the same rotation, on the far side of the sphere
   EXPECT_NEAR(yaw_of(interpolate(a, b, 0.5).R), 0.5, kAlgebra);
 }

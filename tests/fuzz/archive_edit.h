@@ -30,10 +30,20 @@ class Bytes {
     std::erase_if(text, [](char c) { return c <= 0; });  // what NumPy text can hold without a codec
     return text;
   }
+  // Everything that is left, as text of a header: what is not UTF-8 is left out.
+  std::string take_rest() {
+    std::string text(bytes_);
+    bytes_ = {};
+    std::erase_if(text, [](char c) { return c < 0; });
+    return text;
+  }
 
  private:
   std::string_view bytes_;
 };
+
+// Bytes of a fuzzer as an archive: themselves, or where they begin with "edit" a program of edits of `sample`.
+inline constexpr std::string_view kEdit = "edit";
 
 inline void edit_value(Bytes& bytes, NpyArray& array) {
   const auto place = bytes.take<std::uint16_t>();
@@ -87,6 +97,10 @@ inline std::string edited_archive(Npz npz, std::string_view program) {
     npz.set(key, array);
   }
   return npz.bytes();
+}
+
+inline std::string archive_of(const Npz& sample, std::string_view bytes) {
+  return bytes.starts_with(kEdit) ? edited_archive(sample, bytes.substr(kEdit.size())) : std::string(bytes);
 }
 
 }  // namespace duet::fuzz

@@ -1,42 +1,43 @@
-// Shared by the readers' fuzz targets. A reader may refuse its input with InputError and nothing else: any other
-// exception ends the run as a finding. Samples are made in code, so that no seed files are needed.
+// The readers of everything that comes from outside, each with a good sample: what the fuzzer (fuzz_main.cpp) and the
+// test of the corpus (corpus_test.cpp) run. A reader may refuse with InputError and nothing else. Samples are made in
+// code; tests/fuzz/corpus/<reader>/ keeps some of them and what was found.
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <cstring>
+#include <ostream>
+#include <span>
 #include <string>
 #include <string_view>
-
-#include "core/require.h"
-
-extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
+#include <vector>
 
 namespace duet::fuzz {
 
-inline std::string_view text_of(const std::uint8_t* data, std::size_t size) {
-  return {reinterpret_cast<const char*>(data), size};
-}
+struct Reader {
+  const char* name;
+  std::string (*sample)(unsigned seed);  // of several where the seed is not ignored
+  void (*read)(std::string_view bytes);
+};
 
-template <typename Read>
-int read_or_refuse(Read&& read) {
-  try {
-    read();
-  } catch (const InputError&) {
-    return 0;
-  }
-  return 0;
-}
+inline void PrintTo(const Reader& reader, std::ostream* out) { *out << reader.name; }  // for GoogleTest
 
-// libFuzzer's own mutation, which now and then begins anew from `sample`.
-inline std::size_t mutate(std::uint8_t* data, std::size_t size, std::size_t max_size, unsigned seed,
-                          const std::string& sample) {
-  if (size < 2 || seed % 64 == 0) {
-    size = std::min(sample.size(), max_size);
-    std::memcpy(data, sample.data(), size);
-  }
-  return LLVMFuzzerMutate(data, size, max_size);
-}
+std::vector<Reader> core_readers();
+std::vector<Reader> motion_readers();
+std::vector<Reader> robot_readers();
+std::vector<Reader> network_readers();
+std::vector<Reader> controller_readers();
+std::vector<Reader> policy_readers();
+std::vector<Reader> result_readers();
+std::vector<Reader> bench_readers();
+std::vector<Reader> training_readers();
+
+std::vector<Reader> all_readers();
+
+// Writes `bytes` to a file of this process and gives its path: for readers that open their file themselves.
+std::string scratch_file(const std::string& name, std::string_view bytes);
+std::string scratch_folder();
+
+// What a reader's parts are separated by where its bytes stand for several files.
+inline constexpr std::string_view kSeparator = "\n====\n";
+// The parts; as many as asked for, the last ones empty where there are fewer.
+std::vector<std::string_view> parts(std::string_view bytes, std::size_t count);
 
 }  // namespace duet::fuzz

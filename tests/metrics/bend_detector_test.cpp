@@ -88,5 +88,19 @@ TEST(BendDetector, ForwardWithoutThePartnerComesFromTheShoulders) {
   EXPECT_FALSE(judge(s, {}, forward()).success);
 }
 
+// All is relative: neither the place in the room nor the height of the floor tells forwards from backwards.
+TEST(BendDetector, DirectionIsTheSameWhereverTheyStand) {
+  for (const Eigen::Vector3d& place : {Eigen::Vector3d(9.0, -4.0, 0.0), Eigen::Vector3d(-9.0, 4.0, 2.0)})
+    for (const double azimuth : {0.0, std::numbers::pi}) {
+      test::Scene s = bow(0.5, kFive, azimuth);
+      for (Eigen::Matrix3Xd* track :
+           {&s.performer.head, &s.performer.root, &s.performer.lshoulder, &s.performer.rshoulder, &s.partner.root})
+        track->colwise() += place;
+      EXPECT_EQ(judge(s, {}, forward()).success, azimuth == 0.0) << place.transpose();
+      s.partner.root.resize(3, 0);
+      EXPECT_EQ(judge(s, {}, forward()).success, azimuth == 0.0) << place.transpose();
+    }
+}
+
 }  // namespace
 }  // namespace duet

@@ -37,10 +37,19 @@ TEST(Catalogue, DirectionsFollowTheArrowsOfTheSupplement) {
   EXPECT_EQ(metric_info("root_angle_error").unit, "deg");
 }
 
+TEST(Catalogue, FiguresOfAReadingHaveTheirMetricsUnit) {
+  EXPECT_EQ(metric_of_reading("jerk_mean.links.diff").unit, "m/s^3");
+  EXPECT_EQ(metric_of_reading("contact_f1_0.35.source_frame").name, "contact_f1_0.35");
+  EXPECT_EQ(metric_of_reading("jpe.pelvis").name, "jpe.pelvis");
+  EXPECT_EQ(metric_of_reading("awd.with_hands.full").name, "awd");
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)metric_of_reading("jpee.world"); }),
+              HasSubstr("unknown metric 'jpee.world'"));
+}
+
 TEST(Catalogue, UnknownNamesAreRefusedWithTheNearest) {
   const std::string message = test::thrown_message<std::invalid_argument>([] { (void)metric_info("contact_f1_0.36"); });
   EXPECT_THAT(message, HasSubstr("'contact_f1_0.35'"));
-  EXPECT_THAT(message, HasSubstr("hf_ratio"));
+  EXPECT_THAT(message, HasSubstr("Nearest of"));  // of so many, not all
 }
 
 }  // namespace

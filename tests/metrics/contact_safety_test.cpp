@@ -153,10 +153,10 @@ TEST(ContactSafety, AShortPulseIsTransientOnly) {
 
 TEST(ContactSafety, HalfASecondIsTransientAndOneStepMoreIsHeld) {
   for (const double dt : {0.001, 0.002, 0.005}) {
-    const RegionContact& chest = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5), dt).regions[0];
+    const RegionContact chest = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5), dt).regions[0];
     EXPECT_EQ(chest.quasi_static_force, 0.0) << dt;
     EXPECT_EQ(chest.transient_contacts, 1) << dt;
-    const RegionContact& longer = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5 + dt), dt).regions[0];
+    const RegionContact longer = fed(1.0, pulse(kChestA, 50.0, 0.0, 0.5 + dt), dt).regions[0];
     EXPECT_EQ(longer.quasi_static_force, 50.0) << dt;
     EXPECT_EQ(longer.transient_contacts, 0) << dt;
   }

@@ -96,5 +96,11 @@ TEST(GeometryMetrics, RefuseShapesThatDisagreeAndValuesThatAreNotFinite) {
   EXPECT_THAT(of([&] { (void)awd(a, a, a, random_points(4, 4, 1)); }), HasSubstr("awd: robot has 4 frames of 4"));
 }
 
+TEST(Awd, OfOnePointHasNoDistancesWithin) {
+  const PointTracks a = random_points(5, 1, 4), b = random_points(5, 1, 5), c = random_points(5, 1, 6);
+  EXPECT_EQ(awd(a, b, a, c, AwdEntries::kWithin), 0.0);
+  EXPECT_GT(awd(a, b, a, c, AwdEntries::kCross), 0.0);
+}
+
 }  // namespace
 }  // namespace duet

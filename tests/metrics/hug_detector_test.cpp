@@ -57,6 +57,18 @@ TEST(HugDetector, BoundariesAreStrict) {
   EXPECT_FALSE(shoulder(hug(0.25, 0.25, 5), HugShoulder::kTorsoBoth, {{"shoulder", 0.25}}));
 }
 
+// The shoulder embrace is decided by the farther hand: its figure is printed beside the nearer one's.
+TEST(HugDetector, BothHandsFiguresAreThoseThatDecide) {
+  HugScene s = hug(0.2, 0.35, 5);
+  s.partner.lshoulder = s.partner.torso;
+  const DetectorResult result = judge(s, {}, HugSingle::kOff, HugShoulder::kBothHands);
+  EXPECT_DOUBLE_EQ(result.values.at("shoulder_distance_min"), 0.2);
+  EXPECT_DOUBLE_EQ(result.values.at("shoulder_distance_both_min"), 0.35);
+  EXPECT_DOUBLE_EQ(result.values.at("torso_distance_min"), 0.2);
+  EXPECT_DOUBLE_EQ(result.values.at("torso_distance_both_min"), 0.35);
+  EXPECT_NEAR(result.margins.at("shoulder"), 0.4 - result.values.at("shoulder_distance_both_min"), 1e-15);
+}
+
 TEST(HugDetector, FramesMustBeConsecutive) {
   HugScene s = hug(0.2, 0.2, 5);
   s.performer.lhand.col(2) = Eigen::Vector3d(0.0, kFar, 0.0);

@@ -132,6 +132,31 @@ TEST(RetargetingMetrics, AreUndefinedWithoutContact) {
   EXPECT_EQ(metrics.at("contact_accuracy_0.5"), 1.0);
 }
 
+// Motions of other retargeters say nothing of a reshaped person.
+TEST(RetargetingMetrics, WithoutAReshapedPersonJpeAloneIsUndefined) {
+  PairedMotion motion = faithful(20);
+  const std::map<std::string, double> whole = retargeting_metrics(motion, g1());
+  motion.reshaped = {};
+  for (const auto& [name, value] : retargeting_metrics(motion, g1())) {
+    if (name == "jpe") {
+      EXPECT_TRUE(std::isnan(value));
+    } else {
+      EXPECT_TRUE(value == whole.at(name) || (std::isnan(value) && std::isnan(whole.at(name)))) << name;
+    }
+  }
+  const std::map<std::string, double> readings = retargeting_metrics_all_readings(motion, g1());
+  EXPECT_TRUE(std::isnan(readings.at("jpe.pelvis")));
+  EXPECT_TRUE(std::isfinite(readings.at("awd.full")));
+}
+
+TEST(RetargetingMetrics, OfTheRobotAloneAreThoseOfThePair) {
+  const PairedMotion motion = faithful(20);
+  const std::map<std::string, double> whole = retargeting_metrics(motion, g1());
+  const std::map<std::string, double> alone = motion_metrics(motion.robot, g1());
+  EXPECT_EQ(alone.size(), 4u);
+  for (const auto& [name, value] : alone) EXPECT_EQ(value, whole.at(name)) << name;
+}
+
 TEST(RetargetingMetrics, RefuseMotionsThatDisagree) {
   const auto of = [](const PairedMotion& motion) {
     return test::thrown_message<std::invalid_argument>([&] { (void)retargeting_metrics(motion, g1()); });

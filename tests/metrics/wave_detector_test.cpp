@@ -173,5 +173,20 @@ TEST(WaveDetector, FrameReadings) {
   EXPECT_NEAR(judge(s, {}, root).values.at("height"), 0.6, 1e-12);
 }
 
+// The hand is at 0.6 m over the root but for the frames named.
+TEST(WaveDetector, MedianHeightIsTheMiddleOneOrTheMeanOfTheTwoInTheMiddle) {
+  DetectorReadings median;
+  median.wave_height = WaveHeight::kActiveMedian;
+  const auto height = [&](const std::vector<double>& heights) {
+    const auto frames = static_cast<int>(heights.size());
+    test::Scene s{test::standing({0.0, 0.0, 1.0}, 1.0, frames), test::standing({2.0, 0.0, 1.0}, -1.0, frames)};
+    for (int t = 0; t < frames; ++t) s.performer.rhand.col(t) = Eigen::Vector3d(0.1 * t, 0.0, 1.0 + heights[t]);
+    return judge(s, {}, median).values.at("height");
+  };
+  EXPECT_NEAR(height({0.9, 0.1, 0.5}), 0.5, 1e-12);
+  EXPECT_NEAR(height({0.9, 0.1, 0.5, 0.7}), 0.6, 1e-12);
+  EXPECT_NEAR(height({0.1, 0.2, 0.3, 0.9, 1.0, 1.1}), 0.6, 1e-12);
+}
+
 }  // namespace
 }  // namespace duet

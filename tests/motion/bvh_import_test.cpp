@@ -17,6 +17,7 @@ using test::BvhWriter;
 using test::thrown_message;
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // The files hold 12 digits of lengths of the size of 1 m.
 constexpr double kDigits = 1e-10;
@@ -62,6 +63,12 @@ TEST(BvhImport, AnUnlikelyStatureNeedsTheUnitStated) {
   const BvhImport result = import_pair(writer, {.metres_per_unit = 0.005});
   EXPECT_NEAR(result.clip.a.joints.at(0, kPelvis).z(), 0.93, kDigits);
   EXPECT_THAT(result.verdict, Contains(HasSubstr("unit: 0.005 m (as told")));
+}
+
+TEST(BvhImport, PeopleThatAreNotAsExpectedAreInTheVerdict) {
+  EXPECT_THAT(import_pair({}).verdict, Not(Contains(HasSubstr("not as expected"))));
+  EXPECT_THAT(import_pair({}, {.metres_per_unit = 0.5}).verdict,
+              Contains(HasSubstr("not as expected: person A measures")));
 }
 
 TEST(BvhImport, UpAxisIsToldFromHeadsAboveFeet) {

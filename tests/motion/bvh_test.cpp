@@ -86,7 +86,7 @@ TEST(Bvh, RefusalsNameFileLineExpectedAndFound) {
   const std::vector<BadText> cases = {
       {"", "x.bvh:1: start of the file: expected 'HIERARCHY', found the end of the text"},
       {"\n\n  \n", "x.bvh:4: start of the file: expected 'HIERARCHY'"},
-      {"PK\x03\x04", "x.bvh:1: start of the file: expected 'HIERARCHY', found 'PK?\?'"},
+      {"PK\x03\x04", "x.bvh:1: start of the file: expected 'HIERARCHY', found 'PK\\x03\\x04'"},
       {"HIERARCHY\nJOINT a", "x.bvh:2: HIERARCHY: expected 'ROOT', found 'JOINT'"},
       {"HIERARCHY\nROOT\n{", "x.bvh:3: expected the name of a joint, found '{'"},
       {"HIERARCHY\nROOT a\nOFFSET 0 0 0", "x.bvh:3: joint 'a': expected '{', found 'OFFSET'"},

@@ -220,10 +220,24 @@ TEST(InteractionClip, ReadingNamesFileKeyAndFault) {
 
 TEST(InteractionClip, EveryMissingKeyIsNamed) {
   const std::string good = clip_bytes(two_people());
-  for (const std::string key : {"schema", "schema_version", "id", "task", "reactor", "phases", "rate_hz",
-                                "human_joint_names", "a_joints", "b_joints"})
+  for (const std::string key :
+       {"schema", "schema_version", "id", "task", "reactor", "rate_hz", "human_joint_names", "a_joints", "b_joints"})
     EXPECT_THAT(thrown_message<InputError>([&] { (void)parse_clip(without_key(good, key), "part.npz"); }),
                 HasSubstr("'" + key + "'"));
+}
+
+// A clip of which either person was replaced is two clips, in one run too.
+TEST(InteractionClip, AnotherReactorIsAnotherIdAndBackAgain) {
+  InteractionClip clip = two_people();
+  clip.reactor = Person::kB;
+  clip.id = "pair_7";
+  set_reactor(clip, Person::kB);
+  EXPECT_EQ(clip.id, "pair_7");
+  set_reactor(clip, Person::kA);
+  EXPECT_EQ(clip.id, "pair_7-A");
+  EXPECT_EQ(clip.reactor, Person::kA);
+  set_reactor(clip, Person::kB);
+  EXPECT_EQ(clip.id, "pair_7");
 }
 
 TEST(InteractionClip, EmptyAndTruncatedFilesAreRefused) {

@@ -76,7 +76,7 @@ TEST(DenseKernels, GemvOfHalvesEqualsDoubleForAnyNumberOfRows) {
     const Eigen::Matrix<Eigen::half, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W =
         random_matrix(rows, cols, 4).cast<Eigen::half>();
     const Eigen::VectorXd product = W.cast<double>() * x.cast<double>();
-    std::vector<std::uint16_t> halves((rows + kHalfRows - 1) / kHalfRows * kHalfRows * static_cast<size_t>(cols), 0);
+    std::vector<std::uint16_t> halves(half_size(rows, cols), 0);
     for (int row = 0; row < rows; ++row)
       for (int c = 0; c < cols; ++c) halves[half_index(row, c, cols)] = W(row, c).x;
     for (const DenseKernels* kernels : levels()) {

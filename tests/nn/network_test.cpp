@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "core/file.h"
 #include "core/require.h"
@@ -63,7 +65,6 @@ TEST(Network, UnitreeEqualsOnnxRuntimeOverThreeStepsAndAfterReset) {
   const std::string path = test::shared_file("models/unitree_rl_gym_g1_motion.pt");
   if (path.empty()) GTEST_SKIP() << "not run: unitree_rl_gym_g1_motion.pt absent";
   for (const std::string& engine : network_engines()) {
-    if (engine == "onnxruntime") continue;  // reads no TorchScript
     const auto network = load_network(path, engine);
     for (int episode = 0; episode < 2; ++episode, network->reset())
       for (const std::vector<float>& step : kMotion)
@@ -148,6 +149,18 @@ TEST(Network, TruncatedPoliciesAreRefused) {
       write_file(folder / "cut", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
       EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "cut"); }), HasSubstr("cut'")) << name;
     }
+  }
+}
+
+// A header of up to 4 GiB is one of a safetensors file, and then what is missing is said in its words.
+TEST(Network, AHeaderLengthOfFourGibibytesIsStillSafetensors) {
+  const test::ScratchFolder folder;
+  for (const std::uint64_t length : {std::uint64_t{1} << 32, (std::uint64_t{1} << 32) + 1}) {
+    std::string bytes(9, '{');
+    std::memcpy(bytes.data(), &length, sizeof length);
+    write_file(folder / "network", bytes);
+    const std::string message = test::thrown_message<InputError>([&] { load_network(folder / "network"); });
+    EXPECT_EQ(message.find("header") != std::string::npos, length == std::uint64_t{1} << 32) << message;
   }
 }
 

@@ -10,6 +10,7 @@
 
 #include "core/file.h"
 #include "core/require.h"
+#include "tests/deep_json.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -90,7 +91,8 @@ TEST(SafeTensors, HeadersThatAreNotOnesAreRefused) {
   EXPECT_THAT(refusal(""), HasSubstr("'net.safetensors': safetensors: expected 8 bytes of header length, found 0"));
   EXPECT_THAT(refusal(bytes_of<std::uint64_t>({~std::uint64_t{0}})),
               HasSubstr("expected a header of 18446744073709551615 bytes, found 0 (truncated?)"));
-  EXPECT_THAT(refusal(file_of("{\"w\":", "")), HasSubstr("expected a header in JSON"));
+  EXPECT_THAT(refusal(file_of("{\"w\":", "")), HasSubstr("safetensors: header: not valid JSON: parse error"));
+  EXPECT_THAT(refusal(file_of("{\"w\":" + test::deep_json() + "}", "")), HasSubstr(test::kTooDeep));
   EXPECT_THAT(refusal(file_of("[]", "")), HasSubstr("expected a JSON object as header, found array"));
   EXPECT_THAT(refusal(file_of(R"({"__metadata__":[]})", "")), HasSubstr("expected an object, found array"));
   EXPECT_THAT(refusal(file_of(R"({"__metadata__":{"a":1}})", "")), HasSubstr("'a': expected a string, found number"));

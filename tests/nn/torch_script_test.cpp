@@ -117,7 +117,7 @@ TEST(TorchScript, UnitreesPolicyEqualsTheFormula) {
   const std::string path = shared_file("models/unitree_rl_gym_g1_motion.pt");
   if (path.empty()) GTEST_SKIP() << "not run: unitree_rl_gym_g1_motion.pt absent";
   std::vector<Operand> tensors(10);
-  read_zip(read_file(path), path, 1 << 20, [&](const std::string& entry, const std::string& content) {
+  read_zip(read_file(path), path, {1 << 20, 1 << 20}, [&](const std::string& entry, const std::string& content) {
     const std::size_t at = entry.find("/data/");
     if (at == std::string::npos) return;
     std::vector<float>& values = tensors[std::stoi(entry.substr(at + 6))].values;

@@ -46,10 +46,11 @@ TEST(DstarConfig, HasThePapersConditionOf1408) {
 TEST(DstarConfig, RefusesOtherFieldsAndValues) {
   const std::string start = "net: configuration of D-STAR: ";
   EXPECT_EQ(thrown_message<InputError>([] { parse_dstar_config("[1]", "net"); }),
-            start + "expected a JSON object, found other text");
-  EXPECT_EQ(thrown_message<InputError>([] { parse_dstar_config("{", "net"); }),
-            start + "expected a JSON object, found other text");
-  EXPECT_THAT(refusal("widht", 3), StartsWith(start + "unknown field 'widht': did you mean 'width'? Known: "));
+            start + "expected a JSON object, found array");
+  EXPECT_THAT(thrown_message<InputError>([] { parse_dstar_config("{", "net"); }),
+              StartsWith(start + "not valid JSON: parse error at line 1"));
+  EXPECT_THAT(refusal("widht", 3),
+              StartsWith(start + "unknown field 'widht': did you mean 'width'? Nearest of 30: width"));
   EXPECT_EQ(refusal("width", {}), start + "expected a field 'width', found none");
   EXPECT_EQ(refusal("short_stream", {}), start + "expected a field 'short_stream', found none");
   EXPECT_EQ(refusal("width", 0), start + "'width': expected a whole number from 1 to 8192, found 0");

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +11,7 @@
 #include "core/file.h"
 #include "core/require.h"
 #include "policies/dstar/network.h"
+#include "tests/deep_json.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"
 
@@ -131,6 +133,9 @@ TEST(DstarFile, RefusesHeadersThatAreNotOfThisNetworkAndRobot) {
             "'joints' in the header: expected a JSON list of texts, found something else");
   EXPECT_EQ(header_refusal("channels", "[1]"),
             "'channels' in the header: expected a JSON list of texts, found something else");
+  for (const char* key : {"joints", "channels", "notes"})
+    EXPECT_EQ(header_refusal(key, test::deep_json()), fmt::format("'{}' in the header: {}", key, test::kTooDeep));
+  EXPECT_EQ(header_refusal("config", test::deep_json()), std::string("configuration of D-STAR: ") + test::kTooDeep);
   EXPECT_EQ(header_refusal("joints", R"(["left_knee_joint"])"), "joints: expected 29 values, found 1");
   EXPECT_EQ(header_refusal("channels", "[]"), "channels: expected 149 values, found 0");
   EXPECT_EQ(header_refusal("notes", "[]"),
@@ -220,6 +225,25 @@ TEST(DstarFile, IsNotWrittenForWhatDoesNotFit) {
   EXPECT_FALSE(std::filesystem::exists(folder / "net"));
   EXPECT_THROW(save_dstar_network("/proc/none/net", *random_network(small_config()), TensorType::kF32),
                std::runtime_error);
+}
+
+// Of the paper's sizes, of sizes that all differ, and of the latter without short stream, phases and space: a size that
+// stands for another shows in one of them.
+TEST(DstarTensors, NumberAsManyWeightsAsTheyDid) {
+  const auto weights = [](const DstarConfig& config) {
+    std::int64_t sum = 0;
+    for (const TensorShape& tensor : dstar_tensors(config)) {
+      std::int64_t count = 1;
+      for (const std::int64_t size : tensor.shape) count *= size;
+      sum += count;
+    }
+    return sum;
+  };
+  DstarConfig least = test::small_config();
+  least.short_stream = least.phase_attention = least.spatial_reasoning = false;
+  EXPECT_EQ(weights({}), 3966551);
+  EXPECT_EQ(weights(test::small_config()), 34876);
+  EXPECT_EQ(weights(least), 21186);
 }
 
 }  // namespace

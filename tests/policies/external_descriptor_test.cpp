@@ -61,8 +61,9 @@ TEST(PolicyDescriptor, OfAProcessHasDefaults) {
   EXPECT_EQ(read.kind, PolicyKind::kProcess);
   EXPECT_EQ(read.command, (std::vector<std::string>{"python3", "mine.py"}));
   EXPECT_EQ(read.folder(), ".");
-  EXPECT_EQ(read.deadline_ms, 200);
-  EXPECT_EQ(read.start_ms, 10000);
+  EXPECT_EQ(read.deadline_ms, 0);  // none: a slow machine changes no result
+  EXPECT_EQ(read.hang_ms, 60000);
+  EXPECT_EQ(read.start_ms, 120000);
   EXPECT_EQ(read.output.anchors, kAnchors);
   EXPECT_EQ(read.output.ticks_per_anchor, 25);
   EXPECT_EQ(read.output.frame, PlanFrame::kWorld);
@@ -102,6 +103,8 @@ TEST(PolicyDescriptor, RefusesWhatItDoesNotUnderstand) {
             "mine.yaml:1: policy descriptor: expected one of 'command' and 'socket', found none");
   EXPECT_EQ(refusal(kProcess + "deadline_ms: 0\n"),
             "mine.yaml:6: policy descriptor: 'deadline_ms': expected a whole number in [1, 600000], found 0");
+  EXPECT_EQ(refusal(kProcess + "hang_ms: 1.5\n"),
+            "mine.yaml:6: policy descriptor: 'hang_ms': expected a whole number in [1, 600000], found 1.5");
 }
 
 TEST(PolicyDescriptor, JointsAreThoseOfTheRobotInAnyOrder) {

@@ -4,6 +4,7 @@
 
 #include "core/require.h"
 #include "policies/external/message.h"
+#include "tests/deep_json.h"
 #include "tests/policies/external_fixtures.h"
 
 namespace duet {
@@ -46,6 +47,20 @@ TEST(PolicyMessage, RefusesWhatIsNone) {
   EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":[[null]]})"), HasSubstr("expected numbers, found null"));
   EXPECT_THAT(refusal(R"({"type":"plan","tick":1e3,"anchors":[]})"), HasSubstr("'tick': expected a whole number"));
   EXPECT_THAT(refusal(R"({"type":"plan","tick":1,"anchors":[[-Infinity]]})"), HasSubstr("found Infinity"));
+}
+
+// 800 kB are below the limit of a message; the message of a value that deep once ended the program.
+TEST(PolicyMessage, RefusesWhatNestsWithoutEnd) {
+  const std::string expected = std::string("message of the policy: ") + test::kTooDeep;
+  EXPECT_EQ(refusal(R"({"type":"plan","tick":)" + test::deep_json() + R"(,"anchors":[]})"), expected);
+  EXPECT_EQ(refusal(R"({"type":"plan","tick":1,"anchors":)" + test::deep_json() + "}"), expected);
+  EXPECT_EQ(refusal(R"({"type":"hello","version":)" + test::deep_json() + "}"), expected);
+}
+
+TEST(PolicyMessage, SaysWhatIsWrongWithTextThatIsNoJson) {
+  EXPECT_THAT(refusal(R"({"type":"plan","tick":1e999,"anchors":[]})"), HasSubstr("number overflow parsing '1e999'"));
+  EXPECT_LT(refusal("\"" + std::string(400'000, 'x')).size(), 300U);
+  EXPECT_THAT(refusal(R"({"type":")" + std::string(400'000, 'x') + "\"}"), HasSubstr("xxx..."));
 }
 
 TEST(PolicyMessage, BuffersCutAStreamAtAnyPlace) {

@@ -51,13 +51,14 @@ class ProcessPolicyTest : public ::testing::Test {
     EXPECT_EQ(errno, ECHILD);
   }
 
-  // `script` after the import of duet_policy's functions, with `c` connected and the observations' first answers given.
+  // `deadline_ms` 0: none. `script` after the import of duet_policy's functions, with `c` connected and the
+  // observations' first answers given.
   Policy& start(const std::string& script, int deadline_ms = 5000, int start_ms = 20000) {
     write_file(folder_ / "policy.py", "import json, os, signal, socket, struct, sys, time\nsys.path.insert(0, '" +
                                           examples() + "')\nfrom duet_policy import read, write\n" +
                                           "c = socket.socket(fileno=int(os.environ['DUET_POLICY_FD']))\n" + script);
-    write_descriptor(
-        fmt::format("command: [python3, policy.py]\ndeadline_ms: {}\nstart_ms: {}\n", deadline_ms, start_ms));
+    write_descriptor(fmt::format("command: [python3, policy.py]\n{}start_ms: {}\n",
+                                 deadline_ms > 0 ? fmt::format("deadline_ms: {}\n", deadline_ms) : "", start_ms));
     policy_ = make_policy(folder_ / "policy.yaml", g1());
     policy_->reset(test::episode(history_.at(0).now().robot));
     return *policy_;
@@ -130,6 +131,38 @@ TEST_F(ProcessPolicyTest, LateCostsThatPlanAndTheLateAnswerIsDropped) {
   EXPECT_NEAR(references[0].X_WB.p.x(), 0.0, kFloat);
   EXPECT_EQ(policy_->faults().late, 1);
   EXPECT_FALSE(policy_->faults().dead);
+}
+
+// In lock-step simulation the clock of the wall decides nothing unless the descriptor says so.
+TEST_F(ProcessPolicyTest, WithoutADeadlineASlowPlanIsWaitedFor) {
+  start(polite("time.sleep(0.5)\nplan(m)\nread(c)\n"), 0);
+  EXPECT_EQ(plan(0), 100U);
+  EXPECT_FALSE(policy_->faults().any());
+}
+
+TEST_F(ProcessPolicyTest, WithoutADeadlineSilenceEndsItAtTheHangLimit) {
+  start(polite("time.sleep(1000)\n"), 0);
+  policy_ = make_policy(folder_ / "policy.yaml", g1(), {{"hang_ms", "100"}});
+  policy_->reset(test::episode(history_.at(0).now().robot));
+  EXPECT_EQ(plan(0), 0U);
+  EXPECT_TRUE(policy_->faults().dead);
+  EXPECT_EQ(policy_->faults().late, 0);
+  EXPECT_EQ(policy_->faults().message, "policy 'mine': no plan for tick 0 within 100 ms");
+}
+
+// Ctrl-C is heard while a program is silent, and is no fault of it.
+TEST_F(ProcessPolicyTest, AStopEndsEveryWaitWithoutAFault) {
+  EpisodeContext stopped = test::episode(history_.at(0).now().robot);
+  stopped.stop_asked = [] { return true; };
+  start(polite("time.sleep(1000)\n"), 0);
+  policy_->reset(stopped);
+  EXPECT_EQ(plan(0), 0U);
+  EXPECT_FALSE(policy_->faults().any());
+  write_file(folder_ / "policy.py", "import time\ntime.sleep(1000)\n");
+  policy_ = make_policy(folder_ / "policy.yaml", g1());
+  policy_->reset(stopped);
+  EXPECT_EQ(plan(0), 0U);
+  EXPECT_FALSE(policy_->faults().any());
 }
 
 // A program that reads nothing: the socket fills, no call blocks.
@@ -233,6 +266,12 @@ TEST_F(ProcessPolicyTest, SilenceAtHelloEndsIt) {
   EXPECT_EQ(policy_->faults().message, "policy 'mine': no answer to 'hello' within 100 ms");
 }
 
+TEST_F(ProcessPolicyTest, SilenceAtResetEndsItAndIsQuotedOnce) {
+  start("read(c)\nwrite(c, {'type': 'hello', 'version': 1})\ntime.sleep(1000)\n", 200, 4000);
+  EXPECT_TRUE(policy_->faults().dead);
+  EXPECT_EQ(policy_->faults().message, "policy 'mine': no answer to 'reset' within 4000 ms");
+}
+
 TEST_F(ProcessPolicyTest, AnotherVersionOrOrderOfJointsEndsIt) {
   start("read(c)\nwrite(c, {'type': 'hello', 'version': 2})\nread(c)\n");
   EXPECT_EQ(policy_->faults().message, "policy 'mine': hello: expected version 1 of the messages, found 2");
@@ -252,6 +291,7 @@ TEST_F(ProcessPolicyTest, AnotherFirstAnswerEndsIt) {
 TEST_F(ProcessPolicyTest, AScriptThatIsNotThereEndsIt) {
   write_descriptor("command: [python3, none.py]\n");
   policy_ = make_policy(folder_ / "policy.yaml", g1());
+  policy_->reset(test::episode(history_.at(0).now().robot));  // hello is said here
   EXPECT_EQ(policy_->faults().message, "policy 'mine': its process ended with exit status 2");
   write_descriptor("command: [no_such_program]\n");
   EXPECT_EQ(thrown_message<MissingError>([&] { policy_maker(folder_ / "policy.yaml", g1()); }),
@@ -267,7 +307,9 @@ TEST_F(ProcessPolicyTest, OptionsSetItsTimes) {
               policy_maker(folder_ / "policy.yaml", g1(), {{"deadline_ms", "soon"}});
             }),
             "policy 'mine': deadline_ms: expected a whole number in [1, 600000], found 'soon'");
-  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(0).fallback, "200");
+  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(0).fallback, "");
+  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(1).fallback, "60000");
+  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(2).fallback, "120000");
 }
 
 TEST_F(ProcessPolicyTest, APlanOfAnEarlierEpisodeIsDropped) {

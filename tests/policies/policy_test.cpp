@@ -175,5 +175,42 @@ TEST(DenseReplay, LosesNothing) {
   for (const double rate_hz : {0.5, 1.0, 3.0}) EXPECT_NEAR(swing_left("replay_dense", rate_hz), 1.0, kAlgebra);
 }
 
+// Two plans that begin at one tick end at one tick, whether made of anchors or of ticks.
+TEST(DenseReplay, PlansAsFarAheadAsFiveAnchorsReach) {
+  const RobotMotion motion = swinging_motion(300, 1);
+  const auto sparse = make_policy("replay", g1()), dense = make_policy("replay_dense", g1());
+  EpisodeContext context;
+  context.hindsight = &motion;
+  sparse->reset(context);
+  dense->reset(context);
+  for (const int tick : {0, 40}) {
+    const std::vector<Reference> plan = dense->plan({.history = {}, .tick = tick});
+    EXPECT_EQ(plan.size(), sparse->plan({.history = {}, .tick = tick}).size());
+    EXPECT_TRUE(same(plan.front(), motion.reference(tick)));
+    EXPECT_TRUE(same(plan.back(), motion.reference(tick + static_cast<int>(plan.size()) - 1)));
+  }
+}
+
+TEST(Observation, IsFiniteWhereEveryNumberOfItIs) {
+  const auto finite = [](const auto& spoil) {
+    std::vector<ObservationFrame> frames(3);
+    for (ObservationFrame& frame : frames) {
+      frame.partner.setZero();
+      frame.robot = g1()->standing_state(Pose{});
+    }
+    spoil(frames.back());
+    return is_finite(Observation{.history = frames, .tick = 0});
+  };
+  const double nan = std::nan("");
+  EXPECT_TRUE(finite([](ObservationFrame&) {}));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.partner(2, 23) = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.X_WB.p.z() = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.X_WB.R.x() = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.v_WB.x() = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.w_WB_B.y() = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.q[0] = nan; }));
+  EXPECT_FALSE(finite([&](ObservationFrame& frame) { frame.robot.v[28] = nan; }));
+}
+
 }  // namespace
 }  // namespace duet

@@ -37,6 +37,8 @@ TEST(Certificate, IsReadTolerantly) {
   EXPECT_THAT(certificate_markdown({{"engines", "none"}}), HasSubstr("It names no engine."));
   EXPECT_THAT(certificate_markdown("yes"), HasSubstr("is no JSON object and is not shown"));
   EXPECT_THAT(certificate_markdown({{"effort", "a\xff"}}), HasSubstr("digest"));
+  EXPECT_THAT(certificate_markdown({{"effort", "<img src=x>\x1b[0m\n# no"}}),
+              HasSubstr("Effort &lt;img src=x>\\x1b[0m # no, made"));
 }
 
 TEST(Certificate, NamesEnginesThatItDoesNotCoverAsTheyWereRun) {

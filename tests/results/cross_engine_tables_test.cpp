@@ -208,5 +208,24 @@ TEST(EnginePlot, HasALinePerEngineAndABarForTheMean) {
   EXPECT_THAT(engine_plot_svg({}), testing::EndsWith("</svg>\n"));
 }
 
+// Numbers after `name` ("width=\"") in the order in which they occur.
+std::vector<double> numbers_after(const std::string& text, const std::string& name) {
+  std::vector<double> values;
+  for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at + 1))
+    values.push_back(std::stod(text.substr(at + name.size())));
+  return values;
+}
+
+TEST(EnginePlot, HasRoomForTheWidestRate) {
+  std::vector<EpisodeRow> rows = benchmark();
+  for (EpisodeRow& row : rows) row.success = true;  // "mean 100.0 [100.0, 100.0]"
+  const std::string svg = engine_plot_svg(compared(rows));
+  const std::size_t label = svg.find(">mean 100.0 [100.0, 100.0]<");
+  ASSERT_NE(label, std::string::npos);
+  const double left = numbers_after(svg.substr(svg.rfind("<text", label)), "x=\"").front();
+  constexpr double kWidestCharacter = 7.4;  // of common fonts at 13 px, digits [px]
+  EXPECT_GE(numbers_after(svg, "width=\"").front(), left + kWidestCharacter * 25);
+}
+
 }  // namespace
 }  // namespace duet

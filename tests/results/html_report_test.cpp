@@ -91,6 +91,19 @@ TEST(HtmlReport, EscapesEveryText) {
                           HasSubstr("Tiny &lt;run&gt; &amp; &quot;more&quot;")));
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_EQ(escape_html("<a b=\"c\">&'"), "&lt;a b=&quot;c&quot;&gt;&amp;&#39;");
+  EXPECT_EQ(escape_html("clip \x1b[31m7"), "clip \\x1b[31m7");
+}
+
+TEST(HtmlReport, APolicyThatDiedIsNamedAndCounted) {
+  ReportContent tiny = content();
+  EXPECT_THAT(html_report(tiny), Not(HasSubstr("Plans lost")));
+  for (LeaderboardEntry& entry : tiny.entries) {
+    if (entry.policy == "null") continue;
+    entry.policy_dead = 2;
+    entry.policy_fault = "its process ended with <exit> status 2";
+  }
+  EXPECT_THAT(html_report(tiny), AllOf(HasSubstr("Plans lost"), HasSubstr("<td data-v=\"2\">dead in 2</td>"),
+                                       HasSubstr("ended with &lt;exit&gt; status 2")));
 }
 
 TEST(HtmlReport, ShowsMachineNotesTablesAndClips) {
@@ -112,6 +125,17 @@ std::vector<EpisodeRow> two_engines() {
     }
   }
   return rows;
+}
+
+// At 420 px the engine's and the controller's columns would leave no room for the success.
+TEST(HtmlReport, NarrowScreensHaveTheSuccessBesideThePolicy) {
+  ReportContent shown = content();
+  shown.entries = leaderboard(two_engines());
+  const std::string html = html_report(shown);
+  EXPECT_THAT(html,
+              AllOf(HasSubstr("@media(max-width:600px)"), HasSubstr(".context{display:none}.where{display:block}"),
+                    HasSubstr("<td class=\"l context\">"),
+                    HasSubstr("<th scope=\"row\" class=\"l\">replay<span class=\"where\">ode</span></th>")));
 }
 
 TEST(HtmlReport, HasASectionAcrossEngines) {
@@ -245,6 +269,13 @@ EpisodeRow walking(const std::string& controller, int number, Outcome outcome) {
   row.metrics = {{"hf_ratio", 0.25}};
   row.feet = {.rate_hz = 25.0, .left_mm = {0, 60, 0}, .right_mm = {50, 0, 40}};
   return row;
+}
+
+TEST(HtmlReport, TrainingStandsBelowTheResults) {
+  ReportContent shown = content();
+  shown.curves = {parse_curves("steps,return\n0,1\n10,2\n", "curves.csv")};
+  const std::string html = html_report(shown);
+  EXPECT_GT(html.find("id=\"training\""), html.find("id=\"clips\""));
 }
 
 TEST(HtmlReport, ShowsControllersStepsAndTraining) {

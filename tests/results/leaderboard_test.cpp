@@ -7,6 +7,7 @@
 
 #include "core/require.h"
 #include "results/interval_plot.h"
+#include "results/leaderboard_rows.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -197,9 +198,64 @@ TEST(LeaderboardMarkdown, MetricsOfSeveralEnginesAreATableEach) {
   EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("all tasks:\n\n| Metric | replay |\n"));
 }
 
+// A policy that does not play is no policy that scores 0.
+std::vector<EpisodeRow> rows_of_a_dead_and_a_late_policy() {
+  std::vector<EpisodeRow> rows = {episode("good", "hug", 0, true), episode("evil", "hug", 0, false),
+                                  episode("evil", "hug", 1, false), episode("late", "hug", 0, false)};
+  for (int i : {1, 2}) {
+    rows[i].outcome = Outcome::kError;
+    rows[i].policy_faults = {.late = 0, .invalid = i, .dead = true, .message = "policy 'evil': it ended"};
+  }
+  rows[3].policy_faults = {.late = 13, .invalid = 0, .dead = false, .message = "no plan for tick 0\x1b[31m"};
+  return rows;
+}
+
+TEST(Leaderboard, PlansThatWereLostStandInEveryTable) {
+  const std::vector<LeaderboardEntry> entries = leaderboard(rows_of_a_dead_and_a_late_policy());
+  EXPECT_EQ(plans_lost(entry_of(entries, "evil", "all")), "3 invalid, dead in 2");
+  EXPECT_EQ(plans_lost(entry_of(entries, "late", "all")), "13 late");
+  EXPECT_EQ(plans_lost(entry_of(entries, "good", "all")), "0");
+  const std::string text = leaderboard_markdown(entries);
+  EXPECT_THAT(text, AllOf(HasSubstr("Plans lost |"), HasSubstr("3 invalid, dead in 2 |"), HasSubstr("13 late |")));
+  EXPECT_THAT(
+      text,
+      HasSubstr(
+          "Policy 'evil' lost plans (in 2 episodes: 3 invalid, dead in 2, which are errors and count as failures). "
+          "The first fault: policy 'evil': it ended\n"));
+  EXPECT_THAT(text, HasSubstr("The first fault: no plan for tick 0\\x1b[31m\n"));
+  EXPECT_THAT(leaderboard_latex(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("% Policy 'late' lost plans")));
+  EXPECT_THAT(leaderboard_csv(entries),
+              AllOf(HasSubstr("plans_late,plans_invalid,policy_dead"), HasSubstr(",0,3,2\r\n")));
+  const nlohmann::json json = leaderboard_json(entries);
+  for (const nlohmann::json& entry : json.at("entries"))
+    if (entry.at("policy") == "evil" && entry.at("task") == "all") {
+      EXPECT_EQ(entry.at("policy_dead"), 2);
+      EXPECT_EQ(entry.at("plans_invalid"), 3);
+      EXPECT_EQ(entry.at("policy_fault"), "policy 'evil': it ended");
+    }
+}
+
+TEST(Leaderboard, WithoutAFaultThereIsNoColumnForPlans) {
+  const std::vector<LeaderboardEntry> entries = leaderboard({episode("good", "hug", 0, true)});
+  EXPECT_THAT(leaderboard_markdown(entries), Not(HasSubstr("lost")));
+  EXPECT_THAT(leaderboard_latex(entries), Not(HasSubstr("lost")));
+}
+
+TEST(LeaderboardMarkdown, CaptionsAndNotesOfRowsAreEscapedToo) {
+  EpisodeRow row = episode("p", "hug", 0, true);
+  row.engine = "<script>x</script>\x1b[2J";
+  const std::string text = leaderboard_markdown(leaderboard({row}));
+  EXPECT_THAT(text, HasSubstr("Engine &lt;script>x&lt;/script>\\x1b[2J"));
+  EXPECT_THAT(text, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("\x1b"))));
+  row.controller = "a\n\\end{document}";
+  EXPECT_THAT(leaderboard_latex(leaderboard({row})), Not(HasSubstr("\n\\end{document}")));
+}
+
 TEST(LeaderboardMarkdown, EscapesNames) {
   std::vector<EpisodeRow> rows = {episode("a|b\n<c> <5", "hug", 0, true)};
   EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("a\\|b &lt;c> <5"));
+  rows = {episode("a\x1b[31m\r", "hug", 0, true)};
+  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("| a\\x1b[31m"));
   EXPECT_EQ(leaderboard_markdown({}), "No episodes.\n");
 }
 

@@ -103,6 +103,13 @@ TEST(TrainingCurves, ColumnsByHeaderAgainstTheFirst) {
   EXPECT_THAT(line_plot_svg(plots[1]), HasSubstr("<svg"));
 }
 
+TEST(TrainingCurves, LevelColumnsAndASecondClockAreNotDrawn) {
+  const std::vector<LinePlot> plots =
+      curve_plots(parse_curves("steps,minutes,return,loss\n0,0.1,1,0\n10,0.2,2,0\n", "c.csv"));
+  ASSERT_EQ(plots.size(), 1U);
+  EXPECT_EQ(plots[0].y_label, "return");
+}
+
 TEST(TrainingCurves, BadInputIsNamedByFileLineAndColumn) {
   const auto refusal = [](const char* csv) { return thrown_message<InputError>([&] { parse_curves(csv, "c.csv"); }); };
   EXPECT_EQ(refusal("steps,return\n1,x\n"), "c.csv:2: column 'return': expected a number, found 'x'");

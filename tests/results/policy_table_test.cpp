@@ -124,6 +124,20 @@ TEST(PolicyTable, APolicyThatCouldNotRunIsNamedAndHasNoFigure) {
   EXPECT_THAT(policy_table_markdown(table), HasSubstr("no_language could not run (2 episodes)"));
 }
 
+TEST(PolicyTable, APolicyThatDiedIsNamedBelowIt) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.policy = "mine", .successes = "00"}, rows);
+  rows[1].policy_faults = {.late = 0, .invalid = 0, .dead = true, .message = "its process ended with signal 9"};
+  rows[1].outcome = Outcome::kError;
+  const PolicyTable table = policy_table(rows);
+  const std::string note =
+      "Policy 'mine' lost plans (in 2 episodes: dead in 1, which are errors and count as failures). The first fault: "
+      "its process ended "
+      "with signal 9";
+  EXPECT_THAT(policy_table_markdown(table), HasSubstr(note));
+  EXPECT_EQ(policy_table_json(table).at("faults").at(0), note);
+}
+
 TEST(PolicyTable, ThePapersRowsStandUnderThePapersDetectorsAlone) {
   std::vector<EpisodeRow> rows = two_policies();
   add_episodes({.task = "wave", .successes = "11"}, rows);

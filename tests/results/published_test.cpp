@@ -7,6 +7,7 @@
 #include "core/file.h"
 #include "core/require.h"
 #include "results/run_directory.h"
+#include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -80,6 +81,23 @@ TEST_F(Published, AChangedFileIsRefusedByName) {
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(folder); }), HasSubstr("env.json"));
   write_file(folder + "/manifest.json", R"({"schema": "duet.published/2", "files": {}})");
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(folder); }), HasSubstr("expected schema duet.published/1"));
+}
+
+TEST_F(Published, AManifestThatNestsWithoutEndIsRefused) {
+  const std::string folder = scratch_ / "tiny";
+  publish_run(scratch_ / "run", folder);
+  write_file(folder + "/manifest.json", "{\"schema\":" + test::deep_json() + "}");
+  EXPECT_EQ(thrown_message<InputError>([&] { load_run(folder); }),
+            folder + "/manifest.json: " + std::string(test::kTooDeep));
+}
+
+TEST_F(Published, AManifestThatNamesFilesElsewhereIsRefused) {
+  const std::string folder = scratch_ / "tiny";
+  publish_run(scratch_ / "run", folder);
+  write_file(folder + "/manifest.json",
+             R"({"schema": "duet.published/1", "files": {"episodes.jsonl": "", "../../secret": ""}})");
+  EXPECT_EQ(thrown_message<InputError>([&] { load_run(folder); }),
+            folder + "/manifest.json: key 'files': expected names of files in the folder, found '../../secret'");
 }
 
 TEST_F(Published, DoesNotGrow) {

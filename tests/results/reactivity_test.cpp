@@ -144,5 +144,9 @@ TEST(Reactivity, TheSameEpisodeTwiceIsRefused) {
   EXPECT_THAT(thrown_message<InputError>([&] { reactivity_table(rows); }), HasSubstr("is there twice"));
 }
 
+TEST(Reactivity, TheNoteNamesTheLevelOfItsIntervals) {
+  EXPECT_THAT(reactivity_markdown(reactivity_table(shifted("dstar", 1.0))), HasSubstr("with a 95 % interval"));
+}
+
 }  // namespace
 }  // namespace duet

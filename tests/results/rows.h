@@ -17,6 +17,8 @@ inline RunInfo tiny_run() {
   info.argv = {"duet", "run", "tiny.yaml"};
   info.created_at = "2026-01-02T03:04:05Z";
   info.environment = {{"machine", "a machine"}};
+  info.policies = {{"null", ""}, {"replay", ""}};
+  info.controllers = {{"vmc", ""}};
   return info;
 }
 
@@ -35,7 +37,10 @@ inline EpisodeRow full_row() {
   row.engine_profile = "parity";
   row.profile_digest = std::string(64, 'd');
   row.controller = "wbc-sim";
+  row.controller_digest = std::string(64, 'e');
   row.policy = "replay";
+  row.policy_digest = std::string(64, 'f');
+  row.detectors = "3";
   row.perturbation = "jitter_0.05";
   row.robot_digest = std::string(64, 'b');
   row.arm = "oracle";

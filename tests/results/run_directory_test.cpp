@@ -9,6 +9,7 @@
 
 #include "core/require.h"
 #include "results/environment.h"
+#include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -208,13 +209,46 @@ TEST(LoadRun, NamesFileAndLineOfABrokenRow) {
   nlohmann::json json = to_json(episode("replay", "hug", 1, true));
   json["extra"] = 1;
   EXPECT_THAT(with_line(json.dump()), AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("unknown key 'extra'")));
-  EXPECT_THAT(with_line(to_json(episode("replay", "hug", 0, true)).dump()),
+  EXPECT_THAT(with_line(to_json(episode("replay", "hug", 0, false)).dump()),
               AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("is already in line 1")));
   EpisodeRow foreign = episode("replay", "hug", 1, true);
   foreign.suite = "large";
   foreign.suite_hash = "fedcba9876543210";
+  foreign.key = episode_key(foreign);
   EXPECT_THAT(with_line(to_json(foreign).dump()),
               AllOf(HasSubstr("episodes.jsonl:2: "), HasSubstr("large@1.0.0"), HasSubstr("tiny@1.0.0")));
+  EpisodeRow renamed = episode("replay", "hug", 1, true);
+  renamed.policy = "mine";
+  EXPECT_THAT(with_line(to_json(renamed).dump()),
+              AllOf(HasSubstr("episodes.jsonl:2: key 'key': expected " + episode_key(renamed)),
+                    HasSubstr("found " + renamed.key + ": the row was changed")));
+  EpisodeRow other = episode("replay", "hug", 1, true);
+  other.policy_digest = std::string(64, 'b');
+  other.key = episode_key(other);
+  EXPECT_THAT(with_line(to_json(other).dump()),
+              AllOf(HasSubstr("policy 'replay' is absent in "), HasSubstr("episodes.jsonl:1 and bbbbbbbbbbbb in "),
+                    HasSubstr("episodes.jsonl:2: one name stands for one policy")));
+}
+
+TEST(RunDirectory, KeepsTheDigestsOfItsPoliciesAndRefusesOthers) {
+  const ScratchFolder scratch;
+  RunInfo info = tiny_run();
+  info.policies = {{"replay", std::string(64, 'a')}, {"absent", ""}};
+  RunDirectory::open(scratch / "run", info);
+  EXPECT_EQ(load_run(scratch / "run").info.policies, info.policies);
+  EXPECT_EQ(load_run(scratch / "run").info.controllers, info.controllers);
+  info.policies["absent"] = std::string(64, 'c');  // it has come since
+  EXPECT_EQ(RunDirectory::open(scratch / "run", info).size(), 0U);
+  info.policies["replay"] = std::string(64, 'b');
+  EXPECT_EQ(thrown_message<InputError>([&] { RunDirectory::open(scratch / "run", info); }),
+            "'" + (scratch / "run") + "' cannot be resumed: policy 'replay' is aaaaaaaaaaaa in " +
+                (scratch / "run/run.json") +
+                " and bbbbbbbbbbbb in this machine: one name stands for one policy; choose another folder");
+  nlohmann::json json = nlohmann::json::parse(read_file(scratch / "run/run.json"));
+  json["controllers"] = {{"vmc", 1}};
+  std::ofstream(scratch / "run/run.json", std::ios::trunc) << json;
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "run"); }),
+              HasSubstr("run.json: key 'controllers': expected an object of names and digests"));
 }
 
 TEST(LoadRun, RefusesWhatIsNoRun) {
@@ -232,6 +266,22 @@ TEST(LoadRun, RefusesWhatIsNoRun) {
   std::ofstream(scratch / "other/run.json", std::ios::trunc) << json;
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "other"); }),
               HasSubstr("run.json: key 'certificate': expected an object, found string"));
+}
+
+// Each document of a run, and the place of the value in it, as a stranger's run could bring it.
+TEST(LoadRun, RefusesJsonThatNestsWithoutEnd) {
+  const ScratchFolder scratch;
+  const auto refusal = [&](const std::string& file, const std::string& text) {
+    std::filesystem::remove_all(scratch / "run");
+    RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
+    write_file(scratch / ("run/" + file), text);
+    return thrown_message<InputError>([&] { load_run(scratch / "run"); });
+  };
+  for (const auto& [file, place] : std::map<std::string, std::string>{
+           {"episodes.jsonl", "episodes.jsonl:1: "}, {"run.json", "run.json: "}, {"env.json", "env.json: "}})
+    for (const std::string& text : {test::deep_json() + "\n", "{\"schema\":" + test::deep_json() + "}\n",
+                                    "{\"extra\":" + test::deep_json() + "}\n"})
+      EXPECT_THAT(refusal(file, text), AllOf(HasSubstr(place), HasSubstr(test::kTooDeep))) << file;
 }
 
 TEST(Environment, HasWhatResultsDependOnAndNamesNobody) {

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <ctime>
 #include <limits>
 
 #include "core/require.h"
@@ -249,6 +250,20 @@ TEST(PairTiming, CountsFramesAndNamesTheKernel) {
   EXPECT_THAT(test::thrown_message<std::invalid_argument>(
                   [&] { time_pair(test::random_clip(25, 15), test::g1(), options, 0); }),
               HasSubstr("at least one round"));
+}
+
+// Frames a second are of the fastest round: all rounds together took no less than that many times it.
+TEST(PairTiming, IsNoLongerThanWhatTheThreadSpent) {
+  const auto spent = [] {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  };
+  PairOptions options;
+  options.schedule = {.stage1_iterations = 1, .stage2_iterations = 1};
+  const double begin = spent();
+  const PairTiming timing = time_pair(test::random_clip(25, 15, 100.0), test::g1(), options, 3);
+  EXPECT_LE(3 * timing.frames * (1.0 / timing.solver + 1.0 / timing.whole), spent() - begin);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@
 namespace duet::test {
 
 inline const RobotModel& g1() {
-  static const RobotModel model = load_robot(std::string(DUET_SOURCE_DIR) + "/robots/g1/g1.yaml");
+  static const RobotModel model = load_robot(DUET_SOURCE_DIR "/robots/g1/g1.yaml");
   return model;
 }
 

@@ -9,7 +9,7 @@ struct Body {
   const char* card;
   const char* makers_urdf;  // of the shared reference data
   int dof;
-  double mass;  // [kg], reference/controllers.md
+  double mass;  // [kg], of the controller's own model
 };
 
 void PrintTo(const Body& body, std::ostream* out) { *out << body.card; }

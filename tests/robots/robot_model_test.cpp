@@ -20,9 +20,9 @@ TEST(RobotModel, FindsNamesAndRefusesOthers) {
   EXPECT_EQ(g1().track_frame("head"), g1().frame_index("head_link"));
   EXPECT_THAT(
       thrown_message<std::invalid_argument>([] { static_cast<void>(g1().joint_index("left_kne_joint")); }),
-      testing::StartsWith("unknown joint 'left_kne_joint': did you mean 'left_knee_joint'? Known: left_hip_pi"));
+      testing::StartsWith("unknown joint 'left_kne_joint': did you mean 'left_knee_joint'? Nearest of 29: left_knee_"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().frame_index("pelvi")); }),
-              testing::StartsWith("unknown frame 'pelvi': did you mean 'pelvis'? Known: "));
+              testing::StartsWith("unknown frame 'pelvi': did you mean 'pelvis'? Nearest of "));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().keypoint_index("left_wris")); }),
               testing::StartsWith("unknown keypoint 'left_wris': did you mean 'left_wrist'?"));
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { static_cast<void>(g1().track_frame("trso")); }),

@@ -143,7 +143,7 @@ TEST(UrdfErrors, NotXml) {
   EXPECT_EQ(urdf_error("joints: 3"), "x.urdf:1: expected well-formed XML, found: Error document empty.");
   EXPECT_EQ(urdf_error("<sdf/>"), "x.urdf: expected the element <robot>, found none");
   EXPECT_EQ(urdf_error(kSmallUrdf.substr(0, kSmallUrdf.size() / 2)),
-            "x.urdf:13: expected well-formed XML, found: Error parsing Element.");
+            "x.urdf:13: expected well-formed XML, found a tag without its '>'");
 }
 
 TEST(UrdfErrors, Tree) {
@@ -157,13 +157,12 @@ TEST(UrdfErrors, Tree) {
   const std::string back =
       "<joint name=\"back\" type=\"fixed\"><parent link=\"lower\"/><child link=\"base\"/></joint></robot>";
   EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", back)),
-            "x.urdf: not a valid URDF: expected one root (a link that is no joint's child), found none: the joints "
-            "form a cycle");
+            "x.urdf: link 'base': expected joints that form a tree, found a cycle");
   const std::string island =
       "<link name=\"a\"/><link name=\"b\"/><joint name=\"ab\" type=\"fixed\"><parent link=\"a\"/><child "
       "link=\"b\"/></joint><joint name=\"ba\" type=\"fixed\"><parent link=\"b\"/><child link=\"a\"/></joint></robot>";
   EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", island)),
-            "x.urdf: link 'a': expected a path to the root 'base', found a cycle of joints");
+            "x.urdf: link 'a': expected joints that form a tree, found a cycle");
   const std::string second =
       "<joint name=\"second\" type=\"fixed\"><parent link=\"base\"/><child link=\"lower\"/></joint></robot>";
   EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "</robot>", second)),
@@ -172,6 +171,16 @@ TEST(UrdfErrors, Tree) {
               AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("[lowr]"), HasSubstr("[elbow]")));
   EXPECT_THAT(urdf_error("<robot name=\"empty\"/>"),
               AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("No link")));
+}
+
+TEST(UrdfErrors, AChainWithoutEndIsRefused) {
+  std::string chain = "<robot name=\"r\"><link name=\"l0\"/>";
+  for (int i = 0; i < 50'000; ++i)
+    chain += fmt::format(
+        "<link name=\"l{1}\"/><joint name=\"j{0}\" type=\"fixed\"><parent link=\"l{0}\"/><child "
+        "link=\"l{1}\"/></joint>",
+        i, i + 1);
+  EXPECT_EQ(urdf_error(chain + "</robot>"), "x.urdf: expected at most 1000 joints, found more");
 }
 
 TEST(UrdfErrors, Joints) {

@@ -10,6 +10,7 @@
 #include "tests/support.h"
 #include "tests/training/fixtures.h"
 #include "training/dstar/demonstrations.h"
+#include "training/dstar/log.h"
 #include "training/dstar/trainer.h"
 #include "training/dstar/windows.h"
 
@@ -34,6 +35,19 @@ PointTracks made_partner(int frames) {
   for (int t = 0; t < frames; ++t)
     for (int j = 0; j < kSmplJoints; ++j) partner.at(t, j) = Eigen::Vector3d(2.0 + 0.001 * t, 1.0 + 0.01 * j, 0.05 * j);
   return partner;
+}
+
+// A full disk or a folder that is gone stops a training instead of leaving a curve with holes.
+TEST(DstarLog, ACurveThatCannotBeWrittenIsAnError) {
+  const test::ScratchFolder scratch;
+  DstarRun run;
+  run.folder = scratch / "run";
+  DstarLog log(run, 0, 0.0);
+  log.validated(0.5, 0.9, 10, 1e-4);
+  EXPECT_THAT(read_file(dstar_curves(run)), ::testing::HasSubstr("\n10,"));
+  std::filesystem::remove(dstar_curves(run));
+  std::filesystem::create_directory(dstar_curves(run));
+  EXPECT_THROW(log.validated(0.4, 0.9, 20, 1e-4), InputError);
 }
 
 Demonstration entry(const std::string& id) { return {id, std::string(64, id.back()), Task::kHandshake, {50, 100}}; }

@@ -48,6 +48,15 @@ TEST_F(TrainWbcInMujoco, AStageLeavesACheckpointANetworkAndCurves) {
   EXPECT_EQ(load_wbc_network(wbc_network_file(scratch / "wbc", "student"), *g1()).kind, WbcKind::kStudent);
 }
 
+TEST(WbcPlan, EachStageTrainsOnATaskThatIsThere) {
+  for (const WbcStage& stage : wbc_plan()) EXPECT_EQ(wbc_stage(stage.task).name, stage.task) << stage.name;
+  EXPECT_EQ(find_wbc_stage("student").task, "interact");
+  EXPECT_TRUE(find_wbc_stage("student").distils && find_wbc_stage("student").follows);
+  EXPECT_FALSE(find_wbc_stage("walk").distils || find_wbc_stage("walk").follows);
+  EXPECT_THAT([] { static_cast<void>(find_wbc_stage("wlak")); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("unknown stage 'wlak': did you mean 'walk'?")));
+}
+
 TEST_F(TrainWbcInMujoco, AStoppedStageGoesOnWhereItWas) {
   const test::ScratchFolder scratch;
   int asked = 0;
@@ -118,6 +127,21 @@ TEST_F(TrainWbcInMujoco, ACheckpointOfAnotherRobotOrSeedIsRefused) {
   write_safetensors(file, tensors);
   EXPECT_THAT([&] { train(small_run(scratch / "wbc", "stand")); },
               ThrowsMessage<InputError>(HasSubstr("another robot")));
+}
+
+// What --from names was once the beginning of every stage.
+TEST(TrainWbc, OnlyTheFirstOfAllStagesBeginsWithWhatIsNamed) {
+  WbcRun run;
+  run.from = "oracle.safetensors";
+  run.seed = 7;
+  std::vector<std::string> stages, from;
+  for (const WbcRun& next : wbc_runs(run)) {
+    stages.push_back(next.stage);
+    from.push_back(next.from);
+    EXPECT_EQ(next.seed, 7U);
+  }
+  EXPECT_THAT(stages, testing::ElementsAre("stand", "walk", "student"));
+  EXPECT_THAT(from, testing::ElementsAre("oracle.safetensors", "", ""));
 }
 
 TEST(TrainWbc, AStageWithoutItsPredecessorSaysWhatToDo) {

@@ -72,5 +72,27 @@ TEST(WbcTask, AnUnknownStageIsRefusedWithTheKnownOnes) {
   EXPECT_THAT([] { wbc_stage("run"); }, testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("interact")));
 }
 
+TEST_F(WbcEnvironmentInMujoco, TimeIsUpAfterTheTicksOfTheTaskAndNoSooner) {
+  WbcTask task = wbc_stage("stand");
+  task.domain.kick = 0.0;
+  task.episode_ticks = 5;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  const std::vector<float> nothing(29, 0.0F);
+  for (int tick = 1; tick < 5; ++tick) EXPECT_EQ(environment.step(nothing).end, EpisodeEnd::kNone) << tick;
+  EXPECT_EQ(environment.step(nothing).end, EpisodeEnd::kTimeUp);
+}
+
+// Sums of magnitudes since they were taken last: none is below 0, and a robot that sways has some of each.
+TEST_F(WbcEnvironmentInMujoco, TrackingErrorsAreSumsOfMagnitudes) {
+  WbcTask task = wbc_stage("stand");
+  task.domain.kick = 0.0;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  const std::vector<float> action(29, 0.2F);
+  for (int tick = 0; tick < 10; ++tick) environment.step(action);
+  const TrackingStatistics sums = environment.take_statistics();
+  for (const double sum : {sums.root_xy, sums.heading, sums.upper_body, sums.joints}) EXPECT_GT(sum, 0.0);
+  EXPECT_EQ(environment.take_statistics().joints, 0.0);
+}
+
 }  // namespace
 }  // namespace duet

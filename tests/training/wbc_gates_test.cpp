@@ -59,5 +59,16 @@ TEST_F(WbcGatesInMujoco, TheShippedNetworksStandAndWalk) {
     }
 }
 
+// 28 and 30 of 32 under the hardest kick, all of them under the others, walking 98 %, pushed 95 %.
+TEST(WbcGates, AskForTheSharesThatTheModelCardNames) {
+  for (const WbcGate& gate : wbc_gates()) {
+    const bool hardest = gate.name == "stand/kick_1.0", walks = gate.name.starts_with("walk/");
+    const double others = walks ? 0.98 : gate.name.starts_with("push/") ? 0.95 : 1.0;
+    EXPECT_EQ(gate.least, hardest ? 28.0 / 32.0 : others) << gate.name;
+    EXPECT_EQ(gate.least_oracle, hardest ? 30.0 / 32.0 : others) << gate.name;
+    EXPECT_EQ(gate.push, gate.name.starts_with("push/") ? 60.0 : 0.0) << gate.name;
+  }
+}
+
 }  // namespace
 }  // namespace duet

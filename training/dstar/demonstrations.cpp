@@ -8,8 +8,10 @@
 #include <sstream>
 
 #include "core/file.h"
+#include "core/json.h"
 #include "core/require.h"
 #include "core/skeleton.h"
+#include "core/text.h"
 #include "nn/stored_values.h"
 
 namespace duet {
@@ -45,8 +47,9 @@ nlohmann::json json_of(const Demonstration& entry) {
 std::vector<Demonstration> list_of(const std::string& text, const std::string& path) {
   std::vector<Demonstration> list;
   int begin = 0;
+  const nlohmann::json items = parse_json(text, fmt::format("{}: metadata 'demonstrations'", path));
   try {
-    for (const nlohmann::json& item : nlohmann::json::parse(text)) {
+    for (const nlohmann::json& item : items) {
       Demonstration entry{item.at("clip"),
                           item.at("digest"),
                           parse_task(item.at("task").get<std::string>()),
@@ -170,6 +173,9 @@ DemonstrationSet load_demonstrations(const std::string& path, const std::string&
   const auto wanted = file.tensors.find("wanted");
   const std::int64_t rows =
       wanted != file.tensors.end() && wanted->second.shape.size() == 2 ? wanted->second.shape[1] : 7;
+  if (rows < 7)
+    throw InputError(
+        fmt::format("{}: tensor 'wanted': expected 7 values of a root and the joints', found {}", path, rows));
   set.wanted = columns_of(file, "wanted", rows, used, path);
   set.observed = columns_of(file, "observed", 13 + 2 * (rows - 7), used, path);
   set.partner = columns_of(file, "partner", kPartnerSize, used, path);
@@ -188,7 +194,7 @@ void check_held_out(const DemonstrationSet& set, const std::vector<std::string>&
 }
 
 std::vector<std::string> load_split(const std::string& path) {
-  std::istringstream lines(read_file(path));
+  std::istringstream lines(read_text(path));
   std::vector<std::string> digests;
   std::string line;
   for (int number = 1; std::getline(lines, line); ++number) {
@@ -196,7 +202,7 @@ std::vector<std::string> load_split(const std::string& path) {
     const std::string digest = line.substr(0, line.find(' '));
     if (digest.size() != 64 || digest.find_first_not_of("0123456789abcdef") != std::string::npos)
       throw InputError(fmt::format("{}:{}: expected a SHA-256 (64 hexadecimal digits) and a clip, found '{}'", path,
-                                   number, line.substr(0, 80)));
+                                   number, shown(line)));
     digests.push_back(digest);
   }
   return digests;

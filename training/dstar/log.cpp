@@ -4,19 +4,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include "core/file.h"
 
 namespace duet {
 namespace {
 
-constexpr double kReportEvery = 10.0, kCheckpointEvery = 60.0;  // [s]
 constexpr const char* kColumns = "step,minutes,loss,action,phase,auxiliary,validation,phase_accuracy,rate\n";
-
-double since(std::chrono::steady_clock::time_point begin) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
 
 }  // namespace
 
@@ -42,9 +36,9 @@ void DstarLog::validated(double loss, double accuracy, long step, double rate) {
   progress_.validation = loss;
   progress_.phase_accuracy = accuracy;
   const LossParts mean = means();
-  std::ofstream(dstar_curves(run_), std::ios::app)
-      << fmt::format("{},{:.3f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.4f},{:.2e}\n", step, minutes(), mean.total,
-                     mean.action, mean.phase, mean.auxiliary, loss, accuracy, rate);
+  LineAppender(dstar_curves(run_))
+      .append(fmt::format("{},{:.3f},{:.5f},{:.5f},{:.5f},{:.5f},{:.5f},{:.4f},{:.2e}", step, minutes(), mean.total,
+                          mean.action, mean.phase, mean.auxiliary, loss, accuracy, rate));
 }
 
 DstarProgress DstarLog::report(long step) {
@@ -56,17 +50,15 @@ DstarProgress DstarLog::report(long step) {
   progress.action = mean.action;
   progress.phase = mean.phase;
   progress.auxiliary = mean.auxiliary;
-  const double speed = static_cast<double>(step - first_) / std::max(1e-9, since(begin_));
+  const double speed = static_cast<double>(step - first_) / std::max(1e-9, pace_.seconds());
   progress.windows_per_second = speed * run_.batch;
   progress.seconds_left = static_cast<double>(run_.steps - step) / std::max(1e-9, speed);
   sum_ = {};
   count_ = 0;
-  reported_ = Clock::now();
+  pace_.reported();
   return progress;
 }
 
-bool DstarLog::report_due() const { return since(reported_) > kReportEvery; }
-bool DstarLog::save_due() const { return since(saved_) > kCheckpointEvery; }
-double DstarLog::minutes() const { return minutes_ + since(begin_) / 60.0; }
+double DstarLog::minutes() const { return minutes_ + pace_.seconds() / 60.0; }
 
 }  // namespace duet

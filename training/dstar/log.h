@@ -1,9 +1,8 @@
 // What a training of D-STAR reports: sums between reports, the curve as CSV, and when it is time to print and to save.
 #pragma once
 
-#include <chrono>
-
 #include "training/dstar/trainer.h"
+#include "training/pace.h"
 
 namespace duet {
 
@@ -17,23 +16,23 @@ class DstarLog {
   DstarLog(const DstarRun& run, long done, double minutes);
 
   void add(const LossParts& parts);
+  // A line of the curve. Throws InputError where it cannot be written.
   void validated(double loss, double accuracy, long step, double rate);
   // The means since the last one.
   DstarProgress report(long step);
 
-  [[nodiscard]] bool report_due() const;
-  [[nodiscard]] bool save_due() const;
-  void saved() { saved_ = Clock::now(); }
+  [[nodiscard]] bool report_due() const { return pace_.report_due(); }
+  [[nodiscard]] bool save_due() const { return pace_.save_due(); }
+  void saved() { pace_.saved(); }
   [[nodiscard]] double minutes() const;
 
  private:
-  using Clock = std::chrono::steady_clock;
   [[nodiscard]] LossParts means() const;
 
   DstarRun run_;
   long first_;
   double minutes_;
-  Clock::time_point begin_ = Clock::now(), reported_ = begin_, saved_ = begin_;
+  Pace pace_;
   DstarProgress progress_;
   LossParts sum_;
   int count_ = 0;

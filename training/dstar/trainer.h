@@ -73,7 +73,8 @@ enum class DstarEnd { kComplete, kPaused, kEarly, kStopped };
 DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
                      const std::function<void(const DstarProgress&)>& report, const std::function<bool()>& stop);
 
-bool can_train_dstar();  // whether libtorch was built in
+bool can_train_dstar();     // whether libtorch was built in
+void need_dstar_trainer();  // throws MissingError, which says how to get one, where it was not
 // Which BLAS libtorch has got: OpenBLAS, or the reference one that is 20 to 40 times slower, by its file; empty without
 // libtorch.
 std::string training_blas();

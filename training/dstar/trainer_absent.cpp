@@ -21,6 +21,8 @@ double runner_difference(const DstarData&, const DstarRun&, const std::string&, 
 
 bool can_train_dstar() { return false; }
 
+void need_dstar_trainer() { refuse(); }
+
 std::string training_blas() { return ""; }
 
 }  // namespace duet

@@ -395,4 +395,6 @@ DstarEnd train_dstar(const DstarData& data, const DstarRun& run,
 
 bool can_train_dstar() { return true; }
 
+void need_dstar_trainer() {}
+
 }  // namespace duet

@@ -1,0 +1,70 @@
+#include "bench/cli/run_notes.h"
+
+#include <fmt/format.h>
+
+#include "core/require.h"
+#include "results/distinct_episodes.h"
+
+namespace duet::cli {
+namespace {
+
+// Before and after each note.
+struct Frame {
+  const char *before, *after;
+  bool at_end = false;
+};
+
+Frame frame_of(const std::string& format) {
+  if (format == "md") return {"> ", "\n\n"};
+  if (format == "csv") return {"# ", "\n"};
+  if (format == "tex") return {"% ", "\n"};
+  return {"<!-- ", " -->\n", true};  // svg: its first line has to be its own
+}
+
+}  // namespace
+
+Run open_run(const std::string& path) {
+  Run run = load_run(path);
+  for (const std::string& warning : run.warnings) warn(warning);
+  return run;
+}
+
+std::vector<std::string> completeness_notes(const std::vector<std::string>& paths, const std::vector<Run>& runs) {
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::string text = completeness(runs[i]);
+    if (!text.empty()) notes.push_back(runs.size() > 1 ? fmt::format("{}: {}", paths[i], text) : text);
+  }
+  return notes;
+}
+
+std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
+                                  const std::vector<EpisodeRow>& rows) {
+  std::vector<std::string> notes = completeness_notes(paths, runs);
+  const std::string repeats = repeats_note(rows);
+  if (repeats.empty()) return notes;
+  warn(repeats);
+  notes.push_back(repeats);
+  return notes;
+}
+
+std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes) {
+  if (notes.empty()) return text;
+  if (format == "json") {
+    nlohmann::json json = nlohmann::json::parse(text);
+    json["notes"] = notes;
+    return json.dump(2) + "\n";
+  }
+  const Frame frame = frame_of(format);
+  std::string lines;
+  for (const std::string& note : notes) lines += frame.before + note + frame.after;
+  return frame.at_end ? text + lines : lines + text;
+}
+
+void require_whole(const Run& run, const std::string& path, bool allowed, const std::string& action) {
+  if (allowed || !is_partial(run)) return;
+  throw InputError(
+      fmt::format("'{}': {}: run it to its end, or {} it with --partial", path, completeness(run), action));
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,28 @@
+// Runs as commands read them, and what has to be said of them beside every table: rows that were left out, episodes
+// that are missing.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bench/cli/command.h"
+#include "results/run_directory.h"
+
+namespace duet::cli {
+
+// load_run; its warnings go to standard error.
+Run open_run(const std::string& path);
+
+// "runs/a: 76 of 400 episodes: partial": a line for each run that is not whole; the path where there are several.
+std::vector<std::string> completeness_notes(const std::vector<std::string>& paths, const std::vector<Run>& runs);
+// The same, and which of the `rows`, those of all runs together, repeat others and count once; that is warned of too.
+std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
+                                  const std::vector<EpisodeRow>& rows);
+
+// A file's text with the notes, as its format has them (md, csv, tex, svg; json: key "notes"); unchanged without any.
+std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes);
+
+// Throws InputError for a run whose episodes are not all there, unless `allowed`; `action` is what is refused.
+void require_whole(const Run& run, const std::string& path, bool allowed, const std::string& action);
+
+}  // namespace duet::cli

@@ -1,0 +1,51 @@
+#include "bench/prepared_clips.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <system_error>
+
+#include "bench/version.h"
+#include "core/digest.h"
+#include "core/file.h"
+#include "core/require.h"
+
+namespace duet {
+
+std::string PreparedClips::name_of(const std::string& source) const {
+  return fmt::format("prepared/{:.32}.npz", sha256_hex(fmt::format("{}\n{}", made_by_, source)));
+}
+
+std::optional<PairedMotion> PreparedClips::find(const std::string& source) const {
+  if (!keeps()) return std::nullopt;
+  const std::string path = (std::filesystem::path(folder_) / name_of(source)).string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  try {
+    return load_paired_motion(path);
+  } catch (const InputError&) {
+    return std::nullopt;  // damaged: made anew
+  }
+}
+
+void PreparedClips::keep(const std::string& source, const PairedMotion& clip) const {
+  try {
+    if (keeps()) save_paired_motion(clip, inside(folder_, name_of(source)));
+  } catch (const StorageError&) {
+    return;  // it saves time, nothing else: where the disk is full, the first row says so
+  }
+}
+
+void remove_prepared_clips(const std::string& folder) {
+  std::error_code ignored;
+  std::filesystem::remove_all(std::filesystem::path(folder) / "prepared", ignored);
+}
+
+std::string program_identity() {
+  struct stat program {};
+  if (::stat("/proc/self/exe", &program) != 0) return kVersion;
+  return fmt::format("{} {} {}.{:09}", kVersion, program.st_size, program.st_mtim.tv_sec, program.st_mtim.tv_nsec);
+}
+
+}  // namespace duet

@@ -1,0 +1,102 @@
+#include "bench/run_identity.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "bench/bodies.h"
+#include "bench/suite_names.h"
+#include "core/digest.h"
+#include "core/require.h"
+#include "metrics/contact_limits.h"
+#include "metrics/detector.h"
+
+namespace duet {
+namespace {
+
+using Options = std::map<std::string, std::string>;
+
+bool is_descriptor(const std::string& use) { return use.ends_with(".yaml"); }
+
+// A descriptor is one of the files, wherever it lies; so is what a path option names.
+std::string said_of(const std::string& use, const Options& options) {
+  std::string text = fmt::format("use: {}\n", is_descriptor(use) ? "descriptor" : use);
+  for (const auto& [name, value] : options)
+    if (!is_path_option(name)) text += fmt::format("option {}: {}:{}\n", name, value.size(), value);
+  return text;
+}
+
+template <typename FilesOf>
+ActorIdentity identity(std::string text, const FilesOf& files_of) {
+  ActorIdentity identity;
+  try {
+    for (const LoadedFile& file : files_of()) identity.files.push_back({file.role, file.path, sha256_file(file.path)});
+  } catch (const MissingError& error) {
+    return {.digest = "", .files = {}, .absence = error.what()};
+  }
+  for (const HashedFile& file : identity.files) text += fmt::format("{}: {}\n", file.role, file.sha256);
+  identity.digest = sha256_hex(text);
+  return identity;
+}
+
+// URDF and card of each controller's body, the one that clips are retargeted to first.
+std::string robots_text(const Suite& suite) {
+  const auto digest = [](const std::string& card) { return load_robot(card).digest; };
+  std::string text =
+      fmt::format("robot of clips: {}\n", digest(suite.robot.empty() ? default_card_path() : suite.robot));
+  for (const SuiteController& controller : suite.controllers) {
+    try {
+      text += fmt::format("robot of {}: {}\n", controller.name, digest(card_of(suite, controller)));
+    } catch (const MissingError&) {
+      text += fmt::format("robot of {}: absent\n", controller.name);
+    }
+  }
+  return text;
+}
+
+std::string limits_digest(const Suite& suite) {
+  if (suite.partner != PartnerMode::kSolid) return "";
+  return sha256_file(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
+}
+
+SuiteController without_places(SuiteController controller) {
+  if (is_descriptor(controller.use)) controller.use = sha256_file(controller.use);
+  std::erase_if(controller.options, [](const auto& option) { return is_path_option(option.first); });
+  return controller;
+}
+
+}  // namespace
+
+ActorIdentity identity_of(const SuitePolicy& policy) {
+  const std::string text =
+      fmt::format("policy\n{}prompt: {}:{}\npartner: {}\n", said_of(policy.use, policy.options), policy.prompt.size(),
+                  policy.prompt, policy.shuffled_partner ? "shuffled" : "own");
+  return identity(text, [&] { return policy_files(policy.use, policy.options); });
+}
+
+ActorIdentity identity_of(const SuiteController& controller) {
+  return identity("controller\n" + said_of(controller.use, controller.options),
+                  [&] { return controller_files(controller.use, controller.options); });
+}
+
+std::string suite_hash(const Suite& suite) {
+  Suite said = suite;
+  said.policies.clear();
+  said.engines.clear();
+  said.robot.clear();  // robots_text
+  for (std::string& file : said.clips.files) file = sha256_file(file);
+  said.contact_limits = limits_digest(suite);
+  for (SuiteController& controller : said.controllers) controller = without_places(controller);
+  return sha256_hex(fmt::format("{}{}detectors: {}\n", resolved_yaml(said), robots_text(suite), kDetectorsVersion));
+}
+
+RunIdentity identity_of(const Suite& suite) {
+  RunIdentity identity{.suite_hash = suite_hash(suite)};
+  for (const SuitePolicy& policy : suite.policies) identity.policies[policy.name] = identity_of(policy).digest;
+  identity.policies[kNullPolicy] = identity_of(SuitePolicy{kNullPolicy}).digest;
+  for (const SuiteController& controller : suite.controllers)
+    identity.controllers[controller.name] = identity_of(controller).digest;
+  return identity;
+}
+
+}  // namespace duet

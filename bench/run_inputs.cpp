@@ -1,0 +1,291 @@
+#include "bench/run_inputs.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <numeric>
+
+#include "bench/suite_names.h"
+#include "core/digest.h"
+#include "core/file.h"
+#include "core/require.h"
+#include "core/share.h"
+#include "results/json_fields.h"
+#include "robots/card.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kSchema = "duet.inputs/1";
+constexpr const char* kIndex = "inputs/inputs.json";
+
+std::string in(const std::string& folder, const std::string& file) { return (fs::path(folder) / file).string(); }
+
+std::string from_folder(const std::string& path, const std::string& folder) {
+  return fs::absolute(path).lexically_normal().lexically_proximate(fs::absolute(folder).lexically_normal()).string();
+}
+
+// A path without a way out of the folder that it starts at.
+bool stays_below(const fs::path& path) {
+  const fs::path normal = path.lexically_normal();
+  return !normal.empty() && normal.is_relative() && *normal.begin() != "..";
+}
+
+// A card that ships with duet goes by its name.
+bool is_shipped_card(const fs::path& card) {
+  std::error_code ignored;
+  try {
+    return fs::equivalent(card_path(card.stem().string()), card, ignored);
+  } catch (const MissingError&) {
+    return false;
+  }
+}
+
+class Keeper {
+ public:
+  Keeper(const Suite& suite, const std::string& folder) : folder_(folder) { kept_.suite = suite; }
+
+  KeptSuite keep() {
+    keep_clips();
+    if (!kept_.suite.contact_limits.empty())
+      kept_.suite.contact_limits = copy("contact_limits", "", kept_.suite.contact_limits, "inputs/contact_limits.yaml");
+    keep_robot();
+    for (SuitePolicy& policy : kept_.suite.policies) keep_actor("policy", policy);
+    for (SuiteController& controller : kept_.suite.controllers) keep_actor("controller", controller);
+    return std::move(kept_);
+  }
+
+ private:
+  std::string copy(const std::string& of, const std::string& role, const std::string& from, const std::string& to) {
+    kept_.copies.push_back({from, to});
+    kept_.inputs.push_back({of, role, to, sha256_file(from), true});
+    return to;
+  }
+
+  void keep_clips() {
+    std::vector<std::string>& files = kept_.suite.clips.files;
+    const std::uintmax_t bytes = std::accumulate(
+        files.begin(), files.end(), std::uintmax_t{0},
+        [](std::uintmax_t sum, const std::string& file) { return sum + (fs::exists(file) ? fs::file_size(file) : 0); });
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const std::string name = fs::path(files[i]).filename().string();
+      if (bytes <= kMostClipBytes) {
+        files[i] = copy("clips", "", files[i], fmt::format("inputs/clips/{:04}_{}", i, name));
+      } else {
+        kept_.inputs.push_back({"clips", "", name, sha256_file(files[i]), false});
+        files[i] = from_folder(files[i], folder_);
+      }
+    }
+  }
+
+  void keep_robot() {
+    std::string& robot = kept_.suite.robot;
+    if (robot.empty()) return;
+    const fs::path card(robot);
+    if (is_shipped_card(card)) {
+      robot = card.stem().string();
+      return;
+    }
+    const std::string urdf = parse_card(read_file(robot), robot).urdf;
+    if (!stays_below(urdf)) {
+      robot = from_folder(robot, folder_);
+      return;
+    }
+    copy("robot", "", (card.parent_path() / urdf).string(), "inputs/robot/" + urdf);
+    robot = copy("robot", "", robot, "inputs/robot/" + card.filename().string());
+  }
+
+  template <typename Actor>
+  void keep_actor(const std::string& kind, Actor& actor) {
+    const std::string of = fmt::format("{} {}", kind, actor.name);
+    const std::string place = fmt::format("inputs/{}/{}/", kind == "policy" ? "policies" : "controllers", actor.name);
+    const bool descriptor = actor.use.ends_with(".yaml");
+    const std::vector<HashedFile> files = identity_of(actor).files;
+    if (files.empty() && descriptor)  // its network is absent
+      actor.use = copy(of, "descriptor", actor.use, place + fs::path(actor.use).filename().string());
+    for (const HashedFile& file : files) {
+      const std::string name = fs::path(file.path).filename().string();
+      if (descriptor && file.role == "descriptor") {
+        actor.use = copy(of, file.role, file.path, place + name);
+      } else if (file.role.starts_with("command ")) {
+        copy(of, file.role, file.path, place + file.role.substr(8));
+      } else {
+        kept_.inputs.push_back({of, file.role, name, file.sha256, false});
+        const bool named = actor.options.contains(file.role) && fs::exists(actor.options.at(file.role));
+        const bool beside = descriptor && file.role == "network";  // of the descriptor, which is copied without it
+        if (named || beside) actor.options[file.role] = from_folder(file.path, folder_);
+      }
+    }
+  }
+
+  std::string folder_;
+  KeptSuite kept_;
+};
+
+nlohmann::json to_json(const std::vector<RunInput>& inputs) {
+  nlohmann::json files = nlohmann::json::array();
+  for (const RunInput& input : inputs)
+    files.push_back(
+        {{"of", input.of}, {"role", input.role}, {"file", input.file}, {"sha256", input.sha256}, {"kept", input.kept}});
+  return {{"schema", kSchema}, {"files", files}};
+}
+
+RunInput read_input(const nlohmann::json& json, const std::string& path) {
+  JsonFields fields(json, path);
+  RunInput input{fields.text("of"), fields.text("role"), fields.text("file"), fields.text("sha256"),
+                 fields.boolean("kept")};
+  fields.refuse_unknown();
+  if (input.kept && !stays_below(input.file))
+    throw InputError(
+        fmt::format("{}: key 'file': expected a path below the run directory, found '{}'", path, input.file));
+  return input;
+}
+
+void check_kept(const RunInput& input, const std::string& folder) {
+  const std::string path = in(folder, input.file);
+  const std::string found = sha256_file(path);
+  if (found != input.sha256)
+    throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: it is not what the run was made from", path,
+                                 input.sha256, found));
+}
+
+std::vector<std::string> shipped_places(const std::string& name) {
+  std::vector<std::string> places;
+  for (const char* folder : {"policies/dstar/", "controllers/wbc_sim/"}) {
+    try {
+      places.push_back(share_file("network", folder + name));
+    } catch (const MissingError&) {
+      continue;  // of another name than those that ship
+    }
+  }
+  return places;
+}
+
+// Where a network of that name may be, the likeliest place first.
+std::vector<std::string> places_of(const RunInput& input, const std::string& now, const std::string& folder) {
+  std::vector<std::string> places;
+  if (!now.empty()) places.push_back(now);
+  if (input.role == "descriptor") return places;  // it is of a controller that ships, and found by that one's name
+  for (const char* below : {".", "inputs"})
+    places.push_back((fs::path(folder) / below / input.file).lexically_normal());
+  for (const std::string& place : shipped_places(input.file)) places.push_back(place);
+  if (const char* models = std::getenv("DUET_MODELS"); models != nullptr && *models != '\0')
+    places.push_back(in(models, input.file));
+  return places;
+}
+
+// The first of `places` that holds what the run was made from.
+std::string find_again(const RunInput& input, const std::vector<std::string>& places) {
+  std::vector<std::string> found;
+  for (const std::string& place : places) {
+    if (!fs::is_regular_file(place)) continue;
+    const std::string digest = sha256_file(place);
+    if (digest == input.sha256) return place;
+    found.push_back(fmt::format("{} in {}", digest, place));
+  }
+  const std::string expected =
+      fmt::format("{}: {} '{}': expected SHA-256 {}", input.of, input.role, input.file, input.sha256);
+  if (found.empty()) throw MissingError(fmt::format("{}, found none: looked at {}", expected, fmt::join(places, ", ")));
+  throw InputError(fmt::format("{}, found {}", expected, fmt::join(found, ", ")));
+}
+
+// Where the actor finds its file on this machine; "" where it finds none.
+template <typename Actor>
+std::string place_now(const Actor& actor, const std::string& role) {
+  const auto given = actor.options.find(role);
+  if (given != actor.options.end() && fs::path(given->second).is_absolute() && !fs::exists(given->second)) return "";
+  for (const HashedFile& file : identity_of(actor).files)
+    if (file.role == role) return file.path;
+  return "";
+}
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::ranges::find(names, name) != names.end();
+}
+
+template <typename Actor>
+void find_files(const char* kind, std::vector<Actor>& actors, const std::vector<std::string>& skipped,
+                const std::vector<RunInput>& inputs, const std::string& folder) {
+  for (Actor& actor : actors) {
+    if (contains(skipped, actor.name)) continue;
+    for (const RunInput& input : inputs) {
+      if (input.kept || input.of != fmt::format("{} {}", kind, actor.name)) continue;
+      const std::string now = place_now(actor, input.role);
+      const std::string place = find_again(input, places_of(input, now, folder));
+      if (place != now || actor.options.contains(input.role)) actor.options[input.role] = place;
+    }
+  }
+}
+
+template <typename Actor>
+void rebase_actor(Actor& actor, const std::function<void(std::string&)>& rebase) {
+  if (actor.use.ends_with(".yaml")) rebase(actor.use);
+  for (auto& [name, value] : actor.options)
+    if (is_path_option(name) && fs::path(value).is_absolute()) rebase(value);
+}
+
+}  // namespace
+
+std::vector<RunInput> read_inputs(const std::string& folder) {
+  const std::string path = in(folder, kIndex);
+  const nlohmann::json json = parse_json(read_file(path), path);
+  JsonFields fields(json, path);
+  if (const std::string schema = fields.text("schema"); schema != kSchema)
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, schema));
+  const nlohmann::json& files = fields.at("files");
+  fields.refuse_unknown();
+  if (!files.is_array()) throw InputError(fmt::format("{}: key 'files': expected a list", path));
+  std::vector<RunInput> inputs;
+  for (const nlohmann::json& file : files) inputs.push_back(read_input(file, path));
+  return inputs;
+}
+
+Suite rebased(Suite suite, const std::string& from, const std::string& to) {
+  const auto rebase = [&](std::string& path) {
+    const std::string below = from_folder(path, from);
+    path = stays_below(below) ? below : from_folder(path, to);
+  };
+  for (std::string& file : suite.clips.files) rebase(file);
+  if (!suite.contact_limits.empty()) rebase(suite.contact_limits);
+  if (is_shipped_card(suite.robot))
+    suite.robot = fs::path(suite.robot).stem().string();
+  else if (!suite.robot.empty())
+    rebase(suite.robot);
+  for (SuitePolicy& policy : suite.policies) rebase_actor(policy, rebase);
+  for (SuiteController& controller : suite.controllers) rebase_actor(controller, rebase);
+  return suite;
+}
+
+KeptSuite kept_suite(const Suite& suite, const std::string& folder) { return Keeper(suite, folder).keep(); }
+
+void keep_inputs(const KeptSuite& kept, const std::string& folder) {
+  for (const KeptSuite::Copy& copy : kept.copies) {
+    const std::string to = inside(folder, copy.to);
+    if (fs::exists(to)) continue;
+    write_file(to, read_file(copy.from));
+    fs::permissions(to, fs::status(copy.from).permissions() | fs::perms::owner_write);
+  }
+  if (const std::string index = inside(folder, kIndex); !fs::exists(index))
+    write_file(index, to_json(kept.inputs).dump(2) + "\n");
+}
+
+bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }
+
+Suite suite_of_run(const Run& run, const std::vector<std::string>& skipped_policies,
+                   const std::vector<std::string>& skipped_controllers) {
+  const std::vector<RunInput> inputs = read_inputs(run.path);
+  for (const RunInput& input : inputs)
+    if (input.kept) check_kept(input, run.path);
+  Suite suite = parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
+  find_files("policy", suite.policies, skipped_policies, inputs, run.path);
+  find_files("controller", suite.controllers, skipped_controllers, inputs, run.path);
+  return suite;
+}
+
+}  // namespace duet

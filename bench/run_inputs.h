@@ -1,0 +1,56 @@
+// What a run was made from, kept with it, so that it can be repeated where the originals are not: `inputs/` of a run
+// directory holds copies of clips, descriptors with the programs beside them, limits and cards, and inputs.json with
+// the SHA-256 of each and of the networks. Networks stay where they are and are found again by what is in them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bench/run_identity.h"
+#include "results/run_directory.h"
+
+namespace duet {
+
+struct RunInput {
+  std::string of;    // "clips", "contact_limits", "robot", "policy mine", "controller twist2"
+  std::string role;  // of a policy's or controller's file as in LoadedFile; else empty
+  std::string file;  // from the run directory where it is kept there; else the name of the file
+  std::string sha256;
+  bool kept = false;
+};
+
+// A suite whose files lie in a run directory, and how they come there.
+struct KeptSuite {
+  struct Copy {
+    std::string from, to;  // to: from the run directory
+  };
+  Suite suite;  // its paths start at the run directory
+  std::vector<Copy> copies;
+  std::vector<RunInput> inputs;
+};
+
+// What `folder` is to keep of a suite. Clips of more than kMostClipBytes in all stay where they are. Writes nothing;
+// throws InputError for a file that cannot be read.
+inline constexpr std::uintmax_t kMostClipBytes = std::uintmax_t{1} << 28;
+KeptSuite kept_suite(const Suite& suite, const std::string& folder);
+
+// Copies what is not in `folder` yet and writes inputs.json, in this order.
+void keep_inputs(const KeptSuite& kept, const std::string& folder);
+// Whether it has done so to its end.
+bool has_inputs(const std::string& folder);
+
+// What inputs.json of a run says. Throws InputError (file, key, expected, found).
+std::vector<RunInput> read_inputs(const std::string& folder);
+
+// A suite whose paths below `from` start there, all others at `to`: what a suite.yaml in `to` says of inputs that are
+// copied there from the run directory `from`.
+Suite rebased(Suite suite, const std::string& from, const std::string& to);
+
+// The suite of a run: from its suite.yaml, each network where it is found. Looked at are the place that the suite names
+// or duet's own, the run directory, what ships with duet and $DUET_MODELS. Throws InputError for a file that is not
+// what it was when the run was made, MissingError for one that is not there: which, the SHA-256 expected and found.
+// Policies and controllers in `skipped` are not looked at.
+Suite suite_of_run(const Run& run, const std::vector<std::string>& skipped_policies = {},
+                   const std::vector<std::string>& skipped_controllers = {});
+
+}  // namespace duet

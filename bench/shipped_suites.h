@@ -1,0 +1,31 @@
+// The suites that ship with duet: found by name (`duet run demo`) and listed with the question that each asks.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bench/suite.h"
+
+namespace duet {
+
+struct ShippedSuite {
+  std::string name;           // of the file, without ".yaml"
+  std::string version;        // "hhoi-core 2.0.0"
+  std::string question;       // the first sentence of the comment that begins the file
+  std::int64_t episodes = 0;  // the null arm included, in the engines that this machine has where the suite names none
+};
+
+// In alphabetical order. Throws MissingError where the folder is not there.
+std::vector<std::string> shipped_suite_names();
+// Throws what load_suite throws.
+ShippedSuite shipped_suite(const std::string& name);
+
+// `suite` where it is a file's path (a file that exists, or it ends in ".yaml" or has a '/'), else the file of the
+// suite that ships under this name. Throws std::invalid_argument for an unknown name, with the known ones.
+std::string suite_file(const std::string& suite);
+
+// The first sentence of the comment that begins a YAML file; empty where it begins with none.
+std::string first_sentence(const std::string& yaml);
+
+}  // namespace duet

@@ -1,0 +1,53 @@
+// What stops a run early, as a question that every loop asks: a signal, or the time limit of the command. Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+namespace duet {
+
+enum class RunEnd { kComplete, kTimeLimit, kInterrupted, kTerminated };
+
+class StopSign {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // `limit` [s] counts from `begin`; 0 is none.
+  explicit StopSign(double limit = 0.0, Clock::time_point begin = Clock::now()) : limit_(limit), begin_(begin) {}
+  // kComplete: go on.
+  [[nodiscard]] RunEnd end() const;
+  [[nodiscard]] bool asked() const { return end() != RunEnd::kComplete; }
+
+ private:
+  double limit_;
+  Clock::time_point begin_;
+};
+
+// Thrown by work that ends because of the sign.
+struct Stopped {};
+
+// Calls `act` once where this object still lives `grace` seconds after the sign: for work that cannot be asked to stop
+// (a network that loads, a file that is hashed). On a thread of its own.
+class StopWatch {
+ public:
+  StopWatch(const StopSign& sign, double grace, std::function<void(RunEnd)> act);
+  ~StopWatch();
+  StopWatch(const StopWatch&) = delete;
+  StopWatch& operator=(const StopWatch&) = delete;
+
+ private:
+  bool released_after(double seconds);
+  void watch(double grace);
+
+  const StopSign& sign_;
+  std::function<void(RunEnd)> act_;
+  std::mutex mutex_;
+  std::condition_variable released_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+}  // namespace duet

@@ -1,0 +1,89 @@
+#include "bench/trust.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+
+#include "core/require.h"
+#include "core/text.h"
+#include "policies/external/descriptor.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLongestCommand = 400;  // shown [bytes]
+
+std::vector<fs::path> trusted_folders() {
+  std::vector<fs::path> folders;
+  const char* setting = std::getenv("DUET_TRUSTED_FOLDERS");
+  std::istringstream list(setting == nullptr ? "" : setting);
+  for (std::string folder; std::getline(list, folder, ':');)
+    if (fs::path(folder).is_absolute()) folders.push_back(fs::weakly_canonical(folder));
+  return folders;
+}
+
+bool lies_in(const fs::path& path, const fs::path& folder) {
+  const auto [rest, unused] = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end());
+  return rest == folder.end() || rest->empty();  // "/a/" ends with an empty part
+}
+
+std::string command_line(const std::vector<std::string>& command) {
+  return shown(fmt::format("{}", fmt::join(command, " ")), kLongestCommand);
+}
+
+std::string action_of(const PolicyDescriptor& descriptor) {
+  if (descriptor.command.empty()) return fmt::format("connects to '{}'", shown(descriptor.socket));
+  return fmt::format("runs '{}' in '{}'", command_line(descriptor.command),
+                     shown(descriptor.folder(), kLongestCommand));
+}
+
+}  // namespace
+
+std::vector<PolicyProgram> programs_of(const SuitePolicy& policy) {
+  if (!policy.use.ends_with(".yaml")) return {};
+  const PolicyDescriptor descriptor = read_policy_descriptor(policy.use);
+  if (descriptor.kind != PolicyKind::kProcess) return {};
+  return {{policy.name, policy.use, action_of(descriptor), in_trusted_folder(policy.use)}};
+}
+
+std::vector<PolicyProgram> programs_of(const Suite& suite, const std::vector<std::string>& skipped) {
+  std::vector<PolicyProgram> programs;
+  for (const SuitePolicy& policy : suite.policies) {
+    if (std::find(skipped.begin(), skipped.end(), policy.name) != skipped.end()) continue;
+    for (PolicyProgram& program : programs_of(policy)) programs.push_back(std::move(program));
+  }
+  return programs;
+}
+
+std::string describe(const PolicyProgram& program) {
+  return fmt::format("policy '{}' of {} {}", shown(program.policy), shown(program.descriptor, kLongestCommand),
+                     program.action);
+}
+
+void require_allowed(const std::vector<PolicyProgram>& programs, bool allowed) {
+  std::vector<std::string> refused;
+  for (const PolicyProgram& program : programs)
+    if (!allowed && !program.trusted) refused.push_back(describe(program));
+  if (!refused.empty())
+    throw InputError(fmt::format("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: {}",
+                                 fmt::join(refused, "; ")));
+}
+
+bool in_trusted_folder(const std::string& descriptor) {
+  std::error_code error;
+  const fs::path file = fs::canonical(descriptor, error);
+  if (error) return false;
+  const fs::path folder = fs::canonical(fs::absolute(descriptor).parent_path(), error);
+  if (error) return false;
+  const std::vector<fs::path> trusted = trusted_folders();
+  return std::any_of(trusted.begin(), trusted.end(),
+                     [&](const fs::path& root) { return lies_in(file, root) && lies_in(folder, root); });
+}
+
+}  // namespace duet

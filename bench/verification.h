@@ -1,0 +1,41 @@
+// Whether the rows of a run are what its suite makes: each must be an episode of the suite's plan, none may be left
+// out, and episodes that are run again must give the same row, field by field.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "bench/progress.h"
+#include "results/row_identity.h"
+#include "results/run_directory.h"
+
+namespace duet {
+
+struct VerifyOptions {
+  int episodes = 5;  // run again, drawn at random
+  bool all = false;  // run all again
+  std::uint64_t seed = 1;
+  int threads = 1;
+  bool allow_programs = false;  // Suite::allow_programs
+};
+
+struct RepeatedEpisode {
+  EpisodeRow row;                            // as stored
+  std::string state_hash;                    // now
+  std::vector<FieldDifference> differences;  // first: stored, second: now
+};
+
+struct Verification {
+  std::vector<std::string> faults;         // of rows that are not what the suite plans; sentences
+  std::vector<std::string> missing;        // of episodes that are not there; sentences
+  std::vector<RepeatedEpisode> repeats;    // in the order of the run's rows
+  int repeatable = 0, not_repeatable = 0;  // rows; timed out, or of an engine that this machine lacks
+  [[nodiscard]] int different() const;
+};
+
+// Throws InputError where the run's inputs, suite, detectors, policies or controllers are not what run.json says or not
+// what this machine has (which, expected, found), MissingError for a network that is not there.
+Verification verify_run(const Run& run, const VerifyOptions& options, Progress& progress);
+
+}  // namespace duet

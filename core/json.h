@@ -1,0 +1,18 @@
+// The one door through which JSON comes in. Thread-safe.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+
+namespace duet {
+
+// Our own documents nest 6 deep. Writing, comparing and destroying a value go down its levels by recursion, so that a
+// file that nests without end would end the program.
+inline constexpr int kMostJsonDepth = 64;
+
+// Throws InputError that begins with `what` ("golden baseline", "run.json") for text that is not JSON, that nests
+// deeper than kMostJsonDepth, or that holds a number which no double is.
+nlohmann::json parse_json(std::string_view text, const std::string& what);
+
+}  // namespace duet

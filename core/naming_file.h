@@ -1,0 +1,28 @@
+// Whose fault it is: what is found to be wrong with a file only after it was read still names the file. Thread-safe.
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "core/file.h"
+
+namespace duet {
+
+// "FILE: MESSAGE", or the message alone where it names the file already.
+std::string naming_file_message(const std::string& path, const std::string& message);
+
+// What `work` gives. Its InputError and std::invalid_argument become an InputError that names the file.
+template <typename Work>
+decltype(auto) naming_file(const std::string& path, Work&& work) {
+  try {
+    return std::forward<Work>(work)();
+  } catch (const StorageError&) {
+    throw;  // the disk's fault, not the file's
+  } catch (const InputError& error) {
+    throw InputError(naming_file_message(path, error.what()));
+  } catch (const std::invalid_argument& error) {
+    throw InputError(naming_file_message(path, error.what()));
+  }
+}
+
+}  // namespace duet

@@ -1,0 +1,30 @@
+// The blessed figures of results/golden, made again by this build: `duet run results/golden/suite.yaml -o RUN` and
+// `duet bless RUN -o results/golden/baseline.json` where they change on purpose.
+#include <gmock/gmock.h>
+
+#include "bench/profile.h"
+#include "bench/runner.h"
+#include "core/file.h"
+#include "results/golden.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+TEST(GoldenRun, AgreesWithTheBlessedBaseline) {
+  const std::string folder = std::string(DUET_SOURCE_DIR) + "/results/golden/";
+  const Suite suite = load_suite(folder + "suite.yaml");
+  for (const std::string& engine : suite.engines)
+    if (!is_available(engine)) GTEST_SKIP() << "not run: " << engine << " absent";
+  const test::ScratchFolder scratch;
+  Progress quiet(Progress::Style::kQuiet);
+  RunOptions options;
+  options.threads = 2;
+  EXPECT_EQ(run_suite(suite, scratch / "run", options, quiet).end, RunEnd::kComplete);
+  const duet::Run run = load_run(scratch / "run");
+  for (const GoldenDifference& difference : check(read_file(folder + "baseline.json"), leaderboard(run.rows), run.info))
+    ADD_FAILURE() << difference.where << ": expected " << difference.expected << ", found " << difference.found;
+}
+
+}  // namespace
+}  // namespace duet

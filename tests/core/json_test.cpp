@@ -1,0 +1,59 @@
+#include "core/json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string nested(const std::string& open, const std::string& close, int depth) {
+  std::string text;
+  for (int i = 0; i < depth; ++i) text += open;
+  text += "1";
+  for (int i = 0; i < depth; ++i) text += close;
+  return text;
+}
+
+std::string refusal(const std::string& text) {
+  return thrown_message<InputError>([&] { parse_json(text, "x.json"); });
+}
+
+TEST(ParseJson, ReadsWhatIsAsDeepAsTheLimit) {
+  EXPECT_EQ(parse_json(nested("[", "]", kMostJsonDepth), "x.json").dump(), nested("[", "]", kMostJsonDepth));
+  EXPECT_EQ(parse_json(R"({"a": [1, {"b": "[[[{{{"}]})", "x.json")["a"][1]["b"], "[[[{{{");
+}
+
+TEST(ParseJson, RefusesWhatNestsDeeper) {
+  const std::string expected = "x.json: expected JSON of at most 64 levels, found one that is deeper";
+  for (const int depth : {kMostJsonDepth + 1, 200'000}) {
+    EXPECT_EQ(refusal(nested("[", "]", depth)), expected);
+    EXPECT_EQ(refusal(nested("{\"a\":", "}", depth)), expected);
+    EXPECT_EQ(refusal(nested("[{\"a\":", "}]", depth)), expected);
+    EXPECT_EQ(refusal("{\"good\": 1, \"bad\": " + nested("[", "]", depth) + "}"), expected);
+  }
+  EXPECT_EQ(refusal(std::string(2'000'000, '[')), expected);  // never closed
+}
+
+TEST(ParseJson, AFaultIsOneSentenceThatBeginsWithTheDocument) {
+  EXPECT_THAT(refusal("{"), StartsWith("x.json: not valid JSON: parse error at line 1, column 2"));
+  EXPECT_THAT(refusal("{\"a\": 1e999}"), HasSubstr("number overflow parsing '1e999'"));
+  EXPECT_THAT(refusal("\"\xff\""), HasSubstr("ill-formed UTF-8 byte"));
+}
+
+TEST(ParseJson, AFaultDoesNotRepeatTheDocument) {
+  EXPECT_LT(refusal("\"" + std::string(400'000, 'x')).size(), 300u);
+  EXPECT_LT(refusal(std::string(400'000, '9')).size(), 300u);
+  EXPECT_EQ(refusal("\"\x1b[31m\"").find('\x1b'), std::string::npos);
+}
+
+}  // namespace
+}  // namespace duet

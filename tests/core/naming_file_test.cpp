@@ -1,0 +1,31 @@
+#include "core/naming_file.h"
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+
+template <typename Error>
+std::string told(const std::string& message) {
+  return thrown_message<InputError>([&] { naming_file("a.npz", [&] { throw Error(message); }); });
+}
+
+TEST(NamingFile, PutsTheFileBeforeWhatDoesNotNameIt) {
+  EXPECT_EQ(told<InputError>("nothing pairs"), "a.npz: nothing pairs");
+  EXPECT_EQ(told<std::invalid_argument>("expected frames"), "a.npz: expected frames");
+  EXPECT_EQ(told<InputError>("'a.npz': key 'b'"), "'a.npz': key 'b'");
+}
+
+TEST(NamingFile, LetsValuesAndOtherExceptionsThrough) {
+  int value = 3;
+  EXPECT_EQ(&naming_file("a.npz", [&]() -> int& { return value; }), &value);
+  EXPECT_EQ(thrown_message<MissingError>([] { naming_file("a.npz", [] { throw MissingError("no engine"); }); }),
+            "no engine");
+  EXPECT_EQ(thrown_message<StorageError>([] { naming_file("a.npz", [] { throw StorageError("disk full"); }); }),
+            "disk full");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,89 @@
+// What a run leaves behind and what is made from it: run directories, published or not, baselines, training curves.
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/digest.h"
+#include "results/golden.h"
+#include "results/published.h"
+#include "results/run_directory.h"
+#include "results/training_curves.h"
+#include "tests/fuzz/reader.h"
+#include "tests/results/rows.h"
+
+namespace duet::fuzz {
+namespace {
+
+const char* const kFiles[] = {"run.json", "env.json", "episodes.jsonl", "suite.yaml"};
+
+std::string text_of(const nlohmann::json& json) { return json.dump() + "\n"; }
+
+// run.json, env.json, episodes.jsonl, suite.yaml.
+std::string run_sample(unsigned /*seed*/) {
+  const RunInfo info = test::tiny_run();
+  const std::string folder = scratch_folder() + "/good";
+  std::filesystem::remove_all(folder);
+  RunDirectory run = RunDirectory::open(folder, info);
+  for (int i = 0; i < 2; ++i) run.append(test::episode("replay", "hug", i, i == 0));
+  std::string sample;
+  for (const char* file : kFiles)
+    sample += (sample.empty() ? "" : std::string(kSeparator)) + read_file(folder + "/" + file);
+  return sample;
+}
+
+// The folder of a run whose files are the parts of `bytes`.
+std::string run_folder(std::string_view bytes) {
+  const std::string folder = scratch_folder() + "/run";
+  std::filesystem::create_directories(folder);
+  const std::vector<std::string_view> texts = parts(bytes, std::size(kFiles));
+  for (std::size_t i = 0; i < texts.size(); ++i) scratch_file(std::string("run/") + kFiles[i], texts[i]);
+  std::filesystem::remove(folder + "/manifest.json");
+  return folder;
+}
+
+void read_run(std::string_view bytes) {
+  const Run run = load_run(run_folder(bytes));
+  (void)leaderboard_markdown(leaderboard(run.rows));
+}
+
+// A manifest that fits the run of run_sample.
+std::string manifest_sample(unsigned seed) {
+  (void)run_sample(seed);
+  nlohmann::json files;
+  for (const char* file : kFiles) files[file] = sha256_file(scratch_folder() + "/good/" + file);
+  return text_of({{"schema", "duet.published/1"},
+                  {"suite", "tiny"},
+                  {"suite_version", "1.0.0"},
+                  {"suite_hash", "0123456789abcdef"},
+                  {"rows", 2},
+                  {"without", {"trace", "feet"}},
+                  {"files", files}});
+}
+
+void read_manifest(std::string_view bytes) {
+  static const std::string folder = run_folder(run_sample(0));
+  scratch_file("run/manifest.json", bytes);
+  check_published(folder);
+}
+
+std::vector<LeaderboardEntry> entries() {
+  return leaderboard({test::episode("replay", "hug", 0, true), test::episode("replay", "hug", 1, false)});
+}
+
+std::string golden_sample(unsigned /*seed*/) { return bless(entries(), test::tiny_run()); }
+
+void read_golden(std::string_view bytes) { (void)check(std::string(bytes), entries(), test::tiny_run()); }
+
+std::string curves_sample(unsigned /*seed*/) { return "steps,return,loss\n0,1,0.5\n100,3,\n200,-4e1,nan\n"; }
+
+void read_curves(std::string_view bytes) { (void)parse_curves(bytes, "fuzz.csv"); }
+
+}  // namespace
+
+std::vector<Reader> result_readers() {
+  return {{"run_directory", run_sample, read_run},
+          {"manifest", manifest_sample, read_manifest},
+          {"golden", golden_sample, read_golden},
+          {"training_curves", curves_sample, read_curves}};
+}
+
+}  // namespace duet::fuzz

@@ -1,0 +1,54 @@
+#include "metrics/detector_catalogue.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "core/file.h"
+#include "metrics/detector.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Nothing that a detector prints is without unit and meaning.
+TEST(DetectorCatalogue, EveryFigureAndThresholdIsInTheCatalogue) {
+  for (const Task task : kTasks) {
+    for (const auto& [name, value] : thresholds(task)) EXPECT_FALSE(threshold_info(task, name).meaning.empty());
+    Agent agent;
+    for (Eigen::Matrix3Xd* track :
+         {&agent.lhand, &agent.rhand, &agent.head, &agent.root, &agent.torso, &agent.lshoulder, &agent.rshoulder})
+      *track = Eigen::Matrix3Xd::Random(3, 40);
+    const DetectorResult result = detect(task, agent, agent, DetectorVersion::kRobot);
+    std::size_t figures = 0;
+    for (const DetectorFigure& figure : detector_figures()) figures += figure.task == task ? 1 : 0;
+    EXPECT_EQ(result.values.size(), figures) << to_string(task);
+    for (const auto& [name, value] : result.values) EXPECT_EQ(detector_figure(task, name).name, name);
+  }
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)detector_figure(Task::kHug, "hands_distance"); }),
+              HasSubstr("did you mean 'hands_distance_min'"));
+}
+
+TEST(DetectorCatalogue, StrictChoicesAreTheReadingsThatTheSetBrings) {
+  using Choices = std::vector<std::pair<std::string, std::string>>;
+  EXPECT_EQ(strict_choices(Task::kBend), (Choices{{"bend.direction", "forward"}}));
+  EXPECT_EQ(strict_choices(Task::kFlyKiss), (Choices{{"fly_kiss.order", "after_closest"}}));
+  EXPECT_TRUE(strict_choices(Task::kHug).empty());
+}
+
+// docs/detectors.md has every line of both tables.
+TEST(DetectorCatalogue, TheDocsHaveEveryThresholdAndFigure) {
+  const std::string docs = read_file(fmt::format("{}/docs/detectors.md", DUET_SOURCE_DIR));
+  for (const ThresholdInfo& info : threshold_catalogue())
+    EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {:g} | {:g} | {} | {} |", info.name, info.paper, info.strict,
+                                            info.unit, info.meaning)));
+  for (const DetectorFigure& figure : detector_figures())
+    EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {} | {} |", figure.name, figure.unit, figure.meaning)));
+  for (const Task task : kTasks)
+    for (const auto& [option, value] : strict_choices(task))
+      EXPECT_THAT(docs, HasSubstr(fmt::format("`{}={}`", option, value)));
+}
+
+}  // namespace
+}  // namespace duet
