@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDefaultFriction = 0.4;
 constexpr int kDefaultDelay = 2;
-constexpr double kDefaultLatency = 20.0;  // [ms]
+constexpr double kDefaultLatency = 20.0, kDefaultPlanLatency = 100.0;  // [ms]
 
 int whole_ticks(const YamlSection& section) {
   const double value = in_range(section, "ticks", kDefaultDelay, {1.0, 50.0, true});
@@ -66,6 +66,9 @@ Perturbation read_kinds(const YamlSection& top, const std::string& file) {
   if (top.has("friction")) perturbation.friction = in_range(top, "friction", kDefaultFriction, {0.0, 10.0, true});
   if (top.has("mass")) perturbation.mass = read_mass(below("mass", {"link", "add"}));
   perturbation.perception = read_perception(top, file);
+  if (top.has("plan_latency"))
+    perturbation.plan_latency_ms =
+        in_range(below("plan_latency", {"ms"}), "ms", kDefaultPlanLatency, {0.0, 2000.0, false});
   if (top.has("partner")) perturbation.partner = read_partner_variation(top, file);
   return perturbation;
 }
@@ -95,7 +98,7 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
   }
   const YamlSection item(file, node, "perturbation",
                          {"name", "delay", "latency", "noise", "push", "friction", "mass", "jitter", "dropout",
-                          "perception_latency", "vanish", "freeze", "jump", "partner"});
+                          "perception_latency", "vanish", "freeze", "jump", "plan_latency", "partner"});
   const std::vector<std::string> kinds = kinds_of(item);
   if (kinds.empty())
     item.fail(line, fmt::format("expected at least one of {}, found none", fmt::join(perturbation_kinds(), ", ")));
@@ -113,7 +116,7 @@ const std::vector<std::string>& perturbation_kinds() {
   static const std::vector<std::string> kinds = [] {
     std::vector<std::string> all = {"delay", "latency", "noise", "push", "friction", "mass"};
     all.insert(all.end(), perception_kinds().begin(), perception_kinds().end());
-    all.emplace_back("partner");
+    all.insert(all.end(), {"plan_latency", "partner"});
     return all;
   }();
   return kinds;
@@ -158,6 +161,8 @@ std::string to_yaml(const Perturbation& perturbation) {
   if (const auto& mass = perturbation.mass)
     parts.push_back(fmt::format("mass: {{link: {}, add: {}}}", mass->link, mass->add));
   for (std::string& part : yaml_parts(perturbation.perception)) parts.push_back(std::move(part));
+  if (perturbation.plan_latency_ms > 0.0)
+    parts.push_back(fmt::format("plan_latency: {{ms: {}}}", perturbation.plan_latency_ms));
   if (perturbation.partner) parts.push_back(to_yaml(*perturbation.partner));
   return parts.size() == 1 ? perturbation.name : fmt::format("{{{}}}", fmt::join(parts, ", "));
 }

@@ -1,6 +1,6 @@
 // What disturbs an episode beside the clean arm: the controller's view of the state, its way to the joints, pushes, the
-// ground, the robot's mass, the policy's view of the partner, the partner itself. A named value of a suite; strict YAML
-// (docs/file-formats.md, "Perturbations").
+// ground, the robot's mass, the policy's view of the partner, the way of its plans, the partner itself. A named value
+// of a suite; strict YAML (docs/file-formats.md, "Perturbations").
 #pragma once
 
 #include <memory>
@@ -48,11 +48,12 @@ struct Perturbation {
   std::optional<double> friction;  // of the robot and the ground
   std::optional<AddedMass> mass;
   PerceptionPlan perception;
+  double plan_latency_ms = 0.0;  // from what a policy saw to its plan in the scheduler, to the nearest tick
   std::optional<PartnerVariation> partner;
 };
 
 // The kinds that may be named alone, with their defaults: "delay", "latency", "noise", "push", "friction", "mass",
-// those of perception (perception_kinds), "partner".
+// those of perception (perception_kinds), "plan_latency", "partner".
 const std::vector<std::string>& perturbation_kinds();
 
 // Throws std::invalid_argument for another name, with the nearest; "clean" is one.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <utility>
 
 #include "backends/factory.h"
@@ -71,20 +72,30 @@ class StepMeter {
   Eigen::Vector3d tick_ = Eigen::Vector3d::Zero();  // sum over the steps of this tick
 };
 
-// Asks the policy for plans and takes the time of it. No plan is none: the scheduler then holds the last one.
+// Asks the policy for plans, takes the time of it, and hands each plan to the scheduler when its latency, which is
+// simulated, is over. No plan is none: the scheduler then holds the last one.
 class Planner {
  public:
-  explicit Planner(Policy& policy) : policy_(policy) {}
+  Planner(Policy& policy, double latency_ms)
+      : policy_(policy), latency_ticks_(static_cast<int>(std::lround(latency_ms * kTickRate / 1000.0))) {}
 
   // Returns how long that took: a wait that is no part of the simulation.
-  Clock::duration plan(const Observation& observation, Scheduler& scheduler) {
+  Clock::duration plan(const Observation& observation) {
     const Clock::time_point begin = Clock::now();
     std::vector<Reference> plan = policy_.plan(observation);
     const Clock::duration took = Clock::now() - begin;
     milliseconds_.push_back(std::chrono::duration<double, std::milli>(took).count());
-    if (!plan.empty()) scheduler.push(std::move(plan), observation.tick);
+    if (!plan.empty()) on_their_way_.push_back({observation.tick, std::move(plan)});
     dead_ = policy_.faults().dead;
     return took;
+  }
+
+  // Plans that have arrived by this tick.
+  void deliver(int tick, Scheduler& scheduler) {
+    while (!on_their_way_.empty() && on_their_way_.front().made + latency_ticks_ <= tick) {
+      scheduler.push(std::move(on_their_way_.front().plan), on_their_way_.front().made);
+      on_their_way_.pop_front();
+    }
   }
 
   [[nodiscard]] bool dead() const { return dead_; }
@@ -94,7 +105,14 @@ class Planner {
   }
 
  private:
+  struct SentPlan {
+    int made;  // the tick of what the policy saw
+    std::vector<Reference> plan;
+  };
+
   Policy& policy_;
+  int latency_ticks_;
+  std::deque<SentPlan> on_their_way_;
   bool dead_ = false;
   std::vector<double> milliseconds_;
 };
@@ -208,7 +226,7 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   Sha256 hash;
   JointCommand command = backend.scene().robot->default_command(setup.start.q);
   StepMeter meter(backend, setup.limits);
-  Planner planner(policy);
+  Planner planner(policy, setup.perturbation.plan_latency_ms);
   Perception perception(setup.perturbation.perception, setup.perturbation_seed);
   Disturbance disturbance(setup.perturbation, *backend.scene().robot, setup.start, steps_per_tick, backend.scene().dt,
                           setup.perturbation_seed);
@@ -219,7 +237,8 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
     const HumanJoints velocities = partner_velocities(people, tick, kTickRate);
     const bool own = setup.seen_partner.empty();
     history.add({perception.seen(tick, own ? partner : partner_joints(setup.seen_partner, tick)), backend.state()});
-    if (tick % kTicksPerPlan == 0) deadline.extend(planner.plan(history.at(tick), scheduler));
+    if (tick % kTicksPerPlan == 0) deadline.extend(planner.plan(history.at(tick)));
+    planner.deliver(tick, scheduler);
     if (planner.dead()) {
       recording.outcome = Outcome::kError;
       break;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <tuple>
@@ -28,6 +29,10 @@ namespace {
 using Block = std::tuple<std::string, std::string, std::string, std::string, std::string>;
 
 Block block_of(const EpisodeRow& row) { return {row.engine, row.controller, row.policy, row.perturbation, row.task}; }
+
+constexpr std::array kNames = {&EpisodeRow::engine, &EpisodeRow::controller, &EpisodeRow::task,
+                               &EpisodeRow::perturbation, &EpisodeRow::policy};
+using NamesOfRows = std::array<std::set<std::string>, kNames.size()>;
 
 std::string text_of(const Block& block) {
   const auto& [engine, controller, policy, perturbation, task] = block;
@@ -137,11 +142,15 @@ class Verifier {
   // What run.json says that was asked for must be there.
   void check_missing() {
     std::set<std::string> keys;
-    for (const EpisodeRow& row : run_.rows) keys.insert(row.key);
+    NamesOfRows ran;
+    for (const EpisodeRow& row : run_.rows) {
+      keys.insert(row.key);
+      for (std::size_t i = 0; i < kNames.size(); ++i) ran[i].insert(row.*kNames[i]);
+    }
     std::map<Block, std::pair<int, int>> counts;  // missing, all
     for (std::size_t i = 0; i < plan_.size(); ++i) {
       const EpisodeRow& row = planned_[i];
-      if (!is_wanted(plan_[i], row)) continue;
+      if (!is_wanted(plan_[i], row, ran)) continue;
       auto& [missing, all] = counts[block_of(row)];
       ++all;
       if (!keys.contains(row.key)) ++missing;
@@ -153,15 +162,15 @@ class Verifier {
   }
 
   // A run without a plan is taken for one part: of names that have rows, every combination.
-  [[nodiscard]] bool is_wanted(const EpisodeSpec& spec, const EpisodeRow& row) const {
+  [[nodiscard]] bool is_wanted(const EpisodeSpec& spec, const EpisodeRow& row, const NamesOfRows& ran) const {
     if (run_.info.plan)
       return std::ranges::any_of(run_.info.plan->parts,
                                  [&](const RunPart& part) { return belongs(spec, spec.clip->task, part); });
-    const auto has = [&](std::string EpisodeRow::*field) {
-      return std::ranges::any_of(run_.rows, [&](const EpisodeRow& other) { return other.*field == row.*field; });
-    };
-    return has(&EpisodeRow::engine) && has(&EpisodeRow::controller) && has(&EpisodeRow::task) &&
-           has(&EpisodeRow::perturbation) && (row.arm == "null" || has(&EpisodeRow::policy));
+    for (std::size_t i = 0; i < kNames.size(); ++i) {
+      const bool of_no_policy = kNames[i] == &EpisodeRow::policy && row.arm == "null";
+      if (!of_no_policy && !ran[i].contains(row.*kNames[i])) return false;
+    }
+    return true;
   }
 
   [[nodiscard]] bool is_repeatable(const EpisodeRow& row) const {
@@ -187,20 +196,21 @@ class Verifier {
   void repeat() {
     const std::vector<const EpisodeRow*> rows = sample();
     result_.repeats.resize(rows.size());
+    const bool published = is_published(run_.path);  // without what plots of single episodes need
     progress_.start("running again", static_cast<int>(rows.size()), "episodes");
     parallel_for_each(static_cast<int>(rows.size()), options_.threads, [&](int i) {
-      result_.repeats[i] = repeated(*rows[i]);
+      result_.repeats[i] = repeated(*rows[i], !published);
       progress_.advance();
     });
     progress_.finish();
   }
 
-  [[nodiscard]] RepeatedEpisode repeated(const EpisodeRow& row) const {
+  [[nodiscard]] RepeatedEpisode repeated(const EpisodeRow& row, bool with_traces) const {
     const EpisodeSpec& spec = plan_[place_.at(row.key)];
     const PolicyOnBody& policy = bodies_.policy(spec.controller, spec.policy);
     if (!policy.refusal.empty()) throw MissingError(policy.refusal);
     EpisodeRow now = run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), "", policy.make);
-    if (is_published(run_.path)) {  // without what plots of single episodes need
+    if (!with_traces) {
       now.trace = {};
       now.feet = {};
     }

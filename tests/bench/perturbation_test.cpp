@@ -32,8 +32,8 @@ TEST(Perturbation, ASuiteThatSaysNothingIsClean) {
 }
 
 TEST(Perturbation, NamesAloneHaveTheDocumentedDefaults) {
-  const std::vector<Perturbation> list = read("[clean, delay, latency, noise, push, friction, mass]");
-  ASSERT_EQ(list.size(), 7U);
+  const std::vector<Perturbation> list = read("[clean, delay, latency, noise, push, friction, mass, plan_latency]");
+  ASSERT_EQ(list.size(), 8U);
   EXPECT_EQ(list[0].name, "clean");
   EXPECT_EQ(list[1].delay_ticks, 2);
   EXPECT_EQ(list[2].latency_ms, 20.0);
@@ -43,6 +43,7 @@ TEST(Perturbation, NamesAloneHaveTheDocumentedDefaults) {
   EXPECT_EQ(list[5].friction, 0.4);
   EXPECT_EQ(list[6].mass->add, 3.0);
   EXPECT_EQ(list[6].name, "mass");
+  EXPECT_EQ(list[7].plan_latency_ms, 100.0);
 }
 
 TEST(Perturbation, ValuesAndCombinationsAreRead) {
@@ -61,7 +62,7 @@ TEST(Perturbation, ValuesAndCombinationsAreRead) {
 TEST(Perturbation, WrittenOutItReadsBackToTheSame) {
   for (const char* text : {"clean", "push",
                            "{name: all, delay: {ticks: 3}, latency: {ms: 12.5}, noise: {w: 0.1}, "
-                           "push: {force: 7}, friction: 1.2, mass: {link: pelvis, add: 2}}"}) {
+                           "push: {force: 7}, friction: 1.2, mass: {link: pelvis, add: 2}, plan_latency: {ms: 60}}"}) {
     const std::string once = to_yaml(read(std::string("[") + text + "]")[0]);
     EXPECT_EQ(to_yaml(read("[" + once + "]")[0]), once);
   }

@@ -172,6 +172,26 @@ TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
   EXPECT_EQ(row.policy_ms.max, rollout.plan_times.max);
 }
 
+// Half of a plan's period late, each plan counts for the other half; what it was made of is not moved by it.
+TEST(Rollout, APlanArrivesItsSimulatedLatencyLater) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const int ticks = roll(parts, setup).recording.frames();
+  setup.perturbation = default_perturbation("plan_latency");
+  ASSERT_EQ(setup.perturbation.plan_latency_ms, 100.0);
+  const Rollout late = roll(parts, setup);
+  const std::vector<Reference>& reference = late.recording.reference;
+  for (int t = 0; t < 5; ++t) EXPECT_EQ(reference[t].q, setup.start.q) << t;
+  EXPECT_NE(reference[6].q, setup.start.q);
+  EXPECT_EQ(reference[14].q, reference[9].q);  // the plan of tick 0 is old at tick 10, that of tick 10 comes at 15
+  EXPECT_NE(reference[16].q, reference[14].q);
+  int expected = 0;
+  for (int t = 0; t < ticks; ++t) expected += t % kTicksPerPlan < 5 ? 1 : 0;
+  EXPECT_EQ(late.late_plans, expected);
+  setup.perturbation.plan_latency_ms = 9.0;  // to the nearest tick: none
+  EXPECT_EQ(roll(parts, setup).late_plans, 0);
+}
+
 // Dead from its second plan on.
 class DyingPolicy final : public Policy {
  public:

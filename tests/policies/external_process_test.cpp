@@ -12,81 +12,18 @@
 #include "policies/external/child_process.h"
 #include "policies/external/external_policy.h"
 #include "robots/kinematics.h"
-#include "tests/policies/external_fixtures.h"
+#include "tests/policies/process_fixtures.h"
 
 namespace duet {
 namespace {
 
-using test::ends;
 using test::g1;
-using test::MovingHistory;
-using test::number_in;
-using test::runs;
+using test::polite;
+using test::ProcessPolicyTest;
 using test::thrown_message;
 using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 constexpr double kFloat = 1e-6;
-
-std::string examples() { return std::string(DUET_SOURCE_DIR) + "/examples/policies"; }
-
-bool python_is_here() {
-  try {
-    return !find_program("python3", ".").empty();
-  } catch (const MissingError&) {
-    return false;
-  }
-}
-
-class ProcessPolicyTest : public ::testing::Test {
- protected:
-  void SetUp() override {
-    if (!python_is_here()) GTEST_SKIP() << "not run: python3 absent";
-  }
-
-  // After every test: no child is left, running or not reaped.
-  void TearDown() override {
-    policy_.reset();
-    EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
-    EXPECT_EQ(errno, ECHILD);
-  }
-
-  // `deadline_ms` 0: none. `script` after the import of duet_policy's functions, with `c` connected and the
-  // observations' first answers given.
-  Policy& start(const std::string& script, int deadline_ms = 5000, int start_ms = 20000) {
-    write_file(folder_ / "policy.py", "import json, os, signal, socket, struct, sys, time\nsys.path.insert(0, '" +
-                                          examples() + "')\nfrom duet_policy import read, write\n" +
-                                          "c = socket.socket(fileno=int(os.environ['DUET_POLICY_FD']))\n" + script);
-    write_descriptor(fmt::format("command: [python3, policy.py]\n{}start_ms: {}\n",
-                                 deadline_ms > 0 ? fmt::format("deadline_ms: {}\n", deadline_ms) : "", start_ms));
-    policy_ = make_policy(folder_ / "policy.yaml", g1());
-    policy_->reset(test::episode(history_.at(0).now().robot));
-    return *policy_;
-  }
-
-  void write_descriptor(const std::string& how) const {
-    write_file(folder_ / "policy.yaml", "schema: duet.policy/1\nname: mine\nabout: a test\nkind: process\n" + how);
-  }
-
-  std::size_t plan(int tick) { return policy_->plan(history_.at(tick)).size(); }
-
-  test::ScratchFolder folder_;
-  MovingHistory history_{1};
-  std::unique_ptr<Policy> policy_;
-};
-
-// A program that greets and says it is ready, and then `script` with the first observation in `m`.
-std::string polite(const std::string& script) {
-  return R"(h = read(c)
-write(c, {'type': 'hello', 'version': 1})
-episode = read(c)
-write(c, {'type': 'ready'})
-good = [[0.1 * i, 0, 0.75, 1, 0, 0, 0] + [0] * 29 for i in range(5)]
-def plan(m, anchors=good):
-    write(c, {'type': 'plan', 'tick': m['tick'], 'anchors': anchors})
-m = read(c)
-)" + script;
-}
 
 TEST_F(ProcessPolicyTest, AnswersWithItsPlan) {
   start(polite("while m['type'] == 'observe':\n    plan(m)\n    m = read(c)\n"));
@@ -299,137 +236,6 @@ TEST_F(ProcessPolicyTest, AScriptThatIsNotThereEndsIt) {
   write_descriptor("command: [./none]\n");
   EXPECT_THAT(thrown_message<MissingError>([&] { policy_maker(folder_ / "policy.yaml", g1()); }),
               HasSubstr("none': no such program"));
-}
-
-TEST_F(ProcessPolicyTest, OptionsSetItsTimes) {
-  write_descriptor("command: [python3, none.py]\n");
-  EXPECT_EQ(thrown_message<std::invalid_argument>([&] {
-              policy_maker(folder_ / "policy.yaml", g1(), {{"deadline_ms", "soon"}});
-            }),
-            "policy 'mine': deadline_ms: expected a whole number in [1, 600000], found 'soon'");
-  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(0).fallback, "");
-  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(1).fallback, "60000");
-  EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(2).fallback, "120000");
-}
-
-TEST_F(ProcessPolicyTest, APlanOfAnEarlierEpisodeIsDropped) {
-  start(polite(R"(
-again = read(c)
-write(c, {'type': 'plan', 'tick': 0, 'anchors': [[9, 9, 9, 1, 0, 0, 0] + [0] * 29] * 5})
-write(c, {'type': 'ready'})
-plan(read(c))
-read(c)
-)"),
-        100);
-  EXPECT_EQ(plan(0), 0U);
-  policy_->reset(test::episode(history_.at(0).now().robot));
-  EXPECT_FALSE(policy_->faults().any());
-  const std::vector<Reference> references = policy_->plan(history_.at(0));
-  if (policy_->faults().late == 0) {  // a busy machine
-    ASSERT_EQ(references.size(), 100U);
-    EXPECT_NEAR(references[0].X_WB.p.x(), 0.0, kFloat);
-  }
-}
-
-TEST_F(ProcessPolicyTest, ObservationsThatAreNotFiniteAreNotSent) {
-  start(polite("while m['type'] == 'observe':\n    plan(m)\n    m = read(c)\n"));
-  MovingHistory broken(1);
-  broken.frame(3).robot.v[2] = std::nan("");
-  EXPECT_TRUE(policy_->plan(broken.at(0)).empty());
-  EXPECT_EQ(policy_->faults().invalid, 1);
-  EXPECT_EQ(plan(10), 100U);
-}
-
-const std::string kDeaf = polite(R"(
-plan(m)
-f = open('pid.tmp', 'w')
-f.write(str(os.getpid()) + '\n')
-f.close()
-os.rename('pid.tmp', 'pid')
-while True:
-    time.sleep(1000)
-)");
-
-TEST_F(ProcessPolicyTest, IsKilledWithThePolicyThoughItDoesNotListen) {
-  start(kDeaf);
-  EXPECT_EQ(plan(0), 100U);
-  const int pid = number_in(folder_ / "pid");
-  EXPECT_TRUE(runs(pid));
-  policy_.reset();
-  EXPECT_FALSE(runs(pid));
-}
-
-TEST_F(ProcessPolicyTest, OutlivesTheThreadThatMadeIt) {
-  std::thread([this] { start(polite("while m['type'] == 'observe':\n    plan(m)\n    m = read(c)\n")); }).join();
-  for (const int tick : {0, 10, 20}) EXPECT_EQ(plan(tick), 100U);
-  EXPECT_FALSE(policy_->faults().any());
-}
-
-TEST_F(ProcessPolicyTest, DoesNotOutliveAKilledParent) {
-  const int parent = fork();
-  ASSERT_GE(parent, 0);
-  if (parent == 0) {
-    start(kDeaf);
-    static_cast<void>(plan(0));
-    pause();
-    _exit(0);
-  }
-  const int pid = number_in(folder_ / "pid");
-  EXPECT_GT(pid, 0);
-  kill(parent, SIGKILL);
-  waitpid(parent, nullptr, 0);
-  EXPECT_TRUE(ends(pid));
-}
-
-TEST_F(ProcessPolicyTest, MayBeAServerThatRuns) {
-  write_file(folder_ / "server.py", "import sys\nsys.path.insert(0, '" + examples() + R"(')
-from duet_policy import serve
-class Still:
-    def __init__(self, hello): pass
-    def reset(self, episode): pass
-    def plan(self, observation): return [[0, 0, 0.75, 1, 0, 0, 0] + [0] * 29] * 5
-serve(Still, 'here.sock')
-)");
-  write_descriptor("socket: here.sock\ndeadline_ms: 5000\n");
-  const auto refused = make_policy(folder_ / "policy.yaml", g1());
-  EXPECT_TRUE(refused->faults().dead);
-  EXPECT_THAT(refused->faults().message, StartsWith("policy 'mine': cannot connect to '"));
-  EXPECT_THAT(refused->faults().message, HasSubstr("here.sock': No such file or directory"));
-  const ChildProcess server({"env", "-u", "DUET_POLICY_FD", "python3", "server.py"},
-                            std::filesystem::path(folder_ / "x").parent_path().string(), 0);
-  std::unique_ptr<Policy> first;
-  for (int i = 0; i < 2000 && (first == nullptr || first->faults().dead); ++i) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    first = make_policy(folder_ / "policy.yaml", g1());
-  }
-  const auto second = make_policy(folder_ / "policy.yaml", g1());  // two at once
-  for (Policy* policy : {first.get(), second.get()}) {
-    EXPECT_EQ(policy->faults().message, "");
-    policy->reset(test::episode(history_.at(0).now().robot));
-    EXPECT_EQ(policy->plan(history_.at(0)).size(), 100U);
-  }
-}
-
-// The example raises its hand above its shoulder and swings it, and stands still while nobody is near.
-TEST_F(ProcessPolicyTest, TheExampleWaves) {
-  const auto policy = make_policy(examples() + "/wave_policy.yaml", g1(), {{"deadline_ms", "5000"}});
-  MovingHistory history(1);
-  RobotState start = g1()->standing_state();
-  policy->reset(test::episode(start));
-  history.frame(11).partner.col(0) = Eigen::Vector3d(1.0, 0.0, 0.9);
-  const std::vector<Reference> plan = policy->plan(history.at(0));
-  ASSERT_EQ(policy->faults().message, "");
-  Kinematics kinematics(*g1());
-  const auto hand = [&](const Reference& reference) {
-    kinematics.update(reference.X_WB, reference.q);
-    return Eigen::Vector3d(kinematics.frame_position(g1()->track_frame("rhand")) -
-                           kinematics.frame_position(g1()->track_frame("rshoulder")));
-  };
-  EXPECT_GT(hand(plan[0]).z(), 0.1);
-  EXPECT_GT(std::abs(hand(plan[0]).y() - hand(plan[50]).y()), 0.1);
-  EXPECT_LT((plan[0].X_WB.p - start.X_WB.p).norm(), kFloat);
-  history.frame(11).partner.col(0) = Eigen::Vector3d(9.0, 0.0, 0.9);
-  EXPECT_LT((policy->plan(history.at(10)).at(0).q - g1()->neutral).norm(), kFloat);
 }
 
 }  // namespace

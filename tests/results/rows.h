@@ -1,12 +1,17 @@
 // Rows for the tests of this room.
 #pragma once
 
+#include <fstream>
 #include <string>
 
 #include "results/episode_row.h"
 #include "results/run_directory.h"
 
 namespace duet::test {
+
+inline void append_text(const std::string& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary | std::ios::app) << text;
+}
 
 inline RunInfo tiny_run() {
   RunInfo info;

@@ -16,16 +16,13 @@
 namespace duet {
 namespace {
 
+using test::append_text;
 using test::episode;
 using test::ScratchFolder;
 using test::thrown_message;
 using test::tiny_run;
 using testing::AllOf;
 using testing::HasSubstr;
-
-void append_text(const std::string& path, const std::string& text) {
-  std::ofstream(path, std::ios::binary | std::ios::app) << text;
-}
 
 TEST(RunDirectory, KeepsWhatWasAppended) {
   const ScratchFolder scratch;

@@ -19,16 +19,13 @@
 namespace duet {
 namespace {
 
+using test::append_text;
 using test::episode;
 using test::ScratchFolder;
 using test::thrown_message;
 using test::tiny_run;
 using testing::AllOf;
 using testing::HasSubstr;
-
-void append_text(const std::string& path, const std::string& text) {
-  std::ofstream(path, std::ios::binary | std::ios::app) << text;
-}
 
 // Runs `work` in a process of its own; its exit code, or 128 + the signal that ended it.
 template <typename Work>
