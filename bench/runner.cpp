@@ -272,8 +272,8 @@ std::vector<Task> tasks_of_clips(const Suite& suite) {
 }
 
 std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
-  std::vector<Task> tasks;
-  for (const PairedMotion& clip : clips) tasks.push_back(clip.task);
+  std::vector<Task> tasks(clips.size());
+  std::ranges::transform(clips, tasks.begin(), &PairedMotion::task);
   return tasks;
 }
 

@@ -65,7 +65,7 @@ std::string suite_file(const std::string& suite) {
 }
 
 std::string first_sentence(const std::string& yaml) {
-  const std::string comment = head_comment(yaml);
+  std::string comment = head_comment(yaml);
   for (std::size_t i = 0; i < comment.size(); ++i) {
     const bool ends = comment[i] == '.' || comment[i] == '?';
     if (ends && (i + 1 == comment.size() || comment[i + 1] == ' ')) return comment.substr(0, i + 1);

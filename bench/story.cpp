@@ -16,6 +16,10 @@
 namespace duet {
 namespace {
 
+constexpr const char* kNullAndLift =
+    "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the same "
+    "episodes.";
+
 StickFigure human_figure(const std::string& label, const HumanMotion& motion, int frame) {
   StickFigure figure{label, {}, {}};
   for (int j = 0; j < kSmplJoints; ++j) {
@@ -73,8 +77,7 @@ std::vector<std::string> notes_of(const Suite& suite) {
           to_string(suite.detector), to_string(suite.thresholds)),
       "Start \"auto\" means: a controller that cannot walk starts at the act position; one that walks approaches.",
       "Each controller runs on the body that it was made for; joints that the clips lack stay at neutral.",
-      "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
-      "same episodes.",
+      kNullAndLift,
       "Episodes that fell, diverged, timed out or failed with an error count as failures.",
   };
   if (suite.partner == PartnerMode::kGhost)

@@ -51,7 +51,8 @@ function(duet_add_test room)
   add_executable(${room}_test ${ARG_SOURCES})
   target_link_libraries(${room}_test PRIVATE duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-  target_compile_options(${room}_test PRIVATE $<$<CONFIG:Release>:-O1>)  # what is timed is in the rooms
+  # What is timed is in the rooms.
+  target_compile_options(${room}_test PRIVATE $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
   # Half of a test's compilation. The rooms themselves have none: clang-tidy cannot read those of GCC.
   target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h>)
   # A test whose data are not there says "not run: ... absent" and counts as skipped.
