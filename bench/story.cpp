@@ -17,7 +17,8 @@ namespace duet {
 namespace {
 
 constexpr const char* kNullAndLift =
-    "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the same "
+    "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
+    "same "
     "episodes.";
 
 StickFigure human_figure(const std::string& label, const HumanMotion& motion, int frame) {

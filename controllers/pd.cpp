@@ -23,7 +23,8 @@ class Pd final : public Controller {
 
 }  // namespace
 
-std::unique_ptr<Controller> make_pd_controller(std::shared_ptr<const RobotModel> robot) {
+std::unique_ptr<Controller> make_pd_controller(
+    std::shared_ptr<const RobotModel> robot) {  // NOLINT(performance-unnecessary-value-param): as all makers
   return std::make_unique<Pd>(robot);
 }
 

@@ -49,6 +49,7 @@ std::vector<std::string> by_distance(std::string_view name, std::span<const std:
     ranked.emplace_back(edit_distance(wanted, folded(candidate)), candidate);
   std::ranges::stable_sort(ranked, {}, &std::pair<std::size_t, std::string>::first);
   std::vector<std::string> names;
+  names.reserve(ranked.size());
   for (auto& [distance, candidate] : ranked) names.push_back(std::move(candidate));
   return names;
 }
