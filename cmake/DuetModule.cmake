@@ -1,6 +1,6 @@
 # duet_add_module(<room> SOURCES ... LINK ...): the library duet_<room>. One room = one folder = one target.
 # duet_add_test(<room> SOURCES ... LINK ...): the GoogleTest program <room>_test, each TEST known to ctest.
-# duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `fuzz`).
+# duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `dev`).
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
@@ -32,10 +32,10 @@ if(DUET_SANITIZE)
   set(sanitizers -fsanitize=address,undefined -fno-sanitize=null,alignment,vptr,object-size -fno-sanitize-recover=all)
   target_compile_options(duet_options INTERFACE ${sanitizers} -fno-omit-frame-pointer -O1)
   target_link_options(duet_options INTERFACE ${sanitizers})
+  target_compile_definitions(duet_options INTERFACE DUET_SANITIZED)
 endif()
 if(DUET_FUZZ)
-  target_compile_options(duet_options INTERFACE -fsanitize=address,undefined,fuzzer-no-link)
-  target_link_options(duet_options INTERFACE -fsanitize=address,undefined)
+  target_compile_options(duet_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 function(duet_add_module room)

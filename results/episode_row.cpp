@@ -120,7 +120,7 @@ Outcome outcome_from(const std::string& name) {
 }
 
 std::string arm_from(const std::string& name) {
-  const std::array<std::string, 4> known = {"main", "null", "oracle", "shuffled"};
+  const std::array<std::string, 3> known = {"main", "null", "shuffled"};
   if (std::find(known.begin(), known.end(), name) != known.end()) return name;
   throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", name, known)));
 }

@@ -86,7 +86,7 @@ struct EpisodeRow {
   std::string controller, policy;                // as the suite names them
   std::string controller_digest, policy_digest;  // SHA-256 of what they are; "" where their files were absent
   std::string perturbation = "clean", robot_digest;
-  std::string arm = "main";  // "main", "null", "oracle", "shuffled"
+  std::string arm = "main";  // "main", "null", "shuffled"
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
   std::string detectors;        // version of the detectors' code (metrics/detector.h)

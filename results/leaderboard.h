@@ -28,7 +28,7 @@ struct LeaderboardEntry {
   std::map<std::string, double> other_success;  // "paper/paper", "robot/strict", ... -> rate
   long fell = 0, diverged = 0, timed_out = 0, errors = 0;
   std::map<std::string, double> metrics;  // mean over episodes that have it
-  std::string arm = "main";               // the null and the oracle arm have entries of their own
+  std::string arm = "main";               // the null and the shuffled arm have entries of their own
   double level = 0.95;                    // of both intervals
   long pairs = 0;  // episodes that the null arm has too: null_success, lift and its interval are over these
   long unsupported = 0;

@@ -18,7 +18,7 @@ struct LeaderboardRow {
   [[nodiscard]] const LeaderboardEntry* find(const std::string& task) const;
 };
 
-// By engine, controller, perturbation; then the main arm by policy, the oracle, and the null arm last.
+// By engine, controller, perturbation; then the main arm by policy, the shuffled, and the null arm last.
 std::vector<LeaderboardRow> leaderboard_rows(const std::vector<LeaderboardEntry>& entries);
 
 // Rows of one engine after those of another, each engine's apart: for tables with a column per row, which would be too

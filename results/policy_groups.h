@@ -25,7 +25,7 @@ struct PolicyTableOptions {
 inline constexpr std::string_view kClean = "clean";
 
 struct PolicyKey {
-  std::string engine, controller, arm, policy;  // arms in the order main, oracle, shuffled
+  std::string engine, controller, arm, policy;  // arms in the order main, shuffled
   auto operator<=>(const PolicyKey&) const = default;
 };
 

@@ -8,7 +8,7 @@ thread_local long calls = 0;
 
 }  // namespace
 
-#if !defined(__SANITIZE_ADDRESS__)
+#if !defined(DUET_SANITIZED)
 // The C library's own functions under the names that it keeps for programs that replace them.
 extern "C" {
 void* __libc_malloc(size_t size);
@@ -33,7 +33,7 @@ void* realloc(void* old, size_t size) {
 namespace duet::test {
 
 bool allocations_are_counted() {
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(DUET_SANITIZED)
   return false;
 #else
   return true;

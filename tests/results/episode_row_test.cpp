@@ -108,7 +108,7 @@ TEST(EpisodeRow, FaultsAndTimesOfPoliciesAreReadStrictly) {
 }
 
 TEST(EpisodeRow, EveryArmIsRead) {
-  for (const char* arm : {"main", "null", "oracle", "shuffled"}) {
+  for (const char* arm : {"main", "null", "shuffled"}) {
     EpisodeRow row = full_row();
     row.arm = arm;
     EXPECT_EQ(row_from_json(to_json(row)).arm, arm);

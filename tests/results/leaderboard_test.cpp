@@ -261,11 +261,11 @@ TEST(LeaderboardMarkdown, EscapesNames) {
 
 TEST(LeaderboardMarkdown, NullArmComesAfterThePoliciesOfItsEngine) {
   std::vector<EpisodeRow> rows = {episode("zeta", "hug", 0, true), episode("null", "hug", 0, true, "null"),
-                                  episode("clip", "hug", 0, true, "oracle"), episode("alpha", "hug", 0, true)};
+                                  episode("clip", "hug", 0, true, "shuffled"), episode("alpha", "hug", 0, true)};
   const std::string text = leaderboard_markdown(leaderboard(rows));
   EXPECT_LT(text.find("| alpha"), text.find("| zeta"));
-  EXPECT_LT(text.find("| zeta"), text.find("| clip (oracle arm)"));
-  EXPECT_LT(text.find("| clip (oracle arm)"), text.find("| null (control)"));
+  EXPECT_LT(text.find("| zeta"), text.find("| clip (shuffled arm)"));
+  EXPECT_LT(text.find("| clip (shuffled arm)"), text.find("| null (control)"));
 }
 
 TEST(LeaderboardCsv, FollowsRfc4180) {

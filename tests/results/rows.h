@@ -48,7 +48,7 @@ inline EpisodeRow full_row() {
   row.detectors = "3";
   row.perturbation = "jitter_0.05";
   row.robot_digest = std::string(64, 'b');
-  row.arm = "oracle";
+  row.arm = "shuffled";
   row.outcome = Outcome::kFell;
   row.message = "pelvis below 0.3 m at 2.1 s, \"sideways\"\nμ = 0.8";
   row.success = true;

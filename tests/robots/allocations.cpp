@@ -7,7 +7,7 @@ namespace {
 std::atomic<long> count{0};
 }
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef DUET_SANITIZED
 bool duet::test::counts_allocations() { return false; }
 #else
 // glibc's own allocator under the name that it keeps for programs that replace malloc.
