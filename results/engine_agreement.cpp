@@ -10,8 +10,6 @@
 namespace duet {
 namespace {
 
-constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
-
 struct Differences {
   std::vector<double> playback, values;
   std::vector<int> clips;
