@@ -17,15 +17,14 @@ namespace {
 using conformance::AccuracyPoint;
 using conformance::Measurement;
 using conformance::Tally;
-using conformance::Verdict;
 using nlohmann::json;
 
 constexpr const char* kSchema = "duet.certificate/1";
 
-void count(Verdict verdict, Tally& tally) {
-  if (verdict == Verdict::kPass) ++tally.passed;
-  if (verdict == Verdict::kFail) ++tally.failed;
-  if (verdict == Verdict::kDeviation) ++tally.deviations;
+void count(conformance::Verdict verdict, Tally& tally) {
+  if (verdict == conformance::Verdict::kPass) ++tally.passed;
+  if (verdict == conformance::Verdict::kFail) ++tally.failed;
+  if (verdict == conformance::Verdict::kDeviation) ++tally.deviations;
 }
 
 CertifiedEngine certified(const conformance::EngineReport& report, const std::string& profile) {
@@ -118,8 +117,9 @@ void read_list(JsonFields& fields, const std::string& key, const std::string& wh
   for (std::size_t i = 0; i < list.size(); ++i) read(list[i], fmt::format("{}: {}[{}]", what, key, i));
 }
 
-Verdict read_verdict(const std::string& text, const std::string& what) {
-  for (const Verdict verdict : {Verdict::kPass, Verdict::kFail, Verdict::kDeviation})
+conformance::Verdict read_verdict(const std::string& text, const std::string& what) {
+  for (const conformance::Verdict verdict :
+       {conformance::Verdict::kPass, conformance::Verdict::kFail, conformance::Verdict::kDeviation})
     if (text == conformance::to_string(verdict)) return verdict;
   throw InputError(fmt::format("{}: verdict is '{}', expected pass, FAIL or deviation", what, shown(text)));
 }

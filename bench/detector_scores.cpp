@@ -34,7 +34,7 @@ void add_row(TextTable& table, const Row& scores, const std::string& title, cons
 }
 
 template <typename Map, typename Show>
-std::string shown(const Map& map, const std::string& key, Show&& show) {
+std::string shown_entry(const Map& map, const std::string& key, Show&& show) {
   const auto found = map.find(key);
   return found == map.end() ? "" : show(found->second);
 }
@@ -46,14 +46,14 @@ void add_task(TextTable& table, const Row& scores) {
           [&](const DetectorResult& r) { return yes_no(r.success); });
   for (const auto& [name, holds] : first.result.parts)
     add_row(table, scores, "  " + name, "", "",
-            [&, &name = name](const DetectorResult& r) { return shown(r.parts, name, yes_no); });
+            [&, &name = name](const DetectorResult& r) { return shown_entry(r.parts, name, yes_no); });
   for (const auto& [name, value] : first.result.values)
     add_row(table, scores, "  " + name, std::string(detector_figure(first.task, name).unit), "",
-            [&, &name = name](const DetectorResult& r) { return shown(r.values, name, number); });
+            [&, &name = name](const DetectorResult& r) { return shown_entry(r.values, name, number); });
   const Thresholds tau = thresholds(first.task, first.thresholds);
   for (const auto& [name, value] : tau)
     add_row(table, scores, "  margin of " + name, std::string(threshold_info(first.task, name).unit), number(value),
-            [&, &name = name](const DetectorResult& r) { return shown(r.margins, name, margin); });
+            [&, &name = name](const DetectorResult& r) { return shown_entry(r.margins, name, margin); });
   add_row(table, scores, "  evidence_frames", "frames", "",
           [](const DetectorResult& r) { return std::to_string(std::count(r.frames.begin(), r.frames.end(), true)); });
 }

@@ -9,6 +9,7 @@
 #include "core/require.h"
 #include "core/text.h"
 #include "motion/npz_fields.h"
+#include "results/json_fields.h"
 
 namespace duet {
 namespace {
@@ -32,7 +33,7 @@ std::map<std::string, std::string> chosen_readings(const Readings& readings) {
 }
 
 void put_kept(Npz& npz, const KeptEpisode& kept) {
-  npz.set_text(kRow, to_json(kept.row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  npz.set_text(kRow, dumped(to_json(kept.row)));
   npz.set_text("detector_version", std::string(to_string(kept.rules.detector)));
   npz.set_text("detector_thresholds", std::string(to_string(kept.rules.thresholds)));
   npz.set_integer("feet", kept.rules.feet ? 1 : 0);

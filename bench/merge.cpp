@@ -10,6 +10,7 @@
 #include "bench/suite_names.h"
 #include "core/file.h"
 #include "core/require.h"
+#include "results/json_fields.h"
 
 namespace duet {
 namespace {
@@ -64,8 +65,7 @@ class Merger {
 
 std::string lines_of(const std::vector<EpisodeRow>& rows) {
   std::string text;
-  for (const EpisodeRow& row : rows)
-    text += to_json(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  for (const EpisodeRow& row : rows) text += dumped(to_json(row)) + "\n";
   return text;
 }
 

@@ -11,7 +11,7 @@
 namespace duet {
 namespace {
 
-constexpr double kDefaultJitter = 0.02, kDefaultDropout = 0.1, kDefaultLatency = 200.0, kDefaultVanish = 2.0;
+constexpr double kDefaultJitter = 0.02, kDefaultDropout = 0.1, kDefaultPerceptionLatency = 200.0, kDefaultVanish = 2.0;
 constexpr Range kTime = {0.0, 600.0, true};
 
 }  // namespace
@@ -30,7 +30,8 @@ PerceptionPlan read_perception(const YamlSection& item, const std::string& file)
     plan.jitter = in_range(below("jitter", {"sigma"}), "sigma", kDefaultJitter, {0.0, 1.0, false});
   if (item.has("dropout")) plan.dropout = in_range(below("dropout", {"p"}), "p", kDefaultDropout, {0.0, 1.0, false});
   if (item.has("perception_latency"))
-    plan.latency_ms = in_range(below("perception_latency", {"ms"}), "ms", kDefaultLatency, {0.0, 5000.0, false});
+    plan.latency_ms =
+        in_range(below("perception_latency", {"ms"}), "ms", kDefaultPerceptionLatency, {0.0, 5000.0, false});
   if (item.has("vanish")) plan.vanish = in_range(below("vanish", {"at"}), "at", kDefaultVanish, kTime);
   if (item.has("freeze")) {
     const YamlSection freeze = below("freeze", {"at", "for"});

@@ -91,7 +91,7 @@ void judge_first(const RobotModel& robot, const RobotState& now, PolicyCheck& ch
   }
 }
 
-std::string describe(const ShownInput& input) {
+std::string range_of(const ShownInput& input) {
   const int frame = input.size() / input.frames;
   std::string text =
       fmt::format("shown: {}{} x {} numbers\n", input.name.empty() ? "" : input.name + ", ", input.frames, frame);
@@ -163,7 +163,7 @@ PolicyCheck check_policy(const std::string& use, const std::shared_ptr<const Rob
 std::string describe(const PolicyCheck& check) {
   std::string text = fmt::format("policy '{}': {}\nclip: {}, its first frame\n", shown(check.info.name),
                                  shown(check.info.about), check.clip);
-  for (const ShownInput& input : check.inputs) text += describe(input);
+  for (const ShownInput& input : check.inputs) text += range_of(input);
   if (!check.output.empty()) text += fmt::format("asked for: {}\n", check.output);
   text += fmt::format("came back: {} references at 50 Hz\n", check.plan.size());
   for (std::size_t tick = 0; tick < check.plan.size(); tick += kTicksPerAnchor)

@@ -11,7 +11,7 @@
 namespace duet {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUndefined = std::numeric_limits<double>::infinity();
 constexpr Eigen::Index kRollingWindow = 10;
 
 Eigen::ArrayXd root_distances(const ClosestHands& closest, const Agent& performer, const Agent& partner,
@@ -35,14 +35,14 @@ Eigen::ArrayXd at(const Eigen::ArrayXd& values, const FrameMask& mask) {
 }
 
 struct Spread {
-  double std = kInfinity, mean = kInfinity;  // infinite where undefined: no threshold is met then
+  double std = kUndefined, mean = kUndefined;  // infinite where undefined: no threshold is met then
 };
 
 Spread spread(const Eigen::ArrayXd& values, int ddof) {
   const double n = static_cast<double>(values.size());
   if (values.size() == 0) return {};
   const double mean = values.sum() / n;
-  if (n <= ddof) return {kInfinity, mean};
+  if (n <= ddof) return {kUndefined, mean};
   return {std::sqrt((values - mean).square().sum() / (n - ddof)), mean};
 }
 

@@ -7,7 +7,7 @@
 namespace duet {
 namespace {
 
-constexpr double kSameInstant = 1e-9;  // of a frame
+constexpr double kSameFrame = 1e-9;  // of a frame
 
 std::size_t channel_count(const Bvh& bvh) {
   std::size_t count = 0;
@@ -45,7 +45,7 @@ std::vector<Pose> local_poses(const Bvh& bvh, int frame) {
 
 std::vector<Pose> local_poses_at(const Bvh& bvh, double index) {
   const double nearest = std::round(index);
-  if (std::abs(index - nearest) <= kSameInstant * std::max(1.0, nearest))
+  if (std::abs(index - nearest) <= kSameFrame * std::max(1.0, nearest))
     return local_poses(bvh, static_cast<int>(nearest));
   const int frame = static_cast<int>(index);
   std::vector<Pose> poses = local_poses(bvh, frame);

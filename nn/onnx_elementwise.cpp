@@ -302,7 +302,7 @@ void where(OnnxBuilder& builder) {
   });
 }
 
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kElementwiseOperators[] = {
     {"Abs", 1, 1, 1, absolute},
     {"Add", 2, 2, 1, add},
     {"Clip", 1, 3, 1, clip},
@@ -337,6 +337,6 @@ constexpr OnnxOperator kOperators[] = {
 
 }  // namespace
 
-std::span<const OnnxOperator> elementwise_operators() { return kOperators; }
+std::span<const OnnxOperator> elementwise_operators() { return kElementwiseOperators; }
 
 }  // namespace duet

@@ -253,7 +253,7 @@ void conv(OnnxBuilder& builder) {
   builder.step([c] { run(c); });
 }
 
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kLinearOperators[] = {
     {"Conv", 2, 3, 1, conv},
     {"Gemm", 2, 3, 1, gemm},
     {"MatMul", 2, 2, 1, matmul},
@@ -261,6 +261,6 @@ constexpr OnnxOperator kOperators[] = {
 
 }  // namespace
 
-std::span<const OnnxOperator> linear_operators() { return kOperators; }
+std::span<const OnnxOperator> linear_operators() { return kLinearOperators; }
 
 }  // namespace duet

@@ -288,13 +288,13 @@ void concat(OnnxBuilder& builder) {
 }
 
 constexpr int kAny = std::numeric_limits<int>::max();
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kMovementOperators[] = {
     {"Concat", 1, kAny, 1, concat}, {"Expand", 2, 2, 1, expand},  {"Gather", 2, 2, 1, gather},
     {"Slice", 3, 5, 1, slice},      {"Split", 1, 2, kAny, split}, {"Transpose", 1, 1, 1, transpose},
 };
 
 }  // namespace
 
-std::span<const OnnxOperator> movement_operators() { return kOperators; }
+std::span<const OnnxOperator> movement_operators() { return kMovementOperators; }
 
 }  // namespace duet

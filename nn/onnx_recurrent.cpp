@@ -124,13 +124,13 @@ void gru(OnnxBuilder& builder) {
   });
 }
 
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kRecurrentOperators[] = {
     {"GRU", 3, 6, 2, gru},
     {"LSTM", 3, 8, 3, lstm},
 };
 
 }  // namespace
 
-std::span<const OnnxOperator> recurrent_operators() { return kOperators; }
+std::span<const OnnxOperator> recurrent_operators() { return kRecurrentOperators; }
 
 }  // namespace duet

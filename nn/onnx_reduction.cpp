@@ -164,7 +164,7 @@ void layer_normalization(OnnxBuilder& builder) {
   });
 }
 
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kReductionOperators[] = {
     {"LayerNormalization", 2, 3, 1, layer_normalization},
     {"ReduceL2", 1, 1, 1, reduce<add_square, root>},
     {"ReduceMean", 1, 1, 1, reduce<add, mean>},
@@ -175,6 +175,6 @@ constexpr OnnxOperator kOperators[] = {
 
 }  // namespace
 
-std::span<const OnnxOperator> reduction_operators() { return kOperators; }
+std::span<const OnnxOperator> reduction_operators() { return kReductionOperators; }
 
 }  // namespace duet

@@ -189,7 +189,7 @@ void cast(OnnxBuilder& builder) {
   });
 }
 
-constexpr OnnxOperator kOperators[] = {
+constexpr OnnxOperator kShapeOperators[] = {
     {"Cast", 1, 1, 1, cast},       {"Constant", 0, 0, 1, constant}, {"ConstantOfShape", 1, 1, 1, constant_of_shape},
     {"Flatten", 1, 1, 1, flatten}, {"Identity", 1, 1, 1, identity}, {"Reshape", 2, 2, 1, reshape},
     {"Shape", 1, 1, 1, shape_of},  {"Squeeze", 1, 2, 1, squeeze},   {"Unsqueeze", 1, 2, 1, unsqueeze},
@@ -197,6 +197,6 @@ constexpr OnnxOperator kOperators[] = {
 
 }  // namespace
 
-std::span<const OnnxOperator> shape_operators() { return kOperators; }
+std::span<const OnnxOperator> shape_operators() { return kShapeOperators; }
 
 }  // namespace duet

@@ -91,8 +91,6 @@ constexpr NamedFigure kFigures[] = {{"peak", "N", &RegionContacts::peak},
                                     {"pressure", "N/cm^2", &RegionContacts::pressure_n_cm2},
                                     {"ratio", "1", &RegionContacts::ratio}};
 
-std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
 void add_figures(const ContactGroup& group, const EngineContacts& engine, const std::string& limits, TextTable& table) {
   for (const RegionContacts& contacts : engine.regions) {
     const auto line = [&](const char* figure, const char* unit, long n, const std::string& value) {

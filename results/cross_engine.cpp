@@ -203,7 +203,7 @@ RankStability stability_of(const char* of, const std::vector<EngineSuccess>& suc
   return stability;
 }
 
-std::string listed(const std::set<std::string>& words) {
+std::string comma_separated(const std::set<std::string>& words) {
   std::string text;
   for (const std::string& word : words) {
     if (!word.empty()) text.append(text.empty() ? "" : ", ").append(word);
@@ -220,7 +220,8 @@ std::vector<RunEngine> engine_infos(const std::vector<EpisodeRow>& rows, const s
   }
   std::vector<RunEngine> infos;
   infos.reserve(engines.size());
-  for (const auto& [name, found] : engines) infos.push_back({name, listed(found.first), listed(found.second)});
+  for (const auto& [name, found] : engines)
+    infos.push_back({name, comma_separated(found.first), comma_separated(found.second)});
   return infos;
 }
 

@@ -20,8 +20,6 @@ struct Figure {
   std::optional<Interval> interval = std::nullopt;
 };
 
-std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
 void add(TextTable& table, const Figure& figure) {
   table.rows.push_back({figure.table, figure.perturbation, figure.controller, figure.policy, figure.engine,
                         figure.engine_b, figure.name, figure.unit, figure.figure, fmt::format("{}", figure.n),
@@ -146,10 +144,6 @@ void add_force(const ForceAgreement& force, TextTable& table) {
 }
 
 using Json = nlohmann::json;
-
-Json json_of(const Interval& interval) {
-  return Json::array({number_or_null(interval.low), number_or_null(interval.high)});
-}
 
 Json json_of(const RunEngine& engine) {
   return {{"name", engine.name}, {"version", engine.version}, {"profile", engine.profile}};

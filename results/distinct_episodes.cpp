@@ -13,12 +13,10 @@
 namespace duet {
 namespace {
 
-using Combination = std::tuple<std::string, std::string, std::string, std::string, std::string>;
-using StatesKey = std::tuple<Combination, std::string, std::string, std::string>;  // task, clip, state hash
+using Arms = std::tuple<std::string, std::string, std::string, std::string, std::string>;
+using StatesKey = std::tuple<Arms, std::string, std::string, std::string>;  // task, clip, state hash
 
-Combination combination_of(const EpisodeRow& row) {
-  return {row.engine, row.controller, row.policy, row.perturbation, row.arm};
-}
+Arms arms_of(const EpisodeRow& row) { return {row.engine, row.controller, row.policy, row.perturbation, row.arm}; }
 
 bool repeats(const EpisodeRow& first, const EpisodeRow& other) {
   const std::vector<std::string> fields = differing_fields(first, other);
@@ -28,19 +26,19 @@ bool repeats(const EpisodeRow& first, const EpisodeRow& other) {
 
 struct Distinct {
   std::vector<const EpisodeRow*> rows;
-  std::map<Combination, int> repeated;  // how many are left out
+  std::map<Arms, int> repeated;  // how many are left out
 };
 
 Distinct fold(const std::vector<EpisodeRow>& rows) {
   Distinct distinct;
   std::map<StatesKey, std::vector<const EpisodeRow*>> seen;
   for (const EpisodeRow* row : in_episode_order(rows)) {
-    std::vector<const EpisodeRow*>& same = seen[{combination_of(*row), row->task, row->clip, row->state_hash}];
+    std::vector<const EpisodeRow*>& same = seen[{arms_of(*row), row->task, row->clip, row->state_hash}];
     const auto is_repeat = [&](const EpisodeRow* first) {
       return first->episode != row->episode && repeats(*first, *row);
     };
     if (!row->state_hash.empty() && std::ranges::any_of(same, is_repeat)) {
-      ++distinct.repeated[combination_of(*row)];
+      ++distinct.repeated[arms_of(*row)];
       continue;
     }
     same.push_back(row);

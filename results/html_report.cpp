@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/text.h"
+#include "results/json_fields.h"
 #include "results/leaderboard_rows.h"
 #include "results/report_parts.h"
 
@@ -79,7 +80,7 @@ std::string stories_section(const ReportContent& content) {
 
 std::string environment_section(const ReportContent& content) {
   if (content.environment.is_null() || content.environment.empty()) return "";
-  const std::string text = content.environment.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = dumped(content.environment, 2);
   return fmt::format("<details><summary>What these results depend on</summary><pre>{}</pre></details>",
                      escape_html(text));
 }

@@ -16,6 +16,14 @@ nlohmann::json number_or_null(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
+nlohmann::json json_of(const Interval& interval) {
+  return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
+}
+
+std::string dumped(const nlohmann::json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 JsonFields::JsonFields(const nlohmann::json& json, std::string what) : json_(json), what_(std::move(what)) {
   if (!json.is_object()) throw InputError(fmt::format("{}: expected an object, found {}", what_, json.type_name()));
 }

@@ -10,11 +10,16 @@
 #include <string_view>
 
 #include "core/json.h"
+#include "results/statistics.h"
 
 namespace duet {
 
 // null for a number that is not finite: JSON has no NaN.
 nlohmann::json number_or_null(double value);
+nlohmann::json json_of(const Interval& interval);  // [low, high]
+
+// As text. Bytes that are no valid UTF-8 (a file's name, an engine's message) become one replacement character.
+std::string dumped(const nlohmann::json& json, int indent = -1);
 
 class JsonFields {
  public:

@@ -102,8 +102,6 @@ TextTable metric_table(const Entries& entries, const std::vector<LeaderboardRow>
   return table;
 }
 
-std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
 std::vector<std::string> csv_cells(const LeaderboardEntry& entry) {
   return {entry.engine,
           entry.controller,
@@ -131,10 +129,6 @@ std::vector<std::string> csv_cells(const LeaderboardEntry& entry) {
           fmt::format("{}", entry.plans_late),
           fmt::format("{}", entry.plans_invalid),
           fmt::format("{}", entry.policy_dead)};
-}
-
-nlohmann::json json_of(const Interval& interval) {
-  return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
 }
 
 nlohmann::json json_of(const std::map<std::string, double>& values) {

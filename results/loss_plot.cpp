@@ -12,8 +12,8 @@
 namespace duet {
 namespace {
 
-constexpr double kLeft = 52.0, kRight = 420.0, kTop = 22.0, kBottom = 206.0;
-constexpr int kWidth = 600, kHeight = 246, kKeyLine = 17;
+constexpr double kLossLeft = 52.0, kLossRight = 420.0, kLossTop = 22.0, kLossBottom = 206.0;
+constexpr int kLossWidth = 600, kLossHeight = 246, kLossKeyLine = 17;
 constexpr std::size_t kMaximumPoints = 120;
 constexpr double kLogarithmicSpan = 20.0;
 
@@ -41,17 +41,17 @@ std::vector<Curve> curves_of(const std::map<std::string, std::vector<double>>& l
   return curves;
 }
 
-struct Axis {
+struct LossAxis {
   double low, high;  // of the plotted quantity, which is the logarithm where `logarithmic`
   bool logarithmic;
 
   [[nodiscard]] double y(double value) const {
     const double plotted = logarithmic ? std::log10(value) : value;
-    return kBottom - (kBottom - kTop) * (plotted - low) / (high - low);
+    return kLossBottom - (kLossBottom - kLossTop) * (plotted - low) / (high - low);
   }
 };
 
-Axis axis_of(const std::vector<Curve>& curves) {
+LossAxis axis_of(const std::vector<Curve>& curves) {
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   double positive = low;
@@ -73,11 +73,12 @@ Axis axis_of(const std::vector<Curve>& curves) {
 }
 
 std::string horizontal_line(double y, const std::string& label) {
-  return fmt::format(R"(<line class="grid" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.1f}" y2="{2:.1f}"/>)", kLeft, kRight, y) +
-         fmt::format(R"(<text x="{:.0f}" y="{:.1f}" text-anchor="end">{}</text>)", kLeft - 7.0, y + 4.0, label);
+  return fmt::format(R"(<line class="grid" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.1f}" y2="{2:.1f}"/>)", kLossLeft,
+                     kLossRight, y) +
+         fmt::format(R"(<text x="{:.0f}" y="{:.1f}" text-anchor="end">{}</text>)", kLossLeft - 7.0, y + 4.0, label);
 }
 
-std::string value_axis(const Axis& axis) {
+std::string value_axis(const LossAxis& axis) {
   std::string svg;
   if (axis.logarithmic) {
     const int step = std::max(1, static_cast<int>(std::ceil((axis.high - axis.low) / 6.0)));
@@ -96,24 +97,24 @@ std::string value_axis(const Axis& axis) {
 }
 
 double x_of(std::size_t iteration, std::size_t last) {
-  return kLeft +
-         (kRight - kLeft) * static_cast<double>(iteration) / static_cast<double>(std::max<std::size_t>(last, 1));
+  return kLossLeft + (kLossRight - kLossLeft) * static_cast<double>(iteration) /
+                         static_cast<double>(std::max<std::size_t>(last, 1));
 }
 
 std::string iteration_axis(std::size_t last) {
-  std::string svg = fmt::format(R"(<line class="axis" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.0f}" y2="{2:.0f}"/>)", kLeft,
-                                kRight, kBottom);
+  std::string svg = fmt::format(R"(<line class="axis" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.0f}" y2="{2:.0f}"/>)",
+                                kLossLeft, kLossRight, kLossBottom);
   const double step = std::max(1.0, nice_step(static_cast<double>(std::max<std::size_t>(last, 1)), 5));
   for (double tick = 0.0; tick <= static_cast<double>(last) + 0.5; tick += step) {
     svg += fmt::format(R"(<text x="{:.1f}" y="{:.0f}" text-anchor="middle">{:.0f}</text>)",
-                       x_of(static_cast<std::size_t>(tick), last), kBottom + 17.0, tick);
+                       x_of(static_cast<std::size_t>(tick), last), kLossBottom + 17.0, tick);
   }
   return svg + fmt::format(R"(<text x="{:.0f}" y="{:.0f}" text-anchor="middle">iteration</text>)",
-                           (kLeft + kRight) / 2.0, kBottom + 35.0);
+                           (kLossLeft + kLossRight) / 2.0, kLossBottom + 35.0);
 }
 
 // A path that is interrupted where a value cannot be shown on this axis.
-std::string path_of(const std::vector<double>& values, const Axis& axis, std::size_t last) {
+std::string path_of(const std::vector<double>& values, const LossAxis& axis, std::size_t last) {
   const std::size_t count = std::min(values.size(), kMaximumPoints);
   std::string path;
   bool pen_down = false;
@@ -124,16 +125,16 @@ std::string path_of(const std::vector<double>& values, const Axis& axis, std::si
       pen_down = false;
       continue;
     }
-    path += fmt::format("{}{:.1f} {:.1f}", pen_down ? "L" : "M", x_of(at, last), std::min(axis.y(value), kBottom));
+    path += fmt::format("{}{:.1f} {:.1f}", pen_down ? "L" : "M", x_of(at, last), std::min(axis.y(value), kLossBottom));
     pen_down = true;
   }
   return path;
 }
 
-std::string curve_svg(const Curve& curve, std::size_t place, const Axis& axis, std::size_t last) {
+std::string curve_svg(const Curve& curve, std::size_t place, const LossAxis& axis, std::size_t last) {
   const std::string colour = is_total(curve.name) ? "var(--t0)" : fmt::format("var(--t{})", 1 + place % 8);
   const char* dash = place >= 16 ? R"( stroke-dasharray="1.5 3")" : place >= 8 ? R"( stroke-dasharray="6 3")" : "";
-  const int y = 28 + kKeyLine * static_cast<int>(place);
+  const int y = 28 + kLossKeyLine * static_cast<int>(place);
   std::string svg =
       fmt::format(R"(<path d="{}" style="stroke:{}{}"{}><title>{}: {} at the end</title></path>)",
                   path_of(*curve.values, axis, last), colour, is_total(curve.name) ? ";stroke-width:2.6" : "", dash,
@@ -141,7 +142,7 @@ std::string curve_svg(const Curve& curve, std::size_t place, const Axis& axis, s
   svg += fmt::format(R"(<path d="M434 {}h18" style="stroke:{};stroke-width:2.6"{}/>)", y - 4, colour, dash);
   return svg +
          fmt::format(R"(<text class="key" x="458" y="{}">{}</text><text x="{}" y="{}" text-anchor="end">{}</text>)", y,
-                     escape_html(curve.name), kWidth - 4, y, fmt::format("{:.3g}", curve.last));
+                     escape_html(curve.name), kLossWidth - 4, y, fmt::format("{:.3g}", curve.last));
 }
 
 }  // namespace
@@ -151,13 +152,13 @@ std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss
   if (curves.empty()) return "";
   std::size_t last = 0;
   for (const Curve& curve : curves) last = std::max(last, curve.values->size() - 1);
-  const Axis axis = axis_of(curves);
-  const int height = std::max(kHeight, 24 + kKeyLine * static_cast<int>(curves.size() + 1));
+  const LossAxis axis = axis_of(curves);
+  const int height = std::max(kLossHeight, 24 + kLossKeyLine * static_cast<int>(curves.size() + 1));
   std::string svg =
       fmt::format(R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="Loss terms over {} iterations">)",
-                  kWidth, height, last);
-  svg += fmt::format(R"(<text x="{:.0f}" y="11">loss{}</text>)", kLeft, axis.logarithmic ? " (logarithmic)" : "");
-  svg += fmt::format(R"(<text x="{}" y="11" text-anchor="end">at the end</text>)", kWidth - 4);
+                  kLossWidth, height, last);
+  svg += fmt::format(R"(<text x="{:.0f}" y="11">loss{}</text>)", kLossLeft, axis.logarithmic ? " (logarithmic)" : "");
+  svg += fmt::format(R"(<text x="{}" y="11" text-anchor="end">at the end</text>)", kLossWidth - 4);
   svg += value_axis(axis) + iteration_axis(last);
   // The total is drawn last, over the others.
   for (std::size_t i = curves.size(); i-- > 0;) svg += curve_svg(curves[i], i, axis, last);

@@ -118,12 +118,6 @@ std::string tables_latex(const std::vector<TitledTable>& tables) {
   return text;
 }
 
-std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
-
-nlohmann::json json_of(const Interval& interval) {
-  return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
-}
-
 TextTable figure_lines(const std::string& about) {
   TextTable lines;
   lines.header = {"source", "engine", "controller", "arm",    "policy", about,

@@ -76,7 +76,6 @@ std::vector<std::string>& add_paper_row(const std::string& name, TitledTable& ti
 std::string rate_cell(const Rate& rate);  // "84.9 [77.6, 90.1]", "-" without episodes
 std::string tables_markdown(const std::vector<TitledTable>& tables);
 std::string tables_latex(const std::vector<TitledTable>& tables);
-std::string number_cell(double value);  // not rounded, "" for NaN: for CSV
 
 inline constexpr Interval kNoInterval = {std::numeric_limits<double>::quiet_NaN(),
                                          std::numeric_limits<double>::quiet_NaN()};
@@ -87,7 +86,6 @@ void add_figure_line(const char* source, const PolicyKey& key, const std::string
                      long n, double value, const Interval& interval, TextTable& lines);
 
 nlohmann::json json_of(const Rate& rate);
-nlohmann::json json_of(const Interval& interval);
 nlohmann::json json_of(const PolicyKey& key);
 
 }  // namespace duet

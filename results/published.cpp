@@ -32,7 +32,7 @@ std::string lean_rows(const Run& run) {
   for (EpisodeRow row : run.rows) {
     row.trace = {};
     row.feet = {};
-    text += to_json(row).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    text += dumped(to_json(row)) + "\n";
   }
   return text;
 }

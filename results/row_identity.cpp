@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <set>
 
+#include "results/json_fields.h"
+
 namespace duet {
 namespace {
 
@@ -14,14 +16,9 @@ using Differences = std::vector<FieldDifference>;
 constexpr std::size_t kLongestValue = 80;  // characters
 constexpr std::size_t kMostNamed = 5;      // fields
 
-// Bytes that are no valid UTF-8 are written to a file as one replacement character, and compared as such.
-std::string dump(const nlohmann::json& json) {
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 std::string shown(const nlohmann::json* value) {
   if (value == nullptr) return "nothing";
-  const std::string text = dump(*value);
+  const std::string text = dumped(*value);
   return text.size() <= kLongestValue ? text : text.substr(0, kLongestValue) + "...";
 }
 
@@ -54,7 +51,7 @@ void compare(const std::string& field, const nlohmann::json* first, const nlohma
     if (*first == *second) return;
     if (first->is_object() && second->is_object()) return compare_members(field, *first, *second, found);
     if (is_list_of_objects(*first) && is_list_of_objects(*second)) return compare_items(field, *first, *second, found);
-    if (dump(*first) == dump(*second)) return;
+    if (dumped(*first) == dumped(*second)) return;
   }
   found.push_back({field, shown(first), shown(second)});
 }

@@ -26,11 +26,6 @@ std::string beside(const std::string& folder, const char* name) {
   return (std::filesystem::path(folder) / name).string();
 }
 
-// Text that reached us from elsewhere (a file name, an engine's message) may be no valid UTF-8; the row still counts.
-std::string dump(const nlohmann::json& json, int indent = -1) {
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 bool is_run(const std::string& folder) { return std::filesystem::exists(beside(folder, "run.json")); }
 
 // A run that was killed before run.json was there leaves only the lock and the half-written file of another name.
@@ -70,7 +65,7 @@ void require_same_suite(const std::string& folder, const RunInfo& found, const R
 // Also where a run was killed between the first file and these.
 void write_missing(const std::string& folder, const RunInfo& info) {
   if (const std::string file = inside(folder, "env.json"); !std::filesystem::exists(file))
-    write_file(file, dump(info.environment, 2) + "\n");
+    write_file(file, dumped(info.environment, 2) + "\n");
   if (const std::string file = inside(folder, "suite.yaml"); !std::filesystem::exists(file))
     write_file(file, info.suite_yaml);
 }
@@ -89,7 +84,7 @@ void require_same_actors(const std::string& folder, const RunInfo& found, const 
 void record_resumption(const std::string& folder, const RunInfo& info) {
   nlohmann::json json = {{"at", info.created_at}, {"argv", info.argv}, {"environment", info.environment}};
   if (!info.certificate.is_null()) json["certificate"] = info.certificate;
-  LineAppender(inside(folder, "resumed.jsonl")).append(dump(json));
+  LineAppender(inside(folder, "resumed.jsonl")).append(dumped(json));
 }
 
 }  // namespace
@@ -167,7 +162,7 @@ bool RunDirectory::append(const EpisodeRow& row) {
   const ScopedLock writing(*lock_, kWriting);
   read_appended(true);
   const bool first = !has(row.key);
-  if (first) lines_->append(dump(duet::to_json(row)));
+  if (first) lines_->append(dumped(duet::to_json(row)));
   if (first) keys_[row.key] = {row.outcome == Outcome::kError, false};
   release(row.key);
   return first;

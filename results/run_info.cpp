@@ -114,7 +114,7 @@ std::string run_json(const RunInfo& info) {
   if (!info.certificate.is_null()) object["certificate"] = info.certificate;
   if (info.plan) object["plan"] = to_json(*info.plan);
   // An argument may be no valid UTF-8; the run still counts.
-  return object.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+  return dumped(object, 2) + "\n";
 }
 
 RunInfo read_run_json(const std::string& path) {

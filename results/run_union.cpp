@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "core/require.h"
+#include "results/json_fields.h"
 #include "results/name_digests.h"
 #include "results/row_identity.h"
 
@@ -104,8 +105,7 @@ RunInfo info_of(const std::vector<Run>& runs) {
 
 // Wall times are all that equal rows differ in; the earlier row stays.
 bool is_earlier(const EpisodeRow& a, const EpisodeRow& b) {
-  return std::pair(a.started_at, to_json(a).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) <
-         std::pair(b.started_at, to_json(b).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  return std::pair(a.started_at, dumped(to_json(a))) < std::pair(b.started_at, dumped(to_json(b)));
 }
 
 auto place_of(const EpisodeRow& row) {

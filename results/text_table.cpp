@@ -1,6 +1,9 @@
 #include "results/text_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "core/text.h"
 
@@ -141,6 +144,8 @@ std::string escape_latex(std::string_view text) {
   }
   return escaped;
 }
+
+std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
 
 std::string latex_table(const TextTable& table) {
   const auto lines = escaped_lines(table, [](const std::string& cell) { return escape_latex(cell); });

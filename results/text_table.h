@@ -17,6 +17,8 @@ std::string markdown_table(const TextTable& table);
 std::string csv_table(const TextTable& table);    // lines end with CR LF
 std::string latex_table(const TextTable& table);  // tabular with booktabs rules; cells are escaped
 
+std::string number_cell(double value);  // for CSV: not rounded, "" where it is not finite
+
 std::string escape_latex(std::string_view text);
 // On one line, without tags and without characters that move a terminal's cursor: for prose, not for cells.
 std::string escape_markdown(std::string_view text);

@@ -3,10 +3,11 @@
 
   ./run mutants [SEED] [COUNT] [ROOM...]     (builds first; SEED 1, COUNT 40, all rooms)
 
-A changed file is compiled with the command of its build, in a scratch folder (build/mutants), and linked in front of the
-room's library; the source tree and the build are only read. Then the tests of its room run, those first that include the
-file's header, and after them the tests of every room that links it: a changed engine, library or command reaches them
-through DUET_ENGINES and DUET_PROGRAM. A test that fails, a crash and a run out of its time limit have noticed the change.
+A changed file is compiled with the command of its build, and with the files that are compiled together with it, in a
+scratch folder (build/mutants), and linked in front of the room's library; the source tree and the build are only read.
+Then the tests of its room run, those first that include the file's header, and after them the tests of every room that
+links it: a changed engine, library or command reaches them through DUET_ENGINES and DUET_PROGRAM. A test that fails, a
+crash and a run out of its time limit have noticed the change.
 
 What is not drawn: headers; lines of `for (`, `require(`, `throw` and `fmt::` (loops that run out of an array and words of
 messages); bench/benchmarks and the engines' bare loops (what they give is time); code for libtorch. A change that gives
@@ -96,8 +97,14 @@ class Build:
 
     def __init__(self, folder):
         self.folder = os.path.abspath(folder)
-        commands = json.load(open(f'{self.folder}/compile_commands.json'))
-        self.compile = {os.path.relpath(c['file']): c['command'] for c in commands}
+        self.compile, self.unit = {}, {}  # of a file: the command, and the several files that are compiled at once
+        for entry in json.load(open(f'{self.folder}/compile_commands.json')):
+            united = os.path.basename(entry['file']).startswith('unity_')
+            files = re.findall(r'#include "(.*)"', pathlib.Path(entry['file']).read_text()) if united else [entry['file']]
+            for file in map(os.path.relpath, files):
+                self.compile[file] = entry['command']
+                if united:
+                    self.unit[file] = entry['file']
         self.links = {}
         for command in subprocess.check_output(['ninja', '-C', self.folder, '-t', 'commands'], text=True).split('\n'):
             found = OUTPUT.search(command)
@@ -212,6 +219,10 @@ class Trials:
         """The object file of the changed text, None where it does not compile."""
         source = folder / pathlib.Path(path).name
         source.write_text(text)
+        if unit := self.build.unit.get(path):
+            others = pathlib.Path(unit).read_text()
+            source = folder / 'unity.cpp'
+            source.write_text(others.replace(f'"{os.path.abspath(path)}"', f'"{folder / pathlib.Path(path).name}"'))
         output = folder / (source.name + '.o')
         words = self.build.compile[path].split()
         while '=' in words[0] or words[0].endswith(('/cmake', '/ccache')) or words[0] in ('-E', 'env'):

@@ -9,7 +9,7 @@
 namespace duet {
 namespace {
 
-constexpr const char* kFormat = "duet.wbc-checkpoint/1";
+constexpr const char* kCheckpointFormat = "duet.wbc-checkpoint/1";
 
 std::vector<Eigen::Map<Eigen::VectorXf>> parameters_of(WbcAgent& agent) {
   auto parameters = flat_views(agent.actor.layers);
@@ -40,7 +40,7 @@ SafeTensors to_tensors(const TrainingState& state) {
   add_normaliser(tensors, "actor_input", state.agent.actor_input);
   add_normaliser(tensors, "critic_input", state.agent.critic_input);
   add_adam(tensors, state.adam);
-  tensors.metadata["format"] = kFormat;
+  tensors.metadata["format"] = kCheckpointFormat;
   tensors.metadata["rate"] = fmt::format("{}", state.rate);
   tensors.metadata["iteration"] = std::to_string(state.iteration);
   tensors.metadata["steps"] = std::to_string(state.steps);
@@ -53,7 +53,7 @@ SafeTensors to_tensors(const TrainingState& state) {
 }
 
 TrainingState training_state(const SafeTensors& tensors, const std::string& file) {
-  expect_text(tensors, "format", kFormat, file);
+  expect_text(tensors, "format", kCheckpointFormat, file);
   TrainingState state;
   state.agent.actor = read_mlp(tensors, "actor", file);
   state.agent.critic = read_mlp(tensors, "critic", file);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "nn/mlp.h"
@@ -28,6 +29,11 @@ class BatchMlp {
   std::vector<Eigen::MatrixXf> deltas_;
   MlpGradient gradient_;
 };
+
+// One sample of a batch.
+inline std::span<float> column(Eigen::MatrixXf& batch, int sample) {
+  return {batch.col(sample).data(), static_cast<std::size_t>(batch.rows())};
+}
 
 // Views of all weights and biases, in order, as flat vectors.
 std::vector<Eigen::Map<Eigen::VectorXf>> flat_views(std::vector<MlpLayer>& layers);

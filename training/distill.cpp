@@ -16,7 +16,7 @@ namespace {
 using Eigen::MatrixXf;
 using Eigen::VectorXf;
 
-constexpr const char* kFormat = "duet.wbc-student/1";
+constexpr const char* kStudentFormat = "duet.wbc-student/1";
 
 template <typename Vector>
 void disturb(Vector& values, double half_range, Random& random) {
@@ -31,8 +31,6 @@ void disturb(WbcSensors& sensors, const SensorNoise& noise, Random& random) {
   disturb(sensors.q_ref, noise.reference, random);
   disturb(sensors.root_error, noise.reference, random);
 }
-
-std::span<float> column(MatrixXf& m, int c) { return {m.col(c).data(), static_cast<size_t>(m.rows())}; }
 
 }  // namespace
 
@@ -73,7 +71,7 @@ SafeTensors to_tensors(const StudentState& state) {
   add_mlp(tensors, "student", state.student);
   add_normaliser(tensors, "input", state.input);
   add_adam(tensors, state.adam);
-  tensors.metadata["format"] = kFormat;
+  tensors.metadata["format"] = kStudentFormat;
   tensors.metadata["round"] = std::to_string(state.round);
   tensors.metadata["steps"] = std::to_string(state.steps);
   tensors.metadata["minutes"] = fmt::format("{}", state.minutes);
@@ -82,7 +80,7 @@ SafeTensors to_tensors(const StudentState& state) {
 }
 
 StudentState student_state(const SafeTensors& tensors, const std::string& file) {
-  expect_text(tensors, "format", kFormat, file);
+  expect_text(tensors, "format", kStudentFormat, file);
   StudentState state;
   state.student = read_mlp(tensors, "student", file);
   state.input = normaliser_of(tensors, "input", state.student.inputs(), file);

@@ -30,8 +30,6 @@ float log_probability(const VectorXf& inverse_std, float sum_log_std, const floa
   return sum;
 }
 
-std::span<float> column(MatrixXf& m, int c) { return {m.col(c).data(), static_cast<size_t>(m.rows())}; }
-
 void mirror_columns(const Mirror& mirror, const MatrixXf& x, MatrixXf& y) {
   y.resize(x.rows(), x.cols());
   const auto rows = static_cast<size_t>(x.rows());

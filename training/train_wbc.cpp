@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr double kFirstStd = 0.6;  // of an action; training leaves it near this
 constexpr long kCriticAlone = 40;  // iterations
-constexpr const char* kColumns =
+constexpr const char* kWbcColumns =
     "steps,minutes,return,falls,episode_s,root_xy_m,attitude_rad,upper_body_m,joints_rad,"
     "action_rate,clock,lift_m,rate,std,loss\n";
 
@@ -119,7 +119,7 @@ class Log {
     progress_.stage = run.stage;
     progress_.steps_wanted = steps_wanted;
     fs::create_directories(fs::path(path_).parent_path());
-    if (steps_before == 0 || !fs::exists(path_)) write_file(path_, kColumns);
+    if (steps_before == 0 || !fs::exists(path_)) write_file(path_, kWbcColumns);
   }
 
   void add(const IterationReport& iteration) {

@@ -18,7 +18,8 @@ namespace duet {
 namespace {
 
 constexpr double kStep = 0.002;
-constexpr double kLowest = 0.45, kLeastUpright = 0.7, kFarthest = 1.0;  // what counts as lost [m], cosine, [m]
+constexpr double kGateLowest = 0.45, kGateLeastUpright = 0.7,
+                 kGateFarthest = 1.0;  // what counts as lost [m], cosine, [m]
 
 WbcGate standing(const std::string& name, double kick, double least, double least_oracle) {
   WbcGate gate{.name = "stand/" + name, .stream = {}, .push_track = ""};
@@ -102,9 +103,9 @@ class Trial {
       outcome = backend_->step(command_);
     look();
     const RobotState& state = backend_->state();
-    alive_ = outcome == Outcome::kOk && state.X_WB.p.z() > kLowest &&
-             (state.X_WB.R * Eigen::Vector3d::UnitZ()).z() > kLeastUpright &&
-             (state.X_WB.p - stream_.reference().X_WB.p).head<2>().norm() < kFarthest;
+    alive_ = outcome == Outcome::kOk && state.X_WB.p.z() > kGateLowest &&
+             (state.X_WB.R * Eigen::Vector3d::UnitZ()).z() > kGateLeastUpright &&
+             (state.X_WB.p - stream_.reference().X_WB.p).head<2>().norm() < kGateFarthest;
   }
 
   void disturb(double t) {

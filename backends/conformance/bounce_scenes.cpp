@@ -13,10 +13,10 @@
 namespace duet::conformance {
 namespace {
 
-constexpr double kMass = 10.0, kRadius = 0.1, kSpeed = 1.0;
+constexpr double kMass = 10.0, kRadius = 0.1, kImpactSpeed = 1.0;
 constexpr double kCapsuleRadius = 0.05, kGap = 1e-3;
-constexpr double kStiffness = 25000.0;
-constexpr double kHeight = 50.0;  // away from the ground
+constexpr double kSkinStiffness = 25000.0;
+constexpr double kCapsuleHeight = 50.0;  // away from the ground
 
 struct Bounce {
   double speed = 0.0, contact_time = 0.0, peak = 0.0, cost = 0.0;
@@ -26,7 +26,7 @@ struct Bounce {
 // f = -K r - (D + dt K) v+, not negative.
 Bounce discrete_bounce(const Skin& skin, double dt) {
   Bounce bounce;
-  double r = kGap, v = -kSpeed;
+  double r = kGap, v = -kImpactSpeed;
   for (int i = 0; i < steps_in(0.2, dt); ++i) {
     if (r < 0.0) {
       const double damping = skin.damping + dt * skin.stiffness;
@@ -54,11 +54,11 @@ Bounce bounce_in(const Trial& trial, const Skin& skin, double dt) {
   capsule.skin = skin;
   scene.human.capsules = {capsule};
   World world(trial, scene);
-  RobotState start = state_at(world.robot(), {0.0, 0.0, kHeight});
-  start.v_WB.x() = -kSpeed;
+  RobotState start = state_at(world.robot(), {0.0, 0.0, kCapsuleHeight});
+  start.v_WB.x() = -kImpactSpeed;
   world.reset(start);
   HumanJoints joints = HumanJoints::Zero();
-  joints.colwise() = Eigen::Vector3d(-(kRadius + kCapsuleRadius + kGap), 0.0, kHeight);
+  joints.colwise() = Eigen::Vector3d(-(kRadius + kCapsuleRadius + kGap), 0.0, kCapsuleHeight);
   joints(1, kLeftHip) = 0.5;
   joints(1, kRightHip) = -0.5;
   world.backend().set_partner(joints, HumanJoints::Zero());
@@ -85,9 +85,9 @@ double restitution(const Skin& skin) {
 }  // namespace
 
 void measure_skin_bounce(Trial& trial) {
-  const double natural = std::sqrt(kStiffness / kMass);
+  const double natural = std::sqrt(kSkinStiffness / kMass);
   for (const double damping : {0.0, 200.0}) {
-    const Skin skin{.stiffness = kStiffness, .damping = damping};
+    const Skin skin{.stiffness = kSkinStiffness, .damping = damping};
     const auto name = [&](const char* what) {
       return fmt::format("{} skin: {}", damping == 0.0 ? "undamped" : "damped", what);
     };
@@ -100,13 +100,14 @@ void measure_skin_bounce(Trial& trial) {
                      "the same");
       trial.absolute(name("contact time against the implicit step"), "s", dt, found.contact_time, discrete.contact_time,
                      0.5 * dt, "the same number of steps");
-      trial.relative(name("restitution"), "", dt, found.speed / kSpeed, restitution(skin), 1.2 * implicit,
+      trial.relative(name("restitution"), "", dt, found.speed / kImpactSpeed, restitution(skin), 1.2 * implicit,
                      "of the spring and damper; the implicit step damps pi omega dt / 2 more");
       if (damping == 0.0) {
-        trial.relative(name("peak force"), "N", dt, found.peak, kSpeed * kMass * natural, implicit, "v sqrt(m K)");
+        trial.relative(name("peak force"), "N", dt, found.peak, kImpactSpeed * kMass * natural, implicit,
+                       "v sqrt(m K)");
         trial.absolute(name("contact time"), "s", dt, found.contact_time, std::numbers::pi / natural, 2.0 * dt,
                        "pi sqrt(m / K), counted in steps");
-        trial.dot("error of the restitution on an undamped skin", "", dt, std::abs(found.speed / kSpeed - 1.0),
+        trial.dot("error of the restitution on an undamped skin", "", dt, std::abs(found.speed / kImpactSpeed - 1.0),
                   found.cost);
       }
     }

@@ -8,8 +8,8 @@
 namespace duet::conformance {
 namespace {
 
-constexpr double kHeight = 1000.0;  // it falls 490 m in 10 s
-constexpr double kLinear = 1e-7;    // rounding of 2e4 steps on numbers of 1000 m
+constexpr double kDropHeight = 1000.0;  // it falls 490 m in 10 s
+constexpr double kLinear = 1e-7;        // rounding of 2e4 steps on numbers of 1000 m
 
 struct Throw {
   Eigen::Vector3d v_W, w_B;
@@ -24,7 +24,7 @@ void measure_box(Trial& trial, const Throw& thrown) {
   std::vector<double> drifts;
   for (const double dt : trial.step_sizes()) {
     World world(trial, trial.scene(robot, dt));
-    RobotState start = state_at(*robot, {0.0, 0.0, kHeight});
+    RobotState start = state_at(*robot, {0.0, 0.0, kDropHeight});
     start.v_WB = thrown.v_W;
     start.w_WB_B = thrown.w_B;
     world.reset(start);

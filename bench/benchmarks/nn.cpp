@@ -14,14 +14,14 @@ struct Layer {
   int inputs, outputs, times;
 };
 
-struct Policy {
+struct PublishedPolicy {
   const char* name;  // of a published controller
   double most_us;    // what it may cost; 0: no target
   std::vector<Layer> layers;
 };
 
-const std::vector<Policy>& policies() {
-  static const std::vector<Policy> list = {
+const std::vector<PublishedPolicy>& policies() {
+  static const std::vector<PublishedPolicy> list = {
       {"homie",
        40.0,
        {{456, 256, 1}, {256, 256, 1}, {256, 35, 1}, {111, 512, 1}, {512, 256, 1}, {256, 256, 1}, {256, 12, 1}}},
@@ -74,7 +74,7 @@ double bare_seconds(const std::vector<Layer>& layers, double seconds) {
       seconds);
 }
 
-std::vector<Figure> time_policy(const Policy& policy, const BenchmarkOptions& options) {
+std::vector<Figure> time_policy(const PublishedPolicy& policy, const BenchmarkOptions& options) {
   const auto network = load_network(find_network(load_descriptor(policy.name)));
   const double ours = network_seconds(*network, options.seconds / 2);
   const double bare = bare_seconds(policy.layers, options.seconds / 2);
@@ -87,7 +87,7 @@ std::vector<Figure> time_policy(const Policy& policy, const BenchmarkOptions& op
 }  // namespace
 
 void add_nn_benchmarks(std::vector<Benchmark>& list) {
-  for (const Policy& policy : policies())
+  for (const PublishedPolicy& policy : policies())
     list.push_back({fmt::format("nn/{}", policy.name), "one evaluation of a published policy, one core",
                     [policy](const BenchmarkOptions& options) { return time_policy(policy, options); }});
 }

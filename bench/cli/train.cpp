@@ -15,7 +15,7 @@
 namespace duet::cli {
 namespace {
 
-struct TrainArguments {
+struct WbcArguments {
   WbcRun run;
   std::string stage = "all", card;
   bool smoke = false;
@@ -89,7 +89,7 @@ std::vector<WbcRun> smoke_runs(const WbcRun& run) {
   return {stand, student};
 }
 
-std::vector<WbcRun> runs_of(const TrainArguments& arguments) {
+std::vector<WbcRun> runs_of(const WbcArguments& arguments) {
   if (arguments.smoke) return smoke_runs(arguments.run);
   if (arguments.stage == "all") return wbc_runs(arguments.run);
   WbcRun run = arguments.run;
@@ -97,7 +97,7 @@ std::vector<WbcRun> runs_of(const TrainArguments& arguments) {
   return {run};
 }
 
-void train(Session& session, TrainArguments& arguments) {
+void train(Session& session, WbcArguments& arguments) {
   catch_interrupts();
   const auto robot = load_shared_robot(arguments.card);
   std::vector<WbcRun> runs = runs_of(arguments);
@@ -136,7 +136,7 @@ void train(Session& session, TrainArguments& arguments) {
 void add_train(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("train", "Train a controller or a policy of this project");
   command->require_subcommand(1);
-  auto arguments = std::make_shared<TrainArguments>();
+  auto arguments = std::make_shared<WbcArguments>();
   arguments->run.folder = "runs/wbc";
   arguments->run.threads = dividing_threads();
   CLI::App* wbc =

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct TrainArguments {
+struct DstarArguments {
   DstarRun run;
   DemonstrationOptions data;
   std::string config, language, split, from, start = "approach";
@@ -60,7 +60,7 @@ std::shared_ptr<const DemonstrationSet> demonstrations(Session& session, const s
   return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest, origin_of(options)));
 }
 
-DstarData data_of(Session& session, const TrainArguments& arguments) {
+DstarData data_of(Session& session, const DstarArguments& arguments) {
   DstarData data;
   data.robot = load_shared_robot();
   data.language = arguments.language.empty() ? built_in_language() : load_language_table(arguments.language);
@@ -84,7 +84,7 @@ std::string round_file(const DstarRun& run, int round) {
 }
 
 // Adds what is seen where the network of now takes the robot.
-void add_round(Session& session, const TrainArguments& arguments, int round, DstarData& data) {
+void add_round(Session& session, const DstarArguments& arguments, int round, DstarData& data) {
   DemonstrationOptions options = arguments.data;
   options.policy = "dstar";
   options.followed = arguments.round_clips;
@@ -97,7 +97,7 @@ void add_round(Session& session, const TrainArguments& arguments, int round, Dst
 }
 
 // A small training whose outcome can be checked in minutes.
-void make_small(TrainArguments& arguments) {
+void make_small(DstarArguments& arguments) {
   arguments.data.per_task = 12;
   arguments.data.starts = 1;
   arguments.data.engine = "";
@@ -112,7 +112,7 @@ void make_small(TrainArguments& arguments) {
   run.patience = 0;
 }
 
-void read_start(TrainArguments& arguments) {
+void read_start(DstarArguments& arguments) {
   const std::vector<std::string> known = {"approach", "sim_to_real"};
   if (arguments.start == known[0]) return;
   require(arguments.start == known[1], unknown_name_message("start of demonstrations", arguments.start, known));
@@ -130,7 +130,7 @@ void check_network(const Session& session, const DstarData& data, const DstarRun
   note(session, fmt::format("{}: inference agrees with libtorch within {:.1e}", file, difference));
 }
 
-void train(Session& session, TrainArguments& arguments, const std::string& name) {
+void train(Session& session, DstarArguments& arguments, const std::string& name) {
   need_dstar_trainer();
   set_variant(arguments.run, name);
   if (!arguments.config.empty())
@@ -165,7 +165,7 @@ void train(Session& session, TrainArguments& arguments, const std::string& name)
 }
 
 // No training: windows of the same demonstrations, as they are.
-void make_library(Session& session, TrainArguments& arguments, const std::string& name) {
+void make_library(Session& session, DstarArguments& arguments, const std::string& name) {
   const DstarData data = data_of(session, arguments);
   const fs::path file = fs::path(arguments.run.folder) / name / "library.safetensors";
   fs::create_directories(file.parent_path());
@@ -174,7 +174,7 @@ void make_library(Session& session, TrainArguments& arguments, const std::string
   print(session, fmt::format("{}\n", file.string()), {{"library", file.string()}});
 }
 
-void train_or_stop(Session& session, TrainArguments& arguments, const std::string& name) {
+void train_or_stop(Session& session, DstarArguments& arguments, const std::string& name) {
   catch_interrupts();
   read_start(arguments);
   try {
@@ -186,7 +186,7 @@ void train_or_stop(Session& session, TrainArguments& arguments, const std::strin
 }
 
 void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
-  auto arguments = std::make_shared<TrainArguments>();
+  auto arguments = std::make_shared<DstarArguments>();
   arguments->run.folder = "runs/policies";
   arguments->run.threads = arguments->data.threads = default_threads();
   const std::string about =

@@ -73,6 +73,8 @@ struct PlanFormat {
   std::vector<double> scale = {1.0}, offset = {0.0};
 };
 
+inline constexpr int kMostMilliseconds = 600000;  // of each of its waits
+
 struct PolicyDescriptor {
   std::string file;  // where it was read, for messages
   std::string name, about;

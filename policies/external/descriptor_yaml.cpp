@@ -16,7 +16,6 @@ namespace {
 constexpr const char* kSchema = "duet.policy/1";
 constexpr int kMostAnchors = 1000, kMostTicks = 500;
 constexpr int kMostNoise = 1000000;
-constexpr int kMostMilliseconds = 600000;
 
 std::vector<std::string> all_channels() {
   std::vector<std::string> names;

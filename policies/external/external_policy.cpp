@@ -19,9 +19,7 @@
 namespace duet {
 namespace {
 
-constexpr int kMostMilliseconds = 600000;
-
-int milliseconds(const PolicyDescriptor& descriptor, const PolicyOptions& options, const char* name, int fallback) {
+int milliseconds_of(const PolicyDescriptor& descriptor, const PolicyOptions& options, const char* name, int fallback) {
   const auto it = options.find(name);
   if (it == options.end()) return fallback;
   int value = 0;
@@ -83,9 +81,9 @@ PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr
 
 PolicyMaker process_maker(PolicyDescriptor descriptor, const std::shared_ptr<const RobotModel>& robot,
                           const PolicyOptions& options) {
-  descriptor.deadline_ms = milliseconds(descriptor, options, "deadline_ms", descriptor.deadline_ms);
-  descriptor.hang_ms = milliseconds(descriptor, options, "hang_ms", descriptor.hang_ms);
-  descriptor.start_ms = milliseconds(descriptor, options, "start_ms", descriptor.start_ms);
+  descriptor.deadline_ms = milliseconds_of(descriptor, options, "deadline_ms", descriptor.deadline_ms);
+  descriptor.hang_ms = milliseconds_of(descriptor, options, "hang_ms", descriptor.hang_ms);
+  descriptor.start_ms = milliseconds_of(descriptor, options, "start_ms", descriptor.start_ms);
   static_cast<void>(PlanDecoder(descriptor, robot, bind_joints(descriptor, *robot)));
   if (!descriptor.command.empty()) static_cast<void>(find_program(descriptor.command[0], descriptor.folder()));
   return [=] { return make_process_policy(descriptor, robot); };

@@ -256,7 +256,7 @@ TEST(Detector, RefusesAMissingTrackByName) {
                                                                                          }}}}};
   for (const auto& [task, tracks] : needed) {
     for (const auto& [name, pick] : tracks) {
-      const auto message = [&, task = task](const std::function<void(Eigen::Matrix3Xd&)>& spoil) {
+      const auto message = [&, task = task, &pick = pick](const std::function<void(Eigen::Matrix3Xd&)>& spoil) {
         Scene s = acting(task, 0);
         spoil(*pick(s));
         return test::thrown_message<std::invalid_argument>(

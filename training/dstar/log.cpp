@@ -10,13 +10,13 @@
 namespace duet {
 namespace {
 
-constexpr const char* kColumns = "step,minutes,loss,action,phase,auxiliary,validation,phase_accuracy,rate\n";
+constexpr const char* kDstarColumns = "step,minutes,loss,action,phase,auxiliary,validation,phase_accuracy,rate\n";
 
 }  // namespace
 
 DstarLog::DstarLog(const DstarRun& run, long done, double minutes) : run_(run), first_(done), minutes_(minutes) {
   std::filesystem::create_directories(std::filesystem::path(dstar_curves(run)).parent_path());
-  if (done == 0) write_file(dstar_curves(run), kColumns);
+  if (done == 0) write_file(dstar_curves(run), kDstarColumns);
 }
 
 void DstarLog::add(const LossParts& parts) {
