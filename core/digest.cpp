@@ -11,10 +11,6 @@
 namespace duet {
 namespace {
 
-struct FreeContext {
-  void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
-};
-
 void check(bool ok) {
   if (!ok) throw std::runtime_error("OpenSSL refuses SHA-256");
 }
@@ -22,7 +18,10 @@ void check(bool ok) {
 }  // namespace
 
 struct Sha256::Context {
-  std::unique_ptr<EVP_MD_CTX, FreeContext> evp{EVP_MD_CTX_new()};
+  struct Free {
+    void operator()(EVP_MD_CTX* context) const { EVP_MD_CTX_free(context); }
+  };
+  std::unique_ptr<EVP_MD_CTX, Free> evp{EVP_MD_CTX_new()};
 };
 
 Sha256::Sha256() : context_(std::make_unique<Context>()) {
@@ -56,7 +55,7 @@ void Sha256::update(const RobotState& state) {
 }
 
 std::string Sha256::hex() const {
-  const std::unique_ptr<EVP_MD_CTX, FreeContext> copy(EVP_MD_CTX_new());
+  const std::unique_ptr<EVP_MD_CTX, Context::Free> copy(EVP_MD_CTX_new());
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int size = 0;
   check(copy != nullptr && EVP_MD_CTX_copy_ex(copy.get(), context_->evp.get()) == 1 &&
