@@ -1,9 +1,11 @@
 #include "robots/yaml_section.h"
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "core/names.h"
@@ -11,9 +13,45 @@
 #include "core/text.h"
 
 namespace duet {
+namespace {
+
+// A node takes some hundred bytes, and two bytes of text can be one: what a text holds is counted before any is made.
+constexpr int kMostNodes = 200000;
+
+class NodeCounter final : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t) override { count(mark); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { count(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t, const std::string&) override {
+    count(mark);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(mark);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+    count(mark);
+  }
+  void OnMapEnd() override {}
+
+ private:
+  void count(const YAML::Mark& mark) {
+    if (++nodes_ > kMostNodes)
+      throw YAML::ParserException(mark, fmt::format("more than {} keys and values", kMostNodes));
+  }
+
+  int nodes_ = 0;
+};
+
+}  // namespace
 
 YAML::Node parse_yaml(const std::string& text, const std::string& file) {
   try {
+    std::istringstream stream(text);
+    NodeCounter counter;
+    YAML::Parser(stream).HandleNextDocument(counter);
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw InputError(fmt::format("{}:{}: expected YAML, found: {}", file, error.mark.line + 1, error.msg));

@@ -50,7 +50,8 @@ class YamlSection {
   std::map<std::string, int> lines_;  // of the keys
 };
 
-// The document of `text`; throws InputError with file and line for text that is not YAML.
+// The document of `text`; throws InputError with file and line for text that is not YAML or holds more than 200,000
+// keys and values.
 YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
 // What a node holds, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".

@@ -1,0 +1,36 @@
+#include "robots/yaml_section.h"
+
+#include <gmock/gmock.h>
+
+#include "core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string flow_list(int entries) {
+  std::string text = "key:\n  [";
+  for (int i = 0; i < entries; ++i) text += "1,";
+  return text + "]\n";
+}
+
+// Two bytes a value, and each takes some hundred bytes of memory: what is too much is refused before it is made.
+TEST(Yaml, TooManyValuesAreRefusedWithTheirLine) {
+  EXPECT_EQ(parse_yaml(flow_list(199997), "a.yaml")["key"].size(), 199997U);  // with the key, the mapping and the list
+  EXPECT_EQ(thrown_message<InputError>([] { parse_yaml(flow_list(199998), "a.yaml"); }),
+            "a.yaml:2: expected YAML, found: more than 200000 keys and values");
+}
+
+TEST(Yaml, EmptyAndBrokenTextsAreToldApart) {
+  EXPECT_TRUE(parse_yaml("", "a.yaml").IsNull());
+  EXPECT_THAT(thrown_message<InputError>([] { parse_yaml("a: [1, 2\n", "a.yaml"); }),
+              StartsWith("a.yaml:2: expected YAML"));
+  EXPECT_THAT(thrown_message<InputError>([] { parse_yaml("a: *nobody\n", "a.yaml"); }), HasSubstr("a.yaml:1: "));
+}
+
+}  // namespace
+}  // namespace duet
