@@ -81,6 +81,7 @@ std::map<std::string, double> force_in(const RowPerEngine& row_of, const std::st
 void gather_force(const std::map<std::string, double>& in_engine, ForceSamples& samples) {
   if (in_engine.size() < 2) return;
   std::vector<double> values;
+  values.reserve(in_engine.size());
   for (const auto& [engine, value] : in_engine) values.push_back(value);
   std::sort(values.begin(), values.end());
   const double mean = mean_of(values);
