@@ -295,8 +295,7 @@ double WbcEnvironment::stepping_reward() {
     top_[swing] = 0.0;
   }
   return w.clock * match + (0.3 + 0.35 * match) * w.velocity * kernel(velocity_error, w.velocity_width) -
-         w.lift * (std::pow(std::min(0.0, lift_[swing] - wanted), 2) +
-                   0.3 * std::pow(std::max(0.0, lift_[swing] - wanted), 2)) +
+         w.lift * lift_cost(lift_[swing] - wanted) +
          w.foothold * gait.swing_progress() * kernel(miss, w.foothold_width);
 }
 

@@ -1,5 +1,7 @@
 #include "training/wbc_task.h"
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "controllers/stance.h"
@@ -84,5 +86,7 @@ Eigen::VectorXd action_scale(const RobotModel& robot) {
     for (const int joint : leg.joints) scale[joint] = kLegScale;
   return scale;
 }
+
+double lift_cost(double above) { return std::pow(std::min(0.0, above), 2) + 0.3 * std::pow(std::max(0.0, above), 2); }
 
 }  // namespace duet

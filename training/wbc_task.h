@@ -66,6 +66,9 @@ struct WbcTask {
 WbcTask wbc_stage(const std::string& name);
 std::vector<std::string> wbc_stages();
 
+// What RewardWeights::lift weighs: the square of how much higher than wanted [m] a swinging foot is; too high counts less.
+double lift_cost(double above);
+
 // Action: joint target = base + scale a, |a| <= kActionBound; base is the tracker's q.
 inline constexpr double kLegScale = 0.35, kUpperScale = 0.25;  // [rad]
 Eigen::VectorXd action_scale(const RobotModel& robot);

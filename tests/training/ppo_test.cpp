@@ -62,6 +62,12 @@ TEST(Ppo, OptionsThatDoNotDivideAreRefused) {
   options.environments = 5;
   EXPECT_THAT([&] { Ppo(g1(), wbc_stage("stand"), options, fresh()); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("5 environments on 2 threads")));
+  options.threads = 1;
+  options.minibatches = 1;
+  EXPECT_NO_THROW(Ppo(g1(), wbc_stage("stand"), options, fresh()));
+  options.threads = 0;
+  EXPECT_THAT([&] { Ppo(g1(), wbc_stage("stand"), options, fresh()); },
+              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("on 0 threads")));
 }
 
 TEST_F(TrainingStateInMujoco, IsTheSameAfterTheFile) {

@@ -83,6 +83,12 @@ TEST_F(WbcEnvironmentInMujoco, TimeIsUpAfterTheTicksOfTheTaskAndNoSooner) {
 }
 
 // Sums of magnitudes since they were taken last: none is below 0, and a robot that sways has some of each.
+TEST(WbcTask, AFootThatSwingsTooLowCostsMoreThanOneTooHigh) {
+  EXPECT_EQ(lift_cost(0.0), 0.0);
+  EXPECT_DOUBLE_EQ(lift_cost(-0.05), 0.0025);
+  EXPECT_DOUBLE_EQ(lift_cost(0.05), 0.3 * 0.0025);
+}
+
 TEST_F(WbcEnvironmentInMujoco, TrackingErrorsAreSumsOfMagnitudes) {
   WbcTask task = wbc_stage("stand");
   task.domain.kick = 0.0;
