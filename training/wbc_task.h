@@ -66,7 +66,8 @@ struct WbcTask {
 WbcTask wbc_stage(const std::string& name);
 std::vector<std::string> wbc_stages();
 
-// What RewardWeights::lift weighs: the square of how much higher than wanted [m] a swinging foot is; too high counts less.
+// What RewardWeights::lift weighs: the square of how far a swinging foot is above its wanted height [m]; less above
+// than below.
 double lift_cost(double above);
 
 // Action: joint target = base + scale a, |a| <= kActionBound; base is the tracker's q.
