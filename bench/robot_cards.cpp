@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <stdexcept>
+
+#include "core/names.h"
 
 namespace duet {
 
@@ -11,6 +14,15 @@ std::vector<std::string> shipped_cards() {
     if (entry.path().extension() == ".yaml" && entry.path() != cards.front()) cards.push_back(entry.path().string());
   std::sort(cards.begin() + 1, cards.end());
   return cards;
+}
+
+std::string shipped_card(const std::string& name) {
+  std::vector<std::string> names;
+  for (const std::string& card : shipped_cards()) {
+    names.push_back(std::filesystem::path(card).stem().string());
+    if (names.back() == name) return card;
+  }
+  throw std::invalid_argument(unknown_name_message("robot", name, names));
 }
 
 std::shared_ptr<const RobotModel> robot_of_digest(const std::string& digest) {

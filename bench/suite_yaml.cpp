@@ -11,6 +11,7 @@
 #include "backends/factory.h"
 #include "bench/clips.h"
 #include "bench/episode.h"
+#include "bench/robot_cards.h"
 #include "bench/suite.h"
 #include "bench/suite_actors.h"
 #include "bench/suite_names.h"
@@ -229,7 +230,7 @@ void read_episode(const YamlSection& top, Suite& suite) {
   checked(top, "fuse_ticks", [&] { static_cast<void>(Scheduler({.fuse_ticks = suite.fuse_ticks})); });
   get(top, "robot", suite.robot);
   if (is_plain_name(suite.robot) && !suite.robot.ends_with(".yaml"))
-    suite.robot = card_path(suite.robot);
+    checked(top, "robot", [&] { suite.robot = shipped_card(suite.robot); });
   else if (!suite.robot.empty())
     suite.robot = from_folder_of(suite, suite.robot);
   if (top.has("contact_limits")) suite.contact_limits = from_folder_of(suite, top.text("contact_limits"));

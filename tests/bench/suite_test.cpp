@@ -197,6 +197,11 @@ TEST(Suite, VariantsThatCannotBeAreRefused) {
               HasSubstr("bend has no target_height"));
 }
 
+TEST(Suite, ARobotThatIsNotThereIsRefusedByItsName) {
+  EXPECT_THAT(test::thrown_message<InputError>([] { parse_suite(std::string(kMinimal) + "robot: g0\n", "s.yaml"); }),
+              AllOf(HasSubstr("s.yaml:"), HasSubstr("robot"), HasSubstr("'g0'"), HasSubstr("g1")));
+}
+
 TEST(Suite, ARobotMayGoByName) {
   const Suite suite = parse_suite(std::string(kMinimal) + "robot: g1_27dof\n", "s.yaml");
   EXPECT_EQ(suite.robot, card_path("g1_27dof"));
