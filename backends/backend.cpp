@@ -1,11 +1,11 @@
-#include "backends/backend.h"
+#include "duet/backends/backend.h"
 
 #include <fmt/format.h>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -117,12 +117,6 @@ void Backend::set_partner(const HumanJoints& joints, const HumanJoints& velociti
   do_set_partner(joints, velocities);
 }
 
-void Backend::follow(const Reference& reference) {
-  check_pose(reference.X_WB, "Backend::follow");
-  check_vector(reference.q, *scene_.robot, "Backend::follow: q", true);
-  do_follow(reference);
-}
-
 Outcome Backend::step(const JointCommand& command) {
   check_vector(command.q_target, *scene_.robot, "Backend::step: q_target", true);
   check_vector(command.kp, *scene_.robot, "Backend::step: kp", false);
@@ -180,6 +174,13 @@ void Backend::push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& 
         fmt::format("Backend::push: link {} of {}, expected 0 to {}", link, scene_.robot->name, links - 1));
   require(f_W.allFinite() && p_W.allFinite(), "Backend::push: force or point is not finite");
   do_push(link, f_W, p_W);
+}
+
+void Backend::kick(const Eigen::Vector3d& dv_W) {
+  require(dv_W.allFinite(), "Backend::kick: the velocity is not finite");
+  if (diverged_) return;
+  state_.v_WB += dv_W;
+  do_kick(dv_W);
 }
 
 }  // namespace duet

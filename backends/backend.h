@@ -1,4 +1,4 @@
-// One physics engine (or none) behind one interface. Public functions check arguments once and call the private hooks;
+// One physics engine behind one interface. Public functions check arguments once and call the private hooks;
 // adapters never repeat the checks. Not thread-safe: one backend per thread. After construction nothing
 // allocates in step() but what an engine's README names.
 #pragma once
@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "backends/scene.h"
-#include "core/contact.h"
-#include "core/outcome.h"
-#include "core/robot_state.h"
+#include "duet/backends/scene.h"
+#include "duet/core/contact.h"
+#include "duet/core/outcome.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 
@@ -39,7 +39,7 @@ class Backend {
   Backend(const Backend&) = delete;
   Backend& operator=(const Backend&) = delete;
 
-  [[nodiscard]] virtual std::string_view name() const = 0;  // "mujoco", "playback", ...
+  [[nodiscard]] virtual std::string_view name() const = 0;  // "mujoco", ...
   [[nodiscard]] virtual std::string version() const = 0;    // the engine's own
   [[nodiscard]] const Scene& scene() const { return scene_; }
 
@@ -51,8 +51,6 @@ class Backend {
   // Partner joints now; each following step moves them on at `velocities` until the next call. The first call after a
   // reset throws std::invalid_argument in an engine where the solid partner is inside the robot (start_overlap.h).
   void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
-  // The reference being tracked. Engines ignore it; playback moves the robot there.
-  void follow(const Reference& reference);
   // One physics step of scene().dt with the torque law of JointCommand evaluated inside it. kDiverged is final until
   // reset: state() then stays at the last finite one. Throws std::invalid_argument for wrong sizes, values that are not
   // finite and negative gains.
@@ -73,6 +71,9 @@ class Backend {
   // Adds a force on a link for the following steps until called again for that link (with zero: no force). The force
   // keeps its direction in W and acts at the point of the link that is at p_W now. [N], frame W.
   void push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W);
+  // Changes the velocity of the whole robot at once, as a shove does: its base's by `dv_W`, its joints' not. Contacts,
+  // warm starts, pushes, partner and time stay. Throws std::invalid_argument for what is not finite. [m/s], frame W.
+  void kick(const Eigen::Vector3d& dv_W);
 
  protected:
   RobotState state_;               // hooks leave it at the state after the call
@@ -82,9 +83,9 @@ class Backend {
  private:
   virtual void do_reset() = 0;  // from state_
   virtual void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) = 0;
-  virtual void do_follow(const Reference&) {}
   virtual Outcome do_step(const JointCommand& command) = 0;
   virtual void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) = 0;
+  virtual void do_kick(const Eigen::Vector3d& dv_W) = 0;   // state_ has the new velocity already
   virtual void do_snapshot(Snapshot& snapshot) const = 0;  // appends its values
   virtual void do_restore(std::span<const double> values) = 0;
 

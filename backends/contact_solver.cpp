@@ -1,4 +1,4 @@
-#include "backends/contact_solver.h"
+#include "duet/backends/contact_solver.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "backends/narrow_phase.h"
-#include "robots/tree_factor.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/robots/tree_factor.h"
 
 namespace duet {
 

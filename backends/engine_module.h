@@ -2,20 +2,23 @@
 // lacks one engine's library still runs the others, and a new engine needs no change to duet. docs/adding-a-backend.md.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 
-#include "backends/backend.h"
-#include "backends/engine_options.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/engine_interface.h"
+#include "duet/backends/engine_options.h"
+#include "duet/core/version.h"
 
 namespace duet {
 
-// Changes whenever this struct, Backend, Scene or RobotModel does: a module built against others is refused.
-inline constexpr int kEngineInterface = 1;
-
 struct EngineModule {
-  int interface = kEngineInterface;
+  // Both are set by themselves; a module whose interface is not the program's is refused, and what stands behind these
+  // two members is then not looked at.
+  std::uint64_t interface = engine_interface();
+  const char* built_with = duet_version();
   const char* name = "";
   std::string (*version)() = nullptr;  // the engine's own
   // Throws std::invalid_argument (scene, options) and std::runtime_error with the engine's message where it refuses.

@@ -1,4 +1,4 @@
-#include "backends/engine_options.h"
+#include "duet/backends/engine_options.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "core/names.h"
-#include "core/number.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/number.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

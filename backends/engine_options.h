@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "backends/scene.h"
+#include "duet/backends/scene.h"
 
 namespace duet {
 

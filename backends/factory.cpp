@@ -1,4 +1,4 @@
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -10,24 +10,39 @@
 #include <map>
 #include <mutex>
 
-#include "backends/playback/playback.h"
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/core/version.h"
 
 namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPlayback = "playback";
 constexpr std::array kEngines = {"mujoco", "bullet", "ode", "simbody", "dart"};
 constexpr std::string_view kPrefix = "duet_", kSuffix = ".so";
 
+// "a:b" -> a, b.
+std::vector<fs::path> folders_of(std::string_view list) {
+  std::vector<fs::path> folders;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t end = std::min(list.find(':', begin), list.size());
+    if (end > begin) folders.emplace_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return folders;
+}
+
+// Of the folders of duet's own modules the first that is there: a program that is installed looks into no other.
 std::vector<fs::path> module_folders() {
-  if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0') return {set};
+  if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0') return folders_of(set);
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  return {program.parent_path() / "engines", DUET_BUILD_ENGINES};
+  std::vector<fs::path> places = {fs::read_symlink("/proc/self/exe", error).parent_path() / "engines"};
+  for (const std::string& prefix : installed_prefixes()) places.push_back(fs::path(prefix) / DUET_INSTALLED_ENGINES);
+  for (const fs::path& place : places)
+    if (fs::is_directory(place, error)) return {place};
+  return {DUET_BUILD_ENGINES};
 }
 
 struct Loaded {
@@ -46,9 +61,11 @@ Loaded load_file(const std::string& name, const fs::path& file) {
   const auto entry = reinterpret_cast<const EngineModule* (*)()>(dlsym(handle, "duet_engine_module"));
   if (entry == nullptr) return {nullptr, last_error()};
   const EngineModule* module = entry();
-  if (module->interface != kEngineInterface)
-    return {nullptr, fmt::format("its module was built for interface {}, this program has {}", module->interface,
-                                 kEngineInterface)};
+  if (module->interface != engine_interface())
+    return {nullptr,
+            fmt::format("{} was compiled against other types (interface {:016x}, duet {} has {:016x}): compile "
+                        "it again with the headers and the compiler flags of this duet",
+                        file.string(), module->interface, duet_version(), engine_interface())};
   if (name != module->name) return {nullptr, fmt::format("its module names itself '{}'", module->name)};
   return {module, ""};
 }
@@ -71,7 +88,7 @@ const Loaded& loaded(const std::string& name) {
   return entry->second;
 }
 
-// Names of physics engines: the benchmark's, then what else has a module.
+// Names of engines: the benchmark's, then what else has a module.
 std::vector<std::string> engine_names() {
   std::vector<std::string> names(kEngines.begin(), kEngines.end());
   std::vector<std::string> others;
@@ -91,16 +108,14 @@ std::vector<std::string> engine_names() {
 }
 
 void check_name(const std::string& engine) {
-  std::vector<std::string> names = engine_names();
-  names.insert(names.begin(), kPlayback);
+  const std::vector<std::string> names = engine_names();
   require(std::find(names.begin(), names.end(), engine) != names.end(), unknown_name_message("engine", engine, names));
 }
 
 }  // namespace
 
 std::vector<EngineInfo> engines() {
-  std::vector<EngineInfo> infos = {
-      {.name = kPlayback, .available = true, .version = "1", .reason = "", .physics = false}};
+  std::vector<EngineInfo> infos;
   for (const std::string& name : engine_names()) {
     const Loaded& engine = loaded(name);
     const bool available = engine.module != nullptr;
@@ -114,18 +129,12 @@ std::vector<EngineInfo> engines() {
 
 const EngineModule& engine_module(const std::string& engine) {
   check_name(engine);
-  require(engine != kPlayback, "playback is no physics engine");
   const Loaded& entry = loaded(engine);
   if (entry.module == nullptr) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, entry.reason));
   return *entry.module;
 }
 
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene) {
-  check_name(engine);
-  if (engine == kPlayback) {
-    check_options(engine, scene.options, {});
-    return make_playback_backend(scene);
-  }
   const EngineModule& module = engine_module(engine);
   check_options(engine, scene.options, module.options);
   return module.make(scene);

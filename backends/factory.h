@@ -1,5 +1,6 @@
-// Engines by name: playback, and the modules duet_<engine>.so that are found (backends/engine_module.h) in the folder
-// $DUET_ENGINES if it is set, else in `engines` beside the program or where it was built. What is missing is listed
+// Engines by name: the modules duet_<engine>.so that are found (backends/engine_module.h) in the folders
+// $DUET_ENGINES ("mine:/usr/lib/duet/engines") if it is set, else in the first of these that is there: `engines` beside
+// the program, lib/duet/engines of an installed duet (core/share.h), where it was built. What is missing is listed
 // with its reason and refused by name (MissingError). Thread-safe; a module is loaded once and stays.
 #pragma once
 
@@ -7,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "backends/backend.h"
-#include "backends/engine_module.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/engine_module.h"
 
 namespace duet {
 
@@ -17,17 +18,16 @@ struct EngineInfo {
   bool available = false;
   std::string version;  // where available
   std::string reason;   // why not, where not ("libode.so.8: cannot open shared object file")
-  bool physics = true;  // false: playback
 };
 
-// Playback, then the five engines of the benchmark whether present or not, then other modules by name.
+// The five engines of the benchmark whether present or not, then other modules by name.
 std::vector<EngineInfo> engines();
 
 // Throws std::invalid_argument for an unknown name (with the nearest), options that the engine does not have and a
 // scene that it refuses; MissingError for an engine that this machine lacks.
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene);
 
-// Of a physics engine. Throws as make_backend; std::invalid_argument for playback, which has none.
+// Throws as make_backend.
 const EngineModule& engine_module(const std::string& engine);
 
 }  // namespace duet

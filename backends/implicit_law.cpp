@@ -1,4 +1,4 @@
-#include "backends/implicit_law.h"
+#include "duet/backends/implicit_law.h"
 
 #include <cmath>
 #include <stdexcept>

@@ -8,10 +8,10 @@
 
 #include <Eigen/Core>
 
-#include "backends/scene.h"
-#include "core/robot_state.h"
-#include "robots/dynamics.h"
-#include "robots/tree_factor.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/tree_factor.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/link_pushes.h"
+#include "duet/backends/link_pushes.h"
 
 #include <algorithm>
 

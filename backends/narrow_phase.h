@@ -8,10 +8,10 @@
 #include <span>
 #include <vector>
 
-#include "backends/partner.h"
-#include "backends/scene.h"
-#include "core/contact.h"
-#include "robots/kinematics.h"
+#include "duet/backends/partner.h"
+#include "duet/backends/scene.h"
+#include "duet/core/contact.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/partner.h"
+#include "duet/backends/partner.h"
 
 #include <algorithm>
 

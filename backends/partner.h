@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "backends/backend.h"
-#include "robots/human_body.h"
+#include "duet/backends/backend.h"
+#include "duet/robots/human_body.h"
 
 namespace duet {
 

@@ -1,6 +1,6 @@
-#include "backends/physics_backend.h"
+#include "duet/backends/physics_backend.h"
 
-#include "backends/start_overlap.h"
+#include "duet/backends/start_overlap.h"
 
 namespace duet {
 

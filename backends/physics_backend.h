@@ -2,11 +2,11 @@
 // order of a snapshot. An engine adds how it is placed, advanced and stored.
 #pragma once
 
-#include "backends/backend.h"
-#include "backends/link_pushes.h"
-#include "backends/narrow_phase.h"
-#include "backends/partner.h"
-#include "robots/kinematics.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/link_pushes.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/backends/partner.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 

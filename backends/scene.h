@@ -7,9 +7,9 @@
 #include <memory>
 #include <string>
 
-#include "robots/dynamics.h"
-#include "robots/human_body.h"
-#include "robots/robot_model.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

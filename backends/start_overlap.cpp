@@ -1,11 +1,11 @@
-#include "backends/start_overlap.h"
+#include "duet/backends/start_overlap.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "backends/narrow_phase.h"
-#include "core/require.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

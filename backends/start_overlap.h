@@ -2,9 +2,9 @@
 // A light touch at the start (soles, a hand on a shoulder) is allowed.
 #pragma once
 
-#include "backends/partner.h"
-#include "backends/scene.h"
-#include "core/robot_state.h"
+#include "duet/backends/partner.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

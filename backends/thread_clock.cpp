@@ -1,4 +1,4 @@
-#include "backends/thread_clock.h"
+#include "duet/backends/thread_clock.h"
 
 #include <ctime>
 

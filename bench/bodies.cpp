@@ -1,21 +1,34 @@
-#include "bench/bodies.h"
+#include "duet/bench/bodies.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "bench/suite_names.h"
-#include "bench/trust.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "policies/on_other_body.h"
-#include "robots/joint_map.h"
+#include "duet/bench/suite_names.h"
+#include "duet/bench/trust.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/policies/on_other_body.h"
+#include "duet/policies/registry.h"
+#include "duet/robots/joint_map.h"
 
 namespace duet {
 namespace {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// Clips and policies are of the nominal robot: one without any of its joints would be told nothing.
+void require_joints_of(const RobotModel& nominal, const RobotModel& robot, const std::string& controller) {
+  const std::vector<std::string> known = nominal.joint_names();
+  const auto is_known = [&](const RobotJoint& joint) { return contains(known, joint.name); };
+  if (known.empty() || robot.joints.empty() || std::ranges::any_of(robot.joints, is_known)) return;
+  throw InputError(
+      fmt::format("controller '{}' runs on robot '{}', which has no joint in common with '{}', the robot of "
+                  "the clips: expected a suite with 'robot: {}'",
+                  controller, robot.name, nominal.name, robot.name));
 }
 
 }  // namespace
@@ -34,6 +47,7 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
     if (contains(skipped_controllers, controller.name)) continue;
     try {
       const std::size_t place = add(card_of(suite, controller));
+      if (suite.references.empty()) require_joints_of(*nominal(), *bodies_[place].robot, controller.name);
       static_cast<void>(make_controller(controller.use, bodies_[place].robot, controller.options));
       for (const Perturbation& perturbation : suite.perturbations)
         check_perturbation(perturbation, *bodies_[place].robot);
@@ -83,7 +97,8 @@ std::size_t Bodies::add(const std::string& card) {
 void Bodies::take_clips(std::vector<PairedMotion> clips) {
   for (std::size_t i = 1; i < bodies_.size(); ++i) {
     bodies_[i].clips = clips;
-    for (PairedMotion& clip : bodies_[i].clips) clip.robot = on_body(clip.robot, *bodies_[i].robot);
+    for (PairedMotion& clip : bodies_[i].clips)
+      if (clip.robot.frames() > 0) clip.robot = on_body(clip.robot, *bodies_[i].robot);
   }
   bodies_.front().clips = std::move(clips);
 }

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "bench/suite.h"
-#include "motion/paired_motion.h"
-#include "policies/policy.h"
-#include "robots/robot_model.h"
+#include "duet/bench/suite.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/policies/policy.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

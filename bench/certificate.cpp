@@ -1,15 +1,15 @@
-#include "bench/certificate.h"
+#include "duet/bench/certificate.h"
 
 #include <fmt/format.h>
 
-#include "backends/conformance/deviations.h"
-#include "bench/version.h"
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "results/environment.h"
-#include "results/json_fields.h"
+#include "duet/backends/conformance/deviations.h"
+#include "duet/core/digest.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/core/version.h"
+#include "duet/results/environment.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {
@@ -209,7 +209,7 @@ Certificate certify(std::span<const conformance::EngineReport> reports, const st
                     const std::string& created_at) {
   Certificate certificate{.effort = "quick",
                           .created_at = created_at,
-                          .program = kVersion,
+                          .program = duet_version(),
                           .machine = describe_machine(),
                           .engines = {},
                           .deviations = {},

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "backends/conformance/conformance.h"
+#include "duet/backends/conformance/conformance.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "bench/clips.h"
+#include "duet/bench/clips.h"
 
 #include <fmt/format.h>
 
@@ -7,18 +7,18 @@
 #include <optional>
 #include <variant>
 
-#include "bench/parallel.h"
-#include "bench/prepared_clips.h"
-#include "bench/progress.h"
-#include "bench/stop_sign.h"
-#include "bench/suite_names.h"
-#include "core/digest.h"
-#include "core/names.h"
-#include "core/naming_file.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "motion/synthesis.h"
-#include "retarget/pair.h"
+#include "duet/bench/prepared_clips.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/stop_sign.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/digest.h"
+#include "duet/core/names.h"
+#include "duet/core/naming_file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/motion/synthesis.h"
+#include "duet/retarget/pair.h"
 
 namespace duet {
 namespace {
@@ -194,13 +194,23 @@ LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const Pai
 }
 
 PairOptions pair_options(const Suite& suite) {
-  PairOptions options;
-  for (const auto& [name, value] : suite.retarget) set_pair_option(options, name, value);
-  return options;
+  return make_pair_options({suite.retarget.begin(), suite.retarget.end()});
 }
+
+namespace {
+
+// A command has a name and nothing else of a clip.
+std::vector<PairedMotion> empty_clips(const std::vector<SuiteReference>& references) {
+  std::vector<PairedMotion> clips(references.size());
+  for (std::size_t i = 0; i < references.size(); ++i) clips[i].clip_id = references[i].name;
+  return clips;
+}
+
+}  // namespace
 
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& prepare) {
+  if (!suite.references.empty()) return empty_clips(suite.references);
   const PreparedClips prepared(prepare.keep_in, maker_of(suite, robot));
   std::vector<PairedMotion> clips =
       by_task(make_clips(list_sources(suite), robot, pair_options(suite), threads, progress, prepared, prepare.stop),

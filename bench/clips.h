@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "bench/suite.h"
-#include "core/npz.h"
-#include "motion/paired_motion.h"
-#include "motion/plausibility.h"
-#include "retarget/options.h"
-#include "robots/robot_model.h"
+#include "duet/bench/suite.h"
+#include "duet/core/npz.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/motion/plausibility.h"
+#include "duet/retarget/options.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

@@ -1,18 +1,21 @@
-#include "bench/demonstrations.h"
+#include "duet/bench/demonstrations.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
 
-#include "backends/factory.h"
-#include "bench/clips.h"
-#include "bench/parallel.h"
-#include "bench/rollout.h"
-#include "controllers/controller.h"
-#include "core/random.h"
-#include "motion/clip_digest.h"
-#include "policies/phase_adaptation.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/parallel.h"
+#include "duet/core/random.h"
+#include "duet/motion/clip_digest.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/registry.h"
+#include "duet/results/episode_row.h"
+#include "duet/rollout/act_episode.h"
 
 namespace duet {
 namespace {
@@ -39,17 +42,22 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, StartMode start,
 
 void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options,
             const PolicyMaker& make_policy) {
-  Scene scene;
-  scene.robot = robot;
-  scene.human = make_human_body(bone_lengths(take.clip->partner));
-  const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
-  const std::unique_ptr<Controller> controller = make_controller(options.controller, robot);
   const std::unique_ptr<Policy> policy = make_policy();
   RolloutSetup setup;
   setup.clip = take.clip;
   setup.reference = take.adapted;
   setup.start = robot->standing_state(take.adapted.motion.root.front());
-  Rollout rollout = roll_out(setup, *backend, *controller, *policy);
+  setup.fall = robot->fall;
+  Rollout rollout;
+  if (options.engine == kPlaybackEngine) {
+    rollout = play_back(setup, *policy);
+  } else {
+    Scene scene;
+    scene.robot = robot;
+    scene.human = make_human_body(bone_lengths(take.clip->partner));
+    const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
+    rollout = roll_out(setup, *backend, *make_controller(options.controller, robot), *policy);
+  }
   take.followed = std::move(rollout.recording.robot);
   if (rollout.recording.outcome == Outcome::kOk) return;
   take.followed.resize(std::max<std::size_t>(take.followed.size(), kBeforeFall) - kBeforeFall);
@@ -95,7 +103,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   set.origin = origin_of(options);
-  for (const Task task : kTasks) {  // one at a time: hours of clips and takes are gigabytes
+  for (const Task task : kPaperTasks) {  // one at a time: hours of clips and takes are gigabytes
     const std::vector<PairedMotion> clips =
         synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress);
     std::vector<std::optional<Take>> made(clips.size() * starts);

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "bench/progress.h"
-#include "bench/suite.h"
-#include "policies/phase_adaptation.h"
-#include "policies/policy.h"
-#include "training/dstar/demonstrations.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/suite.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/policy.h"
+#include "duet/training/dstar/demonstrations.h"
 
 namespace duet {
 

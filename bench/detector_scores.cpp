@@ -1,12 +1,12 @@
-#include "bench/detector_scores.h"
+#include "duet/bench/detector_scores.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "metrics/detector_catalogue.h"
-#include "results/text_table.h"
+#include "duet/metrics/detector_catalogue.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 namespace {
@@ -97,7 +97,7 @@ std::vector<DetectorScore> score_detectors(const std::vector<Task>& tasks, const
 
 std::string detectors_table(const std::vector<DetectorScore>& scores) {
   TextTable table = table_of({"detector", "unit", "threshold"}, views_of(scores));
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     if (const Row row = of_task(scores, task); !row.empty()) add_task(table, row);
   return table.rows.empty() ? "" : markdown_table(table);
 }
@@ -107,7 +107,7 @@ std::string acceptance_table(const std::map<std::string, std::vector<std::vector
   const std::vector<std::string> views = views_of(clips.begin()->second.front());
   TextTable table = table_of({"clips", "detector accepts"}, views);
   for (const auto& [clip_task, scores_of_clips] : clips) {
-    for (const Task task : kTasks) {
+    for (const Task task : all_tasks()) {
       std::map<std::string, int> accepted;
       for (const std::vector<DetectorScore>& scores : scores_of_clips)
         for (const DetectorScore* score : of_task(scores, task)) accepted[score->view] += score->result.success ? 1 : 0;

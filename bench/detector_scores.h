@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "metrics/detector.h"
+#include "duet/metrics/detector.h"
 
 namespace duet {
 

@@ -1,22 +1,25 @@
-#include "bench/episode.h"
+#include "duet/bench/episode.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "bench/suite_names.h"
-#include "core/random.h"
-#include "core/require.h"
+#include "duet/bench/suite_names.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/results/walk_table.h"
+#include "duet/robots/robot_cards.h"
 
 namespace duet {
 namespace {
 
-constexpr const char* kPlayback = "playback";
-
 // Whether playback under one controller is playback under all; asks what the suite says, not what this machine has.
 bool one_playback(const Suite& suite) {
   const auto robot = [&](const SuiteController& controller) {
-    return suite.robot.empty() ? controller_info(controller.use).robot : suite.robot;
+    if (!suite.robot.empty()) return suite.robot;
+    const std::string made_for = controller_info(controller.use).robot;
+    return made_for.empty() ? default_robot() : made_for;
   };
   const SuiteController& first = suite.controllers.front();
   return std::all_of(suite.controllers.begin(), suite.controllers.end(), [&](const SuiteController& controller) {
@@ -42,7 +45,7 @@ std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
   const bool once = one_playback(suite);
   for (const std::string& engine : suite.engines) {
     for (const SuiteController& controller : suite.controllers) {
-      const bool playback = engine == kPlayback;
+      const bool playback = engine == kPlaybackEngine;
       if (playback && once && controller.name != suite.controllers.front().name) continue;
       EpisodeSpec combination;
       combination.engine = engine;
@@ -72,6 +75,8 @@ bool chosen(const std::vector<std::string>& names, std::string_view name) {
 }
 
 }  // namespace
+
+bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine || is_available(engine); }
 
 StartMode start_mode(const Suite& suite, const SuiteController& controller) {
   switch (suite.start) {
@@ -137,7 +142,7 @@ std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies)
 bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
   return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller) &&
          (spec.arm == "null" || chosen(part.policies, spec.policy)) && chosen(part.tasks, to_string(task)) &&
-         (spec.engine == kPlayback || chosen(part.perturbations, spec.perturbation));
+         (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation));
 }
 
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
@@ -177,12 +182,12 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentit
   row.suite = suite.name;
   row.suite_version = suite.version;
   row.suite_hash = run.suite_hash;
-  row.task = to_string(spec.clip->task);
+  row.task = suite.references.empty() ? std::string(to_string(spec.clip->task)) : std::string(kWalkRows);
   row.clip = spec.clip->clip_id;
   row.episode = spec.episode;
   row.seed = spec.seed;
   row.engine = spec.engine;
-  if (spec.engine != kPlayback) {
+  if (spec.engine != kPlaybackEngine) {
     row.engine_profile = suite.profile.name;
     row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
   }

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "bench/bodies.h"
-#include "bench/run_identity.h"
-#include "bench/suite.h"
-#include "motion/paired_motion.h"
-#include "policies/phase_adaptation.h"
-#include "results/episode_row.h"
-#include "results/run_info.h"
+#include "duet/bench/bodies.h"
+#include "duet/bench/run_identity.h"
+#include "duet/bench/suite.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/run_info.h"
 
 namespace duet {
 
@@ -25,6 +25,9 @@ struct EpisodeSpec {
   std::uint64_t perturbation_seed = 0;  // likewise
   const PairedMotion* seen = nullptr;   // whose partner the policy sees in the place of this clip's; null: this one's
 };
+
+// Whether this machine can run episodes in it: playback always.
+bool can_run_in(const std::string& engine);
 
 // Where episodes of one of the suite's controllers begin.
 StartMode start_mode(const Suite& suite, const SuiteController& controller);

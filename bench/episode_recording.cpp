@@ -1,15 +1,15 @@
-#include "bench/episode_recording.h"
+#include "duet/bench/episode_recording.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "bench/suite_names.h"
-#include "core/json.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "motion/npz_fields.h"
-#include "results/json_fields.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/json.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/motion/npz_fields.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

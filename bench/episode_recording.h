@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "bench/scoring.h"
-#include "core/npz.h"
+#include "duet/bench/scoring.h"
+#include "duet/core/npz.h"
 
 namespace duet {
 

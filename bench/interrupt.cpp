@@ -1,4 +1,4 @@
-#include "bench/interrupt.h"
+#include "duet/bench/interrupt.h"
 
 #include <atomic>
 #include <csignal>

@@ -1,4 +1,4 @@
-#include "bench/merge.h"
+#include "duet/bench/merge.h"
 
 #include <fmt/format.h>
 
@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <set>
 
-#include "bench/run_inputs.h"
-#include "bench/suite_names.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "results/json_fields.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "results/run_union.h"
+#include "duet/results/run_union.h"
 
 namespace duet {
 

@@ -1,14 +1,15 @@
-#include "bench/motion_scores.h"
+#include "duet/bench/motion_scores.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "bench/rollout.h"
-#include "metrics/catalogue.h"
-#include "metrics/detector.h"
-#include "results/text_table.h"
-#include "robots/kinematics.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/metrics/detector.h"
+#include "duet/metrics/grounding.h"
+#include "duet/results/text_table.h"
+#include "duet/robots/kinematics.h"
+#include "duet/rollout/play_back.h"
 
 namespace duet {
 namespace {
@@ -72,7 +73,7 @@ std::map<std::string, double> summarize(const std::vector<const ClipScore*>& sco
 
 std::vector<std::string> columns_of(const std::map<std::string, std::map<std::string, double>>& summary) {
   std::vector<std::string> columns;
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     if (summary.contains(std::string(to_string(task)))) columns.emplace_back(to_string(task));
   if (columns.size() > 1) columns.emplace_back("all");
   return columns;
@@ -113,6 +114,7 @@ ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const Rob
   score.task = to_string(motion.task);
   score.metrics = retargeting_metrics(motion, *robot, readings.metrics);
   add_other_readings(motion, *robot, score.metrics);
+  score.metrics.merge(grounding_metrics(motion, *robot));
   if (options.all_readings) score.all_readings = retargeting_metrics_all_readings(motion, *robot, readings.metrics);
   score.contacts = retargeting_contact_counts(motion, *robot, readings.metrics);
   const std::vector<DetectorView> views = views_of(motion, robot);
@@ -122,7 +124,8 @@ ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const Rob
     if (found.view == "printed") score.paper_detected = found.result.success;
   }
   if (options.all_detectors)
-    score.detectors = score_detectors({kTasks.begin(), kTasks.end()}, views, options.thresholds, readings.detectors);
+    score.detectors =
+        score_detectors({all_tasks().begin(), all_tasks().end()}, views, options.thresholds, readings.detectors);
   return score;
 }
 
@@ -152,8 +155,9 @@ std::string score_table(const std::map<std::string, std::map<std::string, double
   add_row("clips", "", "clips", false);
   for (const MetricInfo& metric : metric_catalogue()) {
     const std::string name(metric.name);
-    const bool retargeting = metric.group == MetricGroup::kRetargeting || metric.group == MetricGroup::kOtherReading;
-    if (retargeting && summary.at(columns.front()).contains(name)) add_row(name, metric.unit, name, false);
+    const bool of_a_motion = metric.group == MetricGroup::kRetargeting || metric.group == MetricGroup::kOtherReading ||
+                             metric.group == MetricGroup::kGrounding;
+    if (of_a_motion && summary.at(columns.front()).contains(name)) add_row(name, metric.unit, name, false);
   }
   for (const auto& [name, title] : detector_rows()) add_row(title, "", name, true);
   return text;

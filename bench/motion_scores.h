@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "bench/detector_scores.h"
-#include "metrics/readings.h"
-#include "metrics/retargeting.h"
-#include "motion/paired_motion.h"
-#include "robots/robot_model.h"
+#include "duet/bench/detector_scores.h"
+#include "duet/metrics/readings.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
@@ -25,7 +25,8 @@ struct ScoreOptions {
 
 struct ClipScore {
   std::string clip, task;
-  std::map<std::string, double> metrics;       // the 18, jpe.pelvis, large_angle_ratio.entry; NaN where undefined
+  std::map<std::string, double>
+      metrics;  // the 18, jpe.pelvis, large_angle_ratio.entry, those of metrics/grounding.h; NaN where undefined
   std::map<std::string, double> all_readings;  // of retargeting_metrics_all_readings, where asked for
   std::vector<DetectorScore> detectors;        // likewise
   std::array<ContactCounts, 3> contacts;

@@ -1,11 +1,12 @@
-#include "bench/parity_page.h"
+#include "duet/bench/parity_page.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "results/report_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

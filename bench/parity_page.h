@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/certificate.h"
+#include "duet/bench/certificate.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "bench/policy_check.h"
+#include "duet/bench/policy_check.h"
 
 #include <fmt/format.h>
 
@@ -6,15 +6,16 @@
 #include <chrono>
 #include <numbers>
 
-#include "core/pose.h"
-#include "core/text.h"
-#include "motion/synthesis.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/descriptor.h"
-#include "policies/external/onnx_policy.h"
-#include "policies/language.h"
-#include "policies/observation_history.h"
-#include "retarget/pair.h"
+#include "duet/core/pose.h"
+#include "duet/core/text.h"
+#include "duet/motion/synthesis.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/external/onnx_policy.h"
+#include "duet/policies/language.h"
+#include "duet/policies/observation_history.h"
+#include "duet/policies/registry.h"
+#include "duet/retarget/pair.h"
 
 namespace duet {
 namespace {
@@ -62,7 +63,7 @@ ShownChannel shown_channel(const PolicyChannel& channel, int frames, int joints,
 std::vector<ShownInput> shown_inputs(const PolicyDescriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
                                      const EpisodeContext& context, const Observation& observation) {
   const std::vector<int> joints = bind_joints(descriptor, *robot);
-  ChannelValues values(robot, joints, descriptor.frame);
+  ChannelValues values(robot, joints, descriptor);
   values.reset(context, shows_language(descriptor) ? built_in_language()->embed(context.prompt) : std::vector<float>{});
   std::vector<ShownInput> inputs;
   for (const PolicyInput& input : inputs_of(descriptor)) {

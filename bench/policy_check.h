@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "policies/policy.h"
-#include "robots/robot_model.h"
+#include "duet/policies/policy.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "bench/prepared_clips.h"
+#include "duet/bench/prepared_clips.h"
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <system_error>
 
-#include "bench/version.h"
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/digest.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/version.h"
 
 namespace duet {
 
@@ -44,8 +44,9 @@ void remove_prepared_clips(const std::string& folder) {
 
 std::string program_identity() {
   struct stat program {};
-  if (::stat("/proc/self/exe", &program) != 0) return kVersion;
-  return fmt::format("{} {} {}.{:09}", kVersion, program.st_size, program.st_mtim.tv_sec, program.st_mtim.tv_nsec);
+  if (::stat("/proc/self/exe", &program) != 0) return duet_version();
+  return fmt::format("{} {} {}.{:09}", duet_version(), program.st_size, program.st_mtim.tv_sec,
+                     program.st_mtim.tv_nsec);
 }
 
 }  // namespace duet

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "motion/paired_motion.h"
+#include "duet/motion/paired_motion.h"
 
 namespace duet {
 

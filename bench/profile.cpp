@@ -1,4 +1,4 @@
-#include "bench/profile.h"
+#include "duet/bench/profile.h"
 
 #include <fmt/format.h>
 
@@ -6,14 +6,14 @@
 #include <cmath>
 #include <filesystem>
 
-#include "backends/factory.h"
-#include "core/clock.h"
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "robots/yaml_section.h"
+#include "duet/backends/factory.h"
+#include "duet/core/clock.h"
+#include "duet/core/digest.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -23,8 +23,7 @@ constexpr double kShortestStep = 1e-6;  // [s]; 20,000 steps a control period, f
 
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
-  for (const EngineInfo& engine : engines())
-    if (engine.physics) names.push_back(engine.name);
+  for (const EngineInfo& engine : engines()) names.push_back(engine.name);
   return names;
 }
 
@@ -128,7 +127,7 @@ std::string settings_yaml(const EngineSettings& settings) {
 
 std::string resolved_settings(const std::string& engine, const EngineSettings& settings) {
   EngineSettings all = settings;
-  if (is_available(engine) && engine != "playback")
+  if (is_available(engine))
     for (const EngineOption& option : engine_module(engine).options) all.options.try_emplace(option.name, option.value);
   return settings_yaml(all);
 }

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "backends/scene.h"
+#include "duet/backends/scene.h"
 
 namespace duet {
 
@@ -34,7 +34,7 @@ Profile read_profile(const YAML::Node& document, const std::string& file);
 // a name that is neither, with the nearest. Options of an engine that this machine lacks are not checked.
 Profile load_profile(const std::string& profile);
 
-// Whether this machine has a physics engine (or playback) of that name.
+// Whether this machine has an engine of that name.
 bool is_available(const std::string& engine);
 
 // Throws std::invalid_argument unless the step [s] divides the control period of 0.02 s.

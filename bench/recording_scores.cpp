@@ -1,21 +1,20 @@
-#include "bench/recording_scores.h"
+#include "duet/bench/recording_scores.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "bench/robot_cards.h"
-#include "core/require.h"
-#include "metrics/catalogue.h"
-#include "metrics/diagnostics.h"
-#include "metrics/onset.h"
-#include "results/text_table.h"
+#include "duet/bench/scoring.h"
+#include "duet/core/require.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/metrics/diagnostics.h"
+#include "duet/metrics/onset.h"
+#include "duet/results/text_table.h"
+#include "duet/robots/robot_cards.h"
 
 namespace duet {
 namespace {
-
-constexpr int kShortest = 8;  // frames; third differences at both ends
 
 std::shared_ptr<const RobotModel> robot_of(const EpisodeRecording& episode) {
   if (!episode.kept) return load_shared_robot();
@@ -51,21 +50,17 @@ bool is_own_reference(const Recording& recording) {
   return true;
 }
 
-void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out) {
-  for (const auto& [name, value] : values)
-    if (std::isfinite(value)) out[name] = value;
-}
-
 // Of a recording that no run kept.
 std::map<std::string, double> metrics_of(const Recording& recording, const RobotModel& robot,
                                          const Readings& readings) {
   std::map<std::string, double> metrics;
   if (!recording.partner.empty()) add_finite(onsets(recording, robot), metrics);
-  if (recording.frames() < kShortest) return metrics;
+  if (recording.frames() < kShortestScored) return metrics;
   add_finite(controller_diagnostics(recording, readings.diagnostics), metrics);
+  add_finite(root_error_parts(recording), metrics);
   if (is_own_reference(recording))
     std::erase_if(metrics, [](const auto& entry) {
-      return entry.first.ends_with("_error") || entry.first.ends_with("_reference");
+      return entry.first.find("_error") != std::string::npos || entry.first.ends_with("_reference");
     });
   add_finite(motion_metrics(motion_of(recording, robot), robot, readings.metrics), metrics);
   return metrics;
@@ -74,14 +69,22 @@ std::map<std::string, double> metrics_of(const Recording& recording, const Robot
 void score_kept(const EpisodeRecording& episode, const RobotModel& robot, RecordingScore& score) {
   score.row = score_again(episode.recording, *episode.kept, robot);
   score.metrics = score.row->metrics;
+  if (episode.recording.frames() >= kShortestScored) add_finite(root_error_parts(episode.recording), score.metrics);
   score.differences = row_differences(episode.kept->row, *score.row);
 }
 
 void add_detectors(const RobotModel& robot, const ScoreOptions& options, RecordingScore& score) {
   const std::vector<DetectorView> views = robot_views(score.recording, robot);
-  const std::vector<Task> tasks =
-      options.all_detectors ? std::vector<Task>{kTasks.begin(), kTasks.end()} : std::vector<Task>{score.recording.task};
+  std::vector<Task> tasks;
+  if (options.all_detectors)
+    tasks.assign(all_tasks().begin(), all_tasks().end());
+  else if (score.recording.task)
+    tasks = {*score.recording.task};
   score.detectors = score_detectors(tasks, views, options.thresholds, options.readings.detectors);
+}
+
+std::string task_name(const Recording& recording) {
+  return recording.task ? std::string(to_string(*recording.task)) : "no task";
 }
 
 // Of the recording's own task.
@@ -97,7 +100,7 @@ std::string identity(const RecordingScore& score) {
                                  recording.frames() / recording.rate_hz, to_string(recording.outcome));
   if (!recording.message.empty()) text += fmt::format(" ({})", recording.message);
   if (recording.partner.empty()) return text + "; no partner, so no detector and no figure of a pair\n";
-  text += fmt::format("; {} with a partner\n", to_string(recording.task));
+  text += fmt::format("; {} with a partner\n", task_name(recording));
   if (!score.row) return text;
   const EpisodeRow& row = *score.row;
   return text + fmt::format("episode {} of clip '{}' of {} {}: {}/{}/{}, {}, {} arm; success: {}\n", row.episode,
@@ -156,15 +159,16 @@ std::string recording_text(const RecordingScore& score) {
 
 std::string recordings_table(const std::vector<RecordingScore>& scores) {
   TextTable table{.header = {"recording", "task", "outcome", "robot", "printed", "hf_ratio", "dof_jerk", "root_jerk",
-                             "root_error", "dof_error", "as in the run"},
+                             "root_error", "horizontal", "vertical", "dof_error", "as in the run"},
                   .rows = {},
                   .label_columns = 3};
   for (const RecordingScore& score : scores) {
     const bool alone = score.recording.partner.empty();
-    table.rows.push_back({score.file, alone ? "-" : std::string(to_string(score.recording.task)),
+    table.rows.push_back({score.file, alone ? "-" : task_name(score.recording),
                           std::string(to_string(score.recording.outcome)), verdict(score, "robot"),
                           verdict(score, "printed"), cell(score, "hf_ratio"), cell(score, "dof_jerk"),
-                          cell(score, "root_jerk"), cell(score, "root_error"), cell(score, "dof_error"),
+                          cell(score, "root_jerk"), cell(score, "root_error"), cell(score, "root_error.horizontal"),
+                          cell(score, "root_error.vertical"), cell(score, "dof_error"),
                           !score.row                  ? "-"
                           : score.differences.empty() ? "yes"
                                                       : "NO"});
@@ -176,13 +180,14 @@ nlohmann::json recordings_json(const std::vector<RecordingScore>& scores) {
   nlohmann::json json = nlohmann::json::array();
   for (const RecordingScore& score : scores) {
     const bool partner = !score.recording.partner.empty();
-    nlohmann::json entry = {{"file", score.file},
-                            {"task", partner ? nlohmann::json(to_string(score.recording.task)) : nlohmann::json()},
-                            {"partner", partner},
-                            {"outcome", to_string(score.recording.outcome)},
-                            {"frames", score.recording.frames()},
-                            {"seconds", score.recording.frames() / score.recording.rate_hz},
-                            {"metrics", score.metrics}};
+    nlohmann::json entry = {
+        {"file", score.file},
+        {"task", partner && score.recording.task ? nlohmann::json(task_name(score.recording)) : nlohmann::json()},
+        {"partner", partner},
+        {"outcome", to_string(score.recording.outcome)},
+        {"frames", score.recording.frames()},
+        {"seconds", score.recording.frames() / score.recording.rate_hz},
+        {"metrics", score.metrics}};
     if (!score.detectors.empty()) entry["detectors"] = detectors_json(score.detectors);
     if (score.row) {
       entry["row"] = to_json(*score.row);

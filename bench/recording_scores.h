@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/episode_recording.h"
-#include "bench/motion_scores.h"
-#include "results/row_identity.h"
+#include "duet/bench/episode_recording.h"
+#include "duet/bench/motion_scores.h"
+#include "duet/results/row_identity.h"
 
 namespace duet {
 

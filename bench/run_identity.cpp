@@ -1,15 +1,17 @@
-#include "bench/run_identity.h"
+#include "duet/bench/run_identity.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
-#include "bench/bodies.h"
-#include "bench/suite_names.h"
-#include "core/digest.h"
-#include "core/require.h"
-#include "metrics/contact_limits.h"
-#include "metrics/detector.h"
+#include "duet/bench/bodies.h"
+#include "duet/bench/suite_names.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
+#include "duet/metrics/contact_limits.h"
+#include "duet/metrics/detector.h"
+#include "duet/policies/registry.h"
 
 namespace duet {
 namespace {
@@ -40,10 +42,9 @@ ActorIdentity identity(std::string text, const FilesOf& files_of) {
 }
 
 // URDF and card of each controller's body, the one that clips are retargeted to first.
-std::string robots_text(const Suite& suite) {
+std::string robots_text(const Suite& suite, const RobotModel& nominal) {
   const auto digest = [](const std::string& card) { return load_robot(card).digest; };
-  std::string text =
-      fmt::format("robot of clips: {}\n", digest(suite.robot.empty() ? default_card_path() : suite.robot));
+  std::string text = fmt::format("robot of clips: {}\n", nominal.digest);
   for (const SuiteController& controller : suite.controllers) {
     try {
       text += fmt::format("robot of {}: {}\n", controller.name, digest(card_of(suite, controller)));
@@ -87,7 +88,10 @@ std::string suite_hash(const Suite& suite) {
   for (std::string& file : said.clips.files) file = sha256_file(file);
   said.contact_limits = limits_digest(suite);
   for (SuiteController& controller : said.controllers) controller = without_places(controller);
-  return sha256_hex(fmt::format("{}{}detectors: {}\n", resolved_yaml(said), robots_text(suite), kDetectorsVersion));
+  const RobotModel nominal = load_robot(suite.robot.empty() ? default_card_path() : suite.robot);
+  for (Perturbation& perturbation : said.perturbations) perturbation = with_links(perturbation, nominal);
+  return sha256_hex(
+      fmt::format("{}{}detectors: {}\n", resolved_yaml(said), robots_text(suite, nominal), kDetectorsVersion));
 }
 
 RunIdentity identity_of(const Suite& suite) {

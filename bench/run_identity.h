@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/suite.h"
+#include "duet/bench/suite.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "bench/run_inputs.h"
+#include "duet/bench/run_inputs.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,20 +9,21 @@
 #include <functional>
 #include <numeric>
 
-#include "bench/suite_names.h"
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "results/json_fields.h"
-#include "robots/card.h"
+#include "duet/bench/suite_names.h"
+#include "duet/controllers/published.h"
+#include "duet/core/digest.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/results/json_fields.h"
+#include "duet/robots/card_reader.h"
 
 namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSchema = "duet.inputs/1";
+constexpr const char* kInputsSchema = "duet.inputs/1";
 constexpr const char* kIndex = "inputs/inputs.json";
 
 std::string in(const std::string& folder, const std::string& file) { return (fs::path(folder) / file).string(); }
@@ -37,6 +38,14 @@ bool stays_below(const fs::path& path) {
   return !normal.empty() && normal.is_relative() && *normal.begin() != "..";
 }
 
+// The lowest folder that has all files below it.
+std::string common_folder(const std::vector<std::string>& files) {
+  fs::path folder = fs::absolute(files.front()).lexically_normal().parent_path();
+  const auto is_outside = [&](const std::string& file) { return !stays_below(from_folder(file, folder.string())); };
+  while (folder.has_relative_path() && std::ranges::any_of(files, is_outside)) folder = folder.parent_path();
+  return folder.string();
+}
+
 // A card that ships with duet goes by its name.
 bool is_shipped_card(const fs::path& card) {
   std::error_code ignored;
@@ -45,6 +54,12 @@ bool is_shipped_card(const fs::path& card) {
   } catch (const MissingError&) {
     return false;
   }
+}
+
+// A descriptor that names its card by a path stays where it is: a copy of it would not find the card.
+bool names_card_by_path(const SuitePolicy&) { return false; }
+bool names_card_by_path(const SuiteController& controller) {
+  return controller.use.ends_with(".yaml") && load_descriptor(controller.use).robot.ends_with(".yaml");
 }
 
 class Keeper {
@@ -92,26 +107,26 @@ class Keeper {
       robot = card.stem().string();
       return;
     }
-    const std::string urdf = parse_card(read_file(robot), robot).urdf;
-    if (!stays_below(urdf)) {
-      robot = from_folder(robot, folder_);
-      return;
-    }
-    copy("robot", "", (card.parent_path() / urdf).string(), "inputs/robot/" + urdf);
-    robot = copy("robot", "", robot, "inputs/robot/" + card.filename().string());
+    const RobotCard parsed = parse_card(read_file(robot), robot);
+    std::vector<std::string> files = parsed.files;  // the card first, and what it extends
+    files.push_back((card.parent_path() / parsed.urdf).string());
+    const std::string folder = common_folder(files);
+    for (const std::string& file : files) copy("robot", "", file, "inputs/robot/" + from_folder(file, folder));
+    robot = "inputs/robot/" + from_folder(files.front(), folder);
   }
 
   template <typename Actor>
   void keep_actor(const std::string& kind, Actor& actor) {
     const std::string of = fmt::format("{} {}", kind, actor.name);
     const std::string place = fmt::format("inputs/{}/{}/", kind == "policy" ? "policies" : "controllers", actor.name);
-    const bool descriptor = actor.use.ends_with(".yaml");
+    const bool stays = names_card_by_path(actor), descriptor = actor.use.ends_with(".yaml");
     const std::vector<HashedFile> files = identity_of(actor).files;
-    if (files.empty() && descriptor)  // its network is absent
+    if (stays) actor.use = from_folder(actor.use, folder_);
+    if (files.empty() && descriptor && !stays)  // its network is absent
       actor.use = copy(of, "descriptor", actor.use, place + fs::path(actor.use).filename().string());
     for (const HashedFile& file : files) {
       const std::string name = fs::path(file.path).filename().string();
-      if (descriptor && file.role == "descriptor") {
+      if (descriptor && !stays && file.role == "descriptor") {
         actor.use = copy(of, file.role, file.path, place + name);
       } else if (file.role.starts_with("command ")) {
         copy(of, file.role, file.path, place + file.role.substr(8));
@@ -133,7 +148,7 @@ nlohmann::json to_json(const std::vector<RunInput>& inputs) {
   for (const RunInput& input : inputs)
     files.push_back(
         {{"of", input.of}, {"role", input.role}, {"file", input.file}, {"sha256", input.sha256}, {"kept", input.kept}});
-  return {{"schema", kSchema}, {"files", files}};
+  return {{"schema", kInputsSchema}, {"files", files}};
 }
 
 RunInput read_input(const nlohmann::json& json, const std::string& path) {
@@ -171,7 +186,8 @@ std::vector<std::string> shipped_places(const std::string& name) {
 std::vector<std::string> places_of(const RunInput& input, const std::string& now, const std::string& folder) {
   std::vector<std::string> places;
   if (!now.empty()) places.push_back(now);
-  if (input.role == "descriptor") return places;  // it is of a controller that ships, and found by that one's name
+  // Of a controller that ships, found by that one's name; and what lies beside a network, found with it.
+  if (input.role == "descriptor" || input.role.starts_with("network data ")) return places;
   for (const char* below : {".", "inputs"})
     places.push_back((fs::path(folder) / below / input.file).lexically_normal());
   for (const std::string& place : shipped_places(input.file)) places.push_back(place);
@@ -236,8 +252,8 @@ std::vector<RunInput> read_inputs(const std::string& folder) {
   const std::string path = in(folder, kIndex);
   const nlohmann::json json = parse_json(read_file(path), path);
   JsonFields fields(json, path);
-  if (const std::string schema = fields.text("schema"); schema != kSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, schema));
+  if (const std::string schema = fields.text("schema"); schema != kInputsSchema)
+    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kInputsSchema, schema));
   const nlohmann::json& files = fields.at("files");
   fields.refuse_unknown();
   if (!files.is_array()) throw InputError(fmt::format("{}: key 'files': expected a list", path));

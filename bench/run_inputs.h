@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "bench/run_identity.h"
-#include "results/run_directory.h"
+#include "duet/bench/run_identity.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

@@ -1,11 +1,11 @@
-#include "bench/run_work.h"
+#include "duet/bench/run_work.h"
 
 #include <chrono>
 #include <numeric>
 #include <thread>
 #include <utility>
 
-#include "bench/parallel.h"
+#include "duet/core/parallel.h"
 
 namespace duet {
 namespace {

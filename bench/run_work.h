@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/progress.h"
-#include "bench/stop_sign.h"
-#include "results/run_directory.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/stop_sign.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

@@ -1,34 +1,21 @@
-#include "bench/runner.h"
+#include "duet/bench/runner.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 
-#include "backends/factory.h"
-#include "bench/clips.h"
-#include "bench/episode_recording.h"
-#include "bench/interrupt.h"
-#include "bench/prepared_clips.h"
-#include "bench/run_inputs.h"
-#include "bench/run_work.h"
-#include "bench/scoring.h"
-#include "bench/trust.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "metrics/contact_limits.h"
-#include "results/environment.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/prepared_clips.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/bench/run_work.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/environment.h"
 
 namespace duet {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr const char* kPlayback = "playback";
-
-std::string utc_now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 bool chosen(const std::vector<std::string>& filter, const std::string& name) {
   return filter.empty() || std::find(filter.begin(), filter.end(), name) != filter.end();
@@ -55,10 +42,15 @@ void check_filters(const RunOptions& options, const Suite& suite) {
   check_filter(options.perturbations, perturbation_names_of(suite), "perturbation");
 }
 
+bool plays_back(const Suite& suite, const RunOptions& options) {
+  const std::string playback(kPlaybackEngine);
+  return std::ranges::find(suite.engines, playback) != suite.engines.end() && chosen(options.engines, playback);
+}
+
 // Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
 std::map<std::string, std::string> absent_engines(const Suite& suite, const RunOptions& options) {
   std::map<std::string, std::string> absent;
-  int present = 0;
+  int present = plays_back(suite, options) ? 1 : 0;
   for (const EngineInfo& engine : engines()) {
     if (std::find(suite.engines.begin(), suite.engines.end(), engine.name) == suite.engines.end()) continue;
     if (!chosen(options.engines, engine.name)) continue;
@@ -86,9 +78,7 @@ void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& op
     throw MissingError(bodies.absent_policies().begin()->second);
   const std::size_t wanted =
       suite.controllers.size() - left_out(options.controllers, controller_names_of(suite)).size();
-  const bool playback = std::find(suite.engines.begin(), suite.engines.end(), kPlayback) != suite.engines.end() &&
-                        chosen(options.engines, kPlayback);
-  if (!bodies.absent().empty() && bodies.absent().size() == wanted && !playback)
+  if (!bodies.absent().empty() && bodies.absent().size() == wanted && !plays_back(suite, options))
     throw MissingError(bodies.absent().begin()->second);
 }
 
@@ -106,122 +96,7 @@ EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
   return row;
 }
 
-std::string trajectory_path(const std::string& folder, const EpisodeRow& row) {
-  return (std::filesystem::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
-}
-
-bool keep_trajectory(const Suite& suite, const EpisodeRow& row) {
-  if (suite.record == RecordTrajectories::kAll) return true;
-  return suite.record == RecordTrajectories::kFailures && !row.success.value_or(false);
-}
-
-void keep_episode(const Recording& recording, const RolloutSetup& setup, const Suite& suite, const EpisodeRow& row,
-                  const std::string& path) {
-  const ScoringRules rules{suite.detector, suite.thresholds, readings_of(suite), setup.foot_trace};
-  save_episode_recording({recording, KeptEpisode{row, rules, act_source(recording, setup)}}, path);
-}
-
-// Playback needs none: anything that fits the robot fills its place.
-std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Suite& suite,
-                                               const std::shared_ptr<const RobotModel>& robot) {
-  if (spec.engine == kPlayback) return make_controller("pd", robot);
-  const SuiteController& controller = controller_of(suite, spec.controller);
-  return make_controller(controller.use, robot, controller.options);
-}
-
-std::unique_ptr<Policy> episode_policy(const EpisodeSpec& spec, const Suite& suite,
-                                       const std::shared_ptr<const RobotModel>& robot) {
-  const SuitePolicy policy = policy_of(suite, spec.policy);
-  require_allowed(programs_of(policy), suite.allow_programs);
-  return make_policy(policy.use, robot, policy.options);
-}
-
-void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-              const std::string& trajectory_folder, const PolicyMaker& make, const std::function<bool()>& stop_asked,
-              EpisodeRow& row) {
-  const std::unique_ptr<Backend> backend = make_backend(spec.engine, episode_scene(spec, suite, robot));
-  const std::unique_ptr<Controller> controller = episode_controller(spec, suite, robot);
-  const std::unique_ptr<Policy> policy = make ? make() : episode_policy(spec, suite, robot);
-  row.engine_version = backend->version();
-  RolloutSetup setup = episode_setup(spec, suite, *robot);
-  if (stop_asked) setup.stop_asked = stop_asked;
-  const Rollout rollout = roll_out(setup, *backend, *controller, *policy);
-  if (rollout.interrupted) throw EpisodeInterrupted();
-  if (const PolicyFaults& faults = rollout.policy_faults; faults.dead) {
-    row.policy_faults = {faults.late, faults.invalid, true, faults.message};
-    throw std::runtime_error(faults.message);
-  }
-  score_rollout(rollout, setup, suite, readings_of(suite), *robot, row);
-  if (!trajectory_folder.empty() && keep_trajectory(suite, row))
-    keep_episode(rollout.recording, setup, suite, row, trajectory_path(trajectory_folder, row));
-}
-
 }  // namespace
-
-Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot) {
-  const EngineSettings settings = suite.profile.settings(spec.engine);
-  const Perturbation perturbation = perturbation_of(suite, spec.perturbation);
-  Scene scene;
-  scene.robot = perturbed_robot(perturbation, robot);
-  scene.friction.robot_ground = perturbation.friction.value_or(scene.friction.robot_ground);
-  std::array<double, kSmplJoints> bones = bone_lengths(spec.clip->partner);
-  if (perturbation.partner)
-    for (double& bone : bones) bone *= perturbation.partner->scale;
-  scene.human = make_human_body(bones);
-  scene.partner = suite.partner;
-  scene.dt = settings.dt;
-  scene.options = settings.options;
-  return scene;
-}
-
-RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot) {
-  const SuiteController& controller = controller_of(suite, spec.controller);
-  AdaptationOptions options;
-  options.start = start_mode(suite, controller);
-  options.start_radius = suite.start_radius;
-  RolloutSetup setup;
-  setup.clip = spec.clip;
-  setup.reference = adapt_by_phase(spec.clip->robot, spec.clip->phases, robot, options, spec.seed);
-  setup.prompt = policy_of(suite, spec.policy).prompt;
-  if (spec.seen != nullptr)
-    setup.seen_partner = partner_from_elsewhere(
-        *spec.seen, adapt_by_phase(spec.seen->robot, spec.seen->phases, robot, options, spec.seed), setup.reference);
-  setup.start = robot.standing_state(setup.reference.motion.root.front());
-  setup.seed = spec.seed;
-  setup.perturbation = perturbation_of(suite, spec.perturbation);
-  setup.perturbation_seed = spec.perturbation_seed;
-  setup.foot_trace = spec.engine != kPlayback && spec.arm == "main" && controller_info(controller.use).walks;
-  setup.wall_limit = suite.wall_limit;
-  setup.fuse_ticks = suite.fuse_ticks;
-  if (suite.partner == PartnerMode::kSolid)
-    setup.limits =
-        load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
-  setup.stop_asked = [] { return interrupt() != Interrupt::kNone; };
-  return setup;
-}
-
-EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
-                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder,
-                       const PolicyMaker& policy, const std::function<bool()>& stop_asked) {
-  EpisodeRow row = row_for(spec, suite, identity, *robot);
-  row.started_at = utc_now();
-  const Clock::time_point begin = Clock::now();
-  try {
-    simulate(spec, suite, robot, trajectory_folder, policy, stop_asked, row);
-  } catch (const StorageError&) {
-    throw;
-  } catch (const MissingError& error) {
-    row.outcome = Outcome::kUnsupported;
-    row.message = error.what();
-    row.success = false;
-  } catch (const std::exception& error) {
-    row.outcome = Outcome::kError;
-    row.message = error.what();
-    row.success = false;
-  }
-  row.wall_s = std::chrono::duration<double>(Clock::now() - begin).count();
-  return row;
-}
 
 namespace {
 
@@ -229,7 +104,7 @@ EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunI
                          const std::string& trajectory_folder, const std::function<bool()>& stop_asked) {
   const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
   const auto absent = bodies.absent().find(spec.controller);
-  if (absent != bodies.absent().end() && spec.engine != kPlayback)
+  if (absent != bodies.absent().end() && spec.engine != kPlaybackEngine)
     return unsupported_row(row_for(spec, suite, identity, *robot), absent->second);
   const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
   if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, identity, *robot), policy.refusal);
@@ -240,7 +115,7 @@ EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunI
 std::string settings_here(const Suite& suite) {
   std::string text;
   for (const std::string& engine : suite.engines)
-    if (engine != kPlayback && is_available(engine))
+    if (engine != kPlaybackEngine && is_available(engine))
       text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
   return text;
 }
@@ -265,6 +140,8 @@ std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPa
 
 // Tasks of the clips that the suite makes itself; those of files are known when they are read.
 std::vector<Task> tasks_of_clips(const Suite& suite) {
+  if (!suite.references.empty())
+    return std::vector<Task>(suite.references.size(), Task::kHug);  // commands have none, and nobody asks
   std::vector<Task> tasks;
   const std::size_t per_task = suite.clips.synth_per_task * std::max<std::size_t>(1, suite.clips.variants.size());
   for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
@@ -272,8 +149,9 @@ std::vector<Task> tasks_of_clips(const Suite& suite) {
 }
 
 std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
-  std::vector<Task> tasks(clips.size());
-  std::ranges::transform(clips, tasks.begin(), &PairedMotion::task);
+  std::vector<Task> tasks;
+  tasks.reserve(clips.size());
+  for (const PairedMotion& clip : clips) tasks.push_back(clip.task);
   return tasks;
 }
 

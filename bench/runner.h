@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "bench/episode.h"
-#include "bench/progress.h"
-#include "bench/rollout.h"
-#include "bench/run_work.h"
-#include "bench/stop_sign.h"
-#include "bench/suite.h"
-#include "results/run_directory.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/run_episode.h"
+#include "duet/bench/run_work.h"
+#include "duet/bench/stop_sign.h"
+#include "duet/bench/suite.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 
@@ -43,16 +43,5 @@ struct RunSummary {
 // (suite, clips, run directory, a full disk), MissingError (none of its engines, of its policies or, but for playback,
 // of its controllers is there), std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
-
-// The scene with the perturbation's ground and robot; `robot` is the controller's nominal one.
-Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot);
-
-// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`, but StorageError (a full
-// disk): it says nothing of the episode. Without `policy` the suite's own is loaded for this episode alone; without
-// `stop_asked` signals alone stop it.
-RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot);
-EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
-                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "",
-                       const PolicyMaker& policy = {}, const std::function<bool()>& stop_asked = {});
 
 }  // namespace duet

@@ -1,26 +1,24 @@
-#include "bench/scoring.h"
+#include "duet/bench/scoring.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <tuple>
 
-#include "core/digest.h"
-#include "metrics/detector.h"
-#include "metrics/diagnostics.h"
-#include "metrics/onset.h"
-#include "metrics/retargeting.h"
-#include "motion/human_motion.h"
-#include "robots/human_body.h"
-#include "robots/kinematics.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
+#include "duet/metrics/detector.h"
+#include "duet/metrics/diagnostics.h"
+#include "duet/metrics/locomotion.h"
+#include "duet/metrics/onset.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/motion/human_motion.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/kinematics.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
-
-void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out) {
-  for (const auto& [name, value] : values)
-    if (std::isfinite(value)) out[name] = value;
-}
 
 void add_strongest_contacts(const ContactSafetyResult& safety, const PairedMotion& clip, const RobotModel& robot,
                             EpisodeRow& row) {
@@ -47,8 +45,21 @@ void add_strongest_contacts(const ContactSafetyResult& safety, const PairedMotio
   row.contacts_total = static_cast<long>(safety.events.size()) + static_cast<long>(safety.events_left_out);
 }
 
-void add_contacts(const Rollout& rollout, const PairedMotion& clip, const RobotModel& robot, EpisodeRow& row) {
+void set_outcome(const Recording& recording, EpisodeRow& row) {
+  row.outcome = recording.outcome;
+  row.message = recording.message;
+  row.fell = recording.outcome == Outcome::kFell;
+  row.frames = recording.frames();
+  row.sim_s = recording.frames() / recording.rate_hz;
+}
+
+void set_measured(const Rollout& rollout, EpisodeRow& row) {
+  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
+  row.state_hash = rollout.state_hash;
   row.forces = {{"ground.mean_n", rollout.ground.mean}, {"ground.peak_n", rollout.ground.peak}};
+}
+
+void add_contacts(const Rollout& rollout, const PairedMotion& clip, const RobotModel& robot, EpisodeRow& row) {
   if (!rollout.safety) return;
   row.contact_peak_n = rollout.safety->peak_force;
   row.contact_impulse_ns = rollout.safety->impulse;
@@ -62,16 +73,6 @@ void append_point(const Eigen::Vector3d& p_W, std::vector<int>& to) {
   for (const double value : p_W) to.push_back(static_cast<int>(std::lround(1000.0 * value)));
 }
 
-// The soles' shapes by the link that carries them, in the card's order: the left foot's first.
-std::vector<std::vector<int>> shapes_of_feet(const RobotModel& robot) {
-  std::vector<std::vector<int>> feet;
-  for (const int shape : robot.feet) {
-    if (feet.empty() || robot.shapes[feet.back().front()].link != robot.shapes[shape].link) feet.emplace_back();
-    feet.back().push_back(shape);
-  }
-  return feet;
-}
-
 int sole_height_mm(const Kinematics& kinematics, const std::vector<int>& shapes) {
   double lowest = std::numeric_limits<double>::infinity();
   for (const int i : shapes) {
@@ -81,6 +82,12 @@ int sole_height_mm(const Kinematics& kinematics, const std::vector<int>& shapes)
     lowest = std::min(lowest, kinematics.shape_position(i).z() - reach);
   }
   return static_cast<int>(std::lround(1000.0 * lowest));
+}
+
+// An episode has one.
+Task task_of(const Recording& recording) {
+  require(recording.task.has_value(), "episode: expected a recording of a task, found one of none");
+  return *recording.task;
 }
 
 }  // namespace
@@ -103,7 +110,7 @@ StateTrace state_trace(const Recording& recording, const RobotModel& robot) {
 }
 
 FootTrace foot_trace(const Recording& recording, const RobotModel& robot) {
-  const std::vector<std::vector<int>> feet = shapes_of_feet(robot);
+  const std::vector<std::vector<int>> feet = soles_of_feet(robot);
   FootTrace trace;
   if (feet.size() != 2) return trace;
   const int stride = static_cast<int>(std::lround(recording.rate_hz / trace.rate_hz));
@@ -114,6 +121,11 @@ FootTrace foot_trace(const Recording& recording, const RobotModel& robot) {
     trace.right_mm.push_back(sole_height_mm(kinematics, feet[1]));
   }
   return trace;
+}
+
+void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out) {
+  for (const auto& [name, value] : values)
+    if (std::isfinite(value)) out[name] = value;
 }
 
 Readings readings_of(const Suite& suite) {
@@ -146,7 +158,7 @@ PairedMotion executed_act(const Recording& recording, const ActSource& source, c
   const int begin = std::min(recording.phases.act_begin, recording.frames());
   const int frames = std::min(recording.phases.act_end, recording.frames()) - begin;
   PairedMotion motion;
-  motion.task = recording.task;
+  motion.task = task_of(recording);
   motion.phases = {0, frames};
   motion.partner.joints = recording.partner.slice(begin, begin + frames);
   motion.source_partner = source.partner;
@@ -175,32 +187,42 @@ std::vector<std::string> measured_metrics() {
   return names;
 }
 
+void score_walk(const Rollout& rollout, const SuiteReference& reference, const RobotModel& robot, EpisodeRow& row) {
+  const Recording& recording = rollout.recording;
+  set_outcome(recording, row);
+  set_measured(rollout, row);
+  row.success = recording.outcome == Outcome::kOk;
+  row.trace = state_trace(recording, robot);
+  row.metrics = {{"command_forward", reference.velocity.x()},
+                 {"command_sideways", reference.velocity.y()},
+                 {"command_turn", reference.velocity.z()}};
+  add_finite(locomotion_metrics(recording, robot), row.metrics);
+  if (row.fell) row.metrics["time_to_fall"] = row.sim_s;
+  if (recording.frames() >= kShortestScored) add_finite(controller_diagnostics(recording), row.metrics);
+}
+
 void score_recording(const Recording& recording, const ActSource& source, const ScoringRules& rules,
                      const RobotModel& robot, EpisodeRow& row) {
+  const Task task = task_of(recording);
   const Agent human = human_agent(recording.partner);
   const Agent machine = robot_agent(robot, recording.robot);
-  row.outcome = recording.outcome;
-  row.message = recording.message;
-  row.fell = recording.outcome == Outcome::kFell;
-  row.frames = recording.frames();
-  row.sim_s = recording.frames() / recording.rate_hz;
+  set_outcome(recording, row);
   row.trace = state_trace(recording, robot);
   if (rules.feet) row.feet = foot_trace(recording, robot);
   row.success = false;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {
     for (const ThresholdSet set : {ThresholdSet::kPaper, ThresholdSet::kStrict}) {
-      const DetectorResult result = detect(recording.task, human, machine, version, set, rules.readings.detectors);
+      const DetectorResult result = detect(task, human, machine, version, set, rules.readings.detectors);
       row.verdicts.push_back(to_verdict(result, version, set));
       if (version == rules.detector && set == rules.thresholds)
         row.success = result.success && recording.outcome == Outcome::kOk;
     }
   }
   add_finite(onsets(recording, robot), row.metrics);
-  constexpr int kShortest = 8;  // third differences at both ends
-  if (recording.frames() < kShortest) return;
+  if (recording.frames() < kShortestScored) return;
   add_finite(controller_diagnostics(recording, rules.readings.diagnostics), row.metrics);
   const PairedMotion executed = executed_act(recording, source, robot);
-  if (executed.frames() >= kShortest)
+  if (executed.frames() >= kShortestScored)
     add_finite(retargeting_metrics(executed, robot, rules.readings.metrics), row.metrics);
 }
 
@@ -210,8 +232,7 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
                        rollout.policy_faults.message};
   row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
-  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
-  row.state_hash = rollout.state_hash;
+  set_measured(rollout, row);
   add_contacts(rollout, *setup.clip, robot, row);
   const ScoringRules rules{suite.detector, suite.thresholds, readings, setup.foot_trace};
   score_recording(rollout.recording, act_source(rollout.recording, setup), rules, robot, row);

@@ -2,10 +2,10 @@
 // motion.
 #pragma once
 
-#include "bench/rollout.h"
-#include "bench/suite.h"
-#include "metrics/readings.h"
-#include "results/episode_row.h"
+#include "duet/bench/suite.h"
+#include "duet/metrics/readings.h"
+#include "duet/results/episode_row.h"
+#include "duet/rollout/act_episode.h"
 
 namespace duet {
 
@@ -35,6 +35,10 @@ void score_recording(const Recording& recording, const ActSource& source, const 
 void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
                    const RobotModel& robot, EpisodeRow& row);
 
+// Of an episode that a commanded velocity led: success where the robot was upright to the end, how it walked, and how
+// it followed.
+void score_walk(const Rollout& rollout, const SuiteReference& reference, const RobotModel& robot, EpisodeRow& row);
+
 // Names in `row.metrics` of what is measured at the physics' rate.
 std::vector<std::string> measured_metrics();
 
@@ -54,5 +58,10 @@ std::string state_hash(const Recording& recording);
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);
 
 Readings readings_of(const Suite& suite);
+
+// Frames that figures of a motion need: third differences at both ends.
+inline constexpr int kShortestScored = 8;
+// Those of the values that are finite.
+void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out);
 
 }  // namespace duet

@@ -1,4 +1,4 @@
-#include "bench/shipped_suites.h"
+#include "duet/bench/shipped_suites.h"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <sstream>
 
-#include "bench/episode.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/share.h"
+#include "duet/bench/episode.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/share.h"
 
 namespace duet {
 namespace {

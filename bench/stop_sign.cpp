@@ -1,8 +1,8 @@
-#include "bench/stop_sign.h"
+#include "duet/bench/stop_sign.h"
 
 #include <utility>
 
-#include "bench/interrupt.h"
+#include "duet/bench/interrupt.h"
 
 namespace duet {
 namespace {

@@ -1,17 +1,17 @@
-#include "bench/story.h"
+#include "duet/bench/story.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "bench/clips.h"
-#include "bench/parallel.h"
-#include "bench/progress.h"
-#include "bench/scoring.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "metrics/catalogue.h"
-#include "robots/kinematics.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/scoring.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -134,7 +134,8 @@ ReportContent report_content(const Run& run, bool with_clips, const std::vector<
   content.controllers = controller_table(rows);
   content.foot_plots = foot_plots(rows);
   content.certificate = run.info.certificate;
-  if (!with_clips) return content;
+  content.walking = walk_table(rows);
+  if (!with_clips || !suite.references.empty()) return content;
 
   const auto robot = load_shared_robot(suite.robot);
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);

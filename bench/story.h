@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "bench/motion_scores.h"
-#include "bench/suite.h"
-#include "results/cross_engine.h"
-#include "results/html_report.h"
-#include "results/run_directory.h"
+#include "duet/bench/motion_scores.h"
+#include "duet/bench/suite.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/html_report.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

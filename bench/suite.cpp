@@ -1,14 +1,13 @@
-#include "bench/suite.h"
+#include "duet/bench/suite.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
-#include "bench/suite_actors.h"
-#include "bench/suite_names.h"
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -98,19 +97,6 @@ std::string profile_yaml(const Profile& profile) {
 
 }  // namespace
 
-bool is_path_option(std::string_view option) {
-  return option == "network" || option == "language" || option == "library";
-}
-
-bool is_plain_name(std::string_view name) {
-  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
-  return !name.empty() && name.find_first_not_of(kLetters) == std::string_view::npos;
-}
-
-std::string plain_name_message(std::string_view name) {
-  return fmt::format("expected letters, digits and _ . + - only, found '{}'", name);
-}
-
 const SuiteController& controller_of(const Suite& suite, const std::string& name) {
   return find_named(suite.controllers, "controller", name);
 }
@@ -124,69 +110,19 @@ std::vector<std::string> controller_names_of(const Suite& suite) { return names_
 std::vector<std::string> policy_names_of(const Suite& suite) { return names_of(suite.policies); }
 std::vector<std::string> perturbation_names_of(const Suite& suite) { return names_of(suite.perturbations); }
 
-void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
-                           const std::string& value) {
-  SuiteController asked = controller_of(suite, controller);
-  asked.options = {{option, value}};
-  check_options_of(asked);
-  for (SuiteController& entry : suite.controllers)
-    if (entry.name == controller) entry.options[option] = value;
-}
-
-void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value) {
-  SuitePolicy asked = policy_of(suite, policy);
-  asked.options = {{option, value}};
-  check_options_of(asked);
-  for (SuitePolicy& entry : suite.policies)
-    if (entry.name == policy) entry.options[option] = value;
-}
-
-const NameTable<SuiteStart>& start_names() {
-  static const NameTable<SuiteStart> names = {{"auto", SuiteStart::kAuto},
-                                              {"clip", SuiteStart::kClip},
-                                              {"approach", SuiteStart::kApproach},
-                                              {"act", SuiteStart::kAct},
-                                              {"sim_to_real", SuiteStart::kSimToReal}};
-  return names;
-}
-
-const NameTable<Side>& side_names() {
-  static const NameTable<Side> names = {{"left", Side::kLeft}, {"right", Side::kRight}};
-  return names;
-}
-
-const NameTable<PartnerMode>& partner_names() {
-  static const NameTable<PartnerMode> names = {
-      {"none", PartnerMode::kNone}, {"ghost", PartnerMode::kGhost}, {"solid", PartnerMode::kSolid}};
-  return names;
-}
-
-const NameTable<RecordTrajectories>& record_names() {
-  static const NameTable<RecordTrajectories> names = {{"none", RecordTrajectories::kNone},
-                                                      {"failures", RecordTrajectories::kFailures},
-                                                      {"all", RecordTrajectories::kAll}};
-  return names;
-}
-
-const NameTable<DetectorVersion>& version_names() {
-  static const NameTable<DetectorVersion> names = {{"robot", DetectorVersion::kRobot},
-                                                   {"paper", DetectorVersion::kPaper}};
-  return names;
-}
-
-const NameTable<ThresholdSet>& threshold_names() {
-  static const NameTable<ThresholdSet> names = {{"paper", ThresholdSet::kPaper}, {"strict", ThresholdSet::kStrict}};
-  return names;
-}
-
-std::string_view to_string(SuiteStart start) { return name_of(start_names(), start); }
-std::string_view to_string(PartnerMode partner) { return name_of(partner_names(), partner); }
-
 std::string resolved_yaml(const Suite& suite) {
   std::vector<std::string_view> tasks;
   for (const Task task : suite.tasks) tasks.push_back(to_string(task));
   std::string text =
       fmt::format("schema: duet.suite/1\nname: {}\nversion: \"{}\"\nseed: {}\n", suite.name, suite.version, suite.seed);
+  if (!suite.references.empty()) {
+    text += fmt::format("{}engines: [{}]\n{}{}episodes_per_clip: {}\n{}", references_yaml(suite.references),
+                        fmt::join(suite.engines, ", "), list_yaml("controllers", suite.controllers),
+                        perturbations_yaml(suite), suite.episodes_per_clip, profile_yaml(suite.profile));
+    if (!suite.robot.empty()) text += fmt::format("robot: \"{}\"\n", suite.robot);
+    return text + fmt::format("limits: {{wall_s_per_episode: {}}}\nrecord: {{trajectories: {}}}\n", suite.wall_limit,
+                              name_of(record_names(), suite.record));
+  }
   if (suite.clips.files.empty()) {
     text += fmt::format("clips: {{synth: {{per_task: {}, seed: {}{}}}}}\n", suite.clips.synth_per_task,
                         suite.clips.synth_seed, variants_yaml(suite.clips.variants));

@@ -9,21 +9,19 @@
 #include <utility>
 #include <vector>
 
-#include "backends/scene.h"
-#include "bench/perturbation.h"
-#include "bench/profile.h"
-#include "controllers/controller.h"
-#include "core/task.h"
-#include "metrics/detector.h"
-#include "motion/synthesis.h"
-#include "policies/phase_adaptation.h"
-#include "policies/policy.h"
+#include "duet/backends/scene.h"
+#include "duet/bench/profile.h"
+#include "duet/bench/suite_names.h"
+#include "duet/bench/suite_reference.h"
+#include "duet/controllers/controller.h"
+#include "duet/core/task.h"
+#include "duet/metrics/detector.h"
+#include "duet/motion/synthesis.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/policy.h"
+#include "duet/rollout/perturbation.h"
 
 namespace duet {
-
-// auto: act where the controller cannot walk, else approach
-enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
-enum class RecordTrajectories { kNone, kFailures, kAll };
 
 // Of each synthesised clip one with this hand and contact height; all else is drawn as for its index.
 struct ClipVariant {
@@ -60,6 +58,7 @@ struct Suite {
   std::string file;  // where it came from, for messages
   std::uint64_t seed = 10000;
   SuiteClips clips;
+  std::vector<SuiteReference> references = {};  // where there are any: in the place of clips, tasks and policies
   std::vector<Task> tasks;
   std::vector<std::string> engines;
   std::vector<SuiteController> controllers;
@@ -96,12 +95,6 @@ std::vector<std::string> controller_names_of(const Suite& suite);
 std::vector<std::string> policy_names_of(const Suite& suite);
 std::vector<std::string> perturbation_names_of(const Suite& suite);
 
-// Sets one option of one of the suite's controllers or policies. Throws std::invalid_argument for a name or an option
-// that is not known, with those that are.
-void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
-                           const std::string& value);
-void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value);
-
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});
 Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides = {});
@@ -109,8 +102,5 @@ Suite parse_suite(const std::string& yaml, const std::string& name, const Overri
 // All keys written out, in a fixed order: what a run directory keeps. Settings of engines are those that the profile
 // says; the rest is an engine's own (resolved_settings).
 std::string resolved_yaml(const Suite& suite);
-
-std::string_view to_string(SuiteStart start);
-std::string_view to_string(PartnerMode partner);
 
 }  // namespace duet

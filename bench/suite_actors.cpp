@@ -1,4 +1,4 @@
-#include "bench/suite_actors.h"
+#include "duet/bench/suite_actors.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,12 @@
 #include <filesystem>
 #include <functional>
 
-#include "bench/suite_names.h"
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/bench/suite_names.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/names.h"
+#include "duet/core/plain_name.h"
+#include "duet/core/require.h"
+#include "duet/policies/registry.h"
 
 namespace duet {
 namespace {
@@ -16,6 +19,13 @@ namespace {
 using Options = std::map<std::string, std::string>;
 
 constexpr const char* kDescriptor = ".yaml";
+
+// A network may also be one that ships, by its name ("oracle").
+std::string file_or_name(const Suite& suite, const std::string& value) {
+  const std::string path = from_folder_of(suite, value);
+  const bool name = value.find_first_of("./") == std::string::npos;
+  return name && !std::filesystem::exists(path) ? value : path;
+}
 
 // Values as written, but paths from the suite's folder.
 Options read_options(const YamlSection& item, const Suite& suite) {
@@ -29,7 +39,7 @@ Options read_options(const YamlSection& item, const Suite& suite) {
     if (!entry.second.IsScalar())
       item.fail(entry.first.Mark().line + 1,
                 fmt::format("options.{}: expected one value, found {}", name, describe(entry.second)));
-    options[name] = is_path_option(name) ? from_folder_of(suite, entry.second.Scalar()) : entry.second.Scalar();
+    options[name] = is_path_option(name) ? file_or_name(suite, entry.second.Scalar()) : entry.second.Scalar();
   }
   return options;
 }
@@ -84,7 +94,7 @@ SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
     policy.options = read_options(item, suite);
     if (item.has("network")) {
       require(!policy.options.contains("network"), "expected the network once, found it in options too");
-      policy.options["network"] = from_folder_of(suite, item.text("network"));
+      policy.options["network"] = file_or_name(suite, item.text("network"));
     }
     if (item.has("prompt")) policy.prompt = item.text("prompt");
     policy.shuffled_partner = reads_shuffled(item);
@@ -129,6 +139,23 @@ void check_options_of(const SuitePolicy& policy) {
   std::vector<std::string> known;
   for (const PolicyOption& option : info.options) known.push_back(option.name);
   check_options("policy", policy.name, policy.options, known);
+}
+
+void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
+                           const std::string& value) {
+  SuiteController asked = controller_of(suite, controller);
+  asked.options = {{option, value}};
+  check_options_of(asked);
+  for (SuiteController& entry : suite.controllers)
+    if (entry.name == controller) entry.options[option] = value;
+}
+
+void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value) {
+  SuitePolicy asked = policy_of(suite, policy);
+  asked.options = {{option, value}};
+  check_options_of(asked);
+  for (SuitePolicy& entry : suite.policies)
+    if (entry.name == policy) entry.options[option] = value;
 }
 
 std::string from_folder_of(const Suite& suite, const std::string& file) {

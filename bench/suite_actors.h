@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "bench/suite.h"
-#include "robots/yaml_section.h"
+#include "duet/bench/suite.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 
@@ -15,6 +15,12 @@ void read_policies(const YamlSection& top, Suite& suite);
 // Throw std::invalid_argument for an unknown controller or policy, or an option that it does not have.
 void check_options_of(const SuiteController& controller);
 void check_options_of(const SuitePolicy& policy);
+
+// Sets one option of one of the suite's controllers or policies. Throws std::invalid_argument for a name or an option
+// that is not known, with those that are.
+void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
+                           const std::string& value);
+void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value);
 
 // A path of a suite file as an absolute one: relative ones start at the file's folder, or, where nothing is there but
 // in the working folder (`-s policies=[my/policy.yaml]`), at that.

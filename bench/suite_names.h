@@ -6,16 +6,18 @@
 #include <utility>
 #include <vector>
 
-#include "bench/suite.h"
+#include "duet/backends/scene.h"
+#include "duet/metrics/detector.h"
+#include "duet/motion/synthesis_options.h"
 
 namespace duet {
 
+// auto: act where the controller cannot walk, else approach
+enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
+enum class RecordTrajectories { kNone, kFailures, kAll };
+
 template <typename E>
 using NameTable = std::vector<std::pair<std::string, E>>;
-
-// What names combinations in tables, keys and file names: letters, digits and _ . + - only.
-bool is_plain_name(std::string_view name);
-std::string plain_name_message(std::string_view name);  // the sentence for one that is not
 
 inline constexpr const char* kNullPolicy = "null";  // of the control arm
 // Whether the value of an option of that name is a file.
@@ -27,6 +29,9 @@ const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();
 const NameTable<ThresholdSet>& threshold_names();
+
+std::string_view to_string(SuiteStart start);
+std::string_view to_string(PartnerMode partner);
 
 template <typename E>
 std::string_view name_of(const NameTable<E>& table, E value) {

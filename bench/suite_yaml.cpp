@@ -8,22 +8,23 @@
 #include <limits>
 #include <utility>
 
-#include "backends/factory.h"
-#include "bench/clips.h"
-#include "bench/episode.h"
-#include "bench/robot_cards.h"
-#include "bench/suite.h"
-#include "bench/suite_actors.h"
-#include "bench/suite_names.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "metrics/readings.h"
-#include "policies/scheduler.h"
-#include "retarget/options.h"
-#include "robots/robot_model.h"
-#include "robots/yaml_section.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/suite.h"
+#include "duet/bench/suite_actors.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/plain_name.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/metrics/readings.h"
+#include "duet/policies/scheduler.h"
+#include "duet/retarget/options.h"
+#include "duet/robots/robot_cards.h"
+#include "duet/robots/robot_model.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -100,7 +101,7 @@ void get_names(const YamlSection& top, const char* key, const char* kind, const 
 }
 
 std::vector<std::string> engine_names() {
-  std::vector<std::string> names;
+  std::vector<std::string> names = {std::string(kPlaybackEngine)};
   for (const EngineInfo& engine : engines()) names.push_back(engine.name);
   return names;
 }
@@ -177,18 +178,58 @@ void read_engines(const YamlSection& top, Suite& suite) {
     get_names(top, "engines", "engine", engine_names(), suite.engines);
     return;
   }
+  suite.engines = {std::string(kPlaybackEngine)};
   for (const EngineInfo& engine : engines())
     if (engine.available) suite.engines.push_back(engine.name);
 }
 
+// A root that moves by command leaves nothing for these keys to say.
+void refuse_clips(const YamlSection& top) {
+  for (const char* key : {"clips", "tasks", "policies", "start", "start_radius", "partner", "fuse_ticks", "detector",
+                          "contact_limits", "null_arm", "retarget", "readings"})
+    if (top.has(key))
+      top.fail(top.line(key), fmt::format("{}: expected no such key beside `reference`, which has neither clips nor "
+                                          "policies nor people",
+                                          key));
+}
+
+// A command that comes and goes is nothing for a controller that takes one for the whole episode.
+void check_commands(const YamlSection& top, const Suite& suite) {
+  for (const SuiteController& controller : suite.controllers) {
+    if (!takes_command(controller.use)) continue;
+    for (const SuiteReference& reference : suite.references)
+      if (!reference.constant())
+        top.fail(top.line("reference"),
+                 fmt::format("reference '{}': controller '{}' takes one velocity for the whole episode: expected no "
+                             "begin, end and pause",
+                             reference.name, controller.name));
+  }
+}
+
+// What a suite of references has in the place of policies, tasks and people.
+void lead_by_velocity(Suite& suite) {
+  suite.policies = {SuitePolicy{.name = kVelocityPolicy, .use = "replay"}};
+  suite.null_arm = false;
+  suite.partner = PartnerMode::kNone;
+  suite.start = SuiteStart::kClip;
+}
+
 void read_lists(const YamlSection& top, Suite& suite) {
+  if (!suite.references.empty()) {
+    read_engines(top, suite);
+    read_controllers(top, suite);
+    suite.perturbations = read_perturbations(top, suite.file);
+    check_commands(top, suite);
+    lead_by_velocity(suite);
+    return;
+  }
   if (top.has("tasks")) {
     checked(top, "tasks", [&] {
       for (const std::string& task : get_texts(top, "tasks")) suite.tasks.push_back(parse_task(task));
       require(!suite.tasks.empty(), "expected at least one task, found none");
     });
   } else {
-    suite.tasks.assign(kTasks.begin(), kTasks.end());
+    suite.tasks.assign(kPaperTasks.begin(), kPaperTasks.end());
   }
   read_engines(top, suite);
   read_controllers(top, suite);
@@ -214,7 +255,7 @@ void read_profile_key(const YamlSection& top, Suite& suite) {
   checked(top, "dt", [&] { check_step(dt); });
   // Of every engine that duet knows, not of those that `engines: all` is on this machine: the suite's hash says it.
   for (const EngineInfo& engine : engines())
-    if (engine.physics) suite.profile.engines[engine.name] = {dt, suite.profile.settings(engine.name).options};
+    suite.profile.engines[engine.name] = {dt, suite.profile.settings(engine.name).options};
 }
 
 void read_episode(const YamlSection& top, Suite& suite) {
@@ -271,45 +312,30 @@ void read_choices(const YamlSection& top, const char* key, const Set& set, std::
 Suite read_suite(const YAML::Node& document, const std::string& file) {
   Suite suite;
   suite.file = file;
-  const YamlSection top(file, document, "suite",
-                        {"schema",
-                         "name",
-                         "version",
-                         "seed",
-                         "clips",
-                         "tasks",
-                         "engines",
-                         "controllers",
-                         "policies",
-                         "perturbations",
-                         "episodes_per_clip",
-                         "start",
-                         "start_radius",
-                         "partner",
-                         "fuse_ticks",
-                         "profile",
-                         "dt",
-                         "contact_limits",
-                         "robot",
-                         "detector",
-                         "limits",
-                         "record",
-                         "null_arm",
-                         "retarget",
-                         "readings"});
+  const YamlSection top(
+      file, document, "suite",
+      {"schema",         "name",         "version",     "seed",       "clips",         "reference",
+       "tasks",          "engines",      "controllers", "policies",   "perturbations", "episodes_per_clip",
+       "start",          "start_radius", "partner",     "fuse_ticks", "profile",       "dt",
+       "contact_limits", "robot",        "detector",    "limits",     "record",        "null_arm",
+       "retarget",       "readings"});
   const std::string schema = top.text("schema");
   if (schema != "duet.suite/1")
     top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));
   suite.name = top.text("name");
   suite.version = top.text("version");
   get_integer<std::uint64_t>(top, "seed", 0, suite.seed);
-  read_clips(top, suite);
+  suite.references = read_references(top, file);
+  if (suite.references.empty())
+    read_clips(top, suite);
+  else
+    refuse_clips(top);
   read_lists(top, suite);
   read_profile_key(top, suite);
   read_episode(top, suite);
   const std::size_t variants = std::max<std::size_t>(1, suite.clips.variants.size());
   const std::size_t made = suite.clips.synth_per_task * suite.tasks.size() * variants;
-  require_sane_size(suite, static_cast<std::int64_t>(made + suite.clips.files.size()));
+  require_sane_size(suite, static_cast<std::int64_t>(made + suite.clips.files.size() + suite.references.size()));
   PairOptions pair;
   Readings readings;
   read_choices(

@@ -1,14 +1,14 @@
-#include "bench/training_motions.h"
+#include "duet/bench/training_motions.h"
 
-#include "bench/clips.h"
-#include "policies/phase_adaptation.h"
+#include "duet/bench/clips.h"
+#include "duet/policies/phase_adaptation.h"
 
 namespace duet {
 
 std::vector<RobotMotion> training_motions(const RobotModel& robot, int per_task, int threads, Progress& progress) {
   std::vector<RobotMotion> motions;
   for (const PairedMotion& clip :
-       synthetic_clips(robot, {kTasks.begin(), kTasks.end()}, per_task, kTrainingSeed, threads, progress)) {
+       synthetic_clips(robot, {kPaperTasks.begin(), kPaperTasks.end()}, per_task, kTrainingSeed, threads, progress)) {
     const AdaptationOptions options{.start = StartMode::kApproach};
     motions.push_back(adapt_by_phase(clip.robot, clip.phases, robot, options, kTrainingSeed + motions.size()).motion);
   }

@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "bench/progress.h"
-#include "core/robot_motion.h"
-#include "robots/robot_model.h"
+#include "duet/bench/progress.h"
+#include "duet/core/robot_motion.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

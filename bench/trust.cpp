@@ -1,4 +1,4 @@
-#include "bench/trust.h"
+#include "duet/bench/trust.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <sstream>
 
-#include "core/require.h"
-#include "core/text.h"
-#include "policies/external/descriptor.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/policies/external/descriptor.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "bench/verification.h"
+#include "duet/bench/verification.h"
 
 #include <fmt/format.h>
 
@@ -9,18 +9,18 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "bench/bodies.h"
-#include "bench/clips.h"
-#include "bench/episode.h"
-#include "bench/parallel.h"
-#include "bench/run_inputs.h"
-#include "bench/runner.h"
-#include "bench/suite_names.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "metrics/detector.h"
-#include "results/name_digests.h"
-#include "results/published.h"
+#include "duet/bench/bodies.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/bench/runner.h"
+#include "duet/bench/suite_names.h"
+#include "duet/core/parallel.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/metrics/detector.h"
+#include "duet/results/name_digests.h"
+#include "duet/results/published.h"
 
 namespace duet {
 namespace {
@@ -125,7 +125,7 @@ class Verifier {
       return;
     }
     const EpisodeRow& planned = planned_[place->second];
-    const bool ran = row.outcome != Outcome::kUnsupported && is_available(row.engine);
+    const bool ran = row.outcome != Outcome::kUnsupported && can_run_in(row.engine);
     const auto check = [&](const char* field, const auto& expected, const auto& found) {
       if (expected != found)
         result_.faults.push_back(
@@ -174,7 +174,7 @@ class Verifier {
   }
 
   [[nodiscard]] bool is_repeatable(const EpisodeRow& row) const {
-    const bool here = is_available(row.engine) && !bodies_.absent().contains(row.controller);
+    const bool here = can_run_in(row.engine) && !bodies_.absent().contains(row.controller);
     return here && row.outcome != Outcome::kTimedOut && row.outcome != Outcome::kUnsupported;
   }
 

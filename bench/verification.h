@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/progress.h"
-#include "results/row_identity.h"
-#include "results/run_directory.h"
+#include "duet/bench/progress.h"
+#include "duet/results/row_identity.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

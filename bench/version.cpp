@@ -1,11 +1,12 @@
-#include "bench/version.h"
+#include "duet/bench/version.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <vector>
 
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
+#include "duet/core/version.h"
 
 namespace duet {
 
@@ -13,7 +14,8 @@ std::string version_text() {
   std::vector<std::string> parts;
   for (const EngineInfo& engine : engines())
     if (engine.available) parts.push_back(engine.name + (engine.version.empty() ? "" : " " + engine.version));
-  return fmt::format("duet {} ({})", kVersion, fmt::join(parts, ", "));
+  return fmt::format("duet {} ({})", duet_version(),
+                     parts.empty() ? "no engine" : fmt::format("{}", fmt::join(parts, ", ")));
 }
 
 }  // namespace duet

@@ -5,9 +5,7 @@
 
 namespace duet {
 
-inline constexpr const char* kVersion = "0.1.0";
-
-// "duet 0.1.0 (mujoco 2.2.2, playback)": one line for --version.
+// "duet 0.1.0 (mujoco 2.2.2, bullet 3.24)": one line for --version.
 std::string version_text();
 
 }  // namespace duet

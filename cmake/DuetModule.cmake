@@ -1,10 +1,12 @@
-# duet_add_module(<room> SOURCES ... LINK ...): the library duet_<room>. One room = one folder = one target.
+# duet_add_module(<room> SOURCES ... LINK ...): the library duet_<room>, duet::<room> to others. One room = one folder =
+# one target.
 # duet_add_test(<room> SOURCES ... LINK ...): the GoogleTest program <room>_test, each TEST known to ctest.
 # duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `dev`).
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
 find_package(Threads REQUIRED)
 
+# Of this folder and those below it; a project that takes duet in by add_subdirectory keeps its own.
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -16,26 +18,47 @@ if(DUET_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${DUET_CCACHE})
 endif()
 
+# What everybody who includes duet's headers needs.
 add_library(duet_options INTERFACE)
-target_include_directories(duet_options INTERFACE ${CMAKE_SOURCE_DIR})
-# Contraction is off so that the same source gives the same bits whatever the optimiser chooses; wider instruction sets
-# appear only in kernel files that dispatch at run time.
-target_compile_options(duet_options INTERFACE -Wall -Wextra -march=x86-64-v2 -ffp-contract=off)
+# "duet/<room>/<header>.h" means the same inside the tree as it does outside, where the headers are installed under such
+# a folder.
+file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/include/duet SYMBOLIC)
+target_include_directories(duet_options INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+                                                  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+target_compile_features(duet_options INTERFACE cxx_std_20)
 target_link_libraries(duet_options INTERFACE Eigen3::Eigen fmt::fmt Threads::Threads)
+# Eigen aligns by the widest instruction set that it may use: a program that may use wider ones than duet (-march=native)
+# has to lay out the types of duet's headers as duet does.
+target_compile_definitions(duet_options INTERFACE $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+if(NOT PROJECT_IS_TOP_LEVEL)
+  target_compile_definitions(duet_options INTERFACE $<BUILD_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+endif()
+set_target_properties(duet_options PROPERTIES EXPORT_NAME options)
+add_library(duet::options ALIAS duet_options)
+
+# How duet itself is compiled; nobody who links it inherits this. Contraction is off so that the same source gives the
+# same bits whatever the optimiser chooses; wider instruction sets appear only in kernel files that dispatch at run time.
+add_library(duet_flags INTERFACE)
+target_compile_options(duet_flags INTERFACE -Wall -Wextra -march=x86-64-v2 -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  # GCC 12 takes the sum of two std::string for a write past the end, if the constant one is longer than 15 characters.
+  target_compile_options(duet_flags INTERFACE -Wno-array-bounds)
+endif()
 if(DUET_WERROR)
-  target_compile_options(duet_options INTERFACE -Werror)
+  target_compile_options(duet_flags INTERFACE -Werror)
 endif()
 if(DUET_SANITIZE)
   # What the undefined-behaviour sanitizer finds ends the program: a message alone would pass a test. Four of its checks
   # are left out, which take as long to compile as all the others: a null pointer and a wrong alignment end the program
   # anyhow, and sizes of objects are what the address sanitizer looks at.
   set(sanitizers -fsanitize=address,undefined -fno-sanitize=null,alignment,vptr,object-size -fno-sanitize-recover=all)
-  target_compile_options(duet_options INTERFACE ${sanitizers} -fno-omit-frame-pointer -O1)
-  target_link_options(duet_options INTERFACE ${sanitizers})
-  target_compile_definitions(duet_options INTERFACE DUET_SANITIZED)
+  target_compile_options(duet_flags INTERFACE ${sanitizers} -fno-omit-frame-pointer -O1)
+  target_link_options(duet_flags INTERFACE ${sanitizers})
+  target_compile_definitions(duet_flags INTERFACE DUET_SANITIZED)
 endif()
 if(DUET_FUZZ)
-  target_compile_options(duet_options INTERFACE -fsanitize=fuzzer-no-link)
+  target_compile_options(duet_flags INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 # Compiles several sources of a target at once: half of a room's compilation is headers that its files share. File-local
@@ -48,7 +71,9 @@ function(duet_add_module room)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_library(duet_${room} STATIC ${ARG_SOURCES})
   duet_unite(duet_${room})
-  target_link_libraries(duet_${room} PUBLIC duet_options ${ARG_LINK})
+  target_link_libraries(duet_${room} PUBLIC duet_options ${ARG_LINK} PRIVATE $<BUILD_INTERFACE:duet_flags>)
+  set_target_properties(duet_${room} PROPERTIES EXPORT_NAME ${room})
+  add_library(duet::${room} ALIAS duet_${room})
 endfunction()
 
 function(duet_add_test room)
@@ -56,21 +81,23 @@ function(duet_add_test room)
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${room}_test ${ARG_SOURCES})
-  target_link_libraries(${room}_test PRIVATE duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  target_link_libraries(${room}_test PRIVATE duet_flags duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_include_directories(${room}_test PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/<room>/..."
+  target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   # What is timed is in the rooms.
   target_compile_options(${room}_test PRIVATE $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
   # Half of a test's compilation. The rooms themselves have none: clang-tidy cannot read those of GCC.
   target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h>)
   # A test whose data are not there says "not run: ... absent" and counts as skipped.
   gtest_discover_tests(${room}_test TEST_PREFIX "${room}/" DISCOVERY_TIMEOUT 60
-                       WORKING_DIRECTORY ${CMAKE_SOURCE_DIR} PROPERTIES TIMEOUT 300)
+                       WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTIES TIMEOUT 300)
 endfunction()
 
 function(duet_add_fuzzer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(fuzz_${name} ${ARG_SOURCES})
-  target_link_libraries(fuzz_${name} PRIVATE duet_options ${ARG_LINK})
-  target_compile_definitions(fuzz_${name} PRIVATE DUET_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  target_link_libraries(fuzz_${name} PRIVATE duet_flags duet_options ${ARG_LINK})
+  target_include_directories(fuzz_${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_compile_definitions(fuzz_${name} PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
 endfunction()

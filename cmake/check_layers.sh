@@ -1,38 +1,46 @@
 #!/usr/bin/env bash
-# The include order of the rooms (docs/architecture.md, "Rooms"). Prints each include that breaks it; exit 1.
-#   core < motion, robots, nn < retarget, backends, controllers, policies, metrics < bench, training
+# The include order of the rooms (docs/architecture.md, "Rooms") and of the units. Prints each include that breaks the
+# order of the rooms and each circle of units; exit 1.
+#   core < tasks < motion, robots, nn < io, formats, retarget, backends, controllers, policies, metrics < rollout < training < bench
 #   results uses core only; metrics, policies and controllers never include backends; a vendor's header stays in its engine.
+# A unit is a header with the .cpp file of its name; a .cpp file without such a header is a unit of its own. No two units
+# include each other, directly or through others.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 declare -A may=(
   [core]="core"
-  [motion]="core motion"
+  [tasks]="core tasks"
+  [motion]="core tasks motion"
   [robots]="core robots"
   [nn]="core nn"
+  [io]="core robots nn io"
+  [formats]="core robots formats"
   [retarget]="core motion robots retarget"
   [backends]="core robots backends"
-  [controllers]="core robots nn controllers"
-  [policies]="core robots nn policies"
-  [metrics]="core motion robots metrics"
-  [training]="core motion robots nn backends controllers policies metrics training"
+  [controllers]="core robots nn io controllers"
+  [policies]="core tasks robots nn io policies"
+  [metrics]="core tasks motion robots metrics"
+  [rollout]="core tasks motion robots backends controllers policies metrics rollout"
+  [training]="core tasks motion robots nn io backends controllers policies metrics rollout training"
   [results]="core results"
+  [datasets]="core tasks motion robots formats retarget metrics results datasets"
 )
 bad=0
 for room in "${!may[@]}"; do
   [ -d "$room" ] || continue
   while IFS=: read -r file line text; do
-    target=$(sed -E 's/.*"([a-z]+)\/.*/\1/' <<<"$text")
+    target=$(sed -E 's/.*"duet\/([a-z]+)\/.*/\1/' <<<"$text")
     case " ${may[$room]} " in
       *" $target "*) ;;
       *) echo "$file:$line: $room may not include $target ($text)"; bad=1 ;;
     esac
-  done < <(grep -rnE '^#include "[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
+  done < <(grep -rnE '^#include "duet/[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
 done
+rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench)
 vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
-  hits=$(grep -rnE "^#include [<\"]($2)" core motion robots nn retarget backends controllers policies metrics results training bench \
-    --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)
+  hits=$(grep -rnE "^#include [<\"]($2)" "${rooms[@]}" --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)
   if [ -n "$hits" ]; then echo "$hits"; echo "only $1/ may include $2"; bad=1; fi
 }
 vendor backends/mujoco 'mujoco/'
@@ -43,5 +51,23 @@ vendor backends/dart 'dart/'
 vendor results 'sqlite3\.h'
 vendor robots 'urdf_'
 vendor nn 'onnx/|google/protobuf'
-[ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms"
+
+# "UNIT INCLUDED-UNIT" for each include between two units.
+unit_includes() {
+  { find "${rooms[@]}" -name '*.h'; grep -rE '^#include "duet/' "${rooms[@]}" --include='*.h' --include='*.cpp'; } | awk -F: '
+    NF == 1 { sub(/\.h$/, ""); has_header[$0]; next }
+    {
+      unit = $1
+      sub(/\.(h|cpp)$/, "", unit)
+      if ($1 ~ /\.cpp$/ && !(unit in has_header)) unit = $1
+      split($2, quoted, "\"")
+      included = quoted[2]
+      sub(/^duet\//, "", included)
+      sub(/\.h$/, "", included)
+      if (included != unit) print unit, included
+    }'
+}
+circles=$(unit_includes | tsort 2>&1 >/dev/null | sed -E 's/^tsort: //; s/^-: input contains a loop:$/units that include each other in a circle:/; /circle:$/!s/^/  /' || true)
+if [ -n "$circles" ]; then echo "$circles"; bad=1; fi
+[ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms, and no units include each other in a circle"
 exit "$bad"

@@ -1,9 +1,9 @@
-#include "controllers/channel.h"
+#include "duet/controllers/channel.h"
 
 #include <fmt/format.h>
 
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -18,11 +18,12 @@ struct Row {
 // In the order of ChannelKind.
 constexpr Row kRows[] = {
     {ChannelKind::kBaseLinearVelocity, "base_linear_velocity", " offset axes ", 3},
-    {ChannelKind::kBaseAngularVelocity, "base_angular_velocity", " axes ", 3},
-    {ChannelKind::kProjectedGravity, "projected_gravity", " axes ", 3},
+    {ChannelKind::kBaseAngularVelocity, "base_angular_velocity", " axes frame ", 3},
+    {ChannelKind::kProjectedGravity, "projected_gravity", " axes frame ", 3},
     {ChannelKind::kRollPitch, "roll_pitch", "", 2},
-    {ChannelKind::kCommandVelocity, "command_velocity", "", 3},
+    {ChannelKind::kCommandVelocity, "command_velocity", " axes ", 3},
     {ChannelKind::kCommandHeight, "command_height", "", 1},
+    {ChannelKind::kCommandStand, "command_stand", "", 1},
     {ChannelKind::kJointPosition, "joint_position", " joints ", 0},
     {ChannelKind::kJointVelocity, "joint_velocity", " joints zero ", 0},
     {ChannelKind::kPreviousAction, "previous_action", " clipped ", 0},
@@ -35,8 +36,8 @@ constexpr Row kRows[] = {
     {ChannelKind::kReferenceFrames, "reference_frames", " joints steps ", 0},
     {ChannelKind::kAnchorPositionError, "anchor_position_error", " frame ", 3},
     {ChannelKind::kAnchorOrientationError, "anchor_orientation_error", " frame ", 6},
-    {ChannelKind::kGaitSine, "gait_sine", " frequency_hz phases ", 0},
-    {ChannelKind::kGaitCosine, "gait_cosine", " frequency_hz phases ", 0},
+    {ChannelKind::kGaitSine, "gait_sine", " frequency_hz phases standing stance ", 0},
+    {ChannelKind::kGaitCosine, "gait_cosine", " frequency_hz phases standing stance ", 0},
     {ChannelKind::kTick, "tick", "", 1},
     {ChannelKind::kConstant, "constant", " values ", 0},
 };
@@ -77,7 +78,7 @@ int channel_size(const Channel& channel, int actions) {
       return static_cast<int>(channel.steps.size()) * (kFrameHead + joints);
     case ChannelKind::kGaitSine:
     case ChannelKind::kGaitCosine:
-      return static_cast<int>(channel.phases.size());
+      return static_cast<int>(channel.gait.phases.size());
     case ChannelKind::kConstant:
       return static_cast<int>(channel.values.size());
     default:

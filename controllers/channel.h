@@ -8,15 +8,18 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/io/gait_clock.h"
+
 namespace duet {
 
 enum class ChannelKind {
   kBaseLinearVelocity,      // 3: of a point of the base, in its axes [m/s]
   kBaseAngularVelocity,     // 3: a gyro's reading [rad/s]
-  kProjectedGravity,        // 3: direction of gravity in the axes of the base
+  kProjectedGravity,        // 3: direction of gravity in the axes of the base, or of the frame where the gyro sits
   kRollPitch,               // 2 [rad]
   kCommandVelocity,         // 3: forward, lateral, yaw rate [m/s, m/s, rad/s]
   kCommandHeight,           // 1 [m]
+  kCommandStand,            // 1: 1 walks, 0 stands (VelocityInterface::stands_below)
   kJointPosition,           // from the default pose [rad]
   kJointVelocity,           // [rad/s]
   kPreviousAction,          // the network's last output; zeros at the start
@@ -45,9 +48,8 @@ struct Channel {
   std::vector<int> axes;                                  // components of a vector that are shown
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();       // p_BF of the point whose velocity is shown [m]
   bool clipped = false;                                   // previous_action: after the action's clip
-  std::string frame;                                      // the anchor, a frame of the robot
-  double frequency_hz = 0.0;                              // of the gait
-  std::vector<double> phases;                             // of the gait at the start [rad]
+  std::string frame;                                      // of the robot: the anchor; of a gyro: "" is the base
+  GaitClock gait;                                         // of a clock
   std::vector<int> steps;                                 // ticks ahead of the reference's frames, >= 1
   std::vector<double> values;                             // of a constant
 };

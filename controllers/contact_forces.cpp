@@ -1,4 +1,4 @@
-#include "controllers/contact_forces.h"
+#include "duet/controllers/contact_forces.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>

@@ -2,14 +2,12 @@
 #pragma once
 
 #include <map>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "core/loaded_file.h"
-#include "core/robot_state.h"
-#include "robots/robot_model.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
@@ -41,26 +39,9 @@ struct ControllerOption {
 struct ControllerInfo {
   std::string name;
   std::string about;  // one sentence for `duet list controllers`
-  std::string robot;  // the card it was made for, robots/g1/<robot>.yaml; rollouts use that body
+  std::string robot;  // the card it was made for, by name or path; rollouts use that body. "": any
   bool walks = false;
   std::vector<ControllerOption> options;
 };
-
-// Those that ship with duet: "pd", "vmc", "wbc_sim", "homie", "twist2", "playground", "rl_gym", ... A name that ends in
-// ".yaml" is the path of an IO descriptor (controllers/descriptor.h) and as good as one of them.
-std::vector<ControllerInfo> controllers();
-std::vector<std::string> controller_names();
-ControllerInfo controller_info(const std::string& name);
-// Every file that such a controller loads, its card aside, in a fixed order. Throws as make_controller for a name that
-// is unknown, a descriptor that is broken and a network that is not on this machine; the files are not read.
-LoadedFiles controller_files(const std::string& name, const ControllerOptions& options = {});
-// Throws std::invalid_argument for an option that it does not have, with the nearest and all known.
-void check_controller_options(const ControllerInfo& info, const ControllerOptions& options);
-
-// Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot whose joints
-// are not those it was made for (by name); MissingError where its network is not on this machine (naming the places
-// looked at and the option that sets it); InputError for a network that is broken or of another kind.
-std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
-                                            const ControllerOptions& options = {});
 
 }  // namespace duet

@@ -1,19 +1,8 @@
-#include "controllers/descriptor.h"
+#include "duet/controllers/descriptor.h"
 
-#include <fmt/format.h>
-
-#include "core/file.h"
+#include "duet/core/file.h"
 
 namespace duet {
-namespace {
-
-std::string channel_place(const Channel& channel, int first, int size) {
-  if (size == 1) return fmt::format("{} {}", to_string(channel.kind), first);
-  return fmt::format("{} {}..{}", to_string(channel.kind), first, first + size - 1);
-}
-
-}  // namespace
-
 int Descriptor::actions() const {
   int count = 0;
   for (const DescriptorJoint& joint : joints) count += joint.action ? 1 : 0;
@@ -32,32 +21,21 @@ int Descriptor::part_size(const InputPart& part) const {
   return size;
 }
 
-int Descriptor::input_size(const DescriptorInput& input) const {
-  int size = 0;
-  for (const InputPart& part : input.parts) size += part.frames * part_size(part);
-  return size;
+std::vector<LayoutBlock> Descriptor::layout(const DescriptorInput& input) const {
+  std::vector<LayoutBlock> blocks;
+  for (const InputPart& part : input.parts) {
+    LayoutBlock& block = blocks.emplace_back();
+    block.frames = part.history.frames;
+    for (const int group : part.groups)
+      for (const Channel& channel : groups[group].channels)
+        block.entries.push_back({to_string(channel.kind), channel_size(channel, actions())});
+  }
+  return blocks;
 }
 
-std::string Descriptor::input_layout(const DescriptorInput& input) const {
-  std::string text;
-  int first = 0;
-  for (const InputPart& part : input.parts) {
-    if (!text.empty()) text += "; ";
-    int place = first;
-    const char* comma = "";
-    for (const int group : part.groups)
-      for (const Channel& channel : groups[group].channels) {
-        const int size = channel_size(channel, actions());
-        text += comma;
-        text += channel_place(channel, place, size);
-        place += size;
-        comma = ", ";
-      }
-    if (part.frames > 1) text += fmt::format(" ({} frames of {})", part.frames, part_size(part));
-    first += part.frames * part_size(part);
-  }
-  return text;
-}
+int Descriptor::input_size(const DescriptorInput& input) const { return layout_size(layout(input)); }
+
+std::string Descriptor::input_layout(const DescriptorInput& input) const { return layout_text(layout(input)); }
 
 Descriptor read_descriptor(const std::string& path) { return parse_descriptor(read_text(path), path); }
 

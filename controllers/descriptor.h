@@ -9,7 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "controllers/channel.h"
+#include "duet/controllers/channel.h"
+#include "duet/io/frame_history.h"
+#include "duet/io/layout.h"
 
 namespace duet {
 
@@ -20,8 +22,9 @@ struct DescriptorJoint {
   double neutral = 0.0;          // the default pose [rad]
   double kp = 0.0, kd = 0.0;     // [N m/rad], [N m s/rad]
   std::optional<double> effort;  // the target is moved until the torque at the tick is within it [N m]
-  std::optional<double>
-      action;  // scale of its output [rad]; none: it is not moved by the network, but by the reference
+  // Scale of its output [rad]; none: it is not moved by the network, but by the reference.
+  std::optional<double> action;
+  bool around_reference = false;  // its action is added to the reference's angle instead of the default pose
 };
 
 // A joint that a body may have and the network knows nothing of: it follows the reference.
@@ -41,15 +44,14 @@ struct ChannelGroup {
 struct InputPart {
   int line = 0;
   std::vector<int> groups;
-  int frames = 1;            // the current one counted where it is among them
-  bool current = true;       // whether the current frame is the last of them
-  bool starts_full = false;  // before the first frame: that frame repeated, else zeros
+  HistoryRule history{};
 };
 
 struct DescriptorInput {
   std::string name;  // of the network's input; "" for its only one
   int line = 0;
-  std::vector<InputPart> parts;
+  std::vector<InputPart> parts;  // none where it is a state
+  std::string state;             // the output of the tick before that it is given, zeros at the start; "" otherwise
 };
 
 // What may be commanded of one direction.
@@ -63,12 +65,14 @@ struct VelocityInterface {
   CommandRange forward, lateral, yaw;  // [m/s], [m/s], [rad/s]
   CommandRange height;                 // [m]; lower == upper where the controller takes none
   double height_offset = 0.0;          // of the pelvis over the commanded height, measured [m]
+  // Below it the network is told to stand: it is shown velocities of 0, a command_stand of 0 and clocks that hold.
+  std::optional<StandBounds> stands_below{};
 };
 
 struct Descriptor {
   std::string file;  // where it was read, for messages
   std::string name, about, licence;
-  std::string robot;    // card: robots/g1/<robot>.yaml
+  std::string robot;    // card: a name (robots/robot_cards.h) or a path
   std::string network;  // file name
   bool walks = false;
   bool waist_locked = false;  // unless the option says otherwise
@@ -79,13 +83,13 @@ struct Descriptor {
   std::string output;  // of the network; "" for its only one
   int output_line = 0;
   double action_clip = std::numeric_limits<double>::infinity();  // of the output's size, before its scale
-  bool around_reference = false;  // actions are added to the reference's angles instead of the default pose
   std::optional<VelocityInterface> command;
 
   [[nodiscard]] int actions() const;  // joints with an action
   [[nodiscard]] int group_size(const ChannelGroup& group) const;
   [[nodiscard]] int part_size(const InputPart& part) const;  // of one frame
   [[nodiscard]] int input_size(const DescriptorInput& input) const;
+  [[nodiscard]] std::vector<LayoutBlock> layout(const DescriptorInput& input) const;
   // "frame: command_velocity 0..2, command_height 3, ...; 6 frames of 76": how input_size comes about.
   [[nodiscard]] std::string input_layout(const DescriptorInput& input) const;
 };

@@ -1,4 +1,4 @@
-#include "controllers/descriptor_controller.h"
+#include "duet/controllers/descriptor_controller.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,29 +9,42 @@
 #include <optional>
 #include <span>
 
-#include "controllers/observer.h"
-#include "controllers/root_conversion.h"
-#include "core/clock.h"
-#include "core/names.h"
-#include "core/number.h"
-#include "core/require.h"
+#include "duet/controllers/observer.h"
+#include "duet/controllers/root_conversion.h"
+#include "duet/core/clock.h"
+#include "duet/core/names.h"
+#include "duet/core/number.h"
+#include "duet/core/require.h"
+#include "duet/io/bound_network.h"
+#include "duet/io/joint_binding.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
 
-constexpr const char* kLockedWaist[] = {"waist_roll_joint", "waist_pitch_joint"};
+// Places of the commanded yaw rate among the channel's numbers.
+std::vector<int> yaw_rates(const Channel& channel) {
+  if (channel.kind != ChannelKind::kCommandVelocity) return {};
+  constexpr int kYawRate = 2;
+  if (channel.axes.empty()) return {kYawRate};
+  std::vector<int> places;
+  for (size_t i = 0; i < channel.axes.size(); ++i)
+    if (channel.axes[i] == kYawRate) places.push_back(static_cast<int>(i));
+  return places;
+}
 
-bool shows(const Descriptor& descriptor, ChannelKind kind) {
+bool shows_yaw_rate(const Descriptor& descriptor) {
   for (const ChannelGroup& group : descriptor.groups)
     for (const Channel& channel : group.channels)
-      if (channel.kind == kind) return true;
+      if (!yaw_rates(channel).empty()) return true;
   return false;
 }
 
-// Scale of the commanded yaw rate: the third of the channel's.
-double& yaw_scale(Channel& channel) {
-  if (channel.scale.size() == 1) channel.scale.assign(3, channel.scale[0]);
-  return channel.scale[2];
+void set_yaw_scale(Channel& channel, double scale) {
+  const std::vector<int> places = yaw_rates(channel);
+  if (places.empty()) return;
+  if (channel.scale.size() == 1) channel.scale.assign(channel_size(channel, 0), channel.scale[0]);
+  for (const int place : places) channel.scale[place] = scale;
 }
 
 Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& options) {
@@ -40,8 +53,7 @@ Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& option
   const std::optional<double> scale = parse_number(text);
   require(scale.has_value(), fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
   for (ChannelGroup& group : descriptor.groups)
-    for (Channel& channel : group.channels)
-      if (channel.kind == ChannelKind::kCommandVelocity) yaw_scale(channel) = *scale;
+    for (Channel& channel : group.channels) set_yaw_scale(channel, *scale);
   return descriptor;
 }
 
@@ -53,22 +65,11 @@ bool waist_is_locked(const Descriptor& descriptor, const ControllerOptions& opti
   return text == "locked";
 }
 
-std::vector<std::string> port_names(std::span<const Port> ports) {
+template <typename Joint>
+std::vector<std::string> names_of(const std::vector<Joint>& joints) {
   std::vector<std::string> names;
-  for (const Port& port : ports) names.push_back(port.name);
+  for (const Joint& joint : joints) names.push_back(joint.name);
   return names;
-}
-
-// Index of the port that the descriptor means; "" is the only one.
-int find_port(std::span<const Port> ports, const std::string& name, const char* what, const std::string& place) {
-  if (name.empty() && ports.size() == 1) return 0;
-  for (size_t i = 0; i < ports.size(); ++i)
-    if (ports[i].name == name) return static_cast<int>(i);
-  throw InputError(fmt::format("{}: {}", place,
-                               name.empty()
-                                   ? fmt::format("expected the name of one of the network's {}s ({}), found none", what,
-                                                 fmt::join(port_names(ports), ", "))
-                                   : unknown_name_message(what, name, port_names(ports))));
 }
 
 // One of the robot's joints as the descriptor has it.
@@ -77,7 +78,7 @@ struct BoundJoint {
   int action = -1;  // index in the network's output; -1: the reference's angle
   double neutral = 0.0, scale = 0.0, kp = 0.0, kd = 0.0;
   double effort = std::numeric_limits<double>::infinity();
-  bool locked = false;
+  bool around_reference = false, locked = false;
 };
 
 class DescriptorController final : public Controller {
@@ -88,9 +89,8 @@ class DescriptorController final : public Controller {
       : robot_(std::move(robot)),
         name_(descriptor.name),
         clip_(static_cast<float>(descriptor.action_clip)),
-        around_reference_(descriptor.around_reference),
         joints_(bind_joints(descriptor, *robot_, waist_is_locked(descriptor, options))),
-        network_(std::move(network)),
+        network_(std::move(network), descriptor.file, network_path),
         observer_(with_yaw_scale(descriptor, options), robot_, first_joints(descriptor.joints.size())),
         rates_(robot_->dof(), kTick),
         action_(descriptor.actions()),
@@ -99,8 +99,8 @@ class DescriptorController final : public Controller {
       gains_.kp[joint.robot] = joint.kp;
       gains_.kd[joint.robot] = joint.kd;
     }
-    bind_inputs(descriptor, network_path);
-    bind_outputs(descriptor, network_path);
+    bind_output(descriptor);
+    bind_inputs(descriptor);
     if (descriptor.command) bind_command(*descriptor.command, options);
   }
 
@@ -108,19 +108,22 @@ class DescriptorController final : public Controller {
 
   void reset(const RobotState&) override {
     tick_ = 0;
+    gate_.reset();
     std::ranges::fill(action_, 0.0F);
     rates_.reset();
     observer_.reset();
-    network_->reset();
+    network_.reset();
     if (conversion_) conversion_->reset();
   }
 
   void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
     rates_.update(reference);
     if (conversion_) command_ = conversion_->update(state, reference, rates_.v_WB(), rates_.w_WB_B().z());
-    observer_.update({state, reference, rates_, command_, action_, tick_});
-    network_->run(inputs_, outputs_);
-    std::ranges::copy(outputs_[action_output_], action_.begin());
+    gate_.update(command_.forward, command_.lateral, command_.yaw_rate);
+    const VelocityCommand shown = gate_.stands() ? VelocityCommand{.height = command_.height} : command_;
+    observer_.update({state, reference, rates_, shown, action_, tick_, gate_});
+    network_.run();
+    std::ranges::copy(network_.output(action_output_), action_.begin());
     command.kp = gains_.kp;
     command.kd = gains_.kd;
     command.tau_ff = gains_.tau_ff;
@@ -135,7 +138,7 @@ class DescriptorController final : public Controller {
     const double wanted = reference.q[joint.robot];
     if (joint.action < 0) return wanted;
     const float action = std::clamp(action_[joint.action], -clip_, clip_);
-    const double goal = (around_reference_ ? wanted : joint.neutral) + joint.scale * action;
+    const double goal = (joint.around_reference ? wanted : joint.neutral) + joint.scale * action;
     if (joint.effort == std::numeric_limits<double>::infinity() || joint.kp == 0.0) return goal;
     const double middle = state.q[joint.robot] + joint.kd * state.v[joint.robot] / joint.kp;
     return std::clamp(goal, middle - joint.effort / joint.kp, middle + joint.effort / joint.kp);
@@ -143,47 +146,47 @@ class DescriptorController final : public Controller {
 
   // The descriptor's joints in its order, then those of the others that the robot has.
   static std::vector<BoundJoint> bind_joints(const Descriptor& descriptor, const RobotModel& robot, bool lock_waist) {
+    const JointBinding bound = bind_by_name(names_of(descriptor.joints), robot);
+    if (!bound.absent.empty())
+      refuse_robot(descriptor, robot, unknown_name_message("joint", bound.absent[0], robot.joint_names()));
     std::vector<BoundJoint> joints;
     int actions = 0;
-    for (const DescriptorJoint& joint : descriptor.joints)
-      joints.push_back({.robot = joint_of(descriptor, robot, joint.name),
+    for (size_t j = 0; j < descriptor.joints.size(); ++j) {
+      const DescriptorJoint& joint = descriptor.joints[j];
+      joints.push_back({.robot = bound.indices[j],
                         .action = joint.action ? actions++ : -1,
                         .neutral = joint.neutral,
                         .scale = joint.action.value_or(0.0),
                         .kp = joint.kp,
                         .kd = joint.kd,
-                        .effort = joint.effort.value_or(std::numeric_limits<double>::infinity())});
-    const std::vector<std::string> names = robot.joint_names();
-    for (const OtherJoint& joint : descriptor.other_joints) {
-      const auto it = std::ranges::find(names, joint.name);
-      if (it != names.end())
-        joints.push_back({.robot = static_cast<int>(it - names.begin()), .kp = joint.kp, .kd = joint.kd});
+                        .effort = joint.effort.value_or(std::numeric_limits<double>::infinity()),
+                        .around_reference = joint.around_reference});
     }
-    refuse_unknown_joints(descriptor, robot, joints);
+    add_other_joints(descriptor, robot, bound.unnamed, joints);
+    const std::vector<int> tilting = tilting_waist(robot);
     for (BoundJoint& joint : joints)
-      joint.locked = lock_waist && std::ranges::find(kLockedWaist, names[joint.robot]) != std::end(kLockedWaist);
+      joint.locked = lock_waist && std::ranges::find(tilting, joint.robot) != tilting.end();
     return joints;
   }
 
-  static int joint_of(const Descriptor& descriptor, const RobotModel& robot, const std::string& name) {
-    const std::vector<std::string> names = robot.joint_names();
-    const auto it = std::ranges::find(names, name);
-    require(it != names.end(),
-            fmt::format("{}: controller '{}' with robot '{}': {} (it was made for '{}')", descriptor.file,
-                        descriptor.name, robot.name, unknown_name_message("joint", name, names), descriptor.robot));
-    return static_cast<int>(it - names.begin());
+  // Those that the network does not see; `left`: the robot's joints that are not the network's.
+  static void add_other_joints(const Descriptor& descriptor, const RobotModel& robot, std::vector<std::string> left,
+                               std::vector<BoundJoint>& joints) {
+    const JointBinding bound = bind_by_name(names_of(descriptor.other_joints), robot);
+    for (size_t j = 0; j < bound.indices.size(); ++j) {
+      const OtherJoint& joint = descriptor.other_joints[j];
+      if (bound.indices[j] >= 0) joints.push_back({.robot = bound.indices[j], .kp = joint.kp, .kd = joint.kd});
+      std::erase(left, joint.name);
+    }
+    if (!left.empty())
+      refuse_robot(descriptor, robot,
+                   fmt::format("expected joints of its descriptor, found also {}", fmt::join(left, ", ")));
   }
 
-  static void refuse_unknown_joints(const Descriptor& descriptor, const RobotModel& robot,
-                                    const std::vector<BoundJoint>& joints) {
-    std::vector<std::string> unknown;
-    for (int r = 0; r < robot.dof(); ++r)
-      if (std::ranges::none_of(joints, [&](const BoundJoint& joint) { return joint.robot == r; }))
-        unknown.push_back(robot.joints[r].name);
-    require(unknown.empty(),
-            fmt::format("{}: controller '{}' with robot '{}': expected joints of its descriptor, found also "
-                        "{} (it was made for '{}')",
-                        descriptor.file, descriptor.name, robot.name, fmt::join(unknown, ", "), descriptor.robot));
+  [[noreturn]] static void refuse_robot(const Descriptor& descriptor, const RobotModel& robot,
+                                        const std::string& problem) {
+    throw std::invalid_argument(fmt::format("{}: controller '{}' with robot '{}': {} (it was made for '{}')",
+                                            descriptor.file, descriptor.name, robot.name, problem, descriptor.robot));
   }
 
   [[nodiscard]] std::vector<int> first_joints(size_t count) const {
@@ -192,39 +195,27 @@ class DescriptorController final : public Controller {
     return indices;
   }
 
-  void bind_inputs(const Descriptor& descriptor, const std::string& network_path) {
-    const std::span<const Port> ports = network_->inputs();
-    inputs_.resize(ports.size());
+  void bind_inputs(const Descriptor& descriptor) {
     for (size_t i = 0; i < descriptor.inputs.size(); ++i) {
       const DescriptorInput& input = descriptor.inputs[i];
-      const std::string place = fmt::format("{}:{}: with {}", descriptor.file, input.line, network_path);
-      const int port = find_port(ports, input.name, "input", place);
-      inputs_[port] = observer_.input(static_cast<int>(i));
-      if (static_cast<int>(inputs_[port].size()) != ports[port].size)
-        throw InputError(fmt::format("{}: input '{}': expected {} numbers, found {} of the channels: {}", place,
-                                     ports[port].name, ports[port].size, inputs_[port].size(),
-                                     descriptor.input_layout(input)));
+      if (input.state.empty())
+        network_.bind_input(input.name, input.line, observer_.input(static_cast<int>(i)), descriptor.layout(input));
+      else
+        network_.bind_state(input.name, input.line, input.state);
     }
-    for (size_t port = 0; port < ports.size(); ++port)
-      if (inputs_[port].data() == nullptr)
-        throw InputError(
-            fmt::format("{}: with {}: expected every input of the network in 'inputs', found none for '{}'",
-                        descriptor.file, network_path, ports[port].name));
+    network_.require_all_bound();
   }
 
-  void bind_outputs(const Descriptor& descriptor, const std::string& network_path) {
-    const std::span<const Port> ports = network_->outputs();
-    const std::string place = fmt::format("{}:{}: with {}", descriptor.file, descriptor.output_line, network_path);
-    action_output_ = find_port(ports, descriptor.output, "output", place);
-    for (const Port& port : ports) output_values_.emplace_back(port.size);
-    for (std::vector<float>& values : output_values_) outputs_.emplace_back(values);
-    if (ports[action_output_].size != descriptor.actions())
+  void bind_output(const Descriptor& descriptor) {
+    action_output_ = network_.find_output(descriptor.output, descriptor.output_line);
+    const Port& port = network_.outputs()[action_output_];
+    if (port.size != descriptor.actions())
       throw InputError(fmt::format("{}: output '{}': expected {} numbers, one for each joint with an action, found {}",
-                                   place, ports[action_output_].name, descriptor.actions(),
-                                   ports[action_output_].size));
+                                   network_.place(descriptor.output_line), port.name, descriptor.actions(), port.size));
   }
 
   void bind_command(const VelocityInterface& interface, const ControllerOptions& options) {
+    gate_ = StandGate(interface.stands_below);
     const std::string fixed = option_or(options, "command");
     const RootConversionLaw law = root_conversion_law(option_or(options, "conversion", "adopted"));
     if (fixed.empty())
@@ -236,20 +227,17 @@ class DescriptorController final : public Controller {
   std::shared_ptr<const RobotModel> robot_;
   std::string name_;
   float clip_;
-  bool around_reference_;
   std::vector<BoundJoint> joints_;
-  std::unique_ptr<Network> network_;
+  BoundNetwork network_;
   Observer observer_;
   ReferenceRates rates_;
   std::optional<RootConversion> conversion_;  // none where the command is fixed or there is none
   VelocityCommand command_;
+  StandGate gate_;
   std::vector<float> action_;  // the network's last output
   JointCommand gains_;
-  std::vector<std::span<const float>> inputs_;  // in the network's order
-  std::vector<std::vector<float>> output_values_;
-  std::vector<std::span<float>> outputs_;
   int action_output_ = 0;
-  long tick_ = 0;
+  long tick_ = 0;  // since reset
 };
 
 }  // namespace
@@ -269,7 +257,7 @@ ControllerInfo descriptor_info(const Descriptor& descriptor) {
         {"conversion", "adopted", "of the reference's root to a velocity: printed, adopted or direct (A.4.3)"});
     info.options.push_back({"command", "", "\"vx,vy,wz\" or \"vx,vy,wz,height\" instead of the reference's root"});
   }
-  if (shows(descriptor, ChannelKind::kCommandVelocity))
+  if (shows_yaw_rate(descriptor))
     info.options.push_back({"yaw_scale", "", "scale of the commanded yaw rate instead of the descriptor's"});
   return info;
 }

@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "controllers/controller.h"
-#include "controllers/descriptor.h"
-#include "nn/network.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/nn/network.h"
 
 namespace duet {
 

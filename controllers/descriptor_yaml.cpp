@@ -3,18 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
-#include "controllers/descriptor.h"
-#include "core/clock.h"
-#include "core/names.h"
-#include "robots/yaml_section.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/core/clock.h"
+#include "duet/core/names.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
 
 constexpr int kMostFrames = 1000;  // of a history; more is a slip of the pen
-constexpr const char* kChannelKeys[] = {"joints", "zero",         "axes",   "offset", "clipped",
-                                        "frame",  "frequency_hz", "phases", "steps",  "values"};
+constexpr const char* kChannelKeys[] = {"joints",       "zero",   "axes",     "offset", "clipped", "frame",
+                                        "frequency_hz", "phases", "standing", "stance", "steps",   "values"};
 
 int line_of(const YAML::Node& node) { return std::max(node.Mark().line, 0) + 1; }
 
@@ -77,6 +78,12 @@ std::string one_of(const YamlSection& section, const char* key, const std::strin
   return value;
 }
 
+// A card's name, or its path from the descriptor's folder.
+std::string robot_of(const std::string& given, const std::string& file) {
+  if (!given.ends_with(".yaml")) return given;
+  return (std::filesystem::path(file).parent_path() / given).lexically_normal().string();
+}
+
 // Reads one descriptor; its members are the state that the steps share.
 class Reader {
  public:
@@ -91,17 +98,18 @@ class Reader {
     out_.name = root_.text("name");
     out_.about = root_.text("about");
     out_.licence = root_.text("licence");
-    out_.robot = root_.text("robot");
+    out_.robot = robot_of(root_.text("robot"), file_);
     out_.network = root_.text("network");
     out_.walks = root_.flag_or("walks", false);
     out_.waist_locked = one_of(root_, "waist", "free", {"free", "locked"}) == "locked";
     if (const double rate = root_.number("rate_hz"); rate != kTickRate)
       root_.fail(root_.line("rate_hz"), fmt::format("'rate_hz': expected {}, found {}", kTickRate, rate));
-    read_joints();
     read_action();
+    read_joints();
     read_groups();
     read_inputs();
     if (root_.has("command")) out_.command = read_command();
+    check_stand_channels();
     return std::move(out_);
   }
 
@@ -109,15 +117,18 @@ class Reader {
   void read_joints() {
     for (const YAML::Node& node : root_.items("joints")) {
       const YamlSection s(file_, node, label("joint", node, "name"),
-                          {"name", "default", "kp", "kd", "effort", "action"});
+                          {"name", "default", "kp", "kd", "effort", "action", "around"});
       DescriptorJoint joint{.name = s.text("name"),
                             .line = s.line(),
                             .neutral = s.number("default"),
                             .kp = not_negative(s, "kp", s.number("kp")),
                             .kd = not_negative(s, "kd", s.number("kd")),
                             .effort = s.optional_number("effort"),
-                            .action = s.optional_number("action")};
+                            .action = s.optional_number("action"),
+                            .around_reference = around_reference(s, around_reference_)};
       if (joint.effort) positive(s, "effort", *joint.effort);
+      if (s.has("around") && !joint.action)
+        s.fail(s.line("around"), "'around': expected the key 'action' beside it, found none");
       refuse_repeat(s, joint.name);
       out_.joints.push_back(joint);
       joint_names_.push_back(joint.name);
@@ -148,7 +159,11 @@ class Reader {
     out_.output_line = s.line("output");
     if (s.has("output")) out_.output = s.text("output");
     if (s.has("clip")) out_.action_clip = positive(s, "clip", s.number("clip"));
-    out_.around_reference = one_of(s, "around", "default", {"default", "reference"}) == "reference";
+    around_reference_ = around_reference(s, false);
+  }
+
+  static bool around_reference(const YamlSection& s, bool otherwise) {
+    return one_of(s, "around", otherwise ? "reference" : "default", {"default", "reference"}) == "reference";
   }
 
   void read_groups() {
@@ -172,7 +187,7 @@ class Reader {
   Channel read_channel(const YAML::Node& node) const {
     const YamlSection s(file_, node, label("channel", node, "channel"),
                         {"channel", "scale", "clip", "joints", "zero", "axes", "offset", "clipped", "frame",
-                         "frequency_hz", "phases", "steps", "values"});
+                         "frequency_hz", "phases", "standing", "stance", "steps", "values"});
     Channel channel;
     channel.line = s.line();
     channel.kind = kind_of(s);
@@ -219,17 +234,39 @@ class Reader {
 
   static void read_lists_of(const YamlSection& s, Channel& channel) {
     for (const double axis : numbers(s, "axes")) channel.axes.push_back(whole_number(s, "axes", axis, 0, 2));
-    if (takes_key(channel.kind, "frame")) channel.frame = s.text("frame");
-    if (takes_key(channel.kind, "frequency_hz")) {
-      channel.frequency_hz = positive(s, "frequency_hz", s.number("frequency_hz"));
-      channel.phases = numbers(s, "phases", {0.0});
-    }
+    const bool is_sensor = takes_key(channel.kind, "axes");  // of the base, where no frame is named
+    if (takes_key(channel.kind, "frame") && (s.has("frame") || !is_sensor)) channel.frame = s.text("frame");
+    if (takes_key(channel.kind, "frequency_hz")) channel.gait = read_gait(s);
     if (takes_key(channel.kind, "values")) channel.values = numbers(s, "values", {});
     if (takes_key(channel.kind, "steps"))
       for (const double step : numbers(s, "steps"))
         channel.steps.push_back(whole_number(s, "steps", step, 1, kMostFrames));
     if (takes_key(channel.kind, "values") && channel.values.empty()) (void)s.node("values");
     if (takes_key(channel.kind, "steps") && channel.steps.empty()) (void)s.node("steps");
+  }
+
+  static GaitClock read_gait(const YamlSection& s) {
+    GaitClock gait{.frequency_hz = positive(s, "frequency_hz", s.number("frequency_hz")),
+                   .phases = numbers(s, "phases", {0.0}),
+                   .standing = numbers(s, "standing"),
+                   .stance = s.optional_number("stance")};
+    if (!gait.standing.empty() && gait.standing.size() != gait.phases.size())
+      s.fail(s.line("standing"), fmt::format("'standing': expected one number for each of the {} phases, found {}",
+                                             gait.phases.size(), gait.standing.size()));
+    if (gait.stance && (*gait.stance <= 0.0 || *gait.stance >= 1.0))
+      s.fail(s.line("stance"), fmt::format("'stance': expected a number in (0, 1), found {}", *gait.stance));
+    return gait;
+  }
+
+  // What is shown of a command to stand needs to be told which command is one.
+  void check_stand_channels() const {
+    if (out_.command && out_.command->stands_below) return;
+    for (const ChannelGroup& group : out_.groups)
+      for (const Channel& channel : group.channels)
+        if (channel.kind == ChannelKind::kCommandStand || !channel.gait.standing.empty())
+          root_.fail(channel.line,
+                     fmt::format("channel '{}'{}: expected the key 'stands_below' in 'command', found none",
+                                 to_string(channel.kind), channel.gait.standing.empty() ? "" : " with 'standing'"));
   }
 
   void read_scale_of(const YamlSection& s, Channel& channel) const {
@@ -242,10 +279,14 @@ class Reader {
 
   void read_inputs() {
     for (const YAML::Node& node : root_.items("inputs")) {
-      const YamlSection s(file_, node, label("input", node, "name"), {"name", "parts"});
-      DescriptorInput input{.name = s.has("name") ? s.text("name") : "", .line = s.line(), .parts = {}};
+      const YamlSection s(file_, node, label("input", node, "name"), {"name", "parts", "state"});
+      DescriptorInput input{.name = s.has("name") ? s.text("name") : "", .line = s.line(), .parts = {}, .state = {}};
       for (const YAML::Node& part : s.items("parts")) input.parts.push_back(read_part(part));
-      if (input.parts.empty()) s.fail(s.line("parts"), "'parts': expected at least one, found none");
+      if (s.has("state")) input.state = s.text("state");
+      if (!input.parts.empty() && !input.state.empty())
+        s.fail(s.line("state"), "expected 'parts' or 'state', found both");
+      if (input.parts.empty() && input.state.empty())
+        s.fail(s.line("parts"), "'parts': expected at least one, found none");
       out_.inputs.push_back(std::move(input));
     }
     if (out_.inputs.empty()) root_.fail(root_.line("inputs"), "'inputs': expected at least one, found none");
@@ -260,23 +301,31 @@ class Reader {
       part.groups.push_back(static_cast<int>(it - group_names_.begin()));
     }
     if (part.groups.empty()) s.fail(s.line("groups"), "'groups': expected at least one, found none");
-    part.frames = whole_number(s, "frames", s.optional_number("frames").value_or(1.0), 1, kMostFrames);
-    part.current = s.flag_or("current", true);
-    part.starts_full = one_of(s, "start", "zeros", {"zeros", "repeated"}) == "repeated";
+    part.history.frames = whole_number(s, "frames", s.optional_number("frames").value_or(1.0), 1, kMostFrames);
+    part.history.current = s.flag_or("current", true);
+    part.history.starts_full = one_of(s, "start", "zeros", {"zeros", "repeated"}) == "repeated";
     return part;
   }
 
   VelocityInterface read_command() const {
-    const YamlSection s(file_, root_.node("command"), "command", {"forward", "lateral", "yaw", "height"});
+    const YamlSection s(file_, root_.node("command"), "command",
+                        {"forward", "lateral", "yaw", "height", "stands_below"});
     VelocityInterface command;
     command.forward = read_speed(s, "forward");
     command.lateral = read_speed(s, "lateral");
     command.yaw = read_speed(s, "yaw");
+    if (s.has("stands_below")) command.stands_below = read_stand_bounds(s.node("stands_below"));
     if (!s.has("height")) return command;
     const YamlSection height(file_, s.node("height"), "height", {"limits", "offset"});
     command.height = read_limits(height);
     command.height_offset = height.optional_number("offset").value_or(0.0);
     return command;
+  }
+
+  [[nodiscard]] StandBounds read_stand_bounds(const YAML::Node& node) const {
+    const YamlSection s(file_, node, "stands_below", {"speed", "yaw_rate"});
+    return {.speed = positive(s, "speed", s.number("speed")),
+            .yaw_rate = positive(s, "yaw_rate", s.number("yaw_rate"))};
   }
 
   CommandRange read_speed(const YamlSection& command, const char* key) const {
@@ -297,6 +346,7 @@ class Reader {
   YamlSection root_;
   Descriptor out_;
   std::vector<std::string> joint_names_, group_names_;
+  bool around_reference_ = false;  // of joints that do not say
 };
 
 }  // namespace

@@ -1,10 +1,10 @@
-#include "controllers/guard.h"
+#include "duet/controllers/guard.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

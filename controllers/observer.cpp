@@ -1,10 +1,10 @@
-#include "controllers/observer.h"
+#include "duet/controllers/observer.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "core/clock.h"
+#include "duet/core/clock.h"
 
 namespace duet {
 namespace {
@@ -32,9 +32,16 @@ Eigen::Vector3d root_velocity(const Senses& senses) {
   return senses.reference.X_WB.R.conjugate() * senses.rates.v_WB();
 }
 
-double gait_angle(const Channel& channel, double phase, long tick) {
-  const double turns = channel.frequency_hz * kTick * static_cast<double>(tick);
-  return 2.0 * std::numbers::pi * (turns - std::floor(turns)) + phase;
+bool is_sensed(const Channel& channel) {
+  return channel.kind == ChannelKind::kBaseAngularVelocity || channel.kind == ChannelKind::kProjectedGravity;
+}
+
+// Where the gyro of a channel sits: in the frame that it names, else in the card's; -1: in the base, with its axes.
+int sensor_frame(const Channel& channel, const RobotModel& robot) {
+  if (!is_sensed(channel)) return -1;
+  const int frame = channel.frame.empty() ? robot.roles.imu_frame : robot.frame_index(channel.frame);
+  const RobotFrame& found = robot.frames[frame];
+  return found.link == 0 && found.X_LF.R.isApprox(Eigen::Quaterniond::Identity(), 0.0) ? -1 : frame;
 }
 
 }  // namespace
@@ -70,8 +77,10 @@ Observer::Observer(const Descriptor& descriptor, std::shared_ptr<const RobotMode
     made.values.resize(descriptor.group_size(group));
     widest = std::max(widest, made.values.size());
     for (const Channel& channel : group.channels) {
-      made.channels.push_back({channel, is_anchor(channel) ? robot_->frame_index(channel.frame) : -1});
+      const int frame = is_anchor(channel) ? robot_->frame_index(channel.frame) : sensor_frame(channel, *robot_);
+      made.channels.push_back({channel, frame});
       anchored_ |= is_anchor(channel);
+      placed_ |= frame >= 0;
     }
   }
   for (const DescriptorInput& input : descriptor.inputs) {
@@ -80,7 +89,7 @@ Observer::Observer(const Descriptor& descriptor, std::shared_ptr<const RobotMode
     for (const InputPart& part : input.parts) {
       const int size = descriptor.part_size(part);
       longest = std::max(longest, static_cast<size_t>(size));
-      made.parts.push_back({part, size, std::vector<float>(static_cast<size_t>(size) * part.frames)});
+      made.parts.push_back({part.groups, FrameHistory(size, part.history)});
     }
   }
   scratch_.reserve(widest);
@@ -88,25 +97,22 @@ Observer::Observer(const Descriptor& descriptor, std::shared_ptr<const RobotMode
 }
 
 void Observer::reset() {
-  first_ = true;
   for (Input& input : inputs_)
-    for (Part& part : input.parts) std::ranges::fill(part.past, 0.0F);
+    for (Part& part : input.parts) part.history.reset();
 }
 
 void Observer::update(const Senses& senses) {
-  if (anchored_) {
-    kinematics_.update(senses.state.X_WB, senses.state.q);
-    reference_kinematics_.update(senses.reference.X_WB, senses.reference.q);
-  }
+  if (placed_) kinematics_.update(senses.state.X_WB, senses.state.q);
+  if (anchored_) reference_kinematics_.update(senses.reference.X_WB, senses.reference.q);
   for (Group& group : groups_) fill_group(group, senses);
   for (Input& input : inputs_) {
     std::span<float> rest = input.values;
     for (Part& part : input.parts) {
-      fill_part(part, rest.first(part.past.size()));
-      rest = rest.subspan(part.past.size());
+      const auto size = static_cast<size_t>(part.history.size());
+      fill_part(part, rest.first(size));
+      rest = rest.subspan(size);
     }
   }
-  first_ = false;
 }
 
 void Observer::fill_group(Group& group, const Senses& senses) {
@@ -130,15 +136,17 @@ void Observer::fill_channel(const BoundChannel& bound, const Senses& senses, std
     case ChannelKind::kBaseLinearVelocity:
       return append(channel, point_velocity(state, channel.offset), out);
     case ChannelKind::kBaseAngularVelocity:
-      return append(channel, state.w_WB_B, out);
+      return append(channel, sensor_rate(bound, state), out);
     case ChannelKind::kProjectedGravity:
-      return append(channel, state.X_WB.R.conjugate() * -Eigen::Vector3d::UnitZ(), out);
+      return append(channel, sensor_rotation(bound, state).conjugate() * -Eigen::Vector3d::UnitZ(), out);
     case ChannelKind::kRollPitch:
       return append(roll_pitch_of(state.X_WB.R), out);
     case ChannelKind::kCommandVelocity:
       return append(channel, {senses.command.forward, senses.command.lateral, senses.command.yaw_rate}, out);
     case ChannelKind::kCommandHeight:
       return out.push_back(senses.command.height);
+    case ChannelKind::kCommandStand:
+      return out.push_back(senses.gate.stands() ? 0.0 : 1.0);
     case ChannelKind::kPreviousAction: {
       const double bound = channel.clipped ? action_clip_ : std::numeric_limits<double>::infinity();
       for (const float action : senses.action) out.push_back(std::clamp<double>(action, -bound, bound));
@@ -158,10 +166,12 @@ void Observer::fill_channel(const BoundChannel& bound, const Senses& senses, std
     case ChannelKind::kAnchorOrientationError:
       return fill_anchor(bound, out);
     case ChannelKind::kGaitSine:
-      for (const double phase : channel.phases) out.push_back(std::sin(gait_angle(channel, phase, senses.tick)));
+      for (size_t i = 0; i < channel.gait.phases.size(); ++i)
+        out.push_back(std::sin(gait_angle(channel.gait, i, senses.tick, senses.gate)));
       return;
     case ChannelKind::kGaitCosine:
-      for (const double phase : channel.phases) out.push_back(std::cos(gait_angle(channel, phase, senses.tick)));
+      for (size_t i = 0; i < channel.gait.phases.size(); ++i)
+        out.push_back(std::cos(gait_angle(channel.gait, i, senses.tick, senses.gate)));
       return;
     case ChannelKind::kTick:
       return out.push_back(static_cast<double>(senses.tick));
@@ -207,16 +217,24 @@ void Observer::fill_anchor(const BoundChannel& bound, std::vector<double>& out) 
   for (int row = 0; row < 3; ++row) out.insert(out.end(), {R(row, 0), R(row, 1)});
 }
 
+Eigen::Quaterniond Observer::sensor_rotation(const BoundChannel& bound, const RobotState& state) const {
+  return bound.frame < 0 ? state.X_WB.R : kinematics_.frame_pose(bound.frame).R;
+}
+
+// The base's rate and those of the hinges between it and the frame.
+Eigen::Vector3d Observer::sensor_rate(const BoundChannel& bound, const RobotState& state) const {
+  if (bound.frame < 0) return state.w_WB_B;
+  Eigen::Vector3d w_WF = state.X_WB.R * state.w_WB_B;
+  for (int link = robot_->frames[bound.frame].link; link > 0; link = robot_->links[link].parent)
+    w_WF += state.v[link - 1] * (kinematics_.R_WL(link) * robot_->links[link].axis);
+  return kinematics_.frame_pose(bound.frame).R.conjugate() * w_WF;
+}
+
 void Observer::fill_part(Part& part, std::span<float> out) {
   frame_.clear();
-  for (const int group : part.spec.groups)
+  for (const int group : part.groups)
     frame_.insert(frame_.end(), groups_[group].values.begin(), groups_[group].values.end());
-  if (first_ && part.spec.starts_full)
-    for (int k = 0; k < part.spec.frames; ++k) std::ranges::copy(frame_, part.past.begin() + k * part.size);
-  if (!part.spec.current) std::ranges::copy(part.past, out.begin());
-  std::copy(part.past.begin() + part.size, part.past.end(), part.past.begin());
-  std::ranges::copy(frame_, part.past.end() - part.size);
-  if (part.spec.current) std::ranges::copy(part.past, out.begin());
+  part.history.add(frame_, out);
 }
 
 }  // namespace duet

@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "controllers/descriptor.h"
-#include "controllers/root_conversion.h"
-#include "core/robot_state.h"
-#include "robots/kinematics.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/controllers/root_conversion.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 
@@ -41,12 +41,13 @@ struct Senses {
   const VelocityCommand& command;
   std::span<const float> action;  // the network's last output
   long tick = 0;                  // since reset
+  const StandGate& gate;          // where it is told to stand, `command` has no velocity
 };
 
 class Observer {
  public:
-  // `robot_joints`: index in the robot of each of the descriptor's joints. Throws std::invalid_argument for an anchor
-  // frame that the robot lacks.
+  // `robot_joints`: index in the robot of each of the descriptor's joints. Throws std::invalid_argument for a frame
+  // that the robot lacks.
   Observer(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::vector<int> robot_joints);
 
   void reset();
@@ -57,16 +58,15 @@ class Observer {
  private:
   struct BoundChannel {
     Channel spec;
-    int frame = -1;  // the anchor's, in the robot
+    int frame = -1;  // the anchor's or the gyro's, in the robot; -1: the base
   };
   struct Group {
     std::vector<BoundChannel> channels;
     std::vector<float> values;
   };
   struct Part {
-    InputPart spec;
-    int size = 0;
-    std::vector<float> past;  // frames of it, oldest first
+    std::vector<int> groups;
+    FrameHistory history;
   };
   struct Input {
     std::vector<Part> parts;
@@ -78,19 +78,20 @@ class Observer {
   void fill_joints(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
   void fill_frames(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
   void fill_anchor(const BoundChannel& bound, std::vector<double>& out) const;
+  Eigen::Quaterniond sensor_rotation(const BoundChannel& bound, const RobotState& state) const;  // R_WF
+  Eigen::Vector3d sensor_rate(const BoundChannel& bound, const RobotState& state) const;         // w_WF_F [rad/s]
   void fill_part(Part& part, std::span<float> out);
 
   std::shared_ptr<const RobotModel> robot_;  // the kinematics' model
   std::vector<int> joints_;
   Eigen::VectorXd neutral_;  // per descriptor's joint
   double action_clip_;
-  bool anchored_ = false;
+  bool anchored_ = false, placed_ = false;  // whether poses of the reference's, of the robot's links are needed
   Kinematics kinematics_, reference_kinematics_;
   std::vector<Group> groups_;
   std::vector<Input> inputs_;
   std::vector<double> scratch_;  // one channel before scaling
   std::vector<float> frame_;     // one frame of a part
-  bool first_ = true;
 };
 
 // Angles of R_WB = Rz(yaw) Ry(pitch) Rx(roll) [rad].

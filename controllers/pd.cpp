@@ -1,4 +1,4 @@
-#include "controllers/pd.h"
+#include "duet/controllers/pd.h"
 
 namespace duet {
 namespace {

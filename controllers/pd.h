@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "controllers/controller.h"
+#include "duet/controllers/controller.h"
 
 namespace duet {
 

@@ -1,14 +1,15 @@
-#include "controllers/published.h"
+#include "duet/controllers/published.h"
 
 #include <fmt/format.h>
 
 #include <cstdlib>
 #include <filesystem>
 
-#include "controllers/descriptor_controller.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
+#include "duet/controllers/descriptor_controller.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/nn/load_network.h"
 
 namespace duet {
 namespace {
@@ -48,7 +49,9 @@ std::string find_network(const Descriptor& descriptor, const ControllerOptions& 
 
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options) {
   const Descriptor descriptor = load_descriptor(name);
-  return {{"descriptor", descriptor.file}, {"network", find_network(descriptor, options)}};
+  LoadedFiles files = {{"descriptor", descriptor.file}};
+  for (LoadedFile& file : network_files(find_network(descriptor, options))) files.push_back(std::move(file));
+  return files;
 }
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,

@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "controllers/controller.h"
-#include "controllers/descriptor.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/core/loaded_file.h"
 
 namespace duet {
 
@@ -19,7 +20,7 @@ std::string find_network(const Descriptor& descriptor, const ControllerOptions& 
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
                                            const ControllerOptions& options);
-// The descriptor and its network.
+// The descriptor, its network, and each file of the network's external data ("network data NAME").
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options);
 
 }  // namespace duet

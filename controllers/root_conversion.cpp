@@ -1,4 +1,4 @@
-#include "controllers/root_conversion.h"
+#include "duet/controllers/root_conversion.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <numbers>
 #include <optional>
 
-#include "core/names.h"
-#include "core/number.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/number.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

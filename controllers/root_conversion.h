@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "controllers/descriptor.h"
-#include "core/robot_state.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

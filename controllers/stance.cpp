@@ -1,10 +1,10 @@
-#include "controllers/stance.h"
+#include "duet/controllers/stance.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -3,7 +3,7 @@
 // forces f do to the centre of mass and the pelvis, y = G f + g; (3) f comes as near to the wanted y as friction and
 // the edges of the soles allow; (4) torques of the legs are M a + h - J^T f. Between ticks the legs are held by weak
 // gains around their predicted motion, so that what the model does not know does not grow for 20 ms.
-#include "controllers/vmc.h"
+#include "duet/controllers/vmc.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
@@ -11,25 +11,24 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controllers/contact_forces.h"
-#include "controllers/stance.h"
-#include "core/clock.h"
-#include "robots/dynamics.h"
-#include "robots/kinematics.h"
+#include "duet/controllers/contact_forces.h"
+#include "duet/controllers/stance.h"
+#include "duet/core/clock.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {
 
 // Found by hand on a G1 that follows clips and is pushed (tests/controllers/vmc_test.cpp). Nobody has swept them.
-constexpr int kIterations = 120;                // of the contact forces
-constexpr double kRegularisation = 1e-6;        // of contact forces: of two that do the same, the even one
-constexpr double kSoleDamping = 10.0;           // of a sole that moves although it should not [1/s]
-constexpr double kSingular = 1e-4;              // damping of a straight leg's Jacobian
-constexpr double kStopMargin = 0.02;            // of the upper body's targets to their stops [rad]
-constexpr double kYawRange = 0.3;               // of the pelvis against the feet [rad]
-constexpr double kTiltRange = 0.3;              // largest error that is acted on [rad]
-constexpr double kLeanRange = 0.05;             // of the centre of mass against a steady push [m]
-const Eigen::Vector2d kShiftRange(0.02, 0.03);  // along x and y of the stance: what of the root's place is followed [m]
+constexpr int kIterations = 120;          // of the contact forces
+constexpr double kRegularisation = 1e-6;  // of contact forces: of two that do the same, the even one
+constexpr double kSoleDamping = 10.0;     // of a sole that moves although it should not [1/s]
+constexpr double kSingular = 1e-4;        // damping of a straight leg's Jacobian
+constexpr double kStopMargin = 0.02;      // of the upper body's targets to their stops [rad]
+constexpr double kYawRange = 0.3;         // of the pelvis against the feet [rad]
+constexpr double kTiltRange = 0.3;        // largest error that is acted on [rad]
+constexpr double kLeanRange = 0.05;       // of the centre of mass against a steady push [m]
 
 using Matrix6 = Matrix6d;
 
@@ -45,6 +44,7 @@ class Vmc final : public Controller {
         lower_(robot_->lower()),
         upper_(robot_->upper()),
         weight_(kGravity * robot_->total_mass()),
+        shift_range_(robot_->stance_size().shift),
         forces_(stance_.points(), options.friction, kRegularisation, kIterations) {
     const int n = 6 + robot_->dof(), p = stance_.points(), u = static_cast<int>(stance_.upper().size());
     for (Eigen::VectorXd* vector : {&velocity_, &bias_, &t_, &a_, &effort_}) *vector = Eigen::VectorXd::Zero(n);
@@ -185,7 +185,7 @@ class Vmc final : public Controller {
   [[nodiscard]] Eigen::Vector2d shift(const Reference& reference) const {
     const Eigen::Rotation2Dd stance(stance_yaw_);
     const Eigen::Vector2d asked = stance.inverse() * Eigen::Vector2d(reference.X_WB.p.head<2>() - root_rest_);
-    return stance * Eigen::Vector2d(asked.cwiseMax(-kShiftRange).cwiseMin(kShiftRange));
+    return stance * Eigen::Vector2d(asked.cwiseMax(-shift_range_).cwiseMin(shift_range_));
   }
 
   // Rotation vector, in W, from the pelvis to upright with the reference's yaw.
@@ -273,7 +273,8 @@ class Vmc final : public Controller {
   Stance stance_;
   JointCommand card_;
   Eigen::VectorXd lower_, upper_;
-  double weight_;  // [N]
+  double weight_;                // [N]
+  Eigen::Vector2d shift_range_;  // along x and y of the stance: what of the root's place is followed [m]
   ContactForces forces_;
 
   // Since reset.

@@ -8,7 +8,7 @@
 
 #include <memory>
 
-#include "controllers/controller.h"
+#include "duet/controllers/controller.h"
 
 namespace duet {
 
@@ -32,7 +32,8 @@ struct VmcOptions {
   double friction = 0.5;  // that the planned forces rely on
 };
 
-// Throws std::invalid_argument for a robot without soles or with soles at the base itself.
+// Throws std::invalid_argument for a robot without soles, with soles at the base itself or without a stance in its
+// card.
 std::unique_ptr<Controller> make_vmc_controller(std::shared_ptr<const RobotModel> robot);
 std::unique_ptr<Controller> make_vmc_controller(std::shared_ptr<const RobotModel> robot, const VmcOptions& options);
 

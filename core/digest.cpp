@@ -1,4 +1,4 @@
-#include "core/digest.h"
+#include "duet/core/digest.h"
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
@@ -6,7 +6,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 
 namespace duet {
 namespace {

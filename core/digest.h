@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/robot_state.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "core/file.h"
+#include "duet/core/file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -110,22 +110,23 @@ TemporaryFile create_beside(const std::string& path) {
 
 // Writes `temporary` and puts it in the place of `path`: 0, or the error number with `path` untouched.
 int fill_and_rename(Descriptor& file, const std::string& temporary, const std::string& path, std::string_view bytes,
-                    std::optional<mode_t> mode) {
+                    std::optional<mode_t> mode, Durability durability) {
   if (mode && ::fchmod(file.get(), *mode) != 0) return errno;
   if (const int error = write_all(file.get(), bytes); error != 0) return error;
-  if (const int error = sync_data(file.get()); error != 0) return error;
+  if (durability == Durability::kSynced)
+    if (const int error = sync_data(file.get()); error != 0) return error;
   if (const int error = file.close(); error != 0) return error;
   return ::rename(temporary.c_str(), path.c_str()) == 0 ? 0 : errno;
 }
 
-void replace_file(const std::string& path, std::string_view bytes, std::optional<mode_t> mode) {
+void replace_file(const std::string& path, std::string_view bytes, std::optional<mode_t> mode, Durability durability) {
   const TemporaryFile temporary = create_beside(path);
   Descriptor file(temporary.descriptor);
-  if (const int error = fill_and_rename(file, temporary.path, path, bytes, mode); error != 0) {
+  if (const int error = fill_and_rename(file, temporary.path, path, bytes, mode, durability); error != 0) {
     ::unlink(temporary.path.c_str());
     fail_to_write(path, error);
   }
-  sync_parent(path);
+  if (durability == Durability::kSynced) sync_parent(path);
 }
 
 // Size of the file up to and including its last newline.
@@ -164,16 +165,16 @@ std::string read_file(const std::string& path, std::int64_t most) {
   }
 }
 
-void write_file(const std::string& path, std::string_view bytes) {
+void write_file(const std::string& path, std::string_view bytes, Durability durability) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
     create_parent(path);
-    return replace_file(path, bytes, std::nullopt);
+    return replace_file(path, bytes, std::nullopt, durability);
   }
   if (S_ISDIR(status.st_mode)) fail_to_write(path, EISDIR);
   if (!S_ISREG(status.st_mode)) return write_in_place(path, bytes);
   // Through a link the file that it points to is replaced, not the link.
-  replace_file(std::filesystem::canonical(path).string(), bytes, status.st_mode & 07777);
+  replace_file(std::filesystem::canonical(path).string(), bytes, status.st_mode & 07777, durability);
 }
 
 std::string inside(const std::string& folder, const std::string& name) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 
@@ -29,7 +29,10 @@ inline std::string read_text(const std::string& path) { return read_file(path, k
 // Writes to a temporary file beside `path`, syncs and renames it; creates missing parent folders. Follows a link that
 // `path` is. Throws StorageError (for example "cannot write 'runs/a/run.json': No space left on device") and leaves
 // `path` as it was.
-void write_file(const std::string& path, std::string_view bytes);
+// Unsynced it is whole after the process is killed, but not after a power cut: for what is checked by its digest when
+// it is used, and can be made again.
+enum class Durability { kSynced, kUnsynced };
+void write_file(const std::string& path, std::string_view bytes, Durability durability = Durability::kSynced);
 
 // The path of `name` ("episodes.jsonl", "trajectories/a.npz") in a folder that may have come from others. Throws
 // StorageError where `name`, or a folder on the way to it below `folder`, is a symbolic link: what is written into

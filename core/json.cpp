@@ -1,11 +1,11 @@
-#include "core/json.h"
+#include "duet/core/json.h"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

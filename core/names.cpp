@@ -1,4 +1,4 @@
-#include "core/names.h"
+#include "duet/core/names.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/text.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/naming_file.h"
+#include "duet/core/naming_file.h"
 
 namespace duet {
 

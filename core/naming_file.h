@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 
 namespace duet {
 

@@ -1,16 +1,17 @@
-#include "core/npy.h"
+#include "duet/core/npy.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <type_traits>
 
-#include "core/npy_header.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/npy_header.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -34,8 +35,41 @@ std::vector<Value> read_items(std::string_view data, std::size_t count, std::siz
   return values;
 }
 
+// The values that stand from `at` on, as an iterator that a vector is made of without being filled with zeros before.
+template <typename Stored, typename Value>
+struct StoredValues {
+  using iterator_category = std::random_access_iterator_tag;
+  using value_type = Value;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const Value*;
+  using reference = Value;
+
+  const char* at = nullptr;
+
+  Value operator*() const {
+    Stored stored;
+    std::memcpy(&stored, at, sizeof(Stored));
+    return static_cast<Value>(stored);
+  }
+  StoredValues& operator++() {
+    at += sizeof(Stored);
+    return *this;
+  }
+  StoredValues operator+(difference_type n) const { return {at + n * static_cast<difference_type>(sizeof(Stored))}; }
+  difference_type operator-(const StoredValues& other) const {
+    return (at - other.at) / static_cast<difference_type>(sizeof(Stored));
+  }
+  bool operator==(const StoredValues&) const = default;
+};
+
 template <typename Stored, typename Value>
 std::vector<Value> read_as(std::string_view data, std::size_t count, bool swapped) {
+  if constexpr (!std::is_same_v<Stored, std::uint64_t>) {
+    if (!swapped) {  // most files: in one pass over memory
+      const StoredValues<Stored, Value> first{data.data()};
+      return std::vector<Value>(first, first + static_cast<std::ptrdiff_t>(count));
+    }
+  }
   return read_items<Value>(data, count, sizeof(Stored), [swapped](const char* at) {
     const Stored stored = read_value<Stored>(at, swapped);
     if constexpr (std::is_same_v<Stored, std::uint64_t>)

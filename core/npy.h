@@ -6,13 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/npz.h"
+#include "duet/core/npy_array.h"
 
 namespace duet {
-
-inline constexpr std::size_t kMaxEntryBytes = std::size_t{1} << 30;  // of one array, header included
-inline constexpr std::size_t kMaxArrayValues = kMaxEntryBytes / 8;   // as many as fit in 1 GiB once they are doubles
-inline constexpr std::size_t kMaxArrayStrings = std::size_t{1} << 22;
 
 // Number of values of a shape. Throws InputError where it is above `limit`.
 std::size_t checked_count(const std::vector<std::size_t>& shape, std::size_t limit);

@@ -1,4 +1,4 @@
-#include "core/npy_header.h"
+#include "duet/core/npy_header.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,9 +7,9 @@
 #include <charconv>
 #include <set>
 
-#include "core/npy.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/npy_array.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -17,7 +17,8 @@ namespace {
 constexpr std::size_t kMaxDimensions = 32;  // NumPy's own limit
 
 // "<f8", "|b1", ">i4", "<U12".
-NpyType parse_type(std::string_view text) {
+NpyType parse_type(std::string_view text, bool objects) {
+  if (objects && text == "|O") return {'O', false, sizeof(void*)};
   const auto refuse = [&]() -> InputError {
     if (text.find('O') != std::string_view::npos)
       return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", shown(text)));
@@ -42,7 +43,7 @@ NpyType parse_type(std::string_view text) {
 // Reads the dictionary's literal; every member throws InputError where the text is something else.
 class HeaderParser {
  public:
-  explicit HeaderParser(std::string_view text) : text_(text) {}
+  HeaderParser(std::string_view text, bool objects) : text_(text), objects_(objects) {}
 
   NpyHeader parse() {
     std::set<std::string_view> seen;
@@ -65,7 +66,7 @@ class HeaderParser {
   void parse_value(std::string_view key) {
     if (key == "descr") {
       if (peek() == '[') throw InputError("expected a plain type, found a structured one");
-      header_.type = parse_type(quoted());
+      header_.type = parse_type(quoted(), objects_);
     } else if (key == "fortran_order") {
       header_.fortran_order = boolean();
     } else if (key == "shape") {
@@ -140,6 +141,7 @@ class HeaderParser {
   }
 
   std::string_view text_;
+  bool objects_;
   std::size_t at_ = 0;
   NpyHeader header_;
 };
@@ -150,7 +152,7 @@ std::string shape_text(const std::vector<std::size_t>& shape) {
   return fmt::format("({}{})", fmt::join(shape, ", "), shape.size() == 1 ? "," : "");
 }
 
-NpyHeader parse_npy_header(std::string_view bytes) {
+NpyHeader parse_npy_header(std::string_view bytes, bool objects) {
   constexpr std::string_view kMagic = "\x93NUMPY";
   if (!bytes.starts_with(kMagic)) throw InputError("expected an NPY array, found other bytes");
   if (bytes.size() < 12) throw InputError("truncated header");
@@ -162,7 +164,7 @@ NpyHeader parse_npy_header(std::string_view bytes) {
   if (major > 1) length |= (byte(10) << 16) | (byte(11) << 24);
   const std::size_t begin = major > 1 ? 12 : 10;
   if (length > bytes.size() - begin) throw InputError("truncated header");
-  NpyHeader header = HeaderParser(bytes.substr(begin, length)).parse();
+  NpyHeader header = HeaderParser(bytes.substr(begin, length), objects).parse();
   header.data_begin = begin + length;
   return header;
 }

@@ -8,7 +8,7 @@
 namespace duet {
 
 struct NpyType {
-  char kind = 'f';  // f, i, u, b, U, S
+  char kind = 'f';  // f, i, u, b, U, S; O where objects are asked for
   bool big_endian = false;
   std::size_t size = 8;  // of one value [bytes]
 };
@@ -23,7 +23,8 @@ struct NpyHeader {
 // "(240, 29)", "(3,)", "()".
 std::string shape_text(const std::vector<std::size_t>& shape);
 
-// Versions 1.0, 2.0, 3.0. Throws InputError saying what is wrong.
-NpyHeader parse_npy_header(std::string_view bytes);
+// Versions 1.0, 2.0, 3.0. Throws InputError saying what is wrong. An array of objects is refused unless asked for
+// (core/npy_objects.h).
+NpyHeader parse_npy_header(std::string_view bytes, bool objects = false);
 
 }  // namespace duet

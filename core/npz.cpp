@@ -1,16 +1,17 @@
-#include "core/npz.h"
+#include "duet/core/npz.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
-#include "core/file.h"
-#include "core/npy.h"
-#include "core/npy_header.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "core/zip.h"
+#include "duet/core/file.h"
+#include "duet/core/npy.h"
+#include "duet/core/npy_header.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/core/zip.h"
 
 namespace duet {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 constexpr std::string_view kSuffix = ".npy";
 constexpr std::size_t kShownKeys = 400;  // of all names together
 constexpr std::size_t kMaxArchiveBytes = std::size_t{1} << 30;
+constexpr ZipLimits kLimits{.entry_bytes = kMaxEntryBytes, .total_bytes = kMaxArchiveBytes};
 
 const char* type_name(const NpyArray& array) {
   constexpr const char* kNames[] = {"numbers", "integers", "strings"};
@@ -75,6 +77,12 @@ const std::vector<T>& typed(const Npz& npz, const std::string& key, const NpyArr
   return *values;
 }
 
+// By the type in the header, which is a dictionary of three keys at the start of the entry.
+bool holds_objects(std::string_view entry) {
+  constexpr std::size_t kHeader = 256;
+  return entry.substr(0, kHeader).find("'descr': '|O'") != std::string_view::npos;
+}
+
 // A scalar is stored as shape () or, by some writers, as (1,).
 std::vector<long> scalar_shape(const Npz& npz, const std::string& key) {
   const NpyArray& array = npz.array(key);
@@ -85,33 +93,55 @@ std::vector<long> scalar_shape(const Npz& npz, const std::string& key) {
 
 Npz Npz::load(const std::string& path) { return parse(read_file(path), path); }
 
-Npz Npz::parse(std::string_view bytes, const std::string& name) {
+Npz Npz::load(const std::string& path, const std::vector<std::string>& only) {
+  return parse(read_file(path), path, only);
+}
+
+void Npz::take(const std::string& entry, const std::string& content, std::size_t& held) {
+  if (!entry.ends_with(kSuffix) || entry.size() == kSuffix.size())
+    throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name_, shown(entry)));
+  const std::string key = entry.substr(0, entry.size() - kSuffix.size());
+  try {
+    const auto [added, is_new] = arrays_.emplace(key, parse_npy(content));
+    if (!is_new) throw InputError("stands in the archive twice");
+    held += bytes_of(added->second);
+  } catch (const InputError& error) {
+    refuse(*this, key, error.what());
+  }
+  // One byte in the file may become eight in memory, and a string of no characters 32.
+  if (held > kMaxArchiveBytes)
+    throw InputError(
+        fmt::format("'{}': expected arrays of at most {} bytes together, found more", name_, kMaxArchiveBytes));
+}
+
+Npz Npz::parse(std::string_view bytes, const std::string& name, ObjectArrays objects) {
   Npz npz;
   npz.name_ = name;
   std::size_t held = 0;
-  const ZipLimits limits{.entry_bytes = kMaxEntryBytes, .total_bytes = kMaxArchiveBytes};
-  read_zip(bytes, name, limits, [&](const std::string& entry, const std::string& content) {
-    if (!entry.ends_with(kSuffix) || entry.size() == kSuffix.size())
-      throw InputError(fmt::format("'{}': expected entries named '<key>.npy', found '{}'", name, shown(entry)));
-    const std::string key = entry.substr(0, entry.size() - kSuffix.size());
-    try {
-      const auto [added, is_new] = npz.arrays_.emplace(key, parse_npy(content));
-      if (!is_new) throw InputError("stands in the archive twice");
-      held += bytes_of(added->second);
-    } catch (const InputError& error) {
-      refuse(npz, key, error.what());
-    }
-    // One byte in the file may become eight in memory, and a string of no characters 32.
-    if (held > kMaxArchiveBytes)
-      throw InputError(
-          fmt::format("'{}': expected arrays of at most {} bytes together, found more", name, kMaxArchiveBytes));
+  read_zip(bytes, name, kLimits, [&](const std::string& entry, const std::string& content) {
+    if (objects == ObjectArrays::kRefused || !holds_objects(content)) npz.take(entry, content, held);
   });
+  return npz;
+}
+
+Npz Npz::parse(std::string_view bytes, const std::string& name, const std::vector<std::string>& only) {
+  Npz npz;
+  npz.name_ = name;
+  std::size_t held = 0;
+  const auto wanted = [&](const std::string& entry) {
+    const std::string key = entry.substr(0, entry.size() - std::min(entry.size(), kSuffix.size()));
+    const bool is_wanted = entry.ends_with(kSuffix) && std::find(only.begin(), only.end(), key) != only.end();
+    if (!is_wanted) npz.left_out_.push_back(key);
+    return is_wanted;
+  };
+  read_zip(bytes, name, kLimits, wanted,
+           [&](const std::string& entry, const std::string& content) { npz.take(entry, content, held); });
   return npz;
 }
 
 void Npz::save(const std::string& path) const { write_file(path, bytes()); }
 
-std::string Npz::bytes() const {
+std::string Npz::bytes(ZipMethod method) const {
   std::vector<ZipEntry> entries;
   for (const auto& [key, array] : arrays_) {
     try {
@@ -120,7 +150,7 @@ std::string Npz::bytes() const {
       refuse(*this, key, error.what());
     }
   }
-  return zip_bytes(entries);
+  return zip_bytes(entries, method);
 }
 
 std::vector<std::string> Npz::keys() const {
@@ -132,10 +162,11 @@ std::vector<std::string> Npz::keys() const {
 
 const NpyArray& Npz::array(const std::string& key) const {
   const auto found = arrays_.find(key);
-  if (found == arrays_.end())
-    throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key,
-                                 shown(fmt::format("{}", fmt::join(keys(), ", ")), kShownKeys)));
-  return found->second;
+  if (found != arrays_.end()) return found->second;
+  std::vector<std::string> names = keys();
+  names.insert(names.end(), left_out_.begin(), left_out_.end());
+  throw InputError(fmt::format("'{}': no array '{}'. It has: {}", name_, key,
+                               shown(fmt::format("{}", fmt::join(names, ", ")), kShownKeys)));
 }
 
 std::vector<double> Npz::numbers(const std::string& key, const std::vector<long>& shape) const {

@@ -7,20 +7,17 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
-#include "core/point_tracks.h"
+#include "duet/core/npy_array.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/zip.h"
 
 namespace duet {
 
-// Row-major values with a shape; an empty shape is a scalar. Read from: f4, f8 -> double; i1..i8, u1..u4, b1 -> int64;
-// U, S -> strings. Both byte orders and both memory orders are read; little-endian C order is written (<f8, <i8, <U).
-struct NpyArray {
-  using Values = std::variant<std::vector<double>, std::vector<std::int64_t>, std::vector<std::string>>;
-  std::vector<std::size_t> shape;
-  Values values;
-};
+// What becomes of arrays of Python objects: they refuse the archive, or are left out as if they were not in it (files
+// that keep `None` in one of their arrays). They are never read.
+enum class ObjectArrays { kRefused, kSkipped };
 
 class Npz {
  public:
@@ -28,10 +25,15 @@ class Npz {
   // executed), an unknown type, a size that does not match the shape, more than 1 GiB in one entry or in all arrays
   // together (two people and a robot at 120 Hz for an hour take half of it).
   static Npz load(const std::string& path);
-  static Npz parse(std::string_view bytes, const std::string& name);  // `name` stands in messages
+  // `name` stands in messages.
+  static Npz parse(std::string_view bytes, const std::string& name, ObjectArrays objects = ObjectArrays::kRefused);
+  // Only the arrays of these names (those that are there); the others are neither inflated nor judged, so that they may
+  // be of any type.
+  static Npz load(const std::string& path, const std::vector<std::string>& only);
+  static Npz parse(std::string_view bytes, const std::string& name, const std::vector<std::string>& only);
   // Atomic (core/file.h). Throws InputError.
   void save(const std::string& path) const;
-  [[nodiscard]] std::string bytes() const;
+  [[nodiscard]] std::string bytes(ZipMethod method = ZipMethod::kDeflated) const;
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool contains(const std::string& key) const { return arrays_.contains(key); }
@@ -58,7 +60,10 @@ class Npz {
   void set(const std::string& key, const PointTracks& tracks);
 
  private:
+  void take(const std::string& entry, const std::string& content, std::size_t& held);
+
   std::string name_ = "(new archive)";
+  std::vector<std::string> left_out_;  // keys that are in the file and were not asked for
   std::map<std::string, NpyArray> arrays_;
 };
 

@@ -1,12 +1,12 @@
-#include "core/outcome.h"
+#include "duet/core/outcome.h"
 
 #include <algorithm>
 #include <array>
 #include <string>
 #include <vector>
 
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -1,8 +1,8 @@
-#include "core/point_tracks.h"
+#include "duet/core/point_tracks.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

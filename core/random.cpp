@@ -1,12 +1,12 @@
-#include "core/random.h"
+#include "duet/core/random.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "core/digest.h"
-#include "core/require.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

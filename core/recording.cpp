@@ -1,13 +1,13 @@
-#include "core/recording.h"
+#include "duet/core/recording.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/npz.h"
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "core/text.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -191,7 +191,7 @@ void get_scalars(const Npz& npz, Recording& recording) {
     refuse(npz, fmt::format("expected schema '{}' version {}, found '{}' version {}", kSchema, kVersion,
                             npz.text("schema"), npz.integer("schema_version")));
   try {
-    recording.task = parse_task(npz.text("task"));
+    if (const std::string task = npz.text("task"); !task.empty()) recording.task = parse_task(task);
     recording.outcome = parse_outcome(npz.text("outcome"));
   } catch (const std::invalid_argument& error) {
     refuse(npz, error.what());
@@ -211,7 +211,7 @@ Npz recording_npz(const Recording& recording) {
   Npz npz;
   npz.set_text("schema", kSchema);
   npz.set_integer("schema_version", kVersion);
-  npz.set_text("task", std::string(to_string(recording.task)));
+  npz.set_text("task", recording.task ? std::string(to_string(*recording.task)) : "");
   npz.set_text("outcome", std::string(to_string(recording.outcome)));
   npz.set_text("message", recording.message);
   npz.set_number("rate_hz", recording.rate_hz);

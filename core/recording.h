@@ -2,14 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "core/contact.h"
-#include "core/outcome.h"
-#include "core/point_tracks.h"
-#include "core/robot_state.h"
-#include "core/task.h"
+#include "duet/core/contact.h"
+#include "duet/core/outcome.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/robot_state.h"
+#include "duet/core/task.h"
 
 namespace duet {
 
@@ -23,8 +24,8 @@ struct RecordedContact {
 // Frame t is the state at time t / rate_hz; its reference and q_target are those that led *to* the next frame; its
 // contacts are those of the last physics step before it. All vectors have T entries.
 struct Recording {
-  Task task = Task::kHug;
-  Phases phases;  // of these frames
+  std::optional<Task> task;  // none: nobody said what it is
+  Phases phases;             // of these frames
   double rate_hz = 50.0;
   std::vector<RobotState> robot;
   std::vector<Reference> reference;

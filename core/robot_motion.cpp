@@ -1,11 +1,11 @@
-#include "core/robot_motion.h"
+#include "duet/core/robot_motion.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

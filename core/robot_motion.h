@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/robot_state.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

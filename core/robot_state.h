@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "core/pose.h"
+#include "duet/core/pose.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "core/share.h"
+#include "duet/core/share.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,27 +6,43 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "core/require.h"
+#include "duet/core/require.h"
+
+// Defined by a program that was linked against an installed duet (cmake/duet_location.cpp.in), absent elsewhere.
+extern "C" const char* duet_installed_prefix() __attribute__((weak));
 
 namespace duet {
 
-std::string share_file(std::string_view what, std::string_view relative) {
-  namespace fs = std::filesystem;
-  std::vector<std::string> places;
-  if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0')
-    places.push_back((fs::path(share) / relative).string());
+namespace fs = std::filesystem;
+
+std::vector<std::string> installed_prefixes() {
+  std::vector<std::string> prefixes;
   std::error_code ignored;
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
-  if (!program.empty())
-    places.push_back((program.parent_path() / ".." / "share" / "duet" / relative).lexically_normal().string());
-  places.push_back((fs::path(DUET_SOURCE_DIR) / relative).string());
+  if (!program.empty()) prefixes.push_back((program.parent_path() / "..").lexically_normal().string());
+  if (duet_installed_prefix != nullptr) prefixes.emplace_back(duet_installed_prefix());
+  return prefixes;
+}
+
+std::vector<std::string> share_folders() {
+  std::vector<std::string> folders;
+  if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0') folders.emplace_back(share);
+  for (const std::string& prefix : installed_prefixes())
+    folders.push_back((fs::path(prefix) / "share" / "duet").string());
+  folders.emplace_back(DUET_SOURCE_DIR);
+  return folders;
+}
+
+std::string share_file(std::string_view what, std::string_view relative) {
+  std::vector<std::string> places;
+  for (const std::string& folder : share_folders()) places.push_back((fs::path(folder) / relative).string());
   return first_existing(what, places);
 }
 
 std::string first_existing(std::string_view what, const std::vector<std::string>& places) {
   std::error_code ignored;
   for (const std::string& place : places)
-    if (std::filesystem::exists(place, ignored)) return place;
+    if (fs::exists(place, ignored)) return place;
   throw MissingError(fmt::format("no {}: looked at {}", what, fmt::join(places, ", ")));
 }
 

@@ -1,4 +1,4 @@
-// Files that ship with duet: robot cards, engine profiles, limit tables.
+// Files that ship with duet: robot cards, engine profiles, limit tables; and where an installed duet keeps its own.
 #pragma once
 
 #include <string>
@@ -7,9 +7,17 @@
 
 namespace duet {
 
-// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in ../share/duet beside the program, else in the
-// source tree of the machine that built it. Throws MissingError naming `what` ("robot card") and the places looked at.
+// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in share/duet of one of `installed_prefixes`, else
+// in the source tree of the machine that built it. Throws MissingError naming `what` ("robot card") and the places
+// looked at.
 std::string share_file(std::string_view what, std::string_view relative);
+
+// The folders that may be the one into which duet was installed, in the order in which they are to be asked: the one
+// above the program's own (<prefix>/bin/duet), and that of the package that a program was built against
+// (find_package(duet) says it to the program).
+std::vector<std::string> installed_prefixes();
+// The folders that share_file looks in, in its order.
+std::vector<std::string> share_folders();
 
 // The first of `places` that exists; throws MissingError naming them all where none does.
 std::string first_existing(std::string_view what, const std::vector<std::string>& places);

@@ -1,4 +1,4 @@
-#include "core/text.h"
+#include "duet/core/text.h"
 
 #include <fmt/format.h>
 

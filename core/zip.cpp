@@ -1,12 +1,12 @@
-#include "core/zip.h"
+#include "duet/core/zip.h"
 
 #include <fmt/format.h>
 #include <zip.h>
 
 #include <memory>
 
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -75,29 +75,31 @@ struct Claim {
   std::size_t bytes;
 };
 
-Claim claim_of(zip_t* archive, zip_uint64_t index, const std::string& name, const ZipLimits& limits) {
+Claim claim_of(zip_t* archive, zip_uint64_t index, const std::string& name) {
   zip_stat_t status;
   if (zip_stat_index(archive, index, 0, &status) != 0) fail(name, zip_strerror(archive));
-  Claim claim{index, status.name == nullptr ? "" : status.name, (status.valid & ZIP_STAT_SIZE) != 0 ? status.size : 0};
-  if (claim.bytes > limits.entry_bytes)
-    fail(name, fmt::format("entry '{}': above {} bytes", shown(claim.entry), limits.entry_bytes));
-  return claim;
+  return {index, status.name == nullptr ? "" : status.name, (status.valid & ZIP_STAT_SIZE) != 0 ? status.size : 0};
 }
 
-std::vector<Claim> claims(zip_t* archive, const std::string& name, const ZipLimits& limits) {
+std::vector<Claim> claims(zip_t* archive, const std::string& name, const ZipLimits& limits,
+                          const std::function<bool(const std::string& entry)>& wanted) {
   const auto count = static_cast<zip_uint64_t>(zip_get_num_entries(archive, 0));
   if (count > limits.entries) fail(name, fmt::format("expected at most {} entries, found {}", limits.entries, count));
   std::vector<Claim> claims;
   std::size_t total = 0;
   for (zip_uint64_t index = 0; index < count; ++index) {
-    claims.push_back(claim_of(archive, index, name, limits));
+    Claim claim = claim_of(archive, index, name);
+    if (wanted && !wanted(claim.entry)) continue;
+    if (claim.bytes > limits.entry_bytes)
+      fail(name, fmt::format("entry '{}': above {} bytes", shown(claim.entry), limits.entry_bytes));
+    claims.push_back(std::move(claim));
     total += claims.back().bytes;  // no overflow: at most 10^4 entries, each below its limit
     if (total > limits.total_bytes) refuse_total(name, limits);
   }
   return claims;
 }
 
-void add_entry(zip_t* archive, const ZipEntry& entry) {
+void add_entry(zip_t* archive, const ZipEntry& entry, ZipMethod method) {
   const auto check = [&](bool ok) {
     if (!ok)
       throw InputError(fmt::format("cannot put '{}' in an archive: {}", shown(entry.name), zip_strerror(archive)));
@@ -110,7 +112,8 @@ void add_entry(zip_t* archive, const ZipEntry& entry) {
   constexpr zip_uint16_t kMidnight = 0, kFirstOfJanuary1980 = (1 << 5) | 1;
   const auto position = static_cast<zip_uint64_t>(index);
   check(zip_file_set_dostime(archive, position, kMidnight, kFirstOfJanuary1980, 0) == 0);
-  check(zip_set_file_compression(archive, position, ZIP_CM_DEFLATE, 0) == 0);
+  check(zip_set_file_compression(archive, position, method == ZipMethod::kStored ? ZIP_CM_STORE : ZIP_CM_DEFLATE, 0) ==
+        0);
 }
 
 std::string read_source(zip_source_t* source) {
@@ -128,10 +131,16 @@ std::string read_source(zip_source_t* source) {
 
 void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
               const std::function<void(const std::string& entry, const std::string& content)>& take) {
+  read_zip(bytes, name, limits, {}, take);
+}
+
+void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
+              const std::function<bool(const std::string& entry)>& wanted,
+              const std::function<void(const std::string& entry, const std::string& content)>& take) {
   if (bytes.empty()) fail(name, "empty, expected a zip archive");  // libzip takes it for an archive of nothing
   const Archive archive = open_archive(bytes, name);
   std::size_t total = 0;
-  for (const Claim& claim : claims(archive.get(), name, limits)) {
+  for (const Claim& claim : claims(archive.get(), name, limits, wanted)) {
     const std::string what = fmt::format("'{}': entry '{}'", name, shown(claim.entry));
     const std::string content = read_entry(archive.get(), claim.index, what, limits.entry_bytes);
     total += content.size();
@@ -140,7 +149,17 @@ void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& 
   }
 }
 
-std::string zip_bytes(const std::vector<ZipEntry>& entries) {
+std::vector<std::string> zip_entry_names(const std::string& path) {
+  int error = 0;
+  const Archive archive(zip_open(path.c_str(), ZIP_RDONLY, &error));
+  std::vector<std::string> names;
+  const zip_int64_t count = archive ? zip_get_num_entries(archive.get(), 0) : 0;
+  for (zip_int64_t index = 0; index < count; ++index)
+    if (const char* name = zip_get_name(archive.get(), static_cast<zip_uint64_t>(index), 0)) names.emplace_back(name);
+  return names;
+}
+
+std::string zip_bytes(const std::vector<ZipEntry>& entries, ZipMethod method) {
   if (entries.empty()) return std::string("PK\x05\x06", 4) + std::string(18, '\0');  // libzip makes no file of nothing
   Error error;
   Source target(zip_source_buffer_create(nullptr, 0, 0, &error.value));
@@ -151,7 +170,7 @@ std::string zip_bytes(const std::vector<ZipEntry>& entries) {
     zip_source_free(target.get());
     throw InputError(fmt::format("cannot make an archive: {}", zip_error_strerror(&error.value)));
   }
-  for (const ZipEntry& entry : entries) add_entry(archive.get(), entry);
+  for (const ZipEntry& entry : entries) add_entry(archive.get(), entry, method);
   if (zip_close(archive.get()) != 0)
     throw InputError(fmt::format("cannot make an archive: {}", zip_strerror(archive.get())));
   static_cast<void>(archive.release());  // NOLINT(bugprone-unused-return-value): closed, and freed by that

@@ -26,7 +26,18 @@ struct ZipLimits {
 void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
               const std::function<void(const std::string& entry, const std::string& content)>& take);
 
-// Deflated, in the order given, with the time stamp 1980-01-01: the same entries give the same bytes.
-std::string zip_bytes(const std::vector<ZipEntry>& entries);
+// The same for the entries that `wanted` says yes to; the others are neither inflated nor counted.
+void read_zip(std::string_view bytes, const std::string& name, const ZipLimits& limits,
+              const std::function<bool(const std::string& entry)>& wanted,
+              const std::function<void(const std::string& entry, const std::string& content)>& take);
+
+// The names of the entries of a file, from its directory alone: cheap. Nothing where it is no archive or not there.
+std::vector<std::string> zip_entry_names(const std::string& path);
+
+// Motions deflate to nine tenths of their size at a hundred times the cost of storing them.
+enum class ZipMethod { kDeflated, kStored };
+
+// In the order given, with the time stamp 1980-01-01: the same entries give the same bytes.
+std::string zip_bytes(const std::vector<ZipEntry>& entries, ZipMethod method = ZipMethod::kDeflated);
 
 }  // namespace duet

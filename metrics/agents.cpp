@@ -3,10 +3,10 @@
 
 #include <stdexcept>
 
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "metrics/detector.h"
-#include "robots/kinematics.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/metrics/detector.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {

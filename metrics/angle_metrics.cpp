@@ -2,26 +2,22 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <string_view>
 
-#include "core/require.h"
-#include "metrics/retargeting.h"
-#include "metrics/track_checks.h"
+#include "duet/core/require.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/metrics/track_checks.h"
 
 namespace duet {
 namespace {
 
-constexpr std::array<std::string_view, 7> kCompoundJoints = {
-    "left_hip_", "right_hip_", "waist_", "left_shoulder_", "right_shoulder_", "left_wrist_", "right_wrist_"};
-
-// Which compound joint a hinge belongs to, "" for one that stands alone.
-std::string_view compound_of(std::string_view joint) {
-  for (const std::string_view prefix : kCompoundJoints)
-    if (joint.substr(0, prefix.size()) == prefix) return prefix;
-  return "";
+// Which of the card's compound joints each hinge belongs to, -1 for one that stands alone.
+std::vector<int> compound_of_hinges(const RobotModel& robot) {
+  std::vector<int> compound(robot.joints.size(), -1);
+  for (size_t group = 0; group < robot.roles.compound.size(); ++group)
+    for (const int joint : robot.roles.compound[group]) compound[joint] = static_cast<int>(group);
+  return compound;
 }
 
 void check_group(const HingeGroup& group, size_t index, Eigen::Index joints) {
@@ -109,11 +105,10 @@ std::vector<HingeGroup> hinge_groups(const RobotModel& robot) {
   std::vector<HingeGroup> groups;
   std::vector<Eigen::Quaterniond> to_group(robot.links.size());  // rotation of a link at q = 0 in its group's frame
   std::vector<size_t> group_of(robot.links.size());
+  const std::vector<int> compound = compound_of_hinges(robot);
   for (size_t i = 1; i < robot.links.size(); ++i) {
     const RobotLink& link = robot.links[i];
-    const std::string_view compound = compound_of(robot.joints[i - 1].name);
-    const bool continues = link.parent > 0 && !compound.empty() &&
-                           compound == compound_of(robot.joints[static_cast<size_t>(link.parent) - 1].name);
+    const bool continues = link.parent > 0 && compound[i - 1] >= 0 && compound[i - 1] == compound[link.parent - 1];
     if (!continues) groups.emplace_back();
     group_of[i] = continues ? group_of[static_cast<size_t>(link.parent)] : groups.size() - 1;
     to_group[i] = continues ? to_group[static_cast<size_t>(link.parent)] * link.X_PL.R : link.X_PL.R;

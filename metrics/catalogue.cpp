@@ -1,11 +1,11 @@
-#include "metrics/catalogue.h"
+#include "duet/metrics/catalogue.h"
 
 #include <array>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "core/names.h"
+#include "duet/core/names.h"
 
 namespace duet {
 namespace {
@@ -15,11 +15,14 @@ constexpr auto kUp = Direction::kHigher;
 constexpr auto kPlain = Direction::kNone;
 constexpr auto kRetarget = MetricGroup::kRetargeting;
 constexpr auto kOther = MetricGroup::kOtherReading;
+constexpr auto kStanding = MetricGroup::kGrounding;
 constexpr auto kControl = MetricGroup::kController;
 constexpr auto kEpisode = MetricGroup::kEpisode;
 constexpr std::string_view kC21 = "supplement C.2.1";
 constexpr std::string_view kS4 = "supplement A.4.6, Table S4";
+constexpr std::string_view kGround = "duet: how a retargeted motion stands (metrics/grounding.h)";
 constexpr std::string_view kDetectors = "supplement C.3.1, Algorithms 1-6";
+constexpr std::string_view kWalking = "duet: walking by command (metrics/locomotion.h)";
 constexpr std::string_view kSafety = "duet: contact safety";
 constexpr std::string_view kLimits =
     "duet: contact safety, table in the form of ISO/TS 15066, unverified unless it names who checked it";
@@ -47,10 +50,26 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"jpe.pelvis", "m", kDown, kOther, "Joint position error, pelvis-aligned", kC21},
     {"large_angle_ratio.entry", "1", kDown, kOther, "Large-angle ratio, per joint", kC21},
 
+    {"sole_height", "m", kDown, kStanding, "Soles off the floor while standing, median", kGround},
+    {"sole_height_max", "m", kDown, kStanding, "Soles off the floor while standing, largest", kGround},
+    {"foot_skate", "m/s", kDown, kStanding, "Skate of the soles in stance, mean", kGround},
+    {"foot_skate_max", "m/s", kDown, kStanding, "Skate of the soles in stance, 99th percentile", kGround},
+    {"penetration", "m", kDown, kStanding, "Robot in the partner, mean depth", kGround},
+    {"penetration_max", "m", kDown, kStanding, "Robot in the partner, deepest", kGround},
+    {"self_penetration_max", "m", kDown, kStanding, "Robot in itself, deepest", kGround},
+    {"bone_change_max", "m", kDown, kStanding, "Partner's arm bones change, most", kGround},
+    {"joint_speed_max", "rad/s", kDown, kStanding, "Joint speed, peak", kGround},
+    {"joint_acceleration_max", "rad/s^2", kDown, kStanding, "Joint acceleration, peak", kGround},
+    {"limit_violations", "1", kDown, kStanding, "Joint limits violated", kGround},
+    {"root_roll_max", "rad", kDown, kStanding, "Roll of the base, peak", kGround},
+    {"root_tilt_max", "rad", kDown, kStanding, "Tilt of the base, peak", kGround},
+
     {"hf_ratio", "1", kDown, kControl, "Joint-velocity energy above 5 Hz", kS4},
     {"dof_jerk", "rad/s^3", kDown, kControl, "Joint jerk", kS4},
     {"root_jerk", "m/s^3", kDown, kControl, "Root jerk", kS4},
     {"root_error", "m", kDown, kControl, "Root position error", kS4},
+    {"root_error.horizontal", "m", kDown, kControl, "Root position error along the floor", "duet: a part of e_root"},
+    {"root_error.vertical", "m", kDown, kControl, "Root position error in height", "duet: a part of e_root"},
     {"root_angle_error", "deg", kDown, kControl, "Root orientation error", kS4},
     {"dof_error", "rad", kDown, kControl, "Joint position tracking error", kS4},
     {"dof_velocity_error", "rad/s", kDown, kControl, "Joint velocity tracking error", kS4},
@@ -70,6 +89,17 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"late_plans", "1", kDown, kEpisode, "Ticks without a plan in time", "supplement F"},
     {"onset_s", "s", kPlain, kEpisode, "Onset of the robot's act", "duet: onset"},
     {"partner_onset_s", "s", kPlain, kEpisode, "Onset of the partner's act", "duet: onset"},
+    {"speed_forward", "m/s", kPlain, kEpisode, "Mean speed forward, in the heading", kWalking},
+    {"speed_sideways", "m/s", kPlain, kEpisode, "Mean speed to the left, in the heading", kWalking},
+    {"turn_rate", "rad/s", kPlain, kEpisode, "Mean yaw rate", kWalking},
+    {"drift", "m", kPlain, kEpisode, "Distance of the root's end from its start", kWalking},
+    {"swing_height", "m", kPlain, kEpisode, "Mean height of swings of a foot", kWalking},
+    {"closest_feet", "m", kUp, kEpisode, "Least distance of the feet over the ground", kWalking},
+    {"upper_body_error", "rad", kDown, kEpisode, "Upper body's joint position error", kWalking},
+    {"upper_body_rate_error", "rad/s", kDown, kEpisode, "Upper body's joint velocity error", kWalking},
+    {"command_forward", "m/s", kPlain, kEpisode, "Commanded speed forward", kWalking},
+    {"command_sideways", "m/s", kPlain, kEpisode, "Commanded speed to the left", kWalking},
+    {"command_turn", "rad/s", kPlain, kEpisode, "Commanded yaw rate", kWalking},
     {"frames", "1", kPlain, kEpisode, "Frames", "duet: episode"},
     {"sim_s", "s", kPlain, kEpisode, "Simulated time", "duet: episode"},
     {"wall_s", "s", kPlain, kEpisode, "Wall time", "duet: episode"},

@@ -10,7 +10,8 @@ namespace duet {
 
 enum class Direction { kLower, kHigher, kNone };
 // kOtherReading: of retargeting, under another reading than the default, printed beside it.
-enum class MetricGroup { kRetargeting, kOtherReading, kController, kEpisode };
+// kGrounding: how a retargeted motion stands (metrics/grounding.h).
+enum class MetricGroup { kRetargeting, kOtherReading, kGrounding, kController, kEpisode };
 
 struct MetricInfo {
   std::string_view name;  // "jpe", "contact_f1_0.35", "hf_ratio", ...

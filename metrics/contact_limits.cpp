@@ -1,4 +1,4 @@
-#include "metrics/contact_limits.h"
+#include "duet/metrics/contact_limits.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,10 +6,10 @@
 #include <cmath>
 #include <utility>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "robots/yaml_section.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {

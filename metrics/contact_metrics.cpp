@@ -7,10 +7,10 @@
 #include <limits>
 #include <vector>
 
-#include "core/require.h"
-#include "metrics/frame_windows.h"
-#include "metrics/retargeting.h"
-#include "metrics/track_checks.h"
+#include "duet/core/require.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/metrics/track_checks.h"
+#include "duet/tasks/frame_windows.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "metrics/contact_safety.h"
+#include "duet/metrics/contact_safety.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <tuple>
 #include <utility>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

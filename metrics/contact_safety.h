@@ -16,11 +16,11 @@
 #include <string_view>
 #include <vector>
 
-#include "core/contact.h"
-#include "metrics/contact_limits.h"
-#include "metrics/sliding_window.h"
-#include "robots/human_body.h"
-#include "robots/robot_model.h"
+#include "duet/core/contact.h"
+#include "duet/metrics/contact_limits.h"
+#include "duet/metrics/sliding_window.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

@@ -1,7 +1,7 @@
 // Contact safety as names and numbers for rows, and as text.
 #include <fmt/format.h>
 
-#include "metrics/contact_safety.h"
+#include "duet/metrics/contact_safety.h"
 
 namespace duet {
 

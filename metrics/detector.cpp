@@ -1,62 +1,17 @@
-#include "metrics/detector.h"
+#include "duet/metrics/detector.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <stdexcept>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "metrics/detector_catalogue.h"
-#include "metrics/task_detectors.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
 
-struct NamedTrack {
-  const char* name;
-  const Eigen::Matrix3Xd* track;
-};
-
-// A direction towards the partner is taken from his root, without one from the performer's shoulders.
-void add_direction(const Agent& performer, const Agent& partner, std::vector<NamedTrack>& tracks) {
-  if (partner.root.cols() > 0) {
-    tracks.push_back({"partner.root", &partner.root});
-  } else {
-    tracks.push_back({"performer.lshoulder", &performer.lshoulder});
-    tracks.push_back({"performer.rshoulder", &performer.rshoulder});
-  }
-}
-
-// The tracks that a task looks at under these readings.
-std::vector<NamedTrack> needed_tracks(Task task, const Agent& performer, const Agent& partner,
-                                      const DetectorReadings& readings) {
-  std::vector<NamedTrack> tracks;
-  if (task != Task::kBend) tracks = {{"performer.lhand", &performer.lhand}, {"performer.rhand", &performer.rhand}};
-  if (task == Task::kBend || task == Task::kFlyKiss) tracks.push_back({"performer.head", &performer.head});
-  if (task != Task::kHug) tracks.push_back({"performer.root", &performer.root});
-
-  if (task == Task::kHug) {
-    tracks.push_back({"partner.torso", &partner.torso});
-    if (readings.hug_shoulder == HugShoulder::kBothHands || readings.hug_shoulder == HugShoulder::kAnyHand) {
-      tracks.push_back({"partner.lshoulder", &partner.lshoulder});
-      tracks.push_back({"partner.rshoulder", &partner.rshoulder});
-    }
-  }
-  if (task == Task::kHandshake || task == Task::kHighFive) {
-    tracks.push_back({"partner.lhand", &partner.lhand});
-    tracks.push_back({"partner.rhand", &partner.rhand});
-  }
-  if (task == Task::kFlyKiss ||
-      (task == Task::kHandshake && readings.handshake_distance == HandshakeDistance::kAgentRoots))
-    tracks.push_back({"partner.root", &partner.root});
-  if ((task == Task::kWave && readings.wave_plane == WavePlane::kLateralUp) ||
-      (task == Task::kBend && readings.bend_direction == BendDirection::kForward))
-    add_direction(performer, partner, tracks);
-  return tracks;
-}
-
-void check_tracks(Task task, const std::vector<NamedTrack>& tracks) {
+void check_tracks(Task task, const Tracks& tracks) {
   const Eigen::Index frames = tracks.front().track->cols();
   for (const auto& [name, track] : tracks) {
     require(track->cols() > 0, fmt::format("{} detector: the track {} is needed and empty", to_string(task), name));
@@ -92,37 +47,16 @@ std::string_view to_string(ThresholdSet set) { return set == ThresholdSet::kPape
 
 Thresholds thresholds(Task task, ThresholdSet set) {
   Thresholds tau;
-  for (const ThresholdInfo& info : threshold_catalogue())
-    if (info.task == task) tau[std::string(info.name)] = set == ThresholdSet::kStrict ? info.strict : info.paper;
-  require(!tau.empty(), "thresholds: not a task");
+  for (const ThresholdInfo& info : definition_of(task).detector.thresholds)
+    tau[std::string(info.name)] = set == ThresholdSet::kStrict ? info.strict : info.paper;
   return tau;
-}
-
-DetectorReadings strict_readings(DetectorReadings readings) {
-  readings.bend_direction = BendDirection::kForward;
-  readings.fly_kiss_order = FlyKissOrder::kAfterClosest;
-  return readings;
 }
 
 DetectorResult detect_performer(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds,
                                 const DetectorReadings& readings) {
-  check_tracks(task, needed_tracks(task, performer, partner, readings));
-  const Thresholds tau = completed(task, thresholds);
-  switch (task) {
-    case Task::kHug:
-      return detect_hug(performer, partner, tau, readings);
-    case Task::kHandshake:
-      return detect_handshake(performer, partner, tau, readings);
-    case Task::kHighFive:
-      return detect_high_five(performer, partner, tau, readings);
-    case Task::kWave:
-      return detect_wave(performer, partner, tau, readings);
-    case Task::kBend:
-      return detect_bend(performer, partner, tau, readings);
-    case Task::kFlyKiss:
-      return detect_fly_kiss(performer, partner, tau, readings);
-  }
-  throw std::invalid_argument("detector: not a task");
+  const TaskDetector& detector = definition_of(task).detector;
+  check_tracks(task, detector.tracks(performer, partner, readings));
+  return detector.detect(performer, partner, completed(task, thresholds), readings);
 }
 
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version, ThresholdSet set,

@@ -1,4 +1,4 @@
-#include "metrics/diagnostics.h"
+#include "duet/metrics/diagnostics.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "core/require.h"
-#include "metrics/differences.h"
-#include "metrics/spectrum.h"
-#include "metrics/track_checks.h"
+#include "duet/core/require.h"
+#include "duet/metrics/differences.h"
+#include "duet/metrics/spectrum.h"
+#include "duet/metrics/track_checks.h"
 
 namespace duet {
 namespace {
@@ -166,11 +166,17 @@ RootError root_error(const std::vector<Pose>& X_WB, const std::vector<Pose>& ref
   check_poses(reference, "reference");
   RootError sum;
   for (size_t t = 0; t < X_WB.size(); ++t) {
-    sum.position += (X_WB[t].p - reference[t].p).norm();
+    const Eigen::Vector3d off = X_WB[t].p - reference[t].p;
+    sum.position += off.norm();
+    sum.horizontal += off.head<2>().norm();
+    sum.vertical += std::abs(off.z());
     sum.angle_deg += angle_between(X_WB[t].R, reference[t].R);
   }
   const auto frames = static_cast<double>(X_WB.size());
-  return {sum.position / frames, sum.angle_deg / frames * 180.0 / std::numbers::pi};
+  return {.position = sum.position / frames,
+          .horizontal = sum.horizontal / frames,
+          .vertical = sum.vertical / frames,
+          .angle_deg = sum.angle_deg / frames * 180.0 / std::numbers::pi};
 }
 
 DofError dof_error(const Eigen::MatrixXd& q, const Eigen::MatrixXd& q_ref, const Eigen::MatrixXd& v,
@@ -202,6 +208,12 @@ std::map<std::string, double> controller_diagnostics(const Recording& recording,
           {"hf_ratio_reference", hf_ratio(t.q_ref, rate_hz, readings, t.v_ref)},
           {"dof_jerk_reference", dof_jerk(t.q_ref, rate_hz, readings)},
           {"root_jerk_reference", root_jerk(t.root_ref, rate_hz, readings)}};
+}
+
+std::map<std::string, double> root_error_parts(const Recording& recording) {
+  const Tracking t = tracking_of(recording);
+  const RootError root = root_error(t.X_WB, t.X_WB_ref);
+  return {{"root_error.horizontal", root.horizontal}, {"root_error.vertical", root.vertical}};
 }
 
 }  // namespace duet

@@ -4,8 +4,8 @@
 #include <map>
 #include <string>
 
-#include "core/recording.h"
-#include "metrics/readings.h"
+#include "duet/core/recording.h"
+#include "duet/metrics/readings.h"
 
 namespace duet {
 
@@ -16,7 +16,9 @@ double dof_jerk(const Eigen::MatrixXd& q, double rate_hz = 50.0, const Diagnosti
 double root_jerk(const Eigen::Matrix3Xd& p, double rate_hz = 50.0, const DiagnosticReadings& readings = {});  // [m/s^3]
 
 struct RootError {
-  double position = 0.0;  // [m]
+  double position = 0.0;    // e_root [m]
+  double horizontal = 0.0;  // of it along the floor, and its size along z: a reference that floats has the second [m]
+  double vertical = 0.0;
   double angle_deg = 0.0;
 };
 RootError root_error(const std::vector<Pose>& X_WB, const std::vector<Pose>& reference);
@@ -33,5 +35,7 @@ DofError dof_error(const Eigen::MatrixXd& q, const Eigen::MatrixXd& q_ref, const
 // (before the controller). Joint velocity of the reference by central differences. Needs 4 frames or more.
 std::map<std::string, double> controller_diagnostics(const Recording& recording,
                                                      const DiagnosticReadings& readings = {});
+// e_root's parts, "root_error.horizontal" and "root_error.vertical": printed beside it; rows do not have them.
+std::map<std::string, double> root_error_parts(const Recording& recording);
 
 }  // namespace duet

@@ -1,10 +1,10 @@
-#include "metrics/differences.h"
+#include "duet/metrics/differences.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "metrics/readings.h"
+#include "duet/metrics/readings.h"
 
 namespace duet {
 

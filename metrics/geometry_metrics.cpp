@@ -1,8 +1,8 @@
 // JPE and AWD: how far the robot's geometry is from the source's.
 #include <cmath>
 
-#include "metrics/retargeting.h"
-#include "metrics/track_checks.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/metrics/track_checks.h"
 
 namespace duet {
 namespace {

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
-#include "core/require.h"
-#include "metrics/differences.h"
-#include "metrics/retargeting.h"
-#include "metrics/track_checks.h"
+#include "duet/core/require.h"
+#include "duet/metrics/differences.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/metrics/track_checks.h"
 
 namespace duet {
 

@@ -1,11 +1,11 @@
-#include "metrics/onset.h"
+#include "duet/metrics/onset.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "core/skeleton.h"
-#include "robots/kinematics.h"
+#include "duet/core/skeleton.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {

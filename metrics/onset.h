@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/recording.h"
-#include "robots/robot_model.h"
+#include "duet/core/recording.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

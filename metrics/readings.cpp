@@ -1,4 +1,4 @@
-#include "metrics/readings.h"
+#include "duet/metrics/readings.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,9 @@
 #include <string_view>
 #include <type_traits>
 
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 namespace {
@@ -145,6 +146,12 @@ std::vector<std::string> reading_names() {
 std::vector<std::string> reading_values(const std::string& option) {
   const Option& found = find_option(option);
   return found.values.empty() ? std::vector<std::string>{reading(Readings{}, option)} : split(found.values);
+}
+
+DetectorReadings strict_readings(DetectorReadings readings) {
+  for (const Task task : all_tasks())
+    if (const auto read_strictly = definition_of(task).detector.read_strictly) read_strictly(readings);
+  return readings;
 }
 
 }  // namespace duet

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "duet/tasks/detector_readings.h"
+
 namespace duet {
 
 enum class JpeFrame { kWorld, kPelvis };
@@ -33,44 +35,6 @@ struct MetricReadings {
   AngleStd angle_std = AngleStd::kPooled;
   int ddof = 0;
   JerkScheme jerk_scheme = JerkScheme::kDiff;
-};
-
-enum class HugSingle { kAnyHand, kSameHand, kExactlyOne, kOff };
-enum class HugShoulder { kBothHands, kAnyHand, kTorsoBoth, kTorsoAny, kOff };
-enum class HandshakeDistance { kHandToRoot, kAgentRoots };
-enum class HandshakeActive { kPerformerHand, kPartnerHand };
-enum class HandshakeStability { kWhole, kRollingAll, kRollingAny };
-enum class StabilityFrames { kRaw, kValidated };
-enum class HighFiveHeight { kClosestPair, kPerformerClosest, kPartnerClosest, kAnyHand, kPerformerAny, kOff };
-enum class WavePlane { kXy, kLateralUp, kPca };
-enum class WaveDisplacement { kStep, kBothSteps, kSinceLast, kNone };
-enum class WaveAmplitude { kMaxAxis, kDiagonal, kDiameter, kHorizontal };
-enum class WaveHeight { kAnyHandMax, kActiveMax, kActiveMean, kActiveMedian };
-enum class MotionFrame { kWorld, kRoot };
-enum class BendFrames { kCount, kConsecutive };
-enum class BendDirection { kAny, kForward };
-enum class FlyKissOrder { kWhole, kAfterClosest, kAfterFirstClose };
-enum class FlyKissDirection { kSpace, kHorizontal };
-
-struct DetectorReadings {
-  HugSingle hug_single = HugSingle::kAnyHand;
-  HugShoulder hug_shoulder = HugShoulder::kBothHands;
-  HandshakeDistance handshake_distance = HandshakeDistance::kHandToRoot;
-  HandshakeActive handshake_active = HandshakeActive::kPerformerHand;
-  HandshakeStability handshake_stability = HandshakeStability::kWhole;
-  StabilityFrames handshake_stability_frames = StabilityFrames::kRaw;
-  int handshake_ddof = 0;
-  HighFiveHeight high_five_height = HighFiveHeight::kClosestPair;
-  WavePlane wave_plane = WavePlane::kXy;
-  WaveDisplacement wave_displacement = WaveDisplacement::kStep;
-  WaveAmplitude wave_amplitude = WaveAmplitude::kMaxAxis;
-  WaveHeight wave_height = WaveHeight::kAnyHandMax;
-  MotionFrame wave_frame = MotionFrame::kWorld;
-  BendFrames bend_frames = BendFrames::kCount;
-  BendDirection bend_direction = BendDirection::kAny;
-  FlyKissOrder fly_kiss_order = FlyKissOrder::kWhole;
-  FlyKissDirection fly_kiss_dir = FlyKissDirection::kSpace;
-  MotionFrame fly_kiss_frame = MotionFrame::kWorld;
 };
 
 enum class VelocitySource { kDiff, kGradient, kGiven };
@@ -107,5 +71,8 @@ void set_reading(Readings& readings, const std::string& option, const std::strin
 std::string reading(const Readings& readings, const std::string& option);
 std::vector<std::string> reading_names();                            // every "family.option"
 std::vector<std::string> reading_values(const std::string& option);  // default first
+
+// Readings as the strict set of thresholds wants them (bend forward, fly-kiss after_closest), others as given.
+DetectorReadings strict_readings(DetectorReadings readings);
 
 }  // namespace duet

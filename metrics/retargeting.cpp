@@ -1,11 +1,12 @@
-#include "metrics/retargeting.h"
+#include "duet/metrics/retargeting.h"
 
 #include <fmt/format.h>
 
 #include <limits>
 
-#include "core/require.h"
-#include "robots/kinematics.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -47,7 +48,8 @@ ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) 
     robot_points.push_back(pairs + static_cast<int>(k));
     frames.push_back(robot.keypoints[k].frame);
     human_points.push_back(robot.keypoints[k].smpl);
-    if (robot.keypoints[k].name.find("hand") == std::string::npos) tracks.awd_points.push_back(static_cast<int>(k));
+    if (const int smpl = robot.keypoints[k].smpl; smpl != kLeftHand && smpl != kRightHand)
+      tracks.awd_points.push_back(static_cast<int>(k));
   }
   tracks.hands = {robot.keypoint_index("left_hand"), robot.keypoint_index("right_hand")};
   const PointTracks points = frame_tracks(robot, motion.robot, frames);

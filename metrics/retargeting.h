@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "metrics/readings.h"
-#include "motion/paired_motion.h"
-#include "robots/robot_model.h"
+#include "duet/core/point_tracks.h"
+#include "duet/metrics/readings.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

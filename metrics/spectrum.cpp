@@ -1,4 +1,4 @@
-#include "metrics/spectrum.h"
+#include "duet/metrics/spectrum.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

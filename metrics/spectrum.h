@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "metrics/readings.h"
+#include "duet/metrics/readings.h"
 
 namespace duet {
 

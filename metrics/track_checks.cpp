@@ -1,8 +1,8 @@
-#include "metrics/track_checks.h"
+#include "duet/metrics/track_checks.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "core/point_tracks.h"
+#include "duet/core/point_tracks.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "motion/bvh.h"
+#include "duet/motion/bvh.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

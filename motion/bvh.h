@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "motion/interaction_clip.h"
+#include "duet/motion/interaction_clip.h"
 
 namespace duet {
 

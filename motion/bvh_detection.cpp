@@ -1,4 +1,4 @@
-#include "motion/bvh_detection.h"
+#include "duet/motion/bvh_detection.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 
-#include "core/require.h"
-#include "motion/bvh_kinematics.h"
-#include "motion/plausibility.h"
+#include "duet/core/require.h"
+#include "duet/motion/bvh_kinematics.h"
+#include "duet/motion/plausibility.h"
 
 namespace duet {
 namespace {

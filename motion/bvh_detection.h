@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "motion/bvh_skeleton.h"
+#include "duet/motion/bvh_skeleton.h"
 
 namespace duet {
 

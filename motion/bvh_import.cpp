@@ -4,12 +4,12 @@
 #include <filesystem>
 #include <numbers>
 
-#include "core/require.h"
-#include "motion/bvh.h"
-#include "motion/bvh_detection.h"
-#include "motion/bvh_kinematics.h"
-#include "motion/phase_proposal.h"
-#include "motion/plausibility.h"
+#include "duet/core/require.h"
+#include "duet/motion/bvh.h"
+#include "duet/motion/bvh_detection.h"
+#include "duet/motion/bvh_kinematics.h"
+#include "duet/motion/phase_proposal.h"
+#include "duet/motion/plausibility.h"
 
 namespace duet {
 namespace {
@@ -22,6 +22,8 @@ struct Conversion {
   double output_rate_hz = 0.0;
   int output_frames = 0;
 };
+
+std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 void check_same_clock(const Bvh& a, const Bvh& b) {
   if (a.frames != b.frames)
@@ -85,9 +87,9 @@ Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& option
   const int frames = a.bvh.frames - first;
   if (frames < 2)
     throw InputError(fmt::format("'{}': expected at least 2 frames of motion, found {}", a.bvh.name, frames));
-  verdict = {
-      fmt::format("joint names: {} ('{}'), {} ('{}')", a.skeleton.naming, a.bvh.name, b.skeleton.naming, b.bvh.name),
-      up.sentence, t_pose.sentence, rate.sentence, unit.sentence};
+  verdict = {fmt::format("joint names: {} ('{}'), {} ('{}')", a.skeleton.naming, file_name(a.bvh.name),
+                         b.skeleton.naming, file_name(b.bvh.name)),
+             up.sentence, t_pose.sentence, rate.sentence, unit.sentence};
   const Eigen::Quaterniond R_WF(
       Eigen::AngleAxisd(up.value == UpAxis::kY ? 0.5 * std::numbers::pi : 0.0, Eigen::Vector3d::UnitX()));
   Conversion to{.R_WF = R_WF,
@@ -105,7 +107,6 @@ Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& option
 }
 
 std::string stem(const std::string& path) { return std::filesystem::path(path).stem().string(); }
-std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-#include "motion/bvh_kinematics.h"
+#include "duet/motion/bvh_kinematics.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "core/pose.h"
-#include "motion/bvh.h"
+#include "duet/core/pose.h"
+#include "duet/motion/bvh.h"
 
 namespace duet {
 

@@ -1,14 +1,14 @@
-// Where the 24 SMPL joints are in a BVH skeleton: CMU's joint names, or the common ones (Mixamo, LAFAN1, OptiTrack).
-// The choice of points is written down in docs/conventions.md. Thread-safe.
+// Where the 24 SMPL joints are in a BVH skeleton: CMU's joint names, Xsens's, SOMA's, or the common ones (Mixamo,
+// LAFAN1, OptiTrack, Nokov). The choice of points is written down in docs/conventions.md. Thread-safe.
 #pragma once
 
 #include <array>
 #include <string>
 #include <vector>
 
-#include "core/pose.h"
-#include "core/skeleton.h"
-#include "motion/bvh.h"
+#include "duet/core/pose.h"
+#include "duet/core/skeleton.h"
+#include "duet/motion/bvh.h"
 
 namespace duet {
 
@@ -21,7 +21,7 @@ struct BvhPoint {
 };
 
 struct BvhSkeleton {
-  std::string naming;  // "CMU" or "common"
+  std::string naming;  // "common", "CMU", "Xsens", "SOMA"
   std::array<BvhPoint, kSmplJoints> points;
 };
 

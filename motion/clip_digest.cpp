@@ -1,9 +1,9 @@
-#include "motion/clip_digest.h"
+#include "duet/motion/clip_digest.h"
 
 #include <cmath>
 #include <cstdint>
 
-#include "core/digest.h"
+#include "duet/core/digest.h"
 
 namespace duet {
 namespace {

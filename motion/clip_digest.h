@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "motion/paired_motion.h"
+#include "duet/motion/paired_motion.h"
 
 namespace duet {
 

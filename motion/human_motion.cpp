@@ -1,11 +1,11 @@
-#include "motion/human_motion.h"
+#include "duet/motion/human_motion.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -56,18 +56,6 @@ void check_rotations(const HumanMotion& motion, const std::string& what) {
   }
 }
 
-struct Instant {
-  int frame = 0;      // of the source, at or before
-  double part = 0.0;  // of the way to the next frame, [0, 1)
-};
-
-Instant instant(double index, int frames) {
-  const double nearest = std::round(index);
-  if (std::abs(index - nearest) <= kSameInstant * std::max(1.0, nearest)) return {static_cast<int>(nearest), 0.0};
-  const int frame = std::min(static_cast<int>(index), frames - 2);
-  return {frame, index - frame};
-}
-
 }  // namespace
 
 void validate(const HumanMotion& motion, const std::string& what) {
@@ -110,7 +98,7 @@ HumanMotion resample(const HumanMotion& motion, double rate_hz) {
   HumanMotion result{.rate_hz = rate_hz, .joints = PointTracks(frames, points), .rotations = {}};
   result.rotations.reserve(motion.rotations.empty() ? 0 : static_cast<std::size_t>(frames) * points);
   for (int t = 0; t < frames; ++t) {
-    const Instant at = instant(t * (motion.rate_hz / rate_hz), motion.frames());
+    const FrameBetween at = frame_between(t * (motion.rate_hz / rate_hz), motion.frames());
     const int next = at.part > 0.0 ? at.frame + 1 : at.frame;
     const PointTracks::ConstFrame before = motion.joints.frame(at.frame);
     result.joints.frame(t) = before;
@@ -122,6 +110,13 @@ HumanMotion resample(const HumanMotion& motion, double rate_hz) {
     }
   }
   return result;
+}
+
+FrameBetween frame_between(double index, int frames) {
+  const double nearest = std::round(index);
+  if (std::abs(index - nearest) <= kSameInstant * std::max(1.0, nearest)) return {static_cast<int>(nearest), 0.0};
+  const int frame = std::min(static_cast<int>(index), frames - 2);
+  return {frame, index - frame};
 }
 
 int resampled_frames(int frames, double rate_hz, double new_rate_hz) {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "core/skeleton.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 
@@ -39,6 +39,13 @@ HumanMotion resample(const HumanMotion& motion, double rate_hz);
 
 // How many frames resample gives for `frames` at `rate_hz` (both positive).
 int resampled_frames(int frames, double rate_hz, double new_rate_hz);
+
+// Where an instant lies between the frames of a motion; `index` counts its frames.
+struct FrameBetween {
+  int frame = 0;      // at or before
+  double part = 0.0;  // of the way to the next frame, [0, 1); 0 where the instant is a frame's (to 1e-9 of a period)
+};
+FrameBetween frame_between(double index, int frames);
 
 // Frames [begin, end).
 HumanMotion slice(const HumanMotion& motion, int begin, int end);

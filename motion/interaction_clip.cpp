@@ -1,11 +1,14 @@
-#include "motion/interaction_clip.h"
+#include "duet/motion/interaction_clip.h"
 
 #include <fmt/format.h>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "motion/npz_fields.h"
-#include "motion/phase_proposal.h"
+#include <algorithm>
+#include <cmath>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/npz_fields.h"
+#include "duet/motion/phase_proposal.h"
 
 namespace duet {
 namespace {
@@ -114,7 +117,7 @@ InteractionClip read_clip(const Npz& npz) {
   return clip;
 }
 
-std::string clip_bytes(const InteractionClip& clip) {
+std::string clip_bytes(const InteractionClip& clip, ZipMethod method) {
   validate(clip);
   Npz npz;
   put_schema(npz, kSchema, kSchemaVersion);
@@ -125,7 +128,7 @@ std::string clip_bytes(const InteractionClip& clip) {
   put_motion(npz, "b", clip.b);
   put_contacts(npz, clip.contacts);
   put_texts(npz, "source", clip.source);
-  return npz.bytes();
+  return npz.bytes(method);
 }
 
 InteractionClip parse_clip(std::string_view bytes, const std::string& name) {
@@ -145,6 +148,43 @@ void set_reactor(InteractionClip& clip, Person reactor) {
     clip.id += after;
   }
   clip.reactor = reactor;
+}
+
+namespace {
+
+// `before` copies of the first frame, the frames, `after` copies of the last.
+HumanMotion held(const HumanMotion& motion, int before, int after) {
+  const int frames = motion.frames();
+  const std::size_t per_frame = motion.rotations.size() / static_cast<std::size_t>(frames);
+  HumanMotion result{.rate_hz = motion.rate_hz,
+                     .joints = PointTracks(before + frames + after, motion.joints.points()),
+                     .rotations = {}};
+  for (int t = 0; t < result.frames(); ++t) {
+    const int source = std::clamp(t - before, 0, frames - 1);
+    result.joints.frame(t) = motion.joints.frame(source);
+    const auto first = motion.rotations.begin() + static_cast<std::ptrdiff_t>(source * per_frame);
+    result.rotations.insert(result.rotations.end(), first, first + static_cast<std::ptrdiff_t>(per_frame));
+  }
+  return result;
+}
+
+}  // namespace
+
+InteractionClip padded(const InteractionClip& clip, double before, double after) {
+  for (const double time : {before, after})
+    require(std::isfinite(time) && time >= 0.0, fmt::format("padding: expected seconds, found {}", time));
+  const int first = static_cast<int>(std::lround(before * clip.rate_hz()));
+  const int last = static_cast<int>(std::lround(after * clip.rate_hz()));
+  InteractionClip result = clip;
+  result.a = held(clip.a, first, last);
+  result.b = held(clip.b, first, last);
+  result.phases.act_begin += first;
+  result.phases.act_end += first;
+  for (ContactWindow& window : result.contacts) {
+    window.begin += first;
+    window.end += first;
+  }
+  return result;
 }
 
 InteractionClip mirrored(const InteractionClip& clip) {

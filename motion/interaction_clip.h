@@ -6,14 +6,14 @@
 #include <string_view>
 #include <vector>
 
-#include "core/task.h"
-#include "motion/human_motion.h"
+#include "duet/core/task.h"
+#include "duet/core/zip.h"
+#include "duet/motion/human_motion.h"
+#include "duet/motion/person.h"
 
 namespace duet {
 
 class Npz;
-
-enum class Person { kA, kB };
 
 // Frames [begin, end) during which two joints are meant to be in touch; joints are SMPL-24 indices.
 struct ContactWindow {
@@ -50,13 +50,18 @@ void validate(const InteractionClip& clip);
 void save_clip(const InteractionClip& clip, const std::string& path);
 InteractionClip load_clip(const std::string& path);
 // The same without a file; `name` stands in messages.
-std::string clip_bytes(const InteractionClip& clip);
+std::string clip_bytes(const InteractionClip& clip, ZipMethod method = ZipMethod::kDeflated);
 InteractionClip parse_clip(std::string_view bytes, const std::string& name);
 InteractionClip read_clip(const Npz& npz);
 
 // Who the robot replaces. Another person than before gives another id, "-A" or "-B" at its end, and back the first one:
 // the two are different clips and may be in one run.
 void set_reactor(InteractionClip& clip, Person reactor);
+
+// Both people stand as in their first frame for `before` seconds, and as in their last for `after`: for recordings that
+// were cropped to the act. Phases and contact windows move along. Throws std::invalid_argument for a time that is
+// negative or not finite.
+InteractionClip padded(const InteractionClip& clip, double before, double after);
 
 // Mirror image in the plane y = 0 with left and right joints (also of the contact windows) exchanged.
 InteractionClip mirrored(const InteractionClip& clip);

@@ -1,13 +1,13 @@
-#include "motion/npz_fields.h"
+#include "duet/motion/npz_fields.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

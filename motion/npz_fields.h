@@ -6,10 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "core/npz.h"
-#include "core/require.h"
-#include "core/task.h"
-#include "motion/interaction_clip.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
+#include "duet/core/task.h"
+#include "duet/motion/human_motion.h"
+#include "duet/motion/person.h"
 
 namespace duet {
 

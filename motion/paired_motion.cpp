@@ -1,10 +1,10 @@
-#include "motion/paired_motion.h"
+#include "duet/motion/paired_motion.h"
 
 #include <fmt/format.h>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "motion/npz_fields.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/npz_fields.h"
 
 namespace duet {
 namespace {
@@ -98,7 +98,7 @@ void validate(const PairedMotion& motion) {
   check_same_time(motion);
 }
 
-std::string paired_motion_bytes(const PairedMotion& motion) {
+std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method) {
   validate(motion);
   Npz npz;
   put_schema(npz, kSchema, kSchemaVersion);
@@ -112,7 +112,7 @@ std::string paired_motion_bytes(const PairedMotion& motion) {
   if (!motion.reshaped.empty()) npz.set("reshaped", motion.reshaped);
   for (const auto& [term, values] : motion.loss) npz.set(kLossPrefix + term, values, {values.size()});
   put_texts(npz, "settings", motion.settings);
-  return npz.bytes();
+  return npz.bytes(method);
 }
 
 PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name) {

@@ -7,8 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "core/robot_motion.h"
-#include "motion/interaction_clip.h"
+#include "duet/core/robot_motion.h"
+#include "duet/core/zip.h"
+#include "duet/motion/interaction_clip.h"
 
 namespace duet {
 
@@ -38,7 +39,7 @@ void validate(const PairedMotion& motion);
 void save_paired_motion(const PairedMotion& motion, const std::string& path);
 PairedMotion load_paired_motion(const std::string& path);
 // The same without a file; `name` stands in messages.
-std::string paired_motion_bytes(const PairedMotion& motion);
+std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method = ZipMethod::kDeflated);
 PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name);
 PairedMotion read_paired_motion(const Npz& npz);
 

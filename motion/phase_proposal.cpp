@@ -1,14 +1,16 @@
-// One signal per task says how far the act is under way (larger = more); the act is the stretch around its peak above a
+// The task's signal says how far the act is under way (larger = more); the act is the stretch around its peak above a
 // threshold. docs/conventions.md describes signals and thresholds.
-#include "motion/phase_proposal.h"
+#include "duet/motion/phase_proposal.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include "core/require.h"
+#include "duet/core/require.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 namespace {
@@ -105,6 +107,11 @@ Signal either(const Signal& a, const Signal& b, double least) {
   return result;
 }
 
+Signal hands_up(const HumanMotion& a, const HumanMotion& b) {
+  return either(over_time(a.frames(), [&](int t) { return hand_rise(a, t); }),
+                over_time(b.frames(), [&](int t) { return hand_rise(b, t); }), kLeastHandRise);
+}
+
 Activity contact(Signal distance, Signal onset, double onset_threshold) {
   for (double& value : distance) value = -value;
   const double edge = *std::max_element(distance.begin(), distance.end()) - kReach;
@@ -128,24 +135,31 @@ Activity gesture(Signal signal, double begin_share, double end_share) {
           .found = found};
 }
 
-Activity activity_of(const HumanMotion& a, const HumanMotion& b, Task task) {
+// The onset of a contact, where the task reaches for it: its signal and threshold.
+std::pair<Signal, double> onset_of(const HumanMotion& a, const HumanMotion& b, OnsetSignal onset) {
+  switch (onset) {
+    case OnsetSignal::kHandsCoverTheGap:
+      return {share(over_time(a.frames(), [&](int t) { return covered_gap(a, b, t); }), kReach), kCoveredShare};
+    case OnsetSignal::kHandsUp:
+      return {hands_up(a, b), kRaisedShare};
+    case OnsetSignal::kNone:
+      break;
+  }
+  return {{}, 0.0};
+}
+
+Activity activity_of(const HumanMotion& a, const HumanMotion& b, const PhaseSignal& signal) {
   const auto over = [&](auto&& value) { return over_time(a.frames(), value); };
-  const auto hands_apart = [&] { return over([&](int t) { return hand_distance(a, b, t); }); };
-  const auto hands_up = [&] {
-    return either(over([&](int t) { return hand_rise(a, t); }), over([&](int t) { return hand_rise(b, t); }),
-                  kLeastHandRise);
-  };
-  switch (task) {
-    case Task::kHandshake:
-      return contact(hands_apart(), share(over([&](int t) { return covered_gap(a, b, t); }), kReach), kCoveredShare);
-    case Task::kHighFive:
-      return contact(hands_apart(), hands_up(), kRaisedShare);
-    case Task::kHug:
-      return contact(over([&](int t) { return std::min(hand_to_chest(a, b, t), hand_to_chest(b, a, t)); }), {}, 0.0);
-    case Task::kWave:
-    case Task::kFlyKiss:
-      return gesture(hands_up(), kRaisedShare, kLoweredShare);
-    case Task::kBend:
+  auto [onset, threshold] = onset_of(a, b, signal.onset);
+  switch (signal.act) {
+    case ActSignal::kHandsTogether:
+      return contact(over([&](int t) { return hand_distance(a, b, t); }), std::move(onset), threshold);
+    case ActSignal::kHandAtChest:
+      return contact(over([&](int t) { return std::min(hand_to_chest(a, b, t), hand_to_chest(b, a, t)); }),
+                     std::move(onset), threshold);
+    case ActSignal::kHandsUp:
+      return gesture(hands_up(a, b), kRaisedShare, kLoweredShare);
+    case ActSignal::kTrunksLean:
       return gesture(
           either(over([&](int t) { return lean(a, t); }), over([&](int t) { return lean(b, t); }), kLeastLean),
           kLeanShare, kLeanShare);
@@ -181,7 +195,7 @@ Phases propose_phases(const HumanMotion& a, const HumanMotion& b, Task task) {
   require(a.frames() == b.frames() && a.frames() >= 1,
           fmt::format("phase proposal: expected two motions of the same length, found {} and {} frames", a.frames(),
                       b.frames()));
-  const Activity activity = activity_of(a, b, task);
+  const Activity activity = activity_of(a, b, definition_of(task).phases);
   if (!activity.found) return {.act_begin = a.frames() / 3, .act_end = std::max(a.frames() - a.frames() / 3, 1)};
   return stretch(activity, a.rate_hz);
 }

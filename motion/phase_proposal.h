@@ -1,7 +1,8 @@
 // Automatic proposal of the three phases for a clip without annotations (supplement B.4 annotated by hand).
 #pragma once
 
-#include "motion/interaction_clip.h"
+#include "duet/core/task.h"
+#include "duet/motion/human_motion.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "motion/plausibility.h"
+#include "duet/motion/plausibility.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <optional>
 
-#include "core/npz.h"
-#include "core/require.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -1,13 +1,14 @@
-#include "motion/synthesis.h"
+#include "duet/motion/synthesis.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "core/require.h"
-#include "motion/synthesis/render.h"
-#include "motion/synthesis/stage.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis/render.h"
+#include "duet/motion/synthesis/stage.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 namespace {
@@ -27,7 +28,7 @@ void check(const char* name, std::optional<double> value, double low, double hig
 }  // namespace
 
 void check_synthesis_options(Task task, const SynthesisOptions& options) {
-  const Act& act = synthesis::act_of(task);
+  const Act& act = definition_of(task).act;
   require(options.index >= 0, fmt::format("synthesize: index {} is out of range; expected 0 or more", options.index));
   check("height_a", options.height_a, 1.5, 1.95, " m");
   check("height_b", options.height_b, 1.5, 1.95, " m");
@@ -39,7 +40,7 @@ void check_synthesis_options(Task task, const SynthesisOptions& options) {
   check("rate_hz", options.rate_hz, 20.0, 240.0, " Hz");
   if (options.target_height)
     require(act.lowest < act.highest, fmt::format("synthesize: {} has no target_height; expected none, found {} m",
-                                                  to_string(act.task), *options.target_height));
+                                                  to_string(task), *options.target_height));
   check("target_height", options.target_height, act.lowest, act.highest, " m");
 }
 
@@ -57,7 +58,7 @@ std::vector<ContactWindow> windows(const Scene& scene, double rate_hz) {
 
 InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   check_synthesis_options(task, options);
-  const Act& act = synthesis::act_of(task);
+  const Act& act = definition_of(task).act;
   Draws draws(options.seed, task, options.index);
   Staged staged = set_stage(task, options, draws);
   act.perform(staged.scene, draws);

@@ -1,30 +1,11 @@
-// Two-person clips of the six tasks made from nothing: approach on foot, act, part. Phases and contact windows are
+// Two-person clips of a task made from nothing: approach on foot, act, part. Phases and contact windows are
 // exact by construction. The same arguments give the same bytes on every run.
 #pragma once
 
-#include <cstdint>
-#include <optional>
-
-#include "motion/interaction_clip.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/motion/synthesis_options.h"
 
 namespace duet {
-
-enum class Side { kLeft, kRight };
-
-// What varies; an empty field is drawn from (seed, task, index). Ranges and draws: docs/conventions.md.
-struct SynthesisOptions {
-  std::uint64_t seed = 42;
-  int index = 0;
-  std::optional<double> height_a{}, height_b{};  // of the bodies [m]
-  std::optional<double> distance{};              // of the roots at the start [m]
-  std::optional<double> angle{};                 // at which B stands off A's path at the start [rad]
-  std::optional<Side> side{};                    // hand (handedness) of the act
-  std::optional<double> target_height{};         // of the contact point or gesture above the ground [m]
-  std::optional<double> speed{};                 // of walking [m/s]
-  std::optional<double> style{};                 // 0 restrained ... 1 expansive
-  std::optional<double> duration{};              // of the whole clip [s]; default as in Table S6 per task
-  double rate_hz = 50.0;
-};
 
 // Throws std::invalid_argument for an option out of its range, naming it and the range.
 void check_synthesis_options(Task task, const SynthesisOptions& options);

@@ -1,9 +1,9 @@
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 #include <array>
 #include <string>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

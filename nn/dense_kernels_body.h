@@ -8,7 +8,7 @@
 #include <immintrin.h>
 #endif
 
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 namespace duet {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
-#include "core/require.h"
-#include "nn/network_engines.h"
+#include "duet/core/require.h"
+#include "duet/nn/network_engines.h"
 
 namespace duet {
 namespace {

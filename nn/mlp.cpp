@@ -1,9 +1,9 @@
-#include "nn/mlp.h"
+#include "duet/nn/mlp.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/random.h"
+#include "duet/core/random.h"
 
 namespace duet {
 

@@ -1,8 +1,8 @@
-#include "nn/mlp_file.h"
+#include "duet/nn/mlp_file.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "nn/mlp.h"
-#include "nn/safetensors.h"
+#include "duet/nn/mlp.h"
+#include "duet/nn/safetensors.h"
 
 namespace duet {
 

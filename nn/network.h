@@ -2,7 +2,6 @@
 // what the network is for. Nothing allocates after load. One owner, not thread-safe: one network per thread.
 #pragma once
 
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -26,12 +25,5 @@ class Network {
   // Clears a recurrent network's memory; others have none.
   virtual void reset() {}
 };
-
-// By content, not by name: ONNX, TorchScript of the kinds in nn/torch_script.h, safetensors of nn/mlp_file.h. Throws
-// InputError (file, place, expected, found) for a file that is not readable, truncated, of another kind, with an
-// operator or a shape that is not supported (by name), or with weights that are not finite. `engine`: "duet" (ours), or
-// "libtorch" where it was built in (std::invalid_argument otherwise, naming those present).
-std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine = "duet");
-std::vector<std::string> network_engines();
 
 }  // namespace duet

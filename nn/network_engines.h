@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "nn/network.h"
+#include "duet/nn/network.h"
 
 namespace duet {
 

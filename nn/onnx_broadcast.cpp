@@ -1,4 +1,4 @@
-#include "nn/onnx_broadcast.h"
+#include "duet/nn/onnx_broadcast.h"
 
 #include <fmt/format.h>
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "nn/onnx_plan.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
-#include "nn/dense_kernels.h"
-#include "nn/onnx_broadcast.h"
-#include "nn/onnx_plan.h"
+#include "duet/nn/dense_kernels.h"
+#include "duet/nn/onnx_broadcast.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 namespace {

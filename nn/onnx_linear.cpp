@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "nn/dense_kernels.h"
-#include "nn/onnx_broadcast.h"
-#include "nn/onnx_plan.h"
+#include "duet/nn/dense_kernels.h"
+#include "duet/nn/onnx_broadcast.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 namespace {

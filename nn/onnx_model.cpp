@@ -1,4 +1,4 @@
-#include "nn/onnx_model.h"
+#include "duet/nn/onnx_model.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,13 +6,15 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <charconv>
 #include <climits>
 #include <cmath>
 #include <cstring>
 #include <set>
 
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/nn/external_data.h"
 
 namespace duet {
 namespace {
@@ -38,6 +40,10 @@ std::vector<Out> values_of(const TensorProto& tensor, const Field& field) {
   return values;
 }
 
+bool is_external(const TensorProto& tensor) {
+  return tensor.data_location() == TensorProto::EXTERNAL || tensor.external_data_size() > 0;
+}
+
 std::vector<float> halves_of(const TensorProto& tensor) {
   std::vector<float> values;
   for (const auto bits : values_of<std::uint16_t, std::uint16_t>(tensor, tensor.int32_data()))
@@ -47,7 +53,7 @@ std::vector<float> halves_of(const TensorProto& tensor) {
 
 class Parser {
  public:
-  explicit Parser(const std::string& file) { graph_.file = file; }
+  Parser(const std::string& file, const std::string& folder) : folder_(folder) { graph_.file = file; }
 
   OnnxGraph parse(std::string_view bytes) {
     onnx::ModelProto model;
@@ -109,14 +115,45 @@ class Parser {
 
   [[nodiscard]] OnnxTensor tensor(const TensorProto& from, const std::string& name) const {
     const std::string place = fmt::format("constant '{}'", name);
-    if (from.data_location() == TensorProto::EXTERNAL || from.external_data_size() > 0)
-      refuse(place + ": expected its numbers in the file, found them in another (external data)");
     OnnxTensor tensor;
     tensor.shape.assign(from.dims().begin(), from.dims().end());
-    read_values(from, place, tensor);
+    read_values(is_external(from) ? with_external_bytes(from, place) : from, place, tensor);
     check_count(tensor, place);
     check_finite(tensor, place);
     return tensor;
+  }
+
+  // The tensor as if its bytes stood in the model's own file.
+  [[nodiscard]] TensorProto with_external_bytes(const TensorProto& from, const std::string& place) const {
+    if (folder_.empty()) refuse(place + ": expected its numbers in the file, found them in another (external data)");
+    const std::string where = fmt::format("'{}': {}", graph_.file, shown(place));
+    TensorProto tensor = from;
+    tensor.set_raw_data(read_external(folder_, external_place(from, place), where));
+    return tensor;
+  }
+
+  [[nodiscard]] ExternalPlace external_place(const TensorProto& from, const std::string& place) const {
+    ExternalPlace at;
+    for (const auto& entry : from.external_data()) {
+      if (entry.key() == "location")
+        at.location = entry.value();
+      else if (entry.key() == "offset")
+        at.offset = byte_count(entry.value(), place);
+      else if (entry.key() == "length")
+        at.length = byte_count(entry.value(), place);
+      else if (entry.key() != "checksum")  // optional, and the run's own digest covers the file
+        refuse(fmt::format("{}: external data: expected location, offset, length or checksum, found '{}'", place,
+                           shown(entry.key())));
+    }
+    return at;
+  }
+
+  [[nodiscard]] std::int64_t byte_count(const std::string& text, const std::string& place) const {
+    std::int64_t count = -1;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+    if (error != std::errc() || end != text.data() + text.size() || count < 0)
+      refuse(fmt::format("{}: external data: expected a number of bytes, found '{}'", place, shown(text)));
+    return count;
   }
 
   void read_values(const TensorProto& from, const std::string& place, OnnxTensor& to) const {
@@ -204,11 +241,31 @@ class Parser {
     }
   }
 
+  std::string folder_;  // of external data; "": there is none
   OnnxGraph graph_;
 };
 
+void add_location(const TensorProto& tensor, std::set<std::string>& locations) {
+  if (!is_external(tensor)) return;
+  for (const auto& entry : tensor.external_data())
+    if (entry.key() == "location") locations.insert(entry.value());
+}
+
 }  // namespace
 
-OnnxGraph parse_onnx(std::string_view bytes, const std::string& file) { return Parser(file).parse(bytes); }
+OnnxGraph parse_onnx(std::string_view bytes, const std::string& file, const std::string& folder) {
+  return Parser(file, folder).parse(bytes);
+}
+
+std::set<std::string> external_locations(std::string_view bytes) {
+  onnx::ModelProto model;
+  if (bytes.size() > INT_MAX || !model.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return {};
+  std::set<std::string> locations;
+  for (const TensorProto& constant : model.graph().initializer()) add_location(constant, locations);
+  for (const auto& node : model.graph().node())
+    for (const AttributeProto& attribute : node.attribute())
+      if (attribute.has_t()) add_location(attribute.t(), locations);
+  return locations;
+}
 
 }  // namespace duet

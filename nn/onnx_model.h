@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -47,11 +48,15 @@ struct OnnxGraph {
   std::vector<OnnxNode> nodes;  // each after those whose outputs it reads
 };
 
-inline constexpr int kOldestOpset = 11, kNewestOpset = 17;
+inline constexpr int kOldestOpset = 11, kNewestOpset = 18;
 
-// Throws InputError naming file, place, expected and found: not an ONNX model or truncated, an operator set outside
-// [kOldestOpset, kNewestOpset], constants in other files, of an unknown type, of a wrong number of bytes, or not finite
-// (a single number may be infinite: a bound of Clip).
-OnnxGraph parse_onnx(std::string_view bytes, const std::string& file);
+// `folder`: where files lie that the model keeps numbers in (nn/external_data.h); "": it may have none. Throws
+// InputError naming file, place, expected and found: not an ONNX model or truncated, an operator set outside
+// [kOldestOpset, kNewestOpset], constants in other files that are not there, too short or elsewhere, of an unknown
+// type, of a wrong number of bytes, or not finite (a single number may be infinite: a bound of Clip).
+OnnxGraph parse_onnx(std::string_view bytes, const std::string& file, const std::string& folder = "");
+
+// Where a model keeps numbers outside of its own file, as it says so; none for bytes that are no model.
+std::set<std::string> external_locations(std::string_view bytes);
 
 }  // namespace duet

@@ -7,8 +7,8 @@
 #include <limits>
 #include <numeric>
 
-#include "nn/onnx_broadcast.h"
-#include "nn/onnx_plan.h"
+#include "duet/nn/onnx_broadcast.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 namespace {
@@ -156,9 +156,23 @@ void slice(OnnxBuilder& builder) {
   move(builder, 0, source, shape, places);
 }
 
+// From operator set 18 without sizes: as many parts as the attribute says, the last smaller where it has to be.
+std::vector<std::int64_t> counted_parts(const OnnxBuilder& builder, std::int64_t size) {
+  const std::int64_t parts = builder.integer("num_outputs", 0), outputs = builder.output_count();
+  builder.require(parts == outputs, fmt::format("num_outputs: expected {}, found {}", outputs, parts));
+  const std::int64_t whole = (size + parts - 1) / parts, last = size - (parts - 1) * whole;
+  builder.require(last >= 0, fmt::format("{} numbers are not {} parts", size, parts));
+  std::vector<std::int64_t> sizes(static_cast<std::size_t>(parts), whole);
+  sizes.back() = last;
+  return sizes;
+}
+
 // Sizes of the parts: an attribute up to operator set 12, an input from 13, equal parts where neither is given.
 std::vector<std::int64_t> part_sizes(const OnnxBuilder& builder, std::int64_t size) {
+  builder.require(builder.opset() < 18 || builder.has_input(1) != (builder.attribute("num_outputs") != nullptr),
+                  "expected sizes as an input or num_outputs, one of the two, from operator set 18");
   if (builder.opset() >= 13 && builder.has_input(1)) return builder.whole_numbers(1);
+  if (builder.opset() >= 18) return counted_parts(builder, size);
   builder.require(builder.input_count() == 1, "expected sizes as an attribute up to operator set 12");
   if (const auto sizes = builder.integers("split"); sizes && builder.opset() < 13) return *sizes;
   const int parts = builder.output_count();

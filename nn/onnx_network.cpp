@@ -1,11 +1,11 @@
-#include "nn/onnx_network.h"
+#include "duet/nn/onnx_network.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "core/require.h"
-#include "nn/onnx_plan.h"
+#include "duet/core/require.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 namespace {
@@ -60,8 +60,10 @@ class OnnxNetwork final : public Network {
 
 }  // namespace
 
-std::unique_ptr<Network> onnx_network(std::string_view bytes, const std::string& file) {
-  return std::make_unique<OnnxNetwork>(parse_onnx(bytes, file));
+std::unique_ptr<Network> onnx_network(const OnnxGraph& graph) { return std::make_unique<OnnxNetwork>(graph); }
+
+std::unique_ptr<Network> onnx_network(std::string_view bytes, const std::string& file, const std::string& folder) {
+  return onnx_network(parse_onnx(bytes, file, folder));
 }
 
 }  // namespace duet

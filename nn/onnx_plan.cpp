@@ -1,4 +1,4 @@
-#include "nn/onnx_plan.h"
+#include "duet/nn/onnx_plan.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "nn/onnx_model.h"
+#include "duet/nn/onnx_model.h"
 
 namespace duet {
 

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "nn/onnx_plan.h"
-#include "nn/recurrent_cell.h"
+#include "duet/nn/onnx_plan.h"
+#include "duet/nn/recurrent_cell.h"
 
 namespace duet {
 namespace {

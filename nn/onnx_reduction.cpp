@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "nn/onnx_broadcast.h"
-#include "nn/onnx_plan.h"
+#include "duet/nn/onnx_broadcast.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 namespace {
@@ -26,10 +26,11 @@ void extend(std::vector<std::int64_t>& places, std::int64_t size, std::int64_t s
   places = std::move(next);
 }
 
-// An attribute; of ReduceSum an input from operator set 13.
+// An attribute; an input of ReduceSum from operator set 13 and of the others from 18.
 std::vector<std::int64_t> reduced_axes(const OnnxBuilder& builder, int rank) {
-  const bool as_input = builder.op() == "ReduceSum" && builder.opset() >= 13;
+  const bool as_input = builder.opset() >= (builder.op() == "ReduceSum" ? 13 : 18);
   builder.require(as_input || builder.input_count() == 1, "expected axes as an attribute in this operator set");
+  builder.require(!as_input || builder.attribute("axes") == nullptr, "expected axes as an input in this operator set");
   std::vector<std::int64_t> axes;
   if (as_input && builder.has_input(1))
     axes = builder.whole_numbers(1);
@@ -39,6 +40,9 @@ std::vector<std::int64_t> reduced_axes(const OnnxBuilder& builder, int rank) {
     axes.resize(rank);
     std::iota(axes.begin(), axes.end(), 0);
   }
+  // Without axes it is said to leave its input as it is; whether its squares and roots are taken nobody agrees on.
+  builder.require(!axes.empty() || rank == 0 || builder.op() == "ReduceSum" || builder.op() == "ReduceMean",
+                  "attribute 'noop_with_empty_axes' without axes is not supported");
   for (std::int64_t& axis : axes) axis = builder.axis(axis, rank);
   return axes;
 }
@@ -166,10 +170,10 @@ void layer_normalization(OnnxBuilder& builder) {
 
 constexpr OnnxOperator kReductionOperators[] = {
     {"LayerNormalization", 2, 3, 1, layer_normalization},
-    {"ReduceL2", 1, 1, 1, reduce<add_square, root>},
-    {"ReduceMean", 1, 1, 1, reduce<add, mean>},
+    {"ReduceL2", 1, 2, 1, reduce<add_square, root>},
+    {"ReduceMean", 1, 2, 1, reduce<add, mean>},
     {"ReduceSum", 1, 2, 1, reduce<add, whole>},
-    {"ReduceSumSquare", 1, 1, 1, reduce<add_square, whole>},
+    {"ReduceSumSquare", 1, 2, 1, reduce<add_square, whole>},
     {"Softmax", 1, 1, 1, softmax},
 };
 

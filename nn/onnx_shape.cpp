@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "nn/onnx_plan.h"
+#include "duet/nn/onnx_plan.h"
 
 namespace duet {
 

@@ -1,8 +1,8 @@
-#include "nn/recurrent_cell.h"
+#include "duet/nn/recurrent_cell.h"
 
 #include <Eigen/Core>
 
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 namespace duet {
 namespace {

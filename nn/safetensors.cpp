@@ -1,4 +1,4 @@
-#include "nn/safetensors.h"
+#include "duet/nn/safetensors.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -10,10 +10,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/file.h"
-#include "core/json.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/file.h"
+#include "duet/core/json.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -1,11 +1,11 @@
-#include "nn/stored_values.h"
+#include "duet/nn/stored_values.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/number.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/number.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <string>
 
-#include "nn/safetensors.h"
+#include "duet/nn/safetensors.h"
 
 namespace duet {
 

@@ -1,30 +1,18 @@
-#include "nn/torch_script.h"
+#include "duet/nn/torch_script.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <functional>
-#include <map>
 
-#include "core/require.h"
-#include "core/text.h"
-#include "core/zip.h"
-#include "nn/dense_kernels.h"
-#include "nn/mlp.h"
-#include "nn/recurrent_cell.h"
+#include "duet/nn/mlp.h"
+#include "duet/nn/onnx_network.h"
+#include "duet/nn/recurrent_cell.h"
+#include "duet/nn/torch_archive.h"
+#include "duet/nn/torch_mlp.h"
 
 namespace duet {
 namespace {
-
-constexpr ZipLimits kLimits{.entry_bytes = std::size_t{1} << 28, .total_bytes = std::size_t{1} << 29};
-
-// The parts of the archive that matter: the tensors by number, the module's pickle, all code in one text.
-struct Archive {
-  std::map<int, std::vector<float>> tensors;
-  std::string pickle, code;
-};
 
 struct Module {
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> W, R;
@@ -32,59 +20,31 @@ struct Module {
   Mlp actor;
 };
 
-class ArchiveReader {
+class LstmReader {
  public:
-  explicit ArchiveReader(const std::string& file) : file_(file) {}
+  explicit LstmReader(const TorchArchive& archive) : archive_(archive) {
+    for (const auto& [path, source] : archive.sources) code_ += source + "\n";
+  }
 
-  Module read(std::string_view bytes) {
-    read_zip(bytes, file_, kLimits, [&](const std::string& entry, const std::string& content) {
-      // "policy/data/0", "policy/data.pkl", "policy/code/..." : the first folder has any name.
-      take(entry.substr(std::min(entry.find('/') + 1, entry.size())), content);
-    });
+  // Whether the archive's own code says so.
+  [[nodiscard]] bool is_one() const { return says("class PolicyExporterLSTM(Module)"); }
+
+  [[nodiscard]] Module read() const {
     check_kind();
     return module();
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& problem) const {
-    throw InputError(fmt::format("'{}': TorchScript: {}", file_, shown(problem, kShownSentence)));
-  }
-
   [[noreturn]] void refuse_kind(const std::string& found) const {
-    refuse(
+    archive_.refuse(
         fmt::format("expected a PolicyExporterLSTM with one LSTM layer and ELU between linear layers, found {} "
                     "(TorchScript of another kind; needs libtorch)",
                     found));
   }
 
-  void take(const std::string& entry, const std::string& content) {
-    if (entry == "data.pkl") archive_.pickle = content;
-    if (entry.starts_with("code/") && entry.ends_with(".py")) archive_.code += content + "\n";
-    if (entry == "byteorder" && !content.starts_with("little")) refuse("expected little-endian numbers");
-    if (!entry.starts_with("data/")) return;
-    const std::string number = entry.substr(5);
-    if (number.empty() || number.size() > 4 ||
-        !std::ranges::all_of(number, [](char c) { return c >= '0' && c <= '9'; }))
-      refuse(fmt::format("expected tensors numbered from 0, found '{}'", entry));
-    archive_.tensors[std::stoi(number)] = floats(entry, content);
-  }
+  [[nodiscard]] bool says(const std::string& text) const { return code_.find(text) != std::string::npos; }
 
-  [[nodiscard]] std::vector<float> floats(const std::string& entry, const std::string& content) const {
-    if (content.size() % sizeof(float) != 0)
-      refuse(fmt::format("tensor '{}': expected 4 bytes a number, found {} bytes", entry, content.size()));
-    std::vector<float> values(content.size() / sizeof(float));
-    if (!values.empty()) std::memcpy(values.data(), content.data(), content.size());
-    for (const float value : values)
-      if (!std::isfinite(value)) refuse(fmt::format("tensor '{}': expected finite numbers, found {}", entry, value));
-    return values;
-  }
-
-  [[nodiscard]] bool says(const std::string& text) const { return archive_.code.find(text) != std::string::npos; }
-
-  // The module's own code says what it is.
   void check_kind() const {
-    if (archive_.pickle.empty()) refuse("expected an entry 'data.pkl', found none");
-    if (!says("class PolicyExporterLSTM(Module)")) refuse_kind("another module");
     for (const char* line : {"num_layers : Final[int] = 1\n", "bidirectional : Final[bool] = False\n",
                              "proj_size : Final[int] = 0\n", "alpha : Final[float] = 1.\n"})
       if (!says(line))
@@ -100,11 +60,10 @@ class ArchiveReader {
       return fmt::format("__annotations__[\"{}\"] = __torch__.torch.nn.modules.", k);
     };
     for (int k = 0; k < 2 * layers - 1; ++k) {
-      const std::size_t at = archive_.code.find(annotation(k));
+      const std::size_t at = code_.find(annotation(k));
       if (at == std::string::npos) refuse_kind(fmt::format("no module {} in its actor", k));
       const std::size_t begin = at + annotation(k).size();
-      const std::string_view kind =
-          std::string_view(archive_.code).substr(begin, archive_.code.find('\n', begin) - begin);
+      const std::string_view kind = std::string_view(code_).substr(begin, code_.find('\n', begin) - begin);
       const bool fits =
           k % 2 == 0 ? kind.starts_with("linear.") : kind.starts_with("activation.") && kind.ends_with("ELU");
       if (!fits || (k % 2 == 1 && kind.ends_with("GELU")))
@@ -120,7 +79,7 @@ class ArchiveReader {
     constexpr int kStates = 2, kLstm = 4;
     const int layers = (count - kStates - kLstm) / 2;
     if (count < kStates + 2 + kLstm || count % 2 != 0 || archive_.tensors.rbegin()->first != count - 1)
-      refuse(fmt::format("expected tensors 0 to 2 n + 5, found {} tensors", count));
+      archive_.refuse(fmt::format("expected tensors 0 to 2 n + 5, found {} tensors", count));
     check_actor(layers);
     Module module;
     const int hidden = static_cast<int>(archive_.tensors.at(0).size());
@@ -136,8 +95,8 @@ class ArchiveReader {
 
   void check(bool condition, int tensor) const {
     if (!condition)
-      refuse(fmt::format("tensor 'data/{}': its {} numbers do not fit the other tensors", tensor,
-                         archive_.tensors.at(tensor).size()));
+      archive_.refuse(fmt::format("tensor 'data/{}': its {} numbers do not fit the other tensors", tensor,
+                                  archive_.tensors.at(tensor).size()));
   }
 
   [[nodiscard]] MlpLayer layer(int first, int inputs) const {
@@ -164,8 +123,8 @@ class ArchiveReader {
                Eigen::Map<const Eigen::VectorXf>(tensor(3).data(), gates);
   }
 
-  std::string file_;
-  Archive archive_;
+  const TorchArchive& archive_;
+  std::string code_;  // of all classes
 };
 
 class LstmPolicy final : public Network {
@@ -208,7 +167,10 @@ class LstmPolicy final : public Network {
 }  // namespace
 
 std::unique_ptr<Network> torch_script_network(std::string_view bytes, const std::string& file) {
-  return std::make_unique<LstmPolicy>(ArchiveReader(file).read(bytes));
+  const TorchArchive archive = read_torch_archive(bytes, file);
+  const LstmReader lstm(archive);
+  if (lstm.is_one()) return std::make_unique<LstmPolicy>(lstm.read());
+  return onnx_network(torch_mlp_graph(archive));
 }
 
 }  // namespace duet

@@ -1,6 +1,6 @@
 // The built-in encoder and tables of embeddings. The built-in one uses no function of the maths library but the square
 // root, so that its bits do not depend on the machine.
-#include "policies/language.h"
+#include "duet/policies/language.h"
 
 #include <fmt/format.h>
 
@@ -10,11 +10,12 @@
 #include <set>
 #include <utility>
 
-#include "core/names.h"
-#include "core/npz.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "policies/language_lexicon.h"
+#include "duet/core/names.h"
+#include "duet/core/npz.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/policies/function_words.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 namespace {
@@ -82,11 +83,7 @@ class BuiltInLanguage final : public LanguageEncoder {
  public:
   BuiltInLanguage() {
     for (const std::string_view word : function_words()) function_words_.insert(stem(std::string(word)));
-    for (const LexiconEntry& entry : language_lexicon()) {
-      Words stems = split_words(entry.phrase);
-      for (std::string& word : stems) word = stem(std::move(word));
-      lexicon_[joined(stems)] = {std::string(entry.concept_name), entry.weight};
-    }
+    for (const Task task : all_tasks()) add_phrases(definition_of(task));
   }
   [[nodiscard]] std::string_view name() const override { return kBuiltInLanguage; }
   [[nodiscard]] int size() const override { return kLanguageSize; }
@@ -106,6 +103,14 @@ class BuiltInLanguage final : public LanguageEncoder {
 
  private:
   using Meaning = std::pair<std::string, double>;
+
+  void add_phrases(const TaskDefinition& task) {
+    for (const TaskPhrase& entry : task.phrases) {
+      Words stems = split_words(entry.phrase);
+      for (std::string& word : stems) word = stem(std::move(word));
+      lexicon_[joined(stems)] = {std::string(task.name), entry.weight};
+    }
+  }
 
   // What the text is made of -> how much that counts; each part once, however often it is said.
   [[nodiscard]] Weights weights_of(std::string_view prompt) const {
@@ -204,6 +209,9 @@ class LanguageTable final : public LanguageEncoder {
 };
 
 }  // namespace
+
+std::string_view task_prompt(Task task) { return definition_of(task).prompt; }
+std::span<const std::string_view> task_paraphrases(Task task) { return definition_of(task).paraphrases; }
 
 std::unique_ptr<LanguageEncoder> built_in_language() { return std::make_unique<BuiltInLanguage>(); }
 

@@ -4,11 +4,12 @@
 
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "core/task.h"
+#include "duet/core/task.h"
 
 namespace duet {
 
@@ -35,7 +36,7 @@ std::unique_ptr<LanguageEncoder> load_language_table(const std::string& path);
 // The command that stands for a task where no other is given ("shake hands with the person"), and paraphrases of it
 // that training uses and that measure the built-in encoder.
 std::string_view task_prompt(Task task);
-const std::vector<std::string>& task_paraphrases(Task task);
+std::span<const std::string_view> task_paraphrases(Task task);
 
 double cosine(const std::vector<float>& a, const std::vector<float>& b);
 

@@ -1,8 +1,8 @@
-#include "policies/null_policy.h"
+#include "duet/policies/null_policy.h"
 
 #include <utility>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

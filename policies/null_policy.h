@@ -1,7 +1,7 @@
 // The control arm (docs/architecture.md, 6): stands where it is, in the neutral pose, whatever the partner does.
 #pragma once
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,8 +1,8 @@
-#include "policies/observation_history.h"
+#include "duet/policies/observation_history.h"
 
 #include <algorithm>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

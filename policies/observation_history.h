@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "policies/on_other_body.h"
+#include "duet/policies/on_other_body.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <array>
 #include <utility>
 
-#include "core/require.h"
-#include "robots/joint_map.h"
+#include "duet/core/require.h"
+#include "duet/robots/joint_map.h"
 
 namespace duet {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <memory>
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "policies/phase_adaptation.h"
+#include "duet/policies/phase_adaptation.h"
 
 #include <fmt/format.h>
 
@@ -7,15 +7,15 @@
 #include <numbers>
 #include <vector>
 
-#include "core/clock.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "policies/torso_orientation.h"
+#include "duet/core/clock.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/policies/torso_orientation.h"
+#include "duet/robots/phase_primitives.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
-
-constexpr int kRamp = 16;  // frames of Algorithm 7
 
 void check_joints(const RobotMotion& motion, const RobotModel& robot) {
   require(static_cast<int>(motion.joint_names.size()) == robot.dof(),
@@ -63,107 +63,62 @@ RobotMotion cut(const RobotMotion& motion, int begin, int end) {
           motion.q.middleCols(begin, end - begin)};
 }
 
-// The primitives of A.4.4 on one motion. Frames and phases are those of that motion.
+// What kAct does to one motion whose base may be the trunk. Frames and phases are those of that motion.
 class Adaptation {
  public:
-  Adaptation(RobotMotion motion, const Phases& phases, const RobotModel& robot)
-      : motion_(std::move(motion)), phases_(phases), robot_(robot) {
-    for (int j = 0; j < robot.dof(); ++j)
-      (is_leg_joint(robot.joints[static_cast<std::size_t>(j)].name) ? legs_ : upper_).push_back(j);
-  }
-
-  [[nodiscard]] AdaptedMotion result(int clip_frame) && { return {std::move(motion_), phases_, clip_frame}; }
-
-  // Preparation: from `start` straight to the first act frame.
-  void approach(const Pose& start) {
-    const Pose goal = root(phases_.act_begin);
-    for (int t = 0; t < phases_.act_begin; ++t)
-      root(t) = interpolate(start, goal, static_cast<double>(t) / phases_.act_begin);
-  }
-
-  // Preparation: the upper body from neutral to the first act frame over the last `ticks`, at most all of it.
-  void raise_upper_body(int ticks) {
-    const Eigen::VectorXd goal = motion_.q.col(phases_.act_begin);
-    const int begin = std::max(0, phases_.act_begin - ticks);
-    for (int t = 0; t < phases_.act_begin; ++t) {
-      const double s = t < begin ? 0.0 : static_cast<double>(t - begin) / (phases_.act_begin - begin);
-      for (const int j : upper_) motion_.q(j, t) = (1.0 - s) * robot_.neutral[j] + s * goal[j];
-    }
-  }
-
-  // Follow-up: the upper body back to neutral over `ticks`.
-  void lower_upper_body(double ticks) {
-    const Eigen::VectorXd last = motion_.q.col(phases_.act_end - 1);
-    for (int t = phases_.act_end; t < motion_.frames(); ++t) {
-      const double s = ticks > 0.0 ? std::min(1.0, (t - phases_.act_end + 1) / ticks) : 1.0;
-      for (const int j : upper_) motion_.q(j, t) = (1.0 - s) * last[j] + s * robot_.neutral[j];
-    }
-  }
-
-  // Frames [begin, end): root and legs as in frame `source`.
-  void freeze(int begin, int end, int source) {
-    for (int t = begin; t < end; ++t) {
-      root(t) = Pose(root(source));
-      for (const int j : legs_) motion_.q(j, t) = motion_.q(j, source);
-    }
-  }
+  Adaptation(RobotMotion& motion, const Phases& phases, const RobotModel& robot)
+      : motion_(motion), phases_(phases), robot_(robot) {}
 
   // All frames: upright on standing legs at the act position.
   void stand() {
-    const Pose stance = stance_at_act();
+    const Pose stance = pelvis_at_act();
+    const std::vector<int> legs = leg_joints(robot_);
     for (int t = 0; t < motion_.frames(); ++t) {
-      root(t) = stance;
-      for (const int j : legs_) motion_.q(j, t) = robot_.neutral[j];
+      for (const int j : legs) motion_.q(j, t) = robot_.neutral[j];
+      root(t) = base_is_pelvis(robot_) ? stance : stance * pelvis_in_base(robot_, motion_.q.col(t)).inverse();
     }
   }
 
-  // Act: turns the waist so that the torso above the pelvis of stand() is oriented as it is now. Comes before stand().
+  // Act: turns the waist so that the trunk over the pelvis of stand() is oriented as it is now. Comes before stand().
   void keep_torso() {
     const TorsoOrientation torso(robot_);
-    const Pose stance = stance_at_act();
+    const Pose stance = pelvis_at_act();
     for (int t = phases_.act_begin; t < phases_.act_end; ++t) {
       Eigen::VectorXd q = motion_.q.col(t);
-      torso.solve(stance.R.conjugate() * root(t).R * torso.at(q), q);
+      torso.solve(stance.R.conjugate() * pelvis(t).R * torso.at(q), q);
       motion_.q.col(t) = q;
     }
   }
 
  private:
   Pose& root(int t) { return motion_.root[static_cast<std::size_t>(t)]; }
-  // Where the robot is in the middle of the act: a person may still be walking in its first frames.
-  Pose stance_at_act() { return robot_.standing_state(root((phases_.act_begin + phases_.act_end) / 2)).X_WB; }
+  Pose pelvis(int t) { return base_is_pelvis(robot_) ? root(t) : root(t) * pelvis_in_base(robot_, motion_.q.col(t)); }
+  // The pelvis upright over where it is in the middle of the act: a person may still be walking in its first frames.
+  Pose pelvis_at_act() {
+    const Pose stance = robot_.standing_state(pelvis((phases_.act_begin + phases_.act_end) / 2)).X_WB;
+    if (base_is_pelvis(robot_)) return stance;
+    const double lower = pelvis_in_base(robot_, robot_.neutral).p.z();
+    return {stance.R, stance.p + Eigen::Vector3d(0.0, 0.0, lower)};
+  }
 
-  RobotMotion motion_;
+  RobotMotion& motion_;
   Phases phases_;
   const RobotModel& robot_;
-  std::vector<int> legs_, upper_;
 };
 
-AdaptedMotion adapt_approach(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
+AdaptedMotion adapt_approach(RobotMotion motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options, std::uint64_t seed) {
-  Adaptation adaptation(motion, phases, robot);
-  adaptation.approach(displaced(motion.root.front(), options.start_radius, seed));
-  adaptation.raise_upper_body(phases.act_begin);
-  adaptation.lower_upper_body(options.return_time * kTickRate);
-  adaptation.freeze(phases.act_end, motion.frames(), phases.act_end - 1);
-  return std::move(adaptation).result(0);
+  walk_straight(motion, phases, displaced(motion.root.front(), options.start_radius, seed));
+  raise_upper_body(motion, phases, robot, phases.act_begin);
+  lower_upper_body(motion, phases, robot, options.return_time * kTickRate);
+  hold_frame(motion, robot, phases.act_end, motion.frames(), phases.act_end - 1);
+  return {std::move(motion), phases, 0};
 }
 
-// `start` turned about the vertical until its heading is at most `mild_yaw` from that of `goal`.
-Pose mildly_turned(const Pose& start, const Pose& goal, double mild_yaw) {
-  const double turn = std::remainder(yaw_of(start.R) - yaw_of(goal.R), 2.0 * std::numbers::pi);
-  const double back = std::clamp(turn, -mild_yaw, mild_yaw) - turn;
-  return {(yaw_rotation(back) * start.R).normalized(), start.p};
-}
-
-AdaptedMotion adapt_for_real(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
+AdaptedMotion adapt_for_real(RobotMotion motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options) {
-  Adaptation adaptation(motion, phases, robot);
-  adaptation.approach(mildly_turned(motion.root.front(), motion.root[phases.act_begin], options.mild_yaw));
-  adaptation.raise_upper_body(kRamp);
-  adaptation.lower_upper_body(kRamp);
-  adaptation.freeze(phases.act_end, motion.frames(), phases.act_end - 1);
-  return std::move(adaptation).result(0);
+  sim_to_real(motion, phases, robot, options.mild_yaw);
+  return {std::move(motion), phases, 0};
 }
 
 AdaptedMotion adapt_in_place(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
@@ -172,25 +127,21 @@ AdaptedMotion adapt_in_place(const RobotMotion& motion, const Phases& phases, co
   const double lead = std::min(std::round(options.lead * kTickRate), static_cast<double>(phases.act_begin));
   const int begin = phases.act_begin - static_cast<int>(lead);
   const Phases shifted{phases.act_begin - begin, phases.act_end - begin};
-  Adaptation adaptation(cut(motion, begin, motion.frames()), shifted, robot);
+  RobotMotion adapted = cut(motion, begin, motion.frames());
+  Adaptation adaptation(adapted, shifted, robot);
   if (options.hold_stance && options.keep_torso) adaptation.keep_torso();
-  adaptation.raise_upper_body(shifted.act_begin);
-  adaptation.lower_upper_body(options.return_time * kTickRate);
+  raise_upper_body(adapted, shifted, robot, shifted.act_begin);
+  lower_upper_body(adapted, shifted, robot, options.return_time * kTickRate);
   if (options.hold_stance) {
     adaptation.stand();
   } else {
-    adaptation.freeze(0, shifted.act_begin, shifted.act_begin);
-    adaptation.freeze(shifted.act_end, motion.frames() - begin, shifted.act_end - 1);
+    hold_frame(adapted, robot, 0, shifted.act_begin, shifted.act_begin);
+    hold_frame(adapted, robot, shifted.act_end, adapted.frames(), shifted.act_end - 1);
   }
-  return std::move(adaptation).result(begin);
+  return {std::move(adapted), shifted, begin};
 }
 
 }  // namespace
-
-bool is_leg_joint(std::string_view name) {
-  return name.find("hip") != std::string_view::npos || name.find("knee") != std::string_view::npos ||
-         name.find("ankle") != std::string_view::npos;
-}
 
 AdaptedMotion adapt_by_phase(const RobotMotion& motion, const Phases& phases, const RobotModel& robot,
                              const AdaptationOptions& options, std::uint64_t seed) {

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <string_view>
 
-#include "core/robot_motion.h"
-#include "core/task.h"
-#include "robots/robot_model.h"
+#include "duet/core/robot_motion.h"
+#include "duet/core/task.h"
+#include "duet/robots/phase_primitives.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
@@ -26,21 +26,20 @@ struct AdaptedMotion {
 
 struct AdaptationOptions {
   StartMode start = StartMode::kApproach;
-  double start_radius = 1.0;  // [m], kApproach
-  double lead = 1.0;          // of neutral-to-act ramp kept before the act with kAct [s]
-  double return_time = 1.0;   // over which the upper body goes back to neutral after the act [s]
-  double mild_yaw = 0.35;     // kSimToReal: largest turn of the root on its way to the act [rad]
-  bool hold_stance = true;    // kAct: legs stay in the standing pose, the pelvis keeps its act position on the ground
-  bool keep_torso = true;  // kAct with hold_stance: the waist takes over, inside its limits, what the pelvis loses of
-                           // its turn and tilt, so that the torso is oriented as in the clip; false: waist as in the
-                           // clip
+  double start_radius = 1.0;        // [m], kApproach
+  double lead = 1.0;                // of neutral-to-act ramp kept before the act with kAct [s]
+  double return_time = 1.0;         // over which the upper body goes back to neutral after the act [s]
+  double mild_yaw = kSimToRealYaw;  // kSimToReal: largest turn of the root on its way to the act [rad]
+  bool hold_stance = true;  // kAct: legs stay in the standing pose, the pelvis keeps its act position on the ground
+  bool keep_torso = true;   // kAct with hold_stance: the waist takes over, inside its limits, what the pelvis loses of
+                            // its turn and tilt, so that the torso is oriented as in the clip; false: waist as in the
+                            // clip
 };
 
-// "hip", "knee" or "ankle" in the joint's name; every other joint is upper body.
-bool is_leg_joint(std::string_view name);
-
-// kClip: the motion to the bit.
-// kApproach: act to the bit. Before it the root goes from a start drawn uniformly from the disc around the clip's start
+// Legs are those of the robot's card, every other joint is upper body. Where the base is the trunk and the pelvis hangs
+// on a waist below it, the pelvis is what stands at the act position, and the base is where the waist has it. kClip:
+// the motion to the bit. kApproach: act to the bit. Before it the root goes from a start drawn uniformly from the disc
+// around the clip's start
 //   (height and orientation as there) straight to the first act frame, the upper body from neutral; legs as in the
 //   clip. After it root and legs stay as in the last act frame, the upper body goes back to neutral.
 // kAct: the clip from `lead` before the act on (all of it, where the preparation is shorter). With hold_stance the root

@@ -2,7 +2,6 @@
 // A.3.1, F).
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -12,21 +11,17 @@
 #include <string_view>
 #include <vector>
 
-#include "core/loaded_file.h"
-#include "core/point_tracks.h"
-#include "core/robot_motion.h"
-#include "core/robot_state.h"
-#include "core/skeleton.h"
-#include "core/task.h"
-#include "robots/robot_model.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/robot_motion.h"
+#include "duet/core/robot_state.h"
+#include "duet/core/skeleton.h"
+#include "duet/core/task.h"
+#include "duet/policies/densify.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
-inline constexpr int kHistoryFrames = 12;      // observation history, the current frame included, at 50 Hz
-inline constexpr int kAnchors = 5;             // at t + {0, 0.5, 1, 1.5, 2} s
-inline constexpr double kAnchorSpacing = 0.5;  // [s]
-inline constexpr int kTicksPerAnchor = 25;
-inline constexpr int kTicksPerPlan = 10;      // 5 Hz on the 50 Hz clock
+inline constexpr int kHistoryFrames = 12;     // observation history, the current frame included, at 50 Hz
 inline constexpr int kObservationSize = 149;  // human root 3, SMPL joints 72, robot 74 (supplement A.2.1)
 
 // One frame as sensed. The 149-D vector of supplement A.2.1 is built from it by to_vector.
@@ -51,8 +46,6 @@ bool is_finite(const Observation& observation);
 // w, x, y, z with w >= 0: q and -q are one orientation.
 Eigen::Vector4d wxyz_of(const Eigen::Quaterniond& R);
 
-using Anchors = std::array<Reference, kAnchors>;
-
 // What a policy may know when an episode starts. Only `replay` looks at `hindsight`.
 struct EpisodeContext {
   Task task = Task::kHug;
@@ -75,10 +68,14 @@ struct PolicyFaults {
   std::vector<Reference> leave_out(std::string_view policy, int tick, std::string_view problem);
 };
 
+// Throws MissingError, which names policy and tasks, unless it was made for the task: its episode is `unsupported`.
+void require_known_task(std::string_view policy, std::span<const Task> known, Task task);
+
 class Policy {
  public:
   virtual ~Policy() = default;
   [[nodiscard]] virtual std::string_view name() const = 0;
+  // Throws MissingError for a task that it was not made for.
   virtual void reset(const EpisodeContext& context) = 0;
   // Anchors at observation.tick / 50 + {0, ..., 2} s.
   virtual Anchors act(const Observation& observation) = 0;
@@ -102,24 +99,7 @@ struct PolicyInfo {
   std::vector<PolicyOption> options;
 };
 
-// Those that ship with duet: "replay" (the retargeted motion with hindsight, as anchors), "replay_dense" (the same at
-// 50 Hz past the anchors: the upper bound of controller and engine), "null" (holds the neutral pose where it stands),
-// "dstar", "dp", ... A name that ends in ".yaml" is the path of a policy descriptor and as good as one of them.
-std::vector<PolicyInfo> policies();
-std::vector<std::string> policy_names();
-PolicyInfo policy_info(const std::string& name);
-// Every file that such a policy loads, in a fixed order. Throws as policy_maker for a name that is unknown and a
-// descriptor that is broken, MissingError for a file that is not on this machine; the files are not read.
-LoadedFiles policy_files(const std::string& name, const PolicyOptions& options = {});
-
 // Makes one policy per episode of what it has loaded once. Thread-safe.
 using PolicyMaker = std::function<std::unique_ptr<Policy>()>;
-
-// Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot that does not
-// fit; MissingError where a file is not on this machine; InputError for one that is broken or of another kind.
-PolicyMaker policy_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                         const PolicyOptions& options = {});
-std::unique_ptr<Policy> make_policy(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                                    const PolicyOptions& options = {});
 
 }  // namespace duet

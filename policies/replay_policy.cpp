@@ -1,4 +1,4 @@
-#include "policies/replay_policy.h"
+#include "duet/policies/replay_policy.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "core/clock.h"
-#include "core/require.h"
+#include "duet/core/clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 ReplayPolicy::ReplayPolicy(std::shared_ptr<const RobotModel> robot) : robot_(std::move(robot)) {

@@ -2,8 +2,8 @@
 // anchors, scheduler and controller.
 #pragma once
 
-#include "core/robot_motion.h"
-#include "policies/policy.h"
+#include "duet/core/robot_motion.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

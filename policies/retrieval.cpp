@@ -1,4 +1,4 @@
-#include "policies/retrieval.h"
+#include "duet/policies/retrieval.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "core/require.h"
-#include "core/share.h"
-#include "core/skeleton.h"
-#include "nn/stored_values.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/core/skeleton.h"
+#include "duet/nn/stored_values.h"
 
 namespace duet {
 namespace {
@@ -22,6 +22,14 @@ constexpr std::array<int, 5> kPoints = {kHead, kLeftElbow, kRightElbow, kLeftHan
 
 int channel_of(int smpl) { return 3 + 3 * smpl; }
 
+// A file has tasks as their places among the supplement's.
+std::vector<Task> tasks_of_windows(const RetrievalLibrary& library) {
+  std::vector<Task> tasks;
+  for (const Task task : kPaperTasks)
+    if (std::ranges::find(library.tasks, task.index()) != library.tasks.end()) tasks.push_back(task);
+  return tasks;
+}
+
 class RetrievalPolicy final : public Policy {
  public:
   RetrievalPolicy(std::shared_ptr<const RobotModel> robot, std::shared_ptr<const RetrievalLibrary> library)
@@ -30,10 +38,9 @@ class RetrievalPolicy final : public Policy {
   [[nodiscard]] std::string_view name() const override { return "retrieval"; }
 
   void reset(const EpisodeContext& context) override {
-    task_ = static_cast<int>(context.task);
+    require_known_task(name(), tasks_of_windows(*library_), context.task);
+    task_ = context.task.index();
     faults_ = {};
-    require(std::find(library_->tasks.begin(), library_->tasks.end(), task_) != library_->tasks.end(),
-            fmt::format("the library of 'retrieval' has no window of task {}", to_string(context.task)));
   }
 
   Anchors act(const Observation& observation) override {
@@ -64,7 +71,7 @@ class RetrievalPolicy final : public Policy {
 
 void check_metadata(const SafeTensors& file, const RobotModel& robot, const std::string& path) {
   expect_text(file, "format", kFormat, path);
-  expect_text(file, "robot", robot.name, path);
+  require_made_for(text_of(file, "robot", path), robot, path);
   expect_text(file, "joints", nlohmann::json(robot.joint_names()).dump(), path);
 }
 
@@ -73,8 +80,9 @@ std::vector<int> tasks_of(const SafeTensors& file, const std::string& path) {
   std::vector<int> tasks;
   tasks.reserve(values.size());
   for (const float value : values) {
-    if (value < 0.0F || value >= static_cast<float>(kTasks.size()) || value != std::floor(value))
-      throw InputError(fmt::format("{}: tensor 'tasks': expected 0 to {}, found {}", path, kTasks.size() - 1, value));
+    if (value < 0.0F || value >= static_cast<float>(kPaperTasks.size()) || value != std::floor(value))
+      throw InputError(
+          fmt::format("{}: tensor 'tasks': expected 0 to {}, found {}", path, kPaperTasks.size() - 1, value));
     tasks.push_back(static_cast<int>(value));
   }
   return tasks;

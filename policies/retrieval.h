@@ -7,9 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "nn/safetensors.h"
-#include "policies/dstar/features.h"
-#include "policies/policy.h"
+#include "duet/core/loaded_file.h"
+#include "duet/nn/safetensors.h"
+#include "duet/policies/dstar/features.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 
@@ -20,7 +21,7 @@ inline constexpr int kRetrievalKey = 50;
 struct RetrievalLibrary {
   std::string robot;                // name of the card
   std::vector<std::string> joints;  // order of every joint vector
-  std::vector<int> tasks;           // per window
+  std::vector<int> tasks;           // per window: place in kPaperTasks
   Eigen::VectorXf mean, deviation;  // of keys
   Eigen::MatrixXf keys;             // (kRetrievalKey, windows), normalised
   Eigen::MatrixXf plans;            // (kPlanSize, windows), as encode_plan has them

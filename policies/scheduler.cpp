@@ -1,4 +1,4 @@
-#include "policies/scheduler.h"
+#include "duet/policies/scheduler.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include "core/clock.h"
-#include "core/require.h"
+#include "duet/core/clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

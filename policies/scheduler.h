@@ -1,18 +1,11 @@
-// Densify and fuse (supplement F, Algorithms 8 and 9): anchors at 5 Hz -> a 36-D reference at 50 Hz.
+// Fuses plans (supplement F, Algorithm 9): anchors at 5 Hz -> a 36-D reference at 50 Hz.
 #pragma once
 
 #include <vector>
 
-#include "policies/policy.h"
+#include "duet/policies/densify.h"
 
 namespace duet {
-
-// Algorithm 8: anchors of a call -> 100 references on the 50 Hz grid, i/50 s after the call. Positions and joints
-// linear, rotation slerp.
-std::vector<Reference> densify(const Anchors& anchors);
-
-// Positions and joints linear, rotation slerp (shorter arc); s = 0 gives a to the bit.
-Reference interpolate(const Reference& a, const Reference& b, double s);
 
 struct SchedulerOptions {
   int fuse_ticks = kTicksPerPlan;  // over which a new plan takes over from the old one, weight growing linearly

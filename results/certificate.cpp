@@ -1,11 +1,11 @@
-#include "results/certificate.h"
+#include "duet/results/certificate.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 
-#include "results/cross_engine_tables.h"
+#include "duet/results/cross_engine_tables.h"
 
 namespace duet {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "results/cross_engine.h"
+#include "duet/results/cross_engine.h"
 
 namespace duet {
 

@@ -7,11 +7,11 @@
 #include <set>
 #include <tuple>
 
-#include "core/require.h"
-#include "results/comparison_parts.h"
-#include "results/distinct_episodes.h"
-#include "results/leaderboard_rows.h"
-#include "results/row_groups.h"
+#include "duet/core/require.h"
+#include "duet/results/comparison_parts.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "results/leaderboard.h"
-#include "results/row_groups.h"
-#include "results/text_table.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/row_groups.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 

@@ -1,10 +1,10 @@
 // A comparison of two runs as Markdown and JSON.
 #include <fmt/format.h>
 
-#include "results/comparison_parts.h"
-#include "results/json_fields.h"
-#include "results/leaderboard_rows.h"
-#include "results/text_table.h"
+#include "duet/results/comparison_parts.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "results/contact_table.h"
+#include "duet/results/contact_table.h"
 
 #include <algorithm>
 #include <array>
@@ -7,11 +7,10 @@
 #include <set>
 #include <tuple>
 
-#include "results/contact_table_parts.h"
-#include "results/cross_engine.h"
-#include "results/distinct_episodes.h"
-#include "results/order_statistics.h"
-#include "results/row_groups.h"
+#include "duet/core/order_statistics.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "results/episode_row.h"
+#include "duet/results/episode_row.h"
 
 namespace duet {
 
@@ -49,6 +49,9 @@ struct ContactTable {
 
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 ContactTable contact_table(const std::vector<EpisodeRow>& rows, const std::string& arm = "main");
+
+bool has_solid_partner(const EpisodeRow& row);  // contacts with one were measured
+bool is_over_limit(const EpisodeRow& row);      // of force or pressure, on any region
 
 // "Limits: unverified (nobody has yet checked the table against ISO/TS 15066)" or "Limits: verified".
 std::string limits_mark(const ContactTable& table);

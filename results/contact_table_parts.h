@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "results/contact_table.h"
-#include "results/cross_engine_tables.h"
+#include "duet/results/contact_table.h"
+#include "duet/results/cross_engine_tables.h"
 
 namespace duet {
 
@@ -18,9 +18,6 @@ std::vector<TitledTable> contact_group_tables(const ContactGroup& group);
 
 // How to read the tables, one sentence or two each.
 std::vector<std::string> contact_notes();
-
-bool has_solid_partner(const EpisodeRow& row);  // contacts with one were measured
-bool is_over_limit(const EpisodeRow& row);      // of force or pressure, on any region
 
 std::string no_contacts();  // the sentence for a table without groups
 

@@ -1,12 +1,12 @@
-#include "results/controller_table.h"
+#include "duet/results/controller_table.h"
 
 #include <algorithm>
 #include <map>
 #include <tuple>
 
-#include "results/cross_engine.h"
-#include "results/distinct_episodes.h"
-#include "results/row_groups.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

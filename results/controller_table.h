@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "results/episode_row.h"
-#include "results/statistics.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/statistics.h"
 
 namespace duet {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "results/controller_table_parts.h"
-#include "results/json_fields.h"
-#include "results/leaderboard_rows.h"
-#include "results/text_table.h"
+#include "duet/results/controller_table_parts.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "results/controller_table.h"
-#include "results/cross_engine_tables.h"
+#include "duet/results/controller_table.h"
+#include "duet/results/cross_engine_tables.h"
 
 namespace duet {
 

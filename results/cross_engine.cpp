@@ -1,14 +1,14 @@
 // Rows by engine, success per engine and the stability of ranks.
-#include "results/cross_engine.h"
+#include "duet/results/cross_engine.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
 
-#include "core/require.h"
-#include "results/cross_engine_parts.h"
-#include "results/distinct_episodes.h"
+#include "duet/core/require.h"
+#include "duet/results/cross_engine_parts.h"
+#include "duet/results/distinct_episodes.h"
 
 namespace duet {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "results/cross_engine.h"
-#include "results/json_fields.h"
-#include "results/text_table.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 namespace {

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "results/cross_engine.h"
-#include "results/order_statistics.h"
-#include "results/row_groups.h"
+#include "duet/core/order_statistics.h"
+#include "duet/results/cross_engine_result.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "results/cross_engine_tables.h"
+#include "duet/results/cross_engine_tables.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "results/leaderboard_rows.h"
+#include "duet/results/leaderboard_rows.h"
 
 namespace duet {
 namespace {

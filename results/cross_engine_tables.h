@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "results/cross_engine.h"
-#include "results/text_table.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "results/database.h"
+#include "duet/results/database.h"
 
 #include <fmt/format.h>
 #include <sqlite3.h>
@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "core/require.h"
-#include "results/row_groups.h"
+#include "duet/core/require.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "results/episode_row.h"
+#include "duet/results/episode_row.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "results/degradation.h"
+#include "duet/results/degradation.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <set>
 #include <tuple>
 
-#include "results/policy_table.h"
+#include "duet/results/policy_table.h"
 
 namespace duet {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "results/degradation.h"
-#include "results/json_fields.h"
-#include "results/policy_table.h"
+#include "duet/results/degradation.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/policy_table.h"
 
 namespace duet {
 namespace {

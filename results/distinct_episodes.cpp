@@ -1,4 +1,4 @@
-#include "results/distinct_episodes.h"
+#include "duet/results/distinct_episodes.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -7,8 +7,8 @@
 #include <map>
 #include <tuple>
 
-#include "results/row_groups.h"
-#include "results/row_identity.h"
+#include "duet/results/row_groups.h"
+#include "duet/results/row_identity.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,8 @@
 #include <limits>
 #include <set>
 
-#include "results/cross_engine_parts.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/cross_engine_parts.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "results/episode_row.h"
+#include "duet/results/episode_row.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,10 @@
 #include <limits>
 #include <set>
 
-#include "core/digest.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "results/json_fields.h"
+#include "duet/core/digest.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

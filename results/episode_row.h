@@ -8,13 +8,17 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "core/outcome.h"
+#include "duet/core/outcome.h"
 
 namespace duet {
 
 inline constexpr int kRowSchema = 5;  // the only one that is read
+
+// In the place of an engine's name: motion without physics (rollout/play_back.h).
+inline constexpr std::string_view kPlaybackEngine = "playback";
 
 struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"

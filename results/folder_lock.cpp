@@ -1,4 +1,4 @@
-#include "results/folder_lock.h"
+#include "duet/results/folder_lock.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <system_error>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "results/golden.h"
+#include "duet/results/golden.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,10 +9,10 @@
 #include <map>
 #include <set>
 
-#include "core/require.h"
-#include "core/text.h"
-#include "results/json_fields.h"
-#include "results/row_identity.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/row_identity.h"
 
 namespace duet {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "results/leaderboard.h"
-#include "results/run_directory.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

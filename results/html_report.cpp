@@ -1,13 +1,15 @@
-#include "results/html_report.h"
+#include "duet/results/html_report.h"
 
 #include <fmt/format.h>
 
 #include <set>
 
-#include "core/text.h"
-#include "results/json_fields.h"
-#include "results/leaderboard_rows.h"
-#include "results/report_parts.h"
+#include "duet/core/text.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/report_parts.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {
@@ -95,33 +97,6 @@ std::string navigation(const std::vector<Section>& sections) {
 
 }  // namespace
 
-std::string escape_html(std::string_view text) {
-  std::string escaped;
-  escaped.reserve(text.size());
-  for (const char c : printable(text)) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
 std::string html_report(const ReportContent& content) {
   std::vector<Section> sections;
   const auto add = [&](const char* id, const char* title, std::string body) {
@@ -133,6 +108,7 @@ std::string html_report(const ReportContent& content) {
   add("reactivity", "Reactivity", reactivity_html(content.policies.reactivity));
   add("controllers", "Controllers", controllers_html(content));
   add("engines", "Across engines", cross_engine_html(content));
+  add("walking", "Walking by command", walking_html(content.walking));
   add("contacts", "Contact with people", contacts_html(content.contacts));
   add("retargeting", "Retargeting", retargeting_html(content));
   add("clips", "Clips", stories_section(content));

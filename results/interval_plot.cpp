@@ -1,4 +1,4 @@
-#include "results/interval_plot.h"
+#include "duet/results/interval_plot.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,9 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "results/cross_engine_tables.h"
-#include "results/leaderboard_rows.h"
-#include "results/report_parts.h"
+#include "duet/results/cross_engine_tables.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "results/cross_engine.h"
-#include "results/leaderboard.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/leaderboard.h"
 
 namespace duet {
 

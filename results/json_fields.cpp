@@ -1,4 +1,4 @@
-#include "results/json_fields.h"
+#include "duet/results/json_fields.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <limits>
 #include <vector>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 

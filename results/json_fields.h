@@ -9,8 +9,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/json.h"
-#include "results/statistics.h"
+#include "duet/core/json.h"
+#include "duet/results/statistics.h"
 
 namespace duet {
 

@@ -7,7 +7,8 @@
 #include <limits>
 #include <optional>
 
-#include "results/report_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "results/leaderboard.h"
+#include "duet/results/leaderboard.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,9 @@
 #include <limits>
 #include <tuple>
 
-#include "core/require.h"
-#include "results/distinct_episodes.h"
-#include "results/leaderboard_rows.h"
-#include "results/row_groups.h"
+#include "duet/core/require.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "results/episode_row.h"
-#include "results/statistics.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/statistics.h"
 
 namespace duet {
 
@@ -38,9 +38,9 @@ struct LeaderboardEntry {
   std::string policy_fault = {};           // message of the first of those, by episode; it is another program's text
 };
 
-// Sorted by engine, controller, policy, perturbation, task (order of kTasks, "all" last); arms of one policy in turn.
-// An episode succeeds where its headline verdict does and its outcome is ok or fell. Throws InputError: rows of two
-// suites or suite versions, an episode that is there twice.
+// Sorted by engine, controller, policy, perturbation, task (order of all_tasks(), "all" last); arms of one policy in
+// turn. An episode succeeds where its headline verdict does and its outcome is ok or fell. Throws InputError: rows of
+// two suites or suite versions, an episode that is there twice.
 std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options = {});
 
 std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries, bool with_metrics = true);

@@ -1,4 +1,4 @@
-#include "results/leaderboard_rows.h"
+#include "duet/results/leaderboard_rows.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,9 @@
 #include <set>
 #include <tuple>
 
-#include "core/task.h"
-#include "core/text.h"
+#include "duet/core/task.h"
+#include "duet/core/text.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {
@@ -115,13 +116,6 @@ std::vector<std::vector<LeaderboardRow>> rows_by_engine(const std::vector<Leader
     engines.back().push_back(row);
   }
   return engines;
-}
-
-int task_rank(std::string_view task) {
-  for (std::size_t i = 0; i < kTasks.size(); ++i) {
-    if (to_string(kTasks[i]) == task) return static_cast<int>(i);
-  }
-  return static_cast<int>(kTasks.size()) + (task == "all" ? 1 : 0);
 }
 
 std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& entries) {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "results/leaderboard.h"
+#include "duet/results/leaderboard.h"
 
 namespace duet {
 
@@ -25,11 +25,8 @@ std::vector<LeaderboardRow> leaderboard_rows(const std::vector<LeaderboardEntry>
 // wide with many engines.
 std::vector<std::vector<LeaderboardRow>> rows_by_engine(const std::vector<LeaderboardRow>& rows);
 
-// Tasks that occur, in the order of kTasks, others after them by name; without "all".
+// Tasks that occur, in the order of all_tasks(), others after them by name; without "all".
 std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& entries);
-// The place of a task in that order.
-int task_rank(std::string_view task);
-
 // Names of other verdicts, or of metrics, that occur in any entry.
 std::vector<std::string> other_verdicts(const std::vector<LeaderboardEntry>& entries);
 std::vector<std::string> metric_names(const std::vector<LeaderboardEntry>& entries);

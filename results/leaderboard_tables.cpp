@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
-#include "results/json_fields.h"
-#include "results/leaderboard.h"
-#include "results/leaderboard_rows.h"
-#include "results/text_table.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/text_table.h"
 
 namespace duet {
 namespace {

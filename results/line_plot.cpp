@@ -1,4 +1,4 @@
-#include "results/line_plot.h"
+#include "duet/results/line_plot.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <limits>
 
-#include "core/require.h"
-#include "results/report_parts.h"
+#include "duet/core/require.h"
+#include "duet/results/escape_html.h"
 
 namespace duet {
 namespace {

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "results/leaderboard_rows.h"
-#include "results/line_plot.h"
-#include "results/report_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/line_plot.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

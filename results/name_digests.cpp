@@ -1,8 +1,8 @@
-#include "results/name_digests.h"
+#include "duet/results/name_digests.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "results/episode_row.h"
-#include "results/run_info.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/run_info.h"
 
 namespace duet {
 

@@ -1,12 +1,12 @@
-#include "results/policy_groups.h"
+#include "duet/results/policy_groups.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "results/distinct_episodes.h"
-#include "results/json_fields.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "results/cross_engine_tables.h"
-#include "results/leaderboard_rows.h"
-#include "results/row_groups.h"
+#include "duet/results/cross_engine_tables.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 

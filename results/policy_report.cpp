@@ -1,4 +1,4 @@
-#include "results/policy_report.h"
+#include "duet/results/policy_report.h"
 
 namespace duet {
 namespace {

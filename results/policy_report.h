@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "results/degradation.h"
-#include "results/policy_table.h"
-#include "results/reactivity.h"
+#include "duet/results/degradation.h"
+#include "duet/results/policy_table.h"
+#include "duet/results/reactivity.h"
 
 namespace duet {
 

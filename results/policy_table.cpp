@@ -1,4 +1,4 @@
-#include "results/policy_table.h"
+#include "duet/results/policy_table.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <optional>
 #include <tuple>
 
-#include "results/comparison_parts.h"
-#include "results/contact_table_parts.h"
-#include "results/cross_engine.h"
-#include "results/leaderboard_rows.h"
+#include "duet/results/comparison_parts.h"
+#include "duet/results/contact_table_parts.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/leaderboard_rows.h"
 
 namespace duet {
 namespace {
@@ -19,17 +19,27 @@ constexpr std::string_view kPaperDetector = "paper/paper";
 constexpr std::string_view kReplay = "replay";
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+constexpr std::array<PaperTaskRate, 6> rates(double hug, double handshake, double high_five, double wave, double bend,
+                                             double fly_kiss) {
+  return {{{Task::kHug, hug},
+           {Task::kHandshake, handshake},
+           {Task::kHighFive, high_five},
+           {Task::kWave, wave},
+           {Task::kBend, bend},
+           {Task::kFlyKiss, fly_kiss}}};
+}
+
 // Source: supplement C.3.3, Table S9.
 constexpr std::array<PaperPolicy, 9> kPaper = {
-    {{"D-STAR", "", 0.0, 84.9, {93.3, 77.4, 70.4, 96.3, 93.3, 90.9}},
-     {"D-STAR, jitter 1 cm", "jitter", 0.01, 80.2, {93.3, 64.5, 63.0, 96.3, 93.3, 90.9}},
-     {"D-STAR, jitter 2 cm", "jitter", 0.02, 79.4, {100.0, 61.3, 59.3, 96.3, 93.3, 90.9}},
-     {"D-STAR, jitter 5 cm", "jitter", 0.05, 77.8, {100.0, 58.1, 55.6, 96.3, 93.3, 90.9}},
-     {"D-STAR, dropout 0.05", "dropout", 0.05, 78.6, {100.0, 61.3, 59.3, 92.6, 93.3, 90.9}},
-     {"D-STAR, dropout 0.1", "dropout", 0.1, 78.6, {93.3, 67.7, 51.9, 96.3, 93.3, 90.9}},
-     {"D-STAR, dropout 0.2", "dropout", 0.2, 75.4, {93.3, 58.1, 48.1, 96.3, 93.3, 90.9}},
-     {"D-STAR, HOMIE, waist free", "", 0.0, 67.8, {66.8, 46.7, 33.8, 93.8, 96.0, 86.4}},
-     {"D-STAR, HOMIE, waist locked", "", 0.0, 66.1, {56.2, 47.5, 32.9, 93.8, 97.5, 86.4}}}};
+    {{"D-STAR", "", 0.0, 84.9, rates(93.3, 77.4, 70.4, 96.3, 93.3, 90.9)},
+     {"D-STAR, jitter 1 cm", "jitter", 0.01, 80.2, rates(93.3, 64.5, 63.0, 96.3, 93.3, 90.9)},
+     {"D-STAR, jitter 2 cm", "jitter", 0.02, 79.4, rates(100.0, 61.3, 59.3, 96.3, 93.3, 90.9)},
+     {"D-STAR, jitter 5 cm", "jitter", 0.05, 77.8, rates(100.0, 58.1, 55.6, 96.3, 93.3, 90.9)},
+     {"D-STAR, dropout 0.05", "dropout", 0.05, 78.6, rates(100.0, 61.3, 59.3, 92.6, 93.3, 90.9)},
+     {"D-STAR, dropout 0.1", "dropout", 0.1, 78.6, rates(93.3, 67.7, 51.9, 96.3, 93.3, 90.9)},
+     {"D-STAR, dropout 0.2", "dropout", 0.2, 75.4, rates(93.3, 58.1, 48.1, 96.3, 93.3, 90.9)},
+     {"D-STAR, HOMIE, waist free", "", 0.0, 67.8, rates(66.8, 46.7, 33.8, 93.8, 96.0, 86.4)},
+     {"D-STAR, HOMIE, waist locked", "", 0.0, 66.1, rates(56.2, 47.5, 32.9, 93.8, 97.5, 86.4)}}};
 
 // Of an entry's rate over its n episodes; none where no row has the verdict.
 Rate paper_rate(const LeaderboardEntry& entry) {

@@ -11,8 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "results/leaderboard.h"
-#include "results/policy_groups.h"
+#include "duet/core/task.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/policy_groups.h"
 
 namespace duet {
 
@@ -72,12 +73,16 @@ struct PolicyTable {
 // Empty where the only policy is `replay`, which decides nothing. Throws InputError as leaderboard() does.
 PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
 
-// A row of Table S9 as the supplement prints it, in %: overall, then as in kTasks.
+struct PaperTaskRate {
+  Task task;
+  double percent;
+};
+// A row of Table S9 as the supplement prints it, in %: overall, then by task.
 struct PaperPolicy {
   std::string_view name, family;  // family and size of the perturbation, "" for none
   double size;                    // [m] or a probability
   double overall;
-  std::array<double, 6> tasks;
+  std::array<PaperTaskRate, kPaperTasks.size()> tasks;
 };
 std::span<const PaperPolicy> paper_policies();
 std::string paper_detector_sentence();  // why only one column can be held against it

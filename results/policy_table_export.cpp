@@ -6,11 +6,12 @@
 #include <functional>
 #include <set>
 
-#include "core/task.h"
-#include "results/comparison_parts.h"
-#include "results/cross_engine.h"
-#include "results/json_fields.h"
-#include "results/policy_table.h"
+#include "duet/core/task.h"
+#include "duet/results/comparison_parts.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/policy_table.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {
@@ -156,8 +157,9 @@ std::vector<std::string> tasks_of(const PolicyTable& table) {
 
 double paper_value(const PaperPolicy& paper, const std::string& task) {
   if (task == "all") return paper.overall;
-  const auto place = static_cast<std::size_t>(task_rank(task));
-  return place < paper.tasks.size() ? paper.tasks[place] : std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [of, percent] : paper.tasks)
+    if (to_string(of) == task) return percent;
+  return std::numeric_limits<double>::quiet_NaN();
 }
 
 using TaskRates = std::map<std::string, Rate>;
@@ -260,7 +262,7 @@ nlohmann::json json_of(const PolicyLine& line) {
 
 nlohmann::json json_of(const PaperPolicy& paper) {
   nlohmann::json tasks = {{"all", paper.overall}};
-  for (std::size_t i = 0; i < kTasks.size(); ++i) tasks[std::string(to_string(kTasks[i]))] = paper.tasks[i];
+  for (const auto& [task, percent] : paper.tasks) tasks[std::string(to_string(task))] = percent;
   return {{"name", paper.name}, {"success_percent", std::move(tasks)}};
 }
 

@@ -1,26 +1,21 @@
-#include "results/published.h"
+#include "duet/results/published.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "results/json_fields.h"
-#include "results/run_directory.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kSchema = "duet.published/1";
-constexpr const char* kManifest = "manifest.json";
 constexpr const char* kRows = "episodes.jsonl";
 constexpr const char* kInputs = "inputs";  // what the run was made from, where it keeps it
 constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // where they are
@@ -37,11 +32,6 @@ std::string lean_rows(const Run& run) {
   return text;
 }
 
-// A path that leads nowhere but below the folder.
-bool stays_below(const fs::path& path) {
-  return !path.empty() && path.is_relative() && std::ranges::find(path, fs::path("..")) == path.end();
-}
-
 // A run names files by their places on its machine; what is published names them from the folder that it is published
 // from.
 std::string without_places(std::string text) {
@@ -56,19 +46,12 @@ std::string without_places(std::string text) {
   return text;
 }
 
-// Everything but the manifest is in `folder` by now.
-nlohmann::json manifest_of(const Run& run, const std::string& folder) {
-  nlohmann::json files = nlohmann::json::object();
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file())
-      files[entry.path().lexically_relative(folder).generic_string()] = sha256_file(entry.path().string());
-  return {{"schema", kSchema},
-          {"suite", run.info.suite},
+nlohmann::json description_of(const Run& run) {
+  return {{"suite", run.info.suite},
           {"suite_version", run.info.suite_version},
           {"suite_hash", run.info.suite_hash},
           {"rows", run.rows.size()},
-          {"without", {"trace", "feet"}},
-          {"files", files}};
+          {"without", {"trace", "feet"}}};
 }
 
 void fill(const std::string& folder, const std::string& source, const Run& run) {
@@ -77,7 +60,7 @@ void fill(const std::string& folder, const std::string& source, const Run& run) 
     if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
   if (const std::string inputs = in(source, kInputs); fs::exists(inputs))
     fs::copy(inputs, in(folder, kInputs), fs::copy_options::recursive);
-  write_file(in(folder, kManifest), manifest_of(run, folder).dump(2) + "\n");
+  write_manifest(folder, description_of(run));
 }
 
 }  // namespace
@@ -96,29 +79,6 @@ void publish_run(const std::string& run, const std::string& folder) {
     std::error_code ignored;
     fs::remove_all(partial, ignored);
     throw;
-  }
-}
-
-bool is_published(const std::string& folder) { return fs::exists(in(folder, kManifest)); }
-
-void check_published(const std::string& folder) {
-  if (!is_published(folder)) return;
-  const std::string path = in(folder, kManifest);
-  const nlohmann::json json = parse_json(read_text(path), path);
-  JsonFields fields(json, path);
-  if (const std::string schema = fields.text("schema"); schema != kSchema)
-    throw InputError(fmt::format("{}: expected schema {}, found {}", path, kSchema, shown(schema)));
-  const nlohmann::json& files = fields.at("files");
-  if (!files.is_object() || !files.contains(kRows))
-    throw InputError(fmt::format("{}: key 'files': expected the SHA-256 of {} and others", path, kRows));
-  for (const auto& [name, digest] : files.items()) {
-    if (!stays_below(name))
-      throw InputError(
-          fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, shown(name)));
-    const std::string found = sha256_file(in(folder, name));
-    if (digest != found)
-      throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", in(folder, name),
-                                   shown(digest.dump()), found));
   }
 }
 

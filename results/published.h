@@ -5,16 +5,13 @@
 
 #include <string>
 
+#include "duet/results/manifest.h"
+
 namespace duet {
 
 // Writes `folder` at once: it is there whole or not at all. Files that the run names by their places on its machine are
 // named from the working folder. Throws InputError for what is no run or a run without rows,
 // and where `folder` is there already.
 void publish_run(const std::string& run, const std::string& folder);
-
-bool is_published(const std::string& folder);
-
-// Where `folder` is published: throws InputError (file, expected, found) unless every file is what the manifest says.
-void check_published(const std::string& folder);
 
 }  // namespace duet

@@ -1,18 +1,19 @@
-#include "results/reactivity.h"
+#include "duet/results/reactivity.h"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "results/order_statistics.h"
+#include "duet/core/order_statistics.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoReaction = std::numeric_limits<double>::quiet_NaN();
 
 struct Onsets {
-  double robot = kNone, partner = kNone;  // [s]; NaN: none
+  double robot = kNoReaction, partner = kNoReaction;  // [s]; NaN: none
 
   [[nodiscard]] bool both() const { return std::isfinite(robot) && std::isfinite(partner); }
   [[nodiscard]] double delay() const { return robot - partner; }
@@ -21,7 +22,7 @@ struct Onsets {
 Onsets onsets_of(const EpisodeRow& row) {
   const auto metric = [&](const char* name) {
     const auto found = row.metrics.find(name);
-    return found == row.metrics.end() ? kNone : found->second;
+    return found == row.metrics.end() ? kNoReaction : found->second;
   };
   return {.robot = metric("onset_s"), .partner = metric("partner_onset_s")};
 }
@@ -95,10 +96,10 @@ Reactivity timing_of(const PolicyKey& key, const PerturbedRows& rows, ClusterBoo
                    [](const OnsetShift& a, const OnsetShift& b) { return a.partner < b.partner; });
   of.n = static_cast<long>(gathered.products.size());
   of.without = gathered.without;
-  of.slope = of.n > 0 ? sum(gathered.products) / sum(gathered.squares) : kNone;
+  of.slope = of.n > 0 ? sum(gathered.products) / sum(gathered.squares) : kNoReaction;
   of.interval = gathered.numbers.size() > 1
                     ? bootstrap.ratio(gathered.products, gathered.squares, gathered.clips, level)
-                    : Interval{.low = kNone, .high = kNone};
+                    : Interval{.low = kNoReaction, .high = kNoReaction};
   std::vector<double> delays = clean_delays(clean);
   of.n_clean = static_cast<long>(delays.size());
   of.delay_clean = quantile(std::move(delays), 0.5);

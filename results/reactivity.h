@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "results/line_plot.h"
-#include "results/policy_groups.h"
+#include "duet/results/line_plot.h"
+#include "duet/results/policy_groups.h"
 
 namespace duet {
 

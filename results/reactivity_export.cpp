@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "results/json_fields.h"
-#include "results/reactivity.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/reactivity.h"
 
 namespace duet {
 namespace {

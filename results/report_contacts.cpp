@@ -1,8 +1,9 @@
 // The section "Contact with people" of the HTML report.
 #include <fmt/format.h>
 
-#include "results/contact_table_parts.h"
-#include "results/report_parts.h"
+#include "duet/results/contact_table_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

@@ -3,10 +3,12 @@
 
 #include <map>
 
-#include "results/controller_table_parts.h"
-#include "results/report_parts.h"
-#include "results/row_groups.h"
-#include "results/training_curves.h"
+#include "duet/results/controller_table_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/html_report.h"
+#include "duet/results/report_parts.h"
+#include "duet/results/row_groups.h"
+#include "duet/results/training_curves.h"
 
 namespace duet {
 namespace {

@@ -1,8 +1,9 @@
 // The section "Across engines" of the HTML report.
 #include <fmt/format.h>
 
-#include "results/cross_engine_tables.h"
-#include "results/report_parts.h"
+#include "duet/results/cross_engine_tables.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

@@ -4,13 +4,12 @@
 #include <string>
 #include <string_view>
 
-#include "results/html_report.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_content.h"
 
 namespace duet {
 
 struct TitledTable;  // results/cross_engine_tables.h
-
-std::string escape_html(std::string_view text);  // also for attribute values in double quotes
 
 // Style sheet and script of the report.
 std::string_view report_style();
@@ -37,6 +36,8 @@ std::string cross_engine_html(const ReportContent& content);
 
 // Mark of the limits, notes and tables; "" for a table without groups.
 std::string contacts_html(const ContactTable& table);
+
+std::string walking_html(const WalkTable& table);  // "" for a table without entries
 
 // Plots side by side, each under its title; those without a point are left out.
 std::string plots_html(const std::vector<LinePlot>& plots);

@@ -1,5 +1,5 @@
 // The sections "Policies", "Perturbations" and "Reactivity" of the HTML report.
-#include "results/report_parts.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,5 @@
 // Style sheet of the HTML report: light and dark by the reader's scheme, printable, no fonts or files from elsewhere.
-#include "results/report_parts.h"
+#include "duet/results/report_parts.h"
 
 namespace duet {
 

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <set>
 
-#include "results/leaderboard_rows.h"
-#include "results/report_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/leaderboard_rows.h"
+#include "duet/results/report_parts.h"
+#include "duet/results/row_groups.h"
 
 namespace duet {
 namespace {

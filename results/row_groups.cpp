@@ -1,12 +1,13 @@
-#include "results/row_groups.h"
+#include "duet/results/row_groups.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <tuple>
 
-#include "core/require.h"
-#include "results/name_digests.h"
+#include "duet/core/require.h"
+#include "duet/core/task.h"
+#include "duet/results/name_digests.h"
 
 namespace duet {
 
@@ -45,6 +46,12 @@ void require_distinct(const EpisodeRow& a, const EpisodeRow& b) {
   if (episode_id(a) != episode_id(b)) return;
   throw InputError(fmt::format("the episode {} {} {} of {}/{}/{} {} ({} arm) is there twice", a.task, a.clip, a.episode,
                                a.engine, a.controller, a.policy, a.perturbation, a.arm));
+}
+
+int task_rank(std::string_view task) {
+  for (const Task known : all_tasks())
+    if (to_string(known) == task) return known.index();
+  return static_cast<int>(all_tasks().size()) + (task == "all" ? 1 : 0);
 }
 
 }  // namespace duet

@@ -3,9 +3,10 @@
 
 #include <compare>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "results/episode_row.h"
+#include "duet/results/episode_row.h"
 
 namespace duet {
 
@@ -16,6 +17,9 @@ struct EpisodeId {
   auto operator<=>(const EpisodeId&) const = default;
 };
 EpisodeId episode_id(const EpisodeRow& row);
+
+// The place of a task in the order of all_tasks; others after them, "all" last.
+int task_rank(std::string_view task);
 
 // The suite's headline verdict; false for any outcome but ok and fell and where no detector ruled.
 bool headline_success(const EpisodeRow& row);

@@ -1,4 +1,4 @@
-#include "results/row_identity.h"
+#include "duet/results/row_identity.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <set>
 
-#include "results/json_fields.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

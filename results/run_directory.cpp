@@ -1,4 +1,4 @@
-#include "results/run_directory.h"
+#include "duet/results/run_directory.h"
 
 #include <fmt/format.h>
 
@@ -9,12 +9,12 @@
 #include <system_error>
 #include <utility>
 
-#include "core/require.h"
-#include "results/json_fields.h"
-#include "results/name_digests.h"
-#include "results/published.h"
-#include "results/run_litter.h"
-#include "results/run_rows.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/manifest.h"
+#include "duet/results/name_digests.h"
+#include "duet/results/run_litter.h"
+#include "duet/results/run_rows.h"
 
 namespace duet {
 namespace {

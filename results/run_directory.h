@@ -11,10 +11,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "core/file.h"
-#include "results/episode_row.h"
-#include "results/folder_lock.h"
-#include "results/run_info.h"
+#include "duet/core/file.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/folder_lock.h"
+#include "duet/results/run_info.h"
 
 namespace duet {
 

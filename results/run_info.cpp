@@ -1,4 +1,4 @@
-#include "results/run_info.h"
+#include "duet/results/run_info.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +7,10 @@
 #include <string_view>
 #include <utility>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "results/json_fields.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/results/json_fields.h"
 
 namespace duet {
 namespace {

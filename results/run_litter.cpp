@@ -1,4 +1,4 @@
-#include "results/run_litter.h"
+#include "duet/results/run_litter.h"
 
 #include <signal.h>
 #include <unistd.h>

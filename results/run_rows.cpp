@@ -1,4 +1,4 @@
-#include "results/run_rows.h"
+#include "duet/results/run_rows.h"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <fstream>
 #include <utility>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "results/json_fields.h"
-#include "results/row_identity.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/row_identity.h"
 
 namespace duet {
 namespace {

@@ -8,9 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "results/episode_row.h"
-#include "results/name_digests.h"
-#include "results/run_info.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/name_digests.h"
+#include "duet/results/run_info.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "results/run_union.h"
+#include "duet/results/run_union.h"
 
 #include <fmt/format.h>
 
@@ -9,10 +9,10 @@
 #include <set>
 #include <tuple>
 
-#include "core/require.h"
-#include "results/json_fields.h"
-#include "results/name_digests.h"
-#include "results/row_identity.h"
+#include "duet/core/require.h"
+#include "duet/results/json_fields.h"
+#include "duet/results/name_digests.h"
+#include "duet/results/row_identity.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "results/run_directory.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 

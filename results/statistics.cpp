@@ -1,4 +1,4 @@
-#include "results/statistics.h"
+#include "duet/results/statistics.h"
 
 #include <fmt/format.h>
 
@@ -9,9 +9,9 @@
 #include <map>
 #include <numeric>
 
-#include "core/random.h"
-#include "core/require.h"
-#include "results/order_statistics.h"
+#include "duet/core/order_statistics.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -1,11 +1,11 @@
-#include "results/text_table.h"
+#include "duet/results/text_table.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/text.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

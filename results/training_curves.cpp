@@ -1,4 +1,4 @@
-#include "results/training_curves.h"
+#include "duet/results/training_curves.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,9 @@
 #include <iterator>
 #include <limits>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

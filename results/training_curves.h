@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "results/line_plot.h"
+#include "duet/results/line_plot.h"
 
 namespace duet {
 

@@ -10,11 +10,16 @@ namespace duet::pair_kernel {
 
 inline constexpr int kLanes = 16;
 inline constexpr int kMaxJoints = 48;
-inline constexpr int kMaxPoints = 32;
+inline constexpr int kMaxPoints = 48;
 inline constexpr int kMaxKeys = 11;
 inline constexpr int kPairs = 16;
 inline constexpr int kHumanRows = 18;
-inline constexpr int kHalo = 2;  // blocks before the first and after the last, for neighbours in time
+inline constexpr int kBones = 6;  // of the partner's arms; bone k ends at his offset k
+inline constexpr int kMaxHumanSpheres = 16;
+inline constexpr int kMaxSpheres = 32;  // of both bodies
+inline constexpr int kMaxSpherePairs = 256;
+inline constexpr int kMemory = 5;  // steps that L-BFGS remembers
+inline constexpr int kHalo = 2;    // blocks before the first and after the last, for neighbours in time
 inline constexpr int kMaxRows = kMaxJoints + 6 + kHumanRows;
 
 struct alignas(64) Row {
@@ -34,6 +39,12 @@ struct Point {
   float offset[3];
 };
 
+// Two spheres by index, the robot's before the partner's, and the sum of their radii [m].
+struct SpherePair {
+  int a, b;
+  float reach;
+};
+
 // Constant over the iterations.
 struct Setup {
   int dof;
@@ -47,9 +58,17 @@ struct Setup {
   float lower[kMaxJoints];
   float upper[kMaxJoints];
   Point point[kMaxPoints];
-  int pair_point[kPairs];
+  int pair_point[kPairs];  // -1: the chain has no such point
   int key_point[kMaxKeys];
   int human_offset[kMaxKeys];
+  // Of the modes on the ground; the paper's kernel leaves them alone.
+  bool extended;
+  bool upright;  // the root does not turn
+  bool bones;
+  int robot_spheres, human_spheres, sphere_pairs;
+  int sphere_point[kMaxSpheres];  // of the robot's
+  int sphere_offset[kMaxHumanSpheres];
+  SpherePair sphere_pair[kMaxSpherePairs];
 };
 
 // One iteration: factors of the gradient of T times the objective, and Adam's step.
@@ -63,9 +82,13 @@ struct Step {
   float square;   // 1 / sqrt(1 - beta2^k)
   float epsilon;  // T times Adam's, as the gradient is
   float offset[3];
+  float bone;
+  float partner_velocity, partner_acceleration;
+  float collision;
 };
 
-// Rows of a block's constants; then the targets (48), the partner's keypoints (3 K), the original distances. Positions
+// Rows of a block's constants; then the targets (48), the partner's keypoints (3 K), the original distances, and for
+// the extended kernel the partner's arm bones (18) and his spheres (3 each). Positions
 // are relative to the frame's root before optimisation: small numbers, wherever the two stand in the world.
 enum Constant {
   kWeight,  // 1 for a frame of the sequence, 0 for padding
@@ -90,23 +113,71 @@ enum Sum : int {
   kVelocity,
   kAcceleration,
   kPose,
+  kBone,
+  kPartnerVelocity,
+  kPartnerAcceleration,
+  kCollision,
   kForce,
   kSums = kForce + 3
 };
 
 struct Sweep {
-  const Setup* setup;
-  const Step* step;
-  const Row* constants;
-  std::size_t constant_rows;
-  const Row* x;  // block 0; kHalo blocks lie before it and after the last
-  Row* next;
-  Row* mean;  // Adam's moments
-  Row* square;
-  std::size_t rows;  // per block of x, next, mean and square
-  int begin, end;    // blocks
-  Row* sums;         // kSums rows, added to
+  const Setup* setup = nullptr;
+  const Step* step = nullptr;
+  const Row* constants = nullptr;
+  std::size_t constant_rows = 0;
+  const Row* x = nullptr;  // block 0; kHalo blocks lie before it and after the last
+  Row* next = nullptr;
+  Row* mean = nullptr;  // Adam's moments
+  Row* square = nullptr;
+  std::size_t rows = 0;     // per block of x, next, mean and square
+  int begin = 0, end = 0;   // blocks
+  Row* sums = nullptr;      // kSums rows, added to
+  Row* gradient = nullptr;  // where not null, the gradient goes there and nothing moves
 };
+
+// Vectors of L-BFGS: blocks of `rows` rows each, as x is. The space that it works in is that of the preconditioner
+// P = L D L^T, with L of three bands and constant along time: z = D^(1/2) L^T x. Per row of the variables:
+struct Filter {
+  float first[kMaxRows], second[kMaxRows];  // l1, l2 of L
+  float scale[kMaxRows];                    // D^(1/2)
+  float inverse[kMaxRows];                  // D^(-1/2)
+};
+
+struct VectorSweep {
+  const Setup* setup;
+  const Filter* filter;
+  std::size_t rows;
+  int blocks;
+  int begin, end;  // blocks, of dots_* only
+};
+
+// gradient -> D^(-1/2) L^-1 of it, with the gradient of variables at their bounds that want to go out set to zero; each
+// lane's segment from a state of zero.
+void filter_gradient_v2(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
+void filter_gradient_v3(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
+void filter_gradient_v4(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
+
+// s = D^(1/2) L^T (x1 - x0), y = g1 - g0. x0, x1 have their halo.
+void step_v2(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
+void step_v3(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
+void step_v4(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
+
+// Products of the `newest` s and y and of g with all `count` vectors and g, lane by lane: sums[3 i], [3 i + 1], [3 i +
+// 2] are those of vector i with vectors[newest], vectors[newest + 1], g; i = count is g itself.
+void dots_v2(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
+void dots_v3(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
+void dots_v4(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
+
+// out = L^-T D^(-1/2) sum_i factors[i] vectors[i], each lane's segment from a state of zero at its end.
+void combine_v2(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
+void combine_v3(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
+void combine_v4(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
+
+// next = x + rate * direction, inside the bounds.
+void move_v2(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
+void move_v3(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
+void move_v4(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
 
 // One Adam iteration over the blocks. v2 needs nothing beyond x86-64-v2, v3 AVX2 and FMA, v4 AVX-512.
 void sweep_v2(const Sweep& sweep);

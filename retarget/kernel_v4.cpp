@@ -1,7 +1,7 @@
 // The PAIR kernel for AVX-512. Compiled with -march=x86-64-v4 (retarget/CMakeLists.txt); chosen at run time.
 #include <immintrin.h>
 
-#include "retarget/kernel_types.h"
+#include "duet/retarget/kernel_types.h"
 
 namespace duet::pair_kernel {
 namespace {
@@ -11,14 +11,31 @@ typedef float V __attribute__((vector_size(4 * kWidth)));
 typedef int VI __attribute__((vector_size(4 * kWidth)));
 
 inline V square_root(V x) { return _mm512_maskz_sqrt_ps(0xffff, x); }
+inline bool any(VI x) { return _mm512_movepi32_mask(reinterpret_cast<__m512i>(x)) != 0; }
 
 }  // namespace
 }  // namespace duet::pair_kernel
 
-#include "retarget/kernel_body.h"
+#include "duet/retarget/kernel_body.h"
+#include "duet/retarget/lbfgs_body.h"
 
 namespace duet::pair_kernel {
 
 void sweep_v4(const Sweep& sweep) { sweep_blocks(sweep); }
+void filter_gradient_v4(const VectorSweep& at, const Row* x, const Row* gradient, Row* out) {
+  filter_gradient(at, x, gradient, out);
+}
+void step_v4(const VectorSweep& at, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y) {
+  step(at, x0, x1, g0, g1, s, y);
+}
+void dots_v4(const VectorSweep& at, const Row* const* vectors, int count, int newest, const Row* g, Row* sums) {
+  dots(at, vectors, count, newest, g, sums);
+}
+void combine_v4(const VectorSweep& at, const Row* const* vectors, const float* factors, int count, Row* out) {
+  combine(at, vectors, factors, count, out);
+}
+void move_v4(const VectorSweep& at, const Row* x, const Row* direction, float rate, Row* next) {
+  move(at, x, direction, rate, next);
+}
 
 }  // namespace duet::pair_kernel

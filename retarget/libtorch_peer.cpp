@@ -1,13 +1,13 @@
 // float by design: the way the peer is used (and measured) elsewhere.
-#include "retarget/libtorch_peer.h"
+#include "duet/retarget/libtorch_peer.h"
 
 #include <malloc.h>
 #include <torch/torch.h>
 
 #include <ctime>
 
-#include "core/require.h"
-#include "retarget/pair_solver.h"
+#include "duet/core/require.h"
+#include "duet/retarget/pair_solver.h"
 
 namespace duet {
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "retarget/pair_problem.h"
+#include "duet/retarget/pair_problem.h"
 
 namespace duet {
 

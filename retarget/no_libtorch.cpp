@@ -1,6 +1,6 @@
 // A build without libtorch: says so.
-#include "core/require.h"
-#include "retarget/libtorch_peer.h"
+#include "duet/core/require.h"
+#include "duet/retarget/libtorch_peer.h"
 
 namespace duet {
 

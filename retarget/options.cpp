@@ -1,4 +1,4 @@
-#include "retarget/options.h"
+#include "duet/retarget/options.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,23 +8,27 @@
 #include <utility>
 #include <variant>
 
-#include "core/names.h"
-#include "core/require.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
 
 namespace duet {
 
 namespace {
 
-using Field = std::variant<double*, int*, bool*, std::string*, KinLoss*, ContactReduction*, ContactBlocks*,
-                           RootTranslation*, ContactKeypoints*, KernelKind*>;
+using Field = std::variant<double*, int*, bool*, std::string*, PairMode*, Optimizer*, KinLoss*, ContactReduction*,
+                           ContactBlocks*, RootTranslation*, ContactKeypoints*, KernelKind*>;
 
 std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
-  return {{"w-kin", &o.weights.kin},
+  return {{"mode", &o.mode},
+          {"w-kin", &o.weights.kin},
           {"w-con", &o.weights.con},
           {"w-hum", &o.weights.hum},
           {"w-temp", &o.weights.temp},
           {"w-acceleration", &o.weights.acceleration},
           {"w-pose", &o.weights.pose},
+          {"w-bone", &o.weights.bone},
+          {"w-partner", &o.weights.partner},
+          {"w-collision", &o.weights.collision},
           {"stage1-iterations", &o.schedule.stage1_iterations},
           {"stage1-rate", &o.schedule.stage1_rate},
           {"stage2-iterations", &o.schedule.stage2_iterations},
@@ -40,10 +44,16 @@ std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
           {"filter", &o.filter},
           {"adapt-human", &o.adapt_human},
           {"kernel", &o.kernel},
+          {"optimizer", &o.optimizer},
+          {"lbfgs-iterations", &o.lbfgs_iterations},
+          {"ground", &o.ground},
+          {"root-smoothing", &o.root_smoothing},
           {"smpl", &o.smpl_path}};
 }
 
 // The texts of an enumeration's values, in the order of its enumerators.
+std::vector<std::string> texts(PairMode) { return {"paper", "grounded", "best"}; }
+std::vector<std::string> texts(Optimizer) { return {"adam", "lbfgs"}; }
 std::vector<std::string> texts(KinLoss) { return {"squared", "mean-norm"}; }
 std::vector<std::string> texts(ContactReduction) { return {"frobenius", "mean"}; }
 std::vector<std::string> texts(ContactBlocks) { return {"full", "cross-and-human", "cross"}; }
@@ -114,7 +124,37 @@ std::vector<std::string> pair_option_names() {
   return names;
 }
 
+PairOptions pair_options_of(PairMode mode) {
+  PairOptions options;
+  options.mode = mode;
+  if (mode == PairMode::kPaper) return options;
+  options.ground = true;
+  options.contact_blocks = ContactBlocks::kCrossAndHuman;
+  options.weights.bone = 5.0;
+  options.weights.partner = 0.2;
+  options.weights.collision = 10.0;
+  if (mode != PairMode::kBest) return options;
+  options.optimizer = Optimizer::kLbfgs;
+  options.lbfgs_iterations = 80;
+  return options;
+}
+
+PairOptions make_pair_options(const std::vector<std::pair<std::string, std::string>>& choices) {
+  PairOptions options;
+  for (const bool mode : {true, false}) {
+    for (const auto& [name, value] : choices)
+      if ((name == "mode") == mode) set_pair_option(options, name, value);
+  }
+  return options;
+}
+
 void set_pair_option(PairOptions& options, const std::string& name, const std::string& value) {
+  if (name == "mode") {
+    PairMode mode = PairMode::kPaper;
+    parse(mode, name, value);
+    options = pair_options_of(mode);
+    return;
+  }
   std::visit([&](auto* field) { parse(*field, name, value); }, find_field(options, name));
 }
 
@@ -128,6 +168,11 @@ void validate(const PairOptions& options) {
     PairOptions copy;
     set_pair_option(copy, name, pair_option(options, name));
   }
+  require(
+      !options.ground || options.root_translation != RootTranslation::kPerFrame,
+      "pair options: root=per-frame would lift a robot that stands on the ground; expected constant-offset or fixed");
+  require(options.optimizer == Optimizer::kAdam || options.lbfgs_iterations > 0,
+          "pair options: lbfgs-iterations is 0; expected at least one iteration");
   require(options.schedule.stage1_iterations + options.schedule.stage2_iterations > 0,
           "pair options: stage1-iterations and stage2-iterations are both 0; expected at least one iteration");
 }

@@ -1,8 +1,9 @@
 // Options of PAIR: the weights and schedule of supplement A.1.2, and every reading where the text leaves a gap. Names
-// and defaults as in docs/deviations.md; the defaults are the `paper` mode.
+// and defaults as in docs/deviations.md; the defaults are the `paper` mode. docs/retargeting.md tells the modes apart.
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace duet {
@@ -14,6 +15,10 @@ struct PairWeights {  // supplement A.1.2, stage 1
   double temp = 5.0;
   double acceleration = 1.0;  // w_a of L_temp, not given in the text
   double pose = 0.02;
+  // Not in the paper, of the modes on the ground.
+  double bone = 0.0;       // the partner's bones, collars to wrists, keep their lengths
+  double partner = 0.0;    // L_temp of the partner's offsets, as a share of `temp`
+  double collision = 0.0;  // depth of spheres of the two bodies in each other
 };
 
 struct PairSchedule {
@@ -26,6 +31,8 @@ struct PairSchedule {
   double epsilon = 1e-8;     // Adam's, not given in the text: the common default
 };
 
+enum class PairMode { kPaper, kGrounded, kBest };
+enum class Optimizer { kAdam, kLbfgs };
 enum class KinLoss { kSquared, kMeanNorm };                  // sum of squares over pairs, 1/T | PHC's mean norm
 enum class ContactReduction { kFrobenius, kMean };           // printed, 1/T | 1/(T N^2)
 enum class ContactBlocks { kFull, kCrossAndHuman, kCross };  // N x N | without robot-robot | robot-human only
@@ -38,6 +45,7 @@ enum class ContactKeypoints {
 enum class KernelKind { kAuto, kScalar, kV2, kV3, kV4 };  // double reference | float lanes: x86-64-v2, AVX2, AVX-512
 
 struct PairOptions {
+  PairMode mode = PairMode::kPaper;  // sets the options below; what is set after it changes that
   PairWeights weights;
   PairSchedule schedule;
   KinLoss kin_loss = KinLoss::kSquared;
@@ -48,7 +56,13 @@ struct PairOptions {
   bool filter = true;       // Gaussian, kernel 5, sigma 0.75, replicate padding, once at the end
   bool adapt_human = true;  // false keeps the partner as it is
   KernelKind kernel = KernelKind::kAuto;
-  std::string smpl_path;  // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
+  Optimizer optimizer = Optimizer::kAdam;
+  int lbfgs_iterations = 50;  // all with the weights of stage 2
+  // The robot stands: soles where the person's feet do, a base that follows slowly and upright
+  // (retarget/ground_plan.h).
+  bool ground = false;
+  double root_smoothing = 0.2;  // standard deviation of the base's smoothing, where `ground` is on [s]
+  std::string smpl_path;        // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
 };
 
 // Text forms for the command line and for PairedMotion::settings. The setter throws std::invalid_argument for an
@@ -57,6 +71,12 @@ struct PairOptions {
 std::vector<std::string> pair_option_names();
 void set_pair_option(PairOptions& options, const std::string& name, const std::string& value);
 std::string pair_option(const PairOptions& options, const std::string& name);
+
+// The options of a mode as it is shipped.
+PairOptions pair_options_of(PairMode mode);
+
+// Options from names and values in any order: `mode`, where it is among them, comes first.
+PairOptions make_pair_options(const std::vector<std::pair<std::string, std::string>>& choices);
 
 // Throws std::invalid_argument naming the option: a number that is negative or not finite, no iteration at all.
 void validate(const PairOptions& options);

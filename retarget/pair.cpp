@@ -1,4 +1,4 @@
-#include "retarget/pair.h"
+#include "duet/retarget/pair.h"
 
 #include <fmt/format.h>
 
@@ -6,12 +6,11 @@
 #include <array>
 #include <cmath>
 
-#include "core/clock.h"
-#include "core/skeleton.h"
-#include "retarget/gaussian_filter.h"
-#include "retarget/pair_kernel.h"
-#include "retarget/pair_problem.h"
-#include "retarget/pair_solver.h"
+#include "duet/core/clock.h"
+#include "duet/core/skeleton.h"
+#include "duet/retarget/gaussian_filter.h"
+#include "duet/retarget/pair_problem.h"
+#include "duet/retarget/pair_solver.h"
 
 namespace duet {
 
@@ -37,8 +36,42 @@ InteractionClip at_50_hz(const InteractionClip& clip) {
   return out;
 }
 
+// The planned base, tilted as the chain above it is, and legs that put the soles where they stand.
+RobotMotion standing_motion(const RobotModel& robot, const PairProblem& problem, const PairOptions& options,
+                            const PairVariables& x) {
+  const int dof = problem.chain.dof();
+  Eigen::MatrixXd q = x.frames.topRows(dof);
+  if (options.filter) q = gaussian_filter(q);
+  q.row(0) = smoothed(q.row(0), 0.5 * options.root_smoothing * kTickRate);
+  RobotMotion motion;
+  motion.rate_hz = kTickRate;
+  motion.joint_names = robot.joint_names();
+  motion.q.resize(robot.dof(), problem.frames());
+  const LegPose legs(robot);
+  Eigen::VectorXd pose = robot.neutral;
+  for (int t = 0; t < problem.frames(); ++t) {
+    for (int j = 1; j < dof; ++j) {
+      const RobotJoint& joint = robot.joints[problem.robot_joint[j]];
+      pose[problem.robot_joint[j]] = std::clamp(q(j, t), joint.lower, joint.upper);
+    }
+    const GroundPlan& plan = problem.plan;
+    const Pose X_WB{yaw_rotation(problem.yaw[t]) * Eigen::AngleAxisd(q(0, t), Eigen::Vector3d::UnitY()),
+                    problem.root.col(t) + x.offset};
+    for (int side = 0; side < 2; ++side) {
+      const Pose X_WS{yaw_rotation(plan.turn[side][t]), plan.sole[side].col(t) + x.offset};
+      legs.solve(side, X_WB, legs.within_reach(side, X_WB, X_WS), pose);
+    }
+    motion.q.col(t) = pose;
+    motion.root.push_back(X_WB);
+    Eigen::Quaterniond& R = motion.root.back().R;
+    if (t > 0 && R.dot(motion.root[t - 1].R) < 0.0) R.coeffs() = -R.coeffs();
+  }
+  return motion;
+}
+
 RobotMotion robot_motion(const RobotModel& robot, const PairProblem& problem, const PairOptions& options,
                          const PairVariables& x) {
+  if (problem.upright) return standing_motion(robot, problem, options, x);
   const int dof = problem.chain.dof();
   RobotMotion motion;
   motion.rate_hz = kTickRate;
@@ -84,11 +117,12 @@ HumanMotion adapted_partner(const HumanMotion& source, int dof, const PairOption
       if (offset >= 0) adapted.joints.at(t, joint) += x.frames.col(t).segment<3>(dof + 3 + 3L * offset);
     }
   }
+  if (options.ground) keep_arm_lengths(source, adapted);
   if (!adapted.rotations.empty()) turn_bones(source, adapted);
   return adapted;
 }
 
-std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solution) {
+std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solution, bool extended) {
   std::map<std::string, std::vector<double>> curves;
   curves["total"] = solution.total;
   for (const PairTerms& terms : solution.terms) {
@@ -97,6 +131,10 @@ std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solut
     curves["hum"].push_back(terms.hum);
     curves["temp"].push_back(terms.temp);
     curves["pose"].push_back(terms.pose);
+    if (!extended) continue;
+    curves["bone"].push_back(terms.bone);
+    curves["partner"].push_back(terms.partner);
+    curves["collision"].push_back(terms.collision);
   }
   return curves;
 }
@@ -130,34 +168,10 @@ PairedMotion retarget(const InteractionClip& clip, const RobotModel& robot, cons
   out.source_partner = resampled.actor_motion();
   out.source_reactor = resampled.reactor_motion();
   out.partner = adapted_partner(out.source_partner, problem.chain.dof(), options, solution.x);
-  out.reshaped = problem.targets;
-  out.loss = loss_curves(solution);
+  out.reshaped = problem.upright ? problem.reshaped : problem.targets;
+  out.loss = loss_curves(solution, options.mode != PairMode::kPaper);
   out.settings = describe(clip, robot, options, solution.kernel);
   return out;
-}
-
-std::vector<KernelKind> available_kernels() {
-  std::vector<KernelKind> kernels;
-  for (const KernelKind kind : {KernelKind::kV4, KernelKind::kV3, KernelKind::kV2}) {
-    if (kernel_runs_here(kind)) kernels.push_back(kind);
-  }
-  kernels.push_back(KernelKind::kScalar);
-  return kernels;
-}
-
-std::string_view to_string(KernelKind kernel) {
-  switch (kernel) {
-    case KernelKind::kScalar:
-      return "scalar";
-    case KernelKind::kV2:
-      return "v2";
-    case KernelKind::kV3:
-      return "v3";
-    case KernelKind::kV4:
-      return "v4";
-    default:
-      return "auto";
-  }
 }
 
 }  // namespace duet

@@ -1,11 +1,11 @@
-#include "retarget/pair_chain.h"
+#include "duet/retarget/pair_chain.h"
 
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
 
-#include "core/require.h"
-#include "core/skeleton.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 

@@ -8,8 +8,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "retarget/options.h"
-#include "robots/robot_model.h"
+#include "duet/retarget/options.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

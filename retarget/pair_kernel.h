@@ -1,12 +1,12 @@
-// The SIMD solver: packs a PairProblem into blocks of 16 lanes and runs a kernel over them. Which kernels there are.
+// The SIMD solvers: Adam with the paper's schedule, and L-BFGS, over a problem in blocks of 16 lanes.
 #pragma once
 
-#include "retarget/pair_solver.h"
+#include "duet/retarget/kernels.h"
+#include "duet/retarget/lane_problem.h"
+#include "duet/retarget/pair_schedule.h"
 
 namespace duet {
 
-bool kernel_runs_here(KernelKind kernel);
-bool kernel_fits(const PairProblem& problem);  // whether the robot fits the kernels' arrays
 PairSolution solve_in_lanes(const PairProblem& problem, const PairOptions& options, KernelKind kernel);
 
 }  // namespace duet

@@ -1,4 +1,4 @@
-#include "retarget/pair_objective.h"
+#include "duet/retarget/pair_objective.h"
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -40,6 +40,7 @@ double kin_term(const PairProblem& problem, const Scales& s, int t, FrameWork& w
   double sum = 0.0;
   for (int i = 0; i < kRetargetPairs; ++i) {
     const int point = problem.chain.pair_points[i];
+    if (point < 0) continue;
     const Eigen::Vector3d d = work.pose.points.col(point) - problem.targets.at(t, i);
     if (s.kin_loss == KinLoss::kSquared) {
       sum += d.squaredNorm() / s.frames;
@@ -113,6 +114,60 @@ void pull_back(const PairProblem& problem, const Eigen::Vector3d& w, FrameWork& 
   g.segment<3>(chain.dof()) += map.a * torque - map.b * w.cross(torque) + map.c * w.dot(torque) * w;
 }
 
+// The partner's arm bones; their gradient by his offsets is added to g (18 rows).
+double bone_term(const PairProblem& problem, const Scales& s, int t, const Eigen::Ref<const Eigen::VectorXd>& offsets,
+                 Eigen::Ref<Eigen::VectorXd> g) {
+  if (problem.bones.size() == 0) return 0.0;
+  double sum = 0.0;
+  for (int k = 0; k < kArmBones; ++k) {
+    const int begin = bone_begin(k);
+    const Eigen::Vector3d before = problem.bones.block<3, 1>(3 * k, t);
+    Eigen::Vector3d bone = before + offsets.segment<3>(3 * k);
+    if (begin >= 0) bone -= offsets.segment<3>(3 * begin);
+    const double length = std::sqrt(bone.squaredNorm() + kDistanceGuard);
+    const double error = length - before.norm();
+    sum += error * error / s.frames;
+    const Eigen::Vector3d force = 2.0 * s.weights.bone / s.frames * error / length * bone;
+    g.segment<3>(3 * k) += force;
+    if (begin >= 0) g.segment<3>(3 * begin) -= force;
+  }
+  return sum;
+}
+
+// Spheres of the robot in themselves and in the partner's; forces go to the robot's points and to his offsets.
+double collision_term(const PairProblem& problem, const Scales& s, int t, FrameWork& work,
+                      const Eigen::Ref<const Eigen::VectorXd>& offsets, Eigen::Ref<Eigen::VectorXd> g) {
+  const BodySpheres& spheres = problem.spheres;
+  const int robots = static_cast<int>(spheres.robot_point.size());
+  const auto at = [&](int i) -> Eigen::Vector3d {
+    if (i < robots) return work.pose.points.col(spheres.robot_point[i]);
+    const int offset = spheres.human_offset[i - robots];
+    Eigen::Vector3d p = spheres.human.at(t, i - robots);
+    if (offset >= 0) p += offsets.segment<3>(3L * offset);
+    return p;
+  };
+  const auto push = [&](int i, const Eigen::Vector3d& force) {
+    if (i < robots) {
+      work.point_force.col(spheres.robot_point[i]) += force;
+    } else if (spheres.human_offset[i - robots] >= 0) {
+      g.segment<3>(3L * spheres.human_offset[i - robots]) += force;
+    }
+  };
+  double sum = 0.0;
+  for (const SpherePair& pair : spheres.pairs) {
+    const Eigen::Vector3d d = at(pair.a) - at(pair.b);
+    const double square = d.squaredNorm() + kDistanceGuard;
+    if (square >= pair.reach * pair.reach) continue;
+    const double distance = std::sqrt(square);
+    const double depth = pair.reach - distance;
+    sum += depth * depth / s.frames;
+    const Eigen::Vector3d force = -2.0 * s.weights.collision / s.frames * depth / distance * d;
+    push(pair.a, force);
+    push(pair.b, -force);
+  }
+  return sum;
+}
+
 // kin, con, hum and pose of one frame; their gradient is added to that frame's column.
 PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, const Scales& s, const PairVariables& x,
                       int t, FrameWork& work, PairVariables* gradient) {
@@ -131,6 +186,9 @@ PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, co
   const auto offsets = column.segment<3 * kHumanOffsets>(dof + 3);
   terms.hum = offsets.squaredNorm() / s.frames;
   terms.pose = column.head(dof).squaredNorm() / (s.frames * dof);
+  Eigen::VectorXd g_arms = Eigen::VectorXd::Zero(3 * kHumanOffsets);
+  terms.bone = bone_term(problem, s, t, offsets, g_arms);
+  terms.collision = collision_term(problem, s, t, work, offsets, g_arms);
   if (gradient == nullptr) return terms;
 
   Eigen::VectorXd g = Eigen::VectorXd::Zero(column.size());
@@ -139,7 +197,7 @@ PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, co
   Eigen::Vector3d root_force;
   pull_back(problem, w, work, g, root_force);
   if (options.adapt_human) {
-    g.segment<3 * kHumanOffsets>(dof + 3) = 2.0 * s.weights.hum / s.frames * offsets;
+    g.segment<3 * kHumanOffsets>(dof + 3) = g_arms + 2.0 * s.weights.hum / s.frames * offsets;
     for (int k = 0; k < keys; ++k) {
       const int offset = problem.human_offset[k];
       if (offset >= 0) g.segment<3>(dof + 3 + 3L * offset) += work.key_force.col(keys + k);
@@ -147,23 +205,27 @@ PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, co
   }
   if (options.root_translation == RootTranslation::kPerFrame) g.tail<3>() = root_force;
   if (options.root_translation == RootTranslation::kConstantOffset) gradient->offset += root_force;
+  if (problem.upright) {
+    g.segment<3>(dof).setZero();
+    gradient->offset.z() = 0.0;
+  }
   gradient->frames.col(t) += g;
   return terms;
 }
 
-double temporal_term(const PairProblem& problem, const PairWeights& weights, const PairVariables& x,
+// Velocities and accelerations of `count` rows from `first`, times `share` in the gradient.
+double temporal_term(const PairWeights& weights, const PairVariables& x, int first, int count, double share,
                      PairVariables* gradient) {
-  const int dof = problem.chain.dof();
   const Eigen::Index frames = x.frames.cols();
-  const auto q = x.frames.topRows(dof);
+  const auto q = x.frames.middleRows(first, count);
   const Eigen::MatrixXd v = q.rightCols(frames - 1) - q.leftCols(frames - 1);
   const Eigen::MatrixXd a = v.rightCols(frames - 2) - v.leftCols(frames - 2);
   const double per_v = 1.0 / static_cast<double>(frames - 1);
   const double per_a = weights.acceleration / static_cast<double>(frames - 2);
   if (gradient != nullptr) {
-    auto g = gradient->frames.topRows(dof);
-    const double gv = 2.0 * weights.temp * per_v;
-    const double ga = 2.0 * weights.temp * per_a;
+    auto g = gradient->frames.middleRows(first, count);
+    const double gv = 2.0 * weights.temp * share * per_v;
+    const double ga = 2.0 * weights.temp * share * per_a;
     g.rightCols(frames - 1) += gv * v;
     g.leftCols(frames - 1) -= gv * v;
     g.rightCols(frames - 2) += ga * a;
@@ -196,14 +258,19 @@ PairTerms evaluate(const PairProblem& problem, const PairOptions& options, const
     sum.con += terms.con;
     sum.hum += terms.hum;
     sum.pose += terms.pose;
+    sum.bone += terms.bone;
+    sum.collision += terms.collision;
   }
-  sum.temp = temporal_term(problem, weights, x, gradient);
+  const int dof = problem.chain.dof();
+  sum.temp = temporal_term(weights, x, 0, dof, 1.0, gradient);
+  if (weights.partner > 0.0 && options.adapt_human)
+    sum.partner = temporal_term(weights, x, dof + 3, 3 * kHumanOffsets, weights.partner, gradient);
   return sum;
 }
 
 Eigen::Matrix3d root_rotation(double yaw, const Eigen::Vector3d& rotation_vector) {
   const double angle = rotation_vector.norm();
-  const Eigen::Matrix3d heading = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  Eigen::Matrix3d heading = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   if (angle < 1e-12) return heading;
   return Eigen::AngleAxisd(angle, rotation_vector / angle).toRotationMatrix() * heading;
 }

@@ -2,8 +2,8 @@
 // against. Pure.
 #pragma once
 
-#include "retarget/options.h"
-#include "retarget/pair_problem.h"
+#include "duet/retarget/options.h"
+#include "duet/retarget/pair_problem.h"
 
 namespace duet {
 
@@ -14,9 +14,14 @@ struct PairTerms {
   double hum = 0.0;
   double temp = 0.0;  // velocity + w_a acceleration
   double pose = 0.0;
+  // Not in the paper.
+  double bone = 0.0;       // squared changes of the partner's arm bones, mean over frames
+  double partner = 0.0;    // velocity + w_a acceleration of the partner's offsets
+  double collision = 0.0;  // squared depths of spheres, mean over frames
 
   [[nodiscard]] double total(const PairWeights& w) const {
-    return w.kin * kin + w.con * con + w.hum * hum + w.temp * temp + w.pose * pose;
+    return w.kin * kin + w.con * con + w.hum * hum + w.temp * temp + w.pose * pose + w.bone * bone +
+           w.temp * w.partner * partner + w.collision * collision;
   }
 };
 

@@ -1,10 +1,12 @@
-#include "retarget/pair_problem.h"
+#include "duet/retarget/pair_problem.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "retarget/reshape.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/retarget/reshape.h"
+#include "duet/retarget/upright_chain.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 
@@ -35,13 +37,27 @@ Eigen::MatrixXd original_distances(const PointTracks& source, const PointTracks&
   return distances;
 }
 
-}  // namespace
-
-int human_offset_of(int smpl) {
-  if (smpl >= kLeftShoulder && smpl <= kRightWrist) return smpl - kLeftShoulder;
-  if (smpl == kLeftHand || smpl == kRightHand) return smpl - kLeftHand + 4;
-  return -1;
+// The robot stands: its base and soles are planned, the rest is a chain above the base, and the reshaped person hangs
+// on the planned base.
+void stand_on_ground(const RobotModel& robot, const HumanMotion& source, const HumanMotion& partner,
+                     const PairTree& tree, const PairOptions& options, PairProblem& problem) {
+  UprightChain upright = make_upright_chain(robot, problem.chain);
+  if (options.weights.collision > 0.0) problem.spheres = make_body_spheres(robot, upright, partner);
+  problem.chain = upright.chain;
+  problem.robot_joint = upright.robot_joint;
+  problem.upright = true;
+  problem.reshaped = problem.targets;
+  problem.plan = plan_ground(robot, LegPose(robot), source, tree, problem.targets, options.root_smoothing);
+  problem.yaw = problem.plan.yaw;
+  problem.root = problem.plan.base;
+  const Eigen::Vector3d p_BPelvis = pelvis_in_base(robot, robot.neutral).p;
+  for (int t = 0; t < problem.frames(); ++t) {
+    const Eigen::Vector3d pelvis = problem.root.col(t) + yaw_rotation(problem.yaw[t]) * p_BPelvis;
+    problem.targets.frame(t).colwise() += Eigen::Vector3d(pelvis - problem.targets.at(t, 0));
+  }
 }
+
+}  // namespace
 
 PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& robot, const PairOptions& options) {
   const HumanMotion& source = clip.reactor_motion();
@@ -56,13 +72,17 @@ PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& rob
                             height_scale(robot, problem.chain, tree, source));
   problem.yaw.resize(source.frames());
   problem.root.resize(3, source.frames());
+  const Eigen::Vector3d p_BPelvis = pelvis_in_base(robot, robot.neutral).p;
   for (int t = 0; t < source.frames(); ++t) {
     problem.yaw[t] = heading(source.joints, t);
     problem.root.col(t) = problem.targets.at(t, 0);
+    if (!base_is_pelvis(robot)) problem.root.col(t) -= yaw_rotation(problem.yaw[t]) * p_BPelvis;
   }
+  if (options.ground) stand_on_ground(robot, source, partner, tree, options, problem);
   problem.human = partner.joints.select(problem.chain.key_smpl);
   for (const int smpl : problem.chain.key_smpl) problem.human_offset.push_back(human_offset_of(smpl));
   problem.distances = original_distances(source.joints.select(problem.chain.key_smpl), problem.human);
+  if (options.weights.bone > 0.0) problem.bones = arm_bones(partner);
   return problem;
 }
 

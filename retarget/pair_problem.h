@@ -5,24 +5,33 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "motion/interaction_clip.h"
-#include "retarget/options.h"
-#include "retarget/pair_chain.h"
+#include "duet/core/point_tracks.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/retarget/body_spheres.h"
+#include "duet/retarget/ground_plan.h"
+#include "duet/retarget/options.h"
+#include "duet/retarget/pair_chain.h"
+#include "duet/retarget/partner_arms.h"
 
 namespace duet {
 
-inline constexpr int kHumanOffsets = 6;          // shoulders, elbows, wrists; left before right
 inline constexpr double kDistanceGuard = 1e-12;  // [m^2] added to squared distances, so that their root has a slope
 
 struct PairProblem {
   PairChain chain;
   Eigen::VectorXd yaw;            // heading of the source person per frame [rad]: R_WB before optimisation
-  Eigen::Matrix3Xd root;          // p_WB before optimisation, (3, T): the reshaped pelvis [m]
+  Eigen::Matrix3Xd root;          // p_WB before optimisation, (3, T): where it puts the pelvis on the reshaped one [m]
   PointTracks targets;            // (T, 16, 3): Reshaped(H_s)
   PointTracks human;              // (T, K, 3): keypoints of the original partner
   std::vector<int> human_offset;  // per keypoint of the partner: which of the 6 offsets moves it, -1 for none
   Eigen::MatrixXd distances;      // (pairs i < j of the 2 K keypoints, robot's first, row by row; T): D_orig [m]
+
+  Eigen::MatrixXd bones;         // (18, T): the partner's arm bones before optimisation; empty where w-bone is 0 [m]
+  BodySpheres spheres;           // no pairs where w-collision is 0
+  PointTracks reshaped;          // (T, 16, 3): Reshaped(H_s) where the robot stands on the ground, empty otherwise
+  std::vector<int> robot_joint;  // of each joint of the chain: of the robot, -1 for the base's tilt
+  GroundPlan plan;               // where the robot stands on the ground
+  bool upright = false;          // the chain is make_upright_chain's: no rotation of the root, no vertical offset
 
   [[nodiscard]] int frames() const { return static_cast<int>(yaw.size()); }
 };
@@ -36,9 +45,6 @@ struct PairVariables {
     return {Eigen::MatrixXd::Zero(dof + 6 + 3 * kHumanOffsets, frames), Eigen::Vector3d::Zero()};
   }
 };
-
-// Offset of a joint of the partner: 0..5, or -1 for a joint that stays. Hands follow wrists.
-int human_offset_of(int smpl);
 
 // `clip` must be valid and at 50 Hz. Throws std::invalid_argument for fewer than 5 frames and for what make_chain,
 // reshape and heading refuse; InputError for a broken SMPL file.

@@ -1,12 +1,13 @@
-#include "retarget/pair_solver.h"
+#include "duet/retarget/pair_solver.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/require.h"
-#include "retarget/pair.h"
-#include "retarget/pair_kernel.h"
+#include "duet/core/require.h"
+#include "duet/retarget/double_lbfgs.h"
+#include "duet/retarget/kernels.h"
+#include "duet/retarget/pair_kernel.h"
 
 namespace duet {
 
@@ -65,20 +66,6 @@ PairSolution solve_in_double(const PairProblem& problem, const PairOptions& opti
 
 }  // namespace
 
-PairIteration pair_iteration(const PairOptions& options, int iteration) {
-  const PairSchedule& schedule = options.schedule;
-  const bool second = iteration >= schedule.stage1_iterations;
-  const bool restarted = second && !schedule.keep_moments;
-  PairIteration out;
-  out.weights = options.weights;
-  if (second) out.weights.con *= schedule.stage2_contact_scale;
-  out.rate = second ? schedule.stage2_rate : schedule.stage1_rate;
-  out.epsilon = schedule.epsilon;
-  out.adam_step = iteration + 1 - (restarted ? schedule.stage1_iterations : 0);
-  out.reset = restarted && iteration == schedule.stage1_iterations;
-  return out;
-}
-
 KernelKind choose_kernel(const PairProblem& problem, const PairOptions& options) {
   if (options.kernel == KernelKind::kAuto) {
     return kernel_fits(problem) ? available_kernels().front() : KernelKind::kScalar;
@@ -98,6 +85,8 @@ KernelKind choose_kernel(const PairProblem& problem, const PairOptions& options)
 PairSolution solve_pair(const PairProblem& problem, const PairOptions& options) {
   validate(options);
   const KernelKind kernel = choose_kernel(problem, options);
+  if (kernel == KernelKind::kScalar && options.optimizer == Optimizer::kLbfgs)
+    return solve_by_double_lbfgs(problem, options);
   if (kernel == KernelKind::kScalar) return solve_in_double(problem, options);
   return solve_in_lanes(problem, options, kernel);
 }

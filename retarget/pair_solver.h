@@ -6,18 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "retarget/options.h"
-#include "retarget/pair_objective.h"
-#include "retarget/pair_problem.h"
+#include "duet/retarget/options.h"
+#include "duet/retarget/pair_objective.h"
+#include "duet/retarget/pair_problem.h"
+#include "duet/retarget/pair_schedule.h"
 
 namespace duet {
-
-struct PairSolution {
-  PairVariables x;               // after the last iteration, before the Gaussian filter
-  std::vector<PairTerms> terms;  // one per iteration, at its start (before its update)
-  std::vector<double> total;     // weighted with the weights of the iteration's stage
-  KernelKind kernel = KernelKind::kScalar;
-};
 
 // Throws std::invalid_argument for options that do not validate and for a robot that the named kernel has no room for
 // (48 joints, 32 points); MissingError for a kernel that this processor cannot run. kAuto takes the best that fits.
@@ -25,19 +19,6 @@ PairSolution solve_pair(const PairProblem& problem, const PairOptions& options);
 
 // The kernel that `options.kernel` stands for here; throws as solve_pair does.
 KernelKind choose_kernel(const PairProblem& problem, const PairOptions& options);
-
-// What one iteration does: its weights, its learning rate, and its place in Adam's count.
-struct PairIteration {
-  PairWeights weights;
-  double rate = 0.0;
-  double epsilon = 1e-8;
-  int adam_step = 1;   // 1 after the moments are (re)set
-  bool reset = false;  // Adam's moments start from zero
-};
-PairIteration pair_iteration(const PairOptions& options, int iteration);
-inline int pair_iterations(const PairOptions& options) {
-  return options.schedule.stage1_iterations + options.schedule.stage2_iterations;
-}
 
 // Throughput in frames per second of CPU time of this thread, best of `rounds`.
 struct PairTiming {

@@ -1,9 +1,9 @@
 #include <ctime>
 #include <limits>
 
-#include "core/require.h"
-#include "retarget/pair.h"
-#include "retarget/pair_solver.h"
+#include "duet/core/require.h"
+#include "duet/retarget/pair.h"
+#include "duet/retarget/pair_solver.h"
 
 namespace duet {
 

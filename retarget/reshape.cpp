@@ -1,13 +1,13 @@
-#include "retarget/reshape.h"
+#include "duet/retarget/reshape.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/npz.h"
-#include "core/require.h"
-#include "core/skeleton.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 

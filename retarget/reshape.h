@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "motion/human_motion.h"
-#include "retarget/pair_chain.h"
+#include "duet/core/point_tracks.h"
+#include "duet/motion/human_motion.h"
+#include "duet/retarget/pair_chain.h"
 
 namespace duet {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 

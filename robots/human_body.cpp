@@ -1,11 +1,11 @@
-#include "robots/human_body.h"
+#include "duet/robots/human_body.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/require.h"
-#include "core/skeleton.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 namespace {

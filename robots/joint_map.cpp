@@ -1,7 +1,11 @@
-#include "robots/joint_map.h"
+#include "duet/robots/joint_map.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
+
+#include "duet/core/require.h"
 
 namespace duet {
 
@@ -10,6 +14,10 @@ JointMap::JointMap(const std::vector<std::string>& from, const RobotModel& to) :
     const auto found = std::find(from.begin(), from.end(), name);
     source_.push_back(found == from.end() ? -1 : static_cast<int>(found - from.begin()));
   }
+  const bool common = std::ranges::any_of(source_, [](int joint) { return joint >= 0; });
+  require(common || from.empty() || source_.empty(),
+          fmt::format("expected a motion with joints of robot '{}' ('{}', ...), found one of '{}', ...", to.name,
+                      source_.empty() ? "" : to.joints.front().name, from.empty() ? "" : from.front()));
 }
 
 Eigen::VectorXd JointMap::fill(const Eigen::VectorXd& values, Eigen::VectorXd filled) const {

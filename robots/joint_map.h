@@ -6,14 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "core/robot_motion.h"
-#include "core/robot_state.h"
-#include "robots/robot_model.h"
+#include "duet/core/robot_motion.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
 class JointMap {
  public:
+  // Throws std::invalid_argument where the two have joints, but none in common.
   JointMap(const std::vector<std::string>& from, const RobotModel& to);
   [[nodiscard]] Eigen::VectorXd positions(const Eigen::VectorXd& q) const { return fill(q, neutral_); }
   [[nodiscard]] Eigen::VectorXd rates(const Eigen::VectorXd& v) const;  // 0 where there is none
@@ -26,7 +27,7 @@ class JointMap {
   std::vector<int> source_;  // of each joint of `to`; -1 where `from` lacks it
 };
 
-// A motion on another robot. Of the same joints in the same order: the motion to the bit.
+// A motion on another robot. Throws as JointMap. Of the same joints in the same order: the motion to the bit.
 RobotMotion on_body(const RobotMotion& motion, const RobotModel& body);
 
 }  // namespace duet

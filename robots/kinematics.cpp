@@ -1,8 +1,8 @@
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

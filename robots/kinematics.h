@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "core/robot_motion.h"
-#include "robots/robot_model.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/robot_motion.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

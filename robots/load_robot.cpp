@@ -7,14 +7,16 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "core/digest.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "robots/card.h"
-#include "robots/kinematics.h"
-#include "robots/robot_model.h"
-#include "robots/urdf.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/robots/card.h"
+#include "duet/robots/card_digest.h"
+#include "duet/robots/card_reader.h"
+#include "duet/robots/card_roles.h"
+#include "duet/robots/kinematics.h"
+#include "duet/robots/robot_model.h"
+#include "duet/robots/urdf.h"
 
 namespace duet {
 namespace {
@@ -58,12 +60,13 @@ class Loader {
     std::sort(model_.self_collision.begin(), model_.self_collision.end());
     check_links();
     set_standing_height();
+    bind_roles(card_, model_);
     return std::move(model_);
   }
 
  private:
-  [[noreturn]] void fail_card(int line, const std::string& message) const {
-    throw InputError(fmt::format("{}:{}: {}", card_file_, line, message));
+  [[noreturn]] static void fail_card(const CardPlace& place, const std::string& message) {
+    throw InputError(fmt::format("{}:{}: {}", place.file, place.line, message));
   }
   [[noreturn]] void fail_urdf(const std::string& message) const {
     throw InputError(fmt::format("{}: {}", urdf_file_, message));
@@ -86,15 +89,15 @@ class Loader {
   void find_base() {
     base_ = urdf_link(card_.base);
     if (base_ < 0)
-      fail_card(card_.base_line, fmt::format("'base' with {}: {}", urdf_file_,
-                                             unknown_name_message("link", card_.base, urdf_link_names())));
+      fail_card(card_.base_place, fmt::format("'base' with {}: {}", urdf_file_,
+                                              unknown_name_message("link", card_.base, urdf_link_names())));
     if (base_ == 0) return;
     const bool floats = base_ == 1 && urdf_.joints[0].type == UrdfJointType::kFloating && urdf_.links[0].mass == 0.0 &&
                         std::count_if(urdf_.joints.begin(), urdf_.joints.end(),
                                       [](const UrdfJoint& joint) { return joint.parent == 0; }) == 1;
     if (!floats)
-      fail_card(card_.base_line, fmt::format("'base': expected the root link of {}, '{}', found '{}'", urdf_file_,
-                                             urdf_.links[0].name, card_.base));
+      fail_card(card_.base_place, fmt::format("'base': expected the root link of {}, '{}', found '{}'", urdf_file_,
+                                              urdf_.links[0].name, card_.base));
   }
 
   const CardJoint* card_joint(const std::string& name) const {
@@ -122,15 +125,15 @@ class Loader {
     }
     for (const CardJoint& joint : card_.joints) {
       if (std::find(movable.begin(), movable.end(), joint.name) == movable.end())
-        fail_card(joint.line,
+        fail_card(joint.place,
                   fmt::format("with {}: {}", urdf_file_, unknown_name_message("joint", joint.name, movable)));
       if (card_lock(joint.name) != nullptr)
-        fail_card(joint.line,
+        fail_card(joint.place,
                   fmt::format("joint '{}': expected it in 'joints' or in 'locked', found it in both", joint.name));
     }
     for (const CardLock& lock : card_.locked)
       if (std::find(movable.begin(), movable.end(), lock.joint) == movable.end())
-        fail_card(lock.line,
+        fail_card(lock.place,
                   fmt::format("with {}: {}", urdf_file_, unknown_name_message("joint", lock.joint, movable)));
     if (!extra.empty())
       throw InputError(fmt::format("{}: expected every joint of {} in 'joints' or 'locked', found none for: {}",
@@ -145,8 +148,8 @@ class Loader {
       fail_urdf(
           fmt::format("joint '{}': expected one that can be locked, found {}", joint.name, to_string(joint.type)));
     if (lock->position < joint.lower || lock->position > joint.upper)
-      fail_card(lock->line, fmt::format("locked joint '{}': expected a position in [{}, {}], found {}", joint.name,
-                                        joint.lower, joint.upper, lock->position));
+      fail_card(lock->place, fmt::format("locked joint '{}': expected a position in [{}, {}], found {}", joint.name,
+                                         joint.lower, joint.upper, lock->position));
     if (joint.type == UrdfJointType::kPrismatic)
       return joint.X_PC * Pose{Eigen::Quaterniond::Identity(), lock->position * joint.axis};
     return joint.X_PC *
@@ -172,8 +175,8 @@ class Loader {
       } else {
         const int index = static_cast<int>(card - card_.joints.data()) + 1;
         if (parent.link >= index)
-          fail_card(card->line, fmt::format("joint '{}': expected it after its parent joint '{}'", joint.name,
-                                            card_.joints[parent.link - 1].name));
+          fail_card(card->place, fmt::format("joint '{}': expected it after its parent joint '{}'", joint.name,
+                                             card_.joints[parent.link - 1].name));
         model_.links[index] = {.name = urdf_.links[joint.child].name,
                                .parent = parent.link,
                                .X_PL = parent.X * joint.X_PC,
@@ -195,8 +198,8 @@ class Loader {
                      .kp = card.kp,
                      .kd = card.kd};
     const auto fail = [&](const std::string& message) {
-      throw InputError(
-          fmt::format("joint '{}' of {} and {}:{}: {}", card.name, urdf_file_, card_file_, card.line, message));
+      throw InputError(fmt::format("joint '{}' of {} and {}:{}: {}", card.name, urdf_file_, card.place.file,
+                                   card.place.line, message));
     };
     if (joint.lower >= joint.upper)
       fail(fmt::format("expected lower < upper, found [{}, {}]", joint.lower, joint.upper));
@@ -212,12 +215,12 @@ class Loader {
     for (size_t i = base_; i < urdf_.links.size(); ++i)
       model_.frames.push_back({urdf_.links[i].name, place_[i].link, place_[i].X});
     for (const CardFrame& frame : card_.frames) {
-      const Place& place = place_of_link(frame.link, frame.line);
+      const Place& place = place_of_link(frame.link, frame.place);
       const RobotFrame entry{frame.name, place.link, place.X * frame.X_LF};
       const auto same = std::find_if(model_.frames.begin(), model_.frames.end(),
                                      [&](const RobotFrame& other) { return other.name == frame.name; });
       if (same != model_.frames.end() && !frame.replaces_urdf_link)
-        fail_card(frame.line,
+        fail_card(frame.place,
                   fmt::format("frame '{}': expected a name that {} does not use (or replaces_urdf_link: true), "
                               "found the name of one of its links",
                               frame.name, urdf_file_));
@@ -233,10 +236,10 @@ class Loader {
     Pose X;  // of the URDF link in that link
   };
 
-  const Place& place_of_link(const std::string& name, int line) const {
+  const Place& place_of_link(const std::string& name, const CardPlace& place) const {
     const int index = urdf_link(name);
     if (index < base_)
-      fail_card(line, fmt::format("with {}: {}", urdf_file_, unknown_name_message("link", name, urdf_link_names())));
+      fail_card(place, fmt::format("with {}: {}", urdf_file_, unknown_name_message("link", name, urdf_link_names())));
     return place_[index];
   }
 
@@ -244,12 +247,12 @@ class Loader {
     try {
       return model_.frame_index(point.frame);
     } catch (const std::invalid_argument& error) {
-      fail_card(point.line, error.what());
+      fail_card(point.place, error.what());
     }
   }
 
   void add_shape(const CardShape& card) {
-    const Place& place = place_of_link(card.link, card.line);
+    const Place& place = place_of_link(card.link, card.place);
     const Eigen::Vector3d axis = card.to - card.from;
     Pose X_FS{Eigen::Quaterniond::Identity(), 0.5 * (card.from + card.to)};
     if (card.kind == ShapeKind::kCapsule) X_FS.R.setFromTwoVectors(Eigen::Vector3d::UnitZ(), axis);
@@ -258,8 +261,8 @@ class Loader {
   }
 
   void add_self_collision(const CardRegions& regions) {
-    check_region(regions.first, regions.line);
-    check_region(regions.second, regions.line);
+    check_region(regions.first, regions.place);
+    check_region(regions.second, regions.place);
     const int n = static_cast<int>(model_.shapes.size());
     for (int i = 0; i < n; ++i)
       for (int j = i + 1; j < n; ++j) {
@@ -270,12 +273,12 @@ class Loader {
       }
   }
 
-  void check_region(const std::string& name, int line) const {
+  void check_region(const std::string& name, const CardPlace& place) const {
     std::vector<std::string> known;
     for (const CardShape& shape : card_.shapes)
       if (std::find(known.begin(), known.end(), shape.region) == known.end()) known.push_back(shape.region);
     if (std::find(known.begin(), known.end(), name) == known.end())
-      fail_card(line, fmt::format("'self_collision': {}", unknown_name_message("region", name, known)));
+      fail_card(place, fmt::format("'self_collision': {}", unknown_name_message("region", name, known)));
   }
 
   int joints_between(int a, int b) const {
@@ -330,10 +333,7 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
   const std::string urdf_text = read_text(path);
   const UrdfModel urdf = parse_urdf(urdf_text, path);
   RobotModel model = Loader(card, card_path, urdf, path).load();
-  Sha256 digest;
-  digest.update(std::string_view(urdf_text));
-  digest.update(std::string_view(card_text));
-  model.digest = digest.hex();
+  model.digest = robot_digest(urdf_text, card.content);
   return model;
 }
 

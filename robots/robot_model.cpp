@@ -1,11 +1,11 @@
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -59,6 +59,26 @@ double RobotModel::total_mass() const {
   return mass;
 }
 
+const StanceSize& RobotModel::stance_size() const {
+  require(stance.has_value(), fmt::format("robot '{}': expected 'stance' in its card, found none", name));
+  return *stance;
+}
+
+const RootBounds& RobotModel::bounds_of_root() const {
+  require(root_bounds.has_value(), fmt::format("robot '{}': expected 'root_bounds' in its card, found none", name));
+  return *root_bounds;
+}
+
+const Eigen::VectorXd* RobotModel::pose(std::string_view pose) const {
+  const auto found = roles.poses.find(std::string(pose));
+  return found == roles.poses.end() ? nullptr : &found->second;
+}
+
+bool has_fallen(const RobotState& state, const FallRule& rule) {
+  const double cos_tilt = (state.X_WB.R * Eigen::Vector3d::UnitZ()).z();
+  return state.X_WB.p.z() < rule.height || cos_tilt < rule.cos_tilt;
+}
+
 RobotState RobotModel::standing_state(const Pose& X_WB) const {
   RobotState state;
   state.X_WB = {yaw_rotation(yaw_of(X_WB.R)), {X_WB.p.x(), X_WB.p.y(), standing_height}};
@@ -78,12 +98,14 @@ JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const 
   return command;
 }
 
-std::string default_card_path() { return card_path("g1"); }
+void require_made_for(const std::string& made_for, const RobotModel& robot, const std::string& file) {
+  if (made_for != robot.name)
+    throw InputError(fmt::format("{}: made for '{}', the robot is '{}'", file, shown(made_for), robot.name));
+}
 
-std::string card_path(const std::string& name) { return share_file("robot card", "robots/g1/" + name + ".yaml"); }
-
-std::shared_ptr<const RobotModel> load_shared_robot(const std::string& card_path) {
-  return std::make_shared<const RobotModel>(load_robot(card_path.empty() ? default_card_path() : card_path));
+std::shared_ptr<const RobotModel> load_shared_robot(const std::string& name_or_path) {
+  return std::make_shared<const RobotModel>(
+      load_robot(name_or_path.empty() ? default_card_path() : card_path(name_or_path)));
 }
 
 }  // namespace duet

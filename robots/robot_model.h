@@ -4,15 +4,17 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "core/pose.h"
-#include "core/robot_state.h"
+#include "duet/core/pose.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 
@@ -68,6 +70,43 @@ struct Keypoint {
   int smpl = 0;
 };
 
+// When a robot counts as fallen: its base is lower than `height`, or its z axis leans further than `cos_tilt` says.
+struct FallRule {
+  double height = 0.0;  // of the base over the ground [m]
+  double cos_tilt = 0.7;
+};
+
+[[nodiscard]] bool has_fallen(const RobotState& state, const FallRule& rule);
+
+// Sizes of the stance of a robot that walks or balances.
+struct StanceSize {
+  double half_width = 0.0;                          // from the middle to the ankle of a standing foot [m]
+  Eigen::Vector2d shift = Eigen::Vector2d::Zero();  // that the base may move over standing feet, along x and y [m]
+};
+
+// Range of the base's pose that the legs can carry, of a robot that walks.
+struct RootBounds {
+  double lowest = 0.0, highest = 0.0;  // [m]
+  double least_crouch = 0.0;           // lowest height that training asks for [m]
+  double max_roll = 0.0;               // [rad]
+  double min_pitch = 0.0, max_pitch = 0.0;
+};
+
+// What the parts of a robot are for: the card's, so that nothing else has to know a joint's or a link's name. Joints
+// are indices in RobotModel::joints, links in RobotModel::links, left before right. Empty where the card names none.
+struct RobotRoles {
+  std::array<std::vector<int>, 2> legs, arms;  // joints from the trunk outwards
+  std::vector<int> waist;                      // joints between pelvis and trunk, whichever of the two is the base
+  std::vector<int> wrists;                     // joints
+  std::vector<std::vector<int>> compound;      // hinges that together are one joint of a person
+  std::vector<int> counterpart;                // of each joint: the one on the other side, or the joint itself
+  std::vector<int> bodies;                     // links, one for each part of the body, ascending
+  int push_frame = 0;                          // frame where pushes act that name no link
+  int imu_frame = 0;                           // frame of the gyro and the accelerometer
+  std::map<int, std::pair<double, double>> pose_ranges;  // of joints: where random poses draw them from [rad]
+  std::map<std::string, Eigen::VectorXd> poses;          // by name: the neutral pose but for what the card says [rad]
+};
+
 struct RobotModel {
   std::string name;
   std::vector<RobotLink> links;    // links[0] is the base; links[i] is moved by joints[i - 1]; parents come first
@@ -84,7 +123,11 @@ struct RobotModel {
   std::vector<int> feet;         // shapes that are the soles' contact sites (left foot's first)
   Eigen::VectorXd neutral;       // neutral pose of A.4.4 with the standing legs [rad]
   double standing_height = 0.0;  // of the base over flat ground in the neutral pose [m]; 0 where no shape is a sole
-  std::string digest;            // SHA-256 over URDF and card
+  RobotRoles roles;
+  FallRule fall;                     // where the card has none: 0.57 of the standing height
+  std::optional<StanceSize> stance;  // of the card
+  std::optional<RootBounds> root_bounds;
+  std::string digest;  // SHA-256 over the URDF and what the card says, with what it extends (robots/card_digest.h)
 
   [[nodiscard]] int dof() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] std::vector<std::string> joint_names() const;
@@ -96,27 +139,36 @@ struct RobotModel {
   [[nodiscard]] int keypoint_index(std::string_view name) const;
   [[nodiscard]] int track_frame(std::string_view name) const;  // index in frames of one of `tracks`
   [[nodiscard]] double total_mass() const;
+  // Those of the card, or std::invalid_argument naming the robot and the missing key.
+  [[nodiscard]] const StanceSize& stance_size() const;
+  [[nodiscard]] const RootBounds& bounds_of_root() const;
+  // A pose of the card by name, or null.
+  [[nodiscard]] const Eigen::VectorXd* pose(std::string_view name) const;
   // Standing in the neutral pose at `X_WB`'s x, y and yaw, at rest, soles on the ground z = 0.
   [[nodiscard]] RobotState standing_state(const Pose& X_WB = {}) const;
   // The card's gains around a target.
   [[nodiscard]] JointCommand default_command(const Eigen::VectorXd& q_target) const;
 };
 
-// Loads a card and the URDF it names (relative to the card; `urdf_path`, where given, replaces it). Meshes need not
-// exist. Throws InputError naming file, element, expected and found: no or a broken URDF, a cycle or two roots, a joint
-// that is neither revolute nor fixed (continuous is taken as +-2 pi), a joint of the card that the URDF lacks or the
-// other way round, unknown keys of the card, values that are not finite or out of range (mass <= 0, lower > upper,
-// ...).
+// Throws InputError ("weights.safetensors: made for 'g1', the robot is 't1'") where something was made for another
+// robot.
+void require_made_for(const std::string& made_for, const RobotModel& robot, const std::string& file);
+
+// Loads a card, the cards that it extends, and the URDF it names (relative to the card; `urdf_path`, where given,
+// replaces it). Meshes need not exist. Throws InputError naming file, element, expected and found: no or a broken URDF,
+// a cycle or two roots, a joint that is neither revolute nor fixed (continuous is taken as +-2 pi), a joint of the card
+// that the URDF lacks or the other way round, unknown keys of the card, a role that names no joint of it, values that
+// are not finite or out of range (mass <= 0, lower > upper, ...).
 RobotModel load_robot(const std::string& card_path, const std::string& urdf_path = "");
 
-// The card that ships with duet: robots/g1/g1.yaml in the source tree or $DUET_SHARE/robots/g1/g1.yaml or beside the
-// program. Throws MissingError naming the places looked at.
+// The card that stands in where none is named: robots/g1/g1.yaml (robots/robot_cards.h says where it is looked for).
 std::string default_card_path();
-// The same of another card that ships with duet, by its name without the ending ("g1_27dof").
-std::string card_path(const std::string& name);
+// The card of that name ("t1", "g1_27dof") in any folder below robots/; a path that ends in .yaml is the card itself.
+// Throws MissingError, with the nearest and all known names, where there is none; InputError where two have the name.
+std::string card_path(const std::string& name_or_path);
 
-// The robot of a card, or where the path is empty of the one that ships with duet, to be shared by episodes and
+// The robot of a card by name or path, or where that is empty of the one that stands in, to be shared by episodes and
 // threads.
-std::shared_ptr<const RobotModel> load_shared_robot(const std::string& card_path = "");
+std::shared_ptr<const RobotModel> load_shared_robot(const std::string& name_or_path = "");
 
 }  // namespace duet

@@ -1,4 +1,4 @@
-#include "robots/tree_factor.h"
+#include "duet/robots/tree_factor.h"
 
 #include <cmath>
 

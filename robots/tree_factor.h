@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

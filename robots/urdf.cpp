@@ -1,4 +1,4 @@
-#include "robots/urdf.h"
+#include "duet/robots/urdf.h"
 
 #include <console_bridge/console.h>
 #include <fmt/format.h>
@@ -14,9 +14,9 @@
 #include <numbers>
 #include <set>
 
-#include "core/require.h"
-#include "core/text.h"
-#include "robots/xml_nesting.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/robots/xml_nesting.h"
 
 namespace duet {
 namespace {

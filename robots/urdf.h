@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/pose.h"
+#include "duet/core/pose.h"
 
 namespace duet {
 

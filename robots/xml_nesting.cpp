@@ -1,10 +1,10 @@
-#include "robots/xml_nesting.h"
+#include "duet/robots/xml_nesting.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

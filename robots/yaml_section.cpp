@@ -1,4 +1,4 @@
-#include "robots/yaml_section.h"
+#include "duet/robots/yaml_section.h"
 
 #include <fmt/format.h>
 #include <yaml-cpp/eventhandler.h>
@@ -8,9 +8,9 @@
 #include <sstream>
 #include <utility>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -54,7 +54,9 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
     YAML::Parser(stream).HandleNextDocument(counter);
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw InputError(fmt::format("{}:{}: expected YAML, found: {}", file, error.mark.line + 1, error.msg));
+    // What a text with ": " in it is taken for, and the library's words for it.
+    const char* hint = error.msg == YAML::ErrorMsg::MAP_VALUE ? " (a text that holds \": \" stands in quotes)" : "";
+    throw InputError(fmt::format("{}:{}: expected YAML, found: {}{}", file, error.mark.line + 1, error.msg, hint));
   }
 }
 
@@ -65,7 +67,7 @@ std::string describe(const YAML::Node& node) {
 }
 
 YamlSection::YamlSection(std::string file, const YAML::Node& node, std::string where,
-                         std::initializer_list<const char*> known)
+                         const std::vector<const char*>& known)
     : file_(std::move(file)), node_(node), where_(std::move(where)) {
   if (!node_.IsMap()) fail(line(), fmt::format("expected a mapping, found {}", describe(node_)));
   const std::vector<std::string> names(known.begin(), known.end());

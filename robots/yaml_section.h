@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -19,7 +18,7 @@ class YamlSection {
  public:
   // `where` names the mapping in messages ("joint 'left_knee_joint'"). Throws for a node that is not a mapping, a key
   // that is not in `known` (with the nearest one) and a key given twice.
-  YamlSection(std::string file, const YAML::Node& node, std::string where, std::initializer_list<const char*> known);
+  YamlSection(std::string file, const YAML::Node& node, std::string where, const std::vector<const char*>& known);
 
   [[nodiscard]] bool has(const char* key) const { return static_cast<bool>(node_[key]); }
   [[nodiscard]] int line() const { return line_of(node_); }
@@ -35,6 +34,9 @@ class YamlSection {
   [[nodiscard]] std::vector<YAML::Node> items(const char* key) const;
   // The node itself; throws where it is absent.
   [[nodiscard]] YAML::Node node(const char* key) const;
+
+  // The mapping itself.
+  [[nodiscard]] const YAML::Node& keys() const { return node_; }
 
   // Throws InputError("FILE:LINE: WHERE: MESSAGE").
   [[noreturn]] void fail(int line, const std::string& message) const;

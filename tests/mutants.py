@@ -10,7 +10,8 @@ links it: a changed engine, library or command reaches them through DUET_ENGINES
 crash and a run out of its time limit have noticed the change.
 
 What is not drawn: headers; lines of `for (`, `require(`, `throw` and `fmt::` (loops that run out of an array and words of
-messages); bench/benchmarks and the engines' bare loops (what they give is time); code for libtorch. A change that gives
+messages); bench/benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
+runs it. A change that gives
 the same machine code, or that stands in tests/mutants_equivalent.txt with its reason, is counted apart.
 
 The draw depends on the seed and on the lines alone, so that a commit elsewhere leaves it as it is. A second call with the
@@ -31,14 +32,14 @@ import sys
 import threading
 import time
 
-ROOMS = 'core motion robots nn retarget backends controllers policies metrics results training bench'.split()
+ROOMS = 'core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench'.split()
 OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' > '), (r' \+ ', ' - '), (r' - ', ' + '),
              (r' \* ', ' + '), (r' / ', ' * '), (r' \+= ', ' -= '), (r' -= ', ' += '), (r' && ', ' || '),
              (r' \|\| ', ' && '), (r' == ', ' != '), (r' != ', ' == '), (r'std::max\(', 'std::min('),
              (r'std::min\(', 'std::max('), (r'\b0\.5\b', '0.6'), (r'return true;', 'return false;'),
              (r'return false;', 'return true;'), (r'if \(!', 'if ('), (r'\[0\]', '[1]')]
 SKIPPED_LINES = ('require(', 'throw ', 'fmt::', '#', 'template', 'for (', 'using ', 'typedef', 'static_assert')
-SKIPPED_FILES = ('bench/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp')
+SKIPPED_FILES = ('bench/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'cli/train_dstar.cpp')
 EQUIVALENT = 'tests/mutants_equivalent.txt'
 OUTPUT = re.compile(r'(?<= -o )\S+')
 MEMORY = 12 << 30
@@ -142,7 +143,7 @@ class Build:
         names = set()
         for test in pathlib.Path(f'tests/{room}').glob('*_test.cpp'):
             text = test.read_text()
-            if f'"{header}"' in text or test.stem == pathlib.Path(path).stem + '_test':
+            if f'"duet/{header}"' in text or test.stem == pathlib.Path(path).stem + '_test':
                 names.update(re.findall(r'^TEST(?:_[FP])?\((\w+),', text, re.M))
         if '/cli/' in path:
             names.add('CommandLine')

@@ -1,10 +1,10 @@
-#include "training/agent.h"
+#include "duet/training/agent.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "training/checkpoint.h"
+#include "duet/training/checkpoint.h"
 
 namespace duet {
 namespace {

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string>
 
-#include "nn/mlp_file.h"
-#include "training/batch_mlp.h"
-#include "training/normaliser.h"
+#include "duet/nn/mlp_file.h"
+#include "duet/training/batch_mlp.h"
+#include "duet/training/normaliser.h"
 
 namespace duet {
 

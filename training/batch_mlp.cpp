@@ -1,8 +1,8 @@
-#include "training/batch_mlp.h"
+#include "duet/training/batch_mlp.h"
 
 #include <cmath>
 
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 namespace duet {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "nn/mlp.h"
+#include "duet/nn/mlp.h"
 
 namespace duet {
 

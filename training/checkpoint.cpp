@@ -1,10 +1,10 @@
-#include "training/checkpoint.h"
+#include "duet/training/checkpoint.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

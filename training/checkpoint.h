@@ -4,9 +4,9 @@
 
 #include <string>
 
-#include "nn/stored_values.h"
-#include "training/batch_mlp.h"
-#include "training/normaliser.h"
+#include "duet/nn/stored_values.h"
+#include "duet/training/batch_mlp.h"
+#include "duet/training/normaliser.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "training/distill.h"
+#include "duet/training/distill.h"
 
 #include <fmt/format.h>
 
@@ -6,9 +6,9 @@
 #include <chrono>
 #include <cmath>
 
-#include "core/require.h"
-#include "training/checkpoint.h"
-#include "training/threads.h"
+#include "duet/core/require.h"
+#include "duet/training/checkpoint.h"
+#include "duet/training/threads.h"
 
 namespace duet {
 namespace {

@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "training/agent.h"
-#include "training/iteration_report.h"
-#include "training/wbc_environment.h"
+#include "duet/training/agent.h"
+#include "duet/training/iteration_report.h"
+#include "duet/training/wbc_environment.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "training/domain.h"
+#include "duet/training/domain.h"
 
 namespace duet {
 

@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "core/random.h"
-#include "robots/robot_model.h"
-#include "training/wbc_task.h"
+#include "duet/core/random.h"
+#include "duet/robots/robot_model.h"
+#include "duet/training/wbc_task.h"
 
 namespace duet {
 

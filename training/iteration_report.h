@@ -1,7 +1,7 @@
 // What one iteration of a training of WBC-Sim says of itself: of the oracle's PPO and of the student's distillation.
 #pragma once
 
-#include "training/wbc_environment.h"
+#include "duet/training/wbc_environment.h"
 
 namespace duet {
 

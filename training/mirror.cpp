@@ -1,26 +1,14 @@
-#include "training/mirror.h"
+#include "duet/training/mirror.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <string>
 
-#include "core/require.h"
+#include "duet/core/require.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
-
-std::string other_side(const std::string& name) {
-  if (name.starts_with("left_")) return "right_" + name.substr(5);
-  if (name.starts_with("right_")) return "left_" + name.substr(6);
-  return name;
-}
-
-// Mirrored at the xz plane, a turn about y stays and one about x or z changes its sign.
-float turn_sign(const RobotModel& robot, int joint) {
-  const Eigen::Vector3d& axis = robot.links[joint + 1].axis;
-  return std::abs(axis.y()) > 0.9 ? 1.0F : -1.0F;
-}
 
 Mirror vector_mirror() { return {.from = {0, 1, 2}, .sign = {1.0F, -1.0F, 1.0F}}; }  // a position or velocity
 Mirror axial_mirror() { return {.from = {0, 1, 2}, .sign = {-1.0F, 1.0F, -1.0F}}; }  // an angular velocity
@@ -46,8 +34,8 @@ void Mirror::apply(std::span<const float> x, std::span<float> y) const {
 Mirror mirror_joints(const RobotModel& robot) {
   Mirror mirror;
   for (int joint = 0; joint < robot.dof(); ++joint) {
-    mirror.from.push_back(robot.joint_index(other_side(robot.joints[joint].name)));
-    mirror.sign.push_back(turn_sign(robot, joint));
+    mirror.from.push_back(robot.roles.counterpart[joint]);
+    mirror.sign.push_back(static_cast<float>(mirror_sign(robot, joint)));
   }
   return mirror;
 }
@@ -74,10 +62,10 @@ Mirror mirror_critic(const RobotModel& robot, const std::vector<int>& links) {
   Mirror body = vector_mirror();
   body.append(columns_mirror(), 3);
   for (const int link : links) {
-    const std::string wanted = other_side(robot.links[link].name);
-    const auto other = std::ranges::find_if(links, [&](int l) { return robot.links[l].name == wanted; });
+    const int wanted = link == 0 ? 0 : robot.roles.counterpart[link - 1] + 1;
+    const auto other = std::ranges::find(links, wanted);
     require(other != links.end(),
-            fmt::format("mirror: link '{}' has no counterpart '{}'", robot.links[link].name, wanted));
+            fmt::format("mirror: link '{}' has no counterpart '{}'", robot.links[link].name, robot.links[wanted].name));
     mirror.append(body, begin + 9 * static_cast<int>(other - links.begin()));
   }
   return mirror;

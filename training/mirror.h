@@ -1,12 +1,12 @@
-// The robot's left-right symmetry: what an observation or an action would be in the mirrored situation. From joint
-// names alone: left_ and right_ change places, and what turns about x or z changes sign.
+// The robot's left-right symmetry: what an observation or an action would be in the mirrored situation. The joints
+// of its card's legs and arms change places, and what turns about x or z changes sign.
 #pragma once
 
 #include <Eigen/Core>
 #include <span>
 #include <vector>
 
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
@@ -20,7 +20,7 @@ struct Mirror {
   [[nodiscard]] int size() const { return static_cast<int>(from.size()); }
 };
 
-// Throws std::invalid_argument where a joint or link has no counterpart.
+// Throws std::invalid_argument where a link has no counterpart.
 Mirror mirror_joints(const RobotModel& robot);
 Mirror mirror_actor(const RobotModel& robot);                                  // kOracle's observation
 Mirror mirror_critic(const RobotModel& robot, const std::vector<int>& links);  // actor and bodies

@@ -1,6 +1,6 @@
-#include "training/normaliser.h"
+#include "duet/training/normaliser.h"
 
-#include "controllers/wbc_sim/network.h"
+#include "duet/controllers/wbc_sim/network.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "training/ppo.h"
+#include "duet/training/ppo.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numeric>
 
-#include "core/clock.h"
-#include "core/require.h"
-#include "training/threads.h"
+#include "duet/core/clock.h"
+#include "duet/core/require.h"
+#include "duet/training/threads.h"
 
 namespace duet {
 namespace {
@@ -82,7 +82,7 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
     : options_(options),
       state_(std::move(state)),
       actor_mirror_(mirror_actor(*robot)),
-      critic_mirror_(mirror_critic(*robot, critic_links(*robot))),
+      critic_mirror_(mirror_critic(*robot, robot->roles.bodies)),
       action_mirror_(mirror_joints(*robot)) {
   require(
       options.threads >= 1 && options.environments % options.threads == 0,

@@ -1,4 +1,4 @@
-#include "training/threads.h"
+#include "duet/training/threads.h"
 
 #include <exception>
 #include <thread>

@@ -1,15 +1,15 @@
-#include "training/train_wbc.h"
+#include "duet/training/train_wbc.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "controllers/stance.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "training/pace.h"
+#include "duet/controllers/stance.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/training/pace.h"
 
 namespace duet {
 namespace {
@@ -63,7 +63,7 @@ TrainingState state_of_checkpoint(const SafeTensors& tensors, const std::string&
 TrainingState new_state(const RobotModel& robot, std::uint64_t seed) {
   const WbcLayout layout(robot.dof());
   TrainingState state;
-  state.agent = make_agent(layout.oracle(), layout.critic(static_cast<int>(critic_links(robot).size())), robot.dof(),
+  state.agent = make_agent(layout.oracle(), layout.critic(static_cast<int>(robot.roles.bodies.size())), robot.dof(),
                            kFirstStd, seed);
   return state;
 }

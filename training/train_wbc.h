@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "controllers/wbc_sim/network.h"
-#include "training/distill.h"
-#include "training/ppo.h"
+#include "duet/controllers/wbc_sim/network.h"
+#include "duet/training/distill.h"
+#include "duet/training/ppo.h"
 
 namespace duet {
 

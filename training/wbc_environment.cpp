@@ -1,4 +1,4 @@
-#include "training/wbc_environment.h"
+#include "duet/training/wbc_environment.h"
 
 #include <fmt/format.h>
 
@@ -6,16 +6,18 @@
 #include <cmath>
 #include <numbers>
 
-#include "backends/factory.h"
-#include "core/clock.h"
-#include "training/domain.h"
+#include "duet/backends/factory.h"
+#include "duet/core/clock.h"
+#include "duet/rollout/control_period.h"
+#include "duet/training/domain.h"
 
 namespace duet {
 namespace {
 
-constexpr double kLowest = 0.5, kLeastUpright = 0.6, kFarthest = 1.0;  // ends: pelvis [m], cosine of tilt, root [m]
-constexpr double kPendulumTime = 0.27;                                 // sqrt(height of the centre of mass / g) [s]
-constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;            // share, [m]
+constexpr double kHigher = 0.05, kSlacker = 0.1;             // than the card's fall, where an episode ends [m], cosine
+constexpr double kFarthest = 1.0;                            // of the root from its reference, likewise [m]
+constexpr double kPendulumTime = 0.27;                       // sqrt(height of the centre of mass / g) [s]
+constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;  // share, [m]
 
 double kernel(double error, double width) { return std::exp(-error * error / (width * width)); }
 
@@ -48,7 +50,7 @@ WbcEnvironment::WbcEnvironment(std::shared_ptr<const RobotModel> robot, const Wb
       layout_(nominal_->dof()),
       actual_(*nominal_),
       wanted_(*nominal_),
-      links_(critic_links(*nominal_)) {
+      links_(nominal_->roles.bodies) {
   const int n = nominal_->dof();
   scale_ = duet::action_scale(*nominal_);
   for (int side = 0; side < 2; ++side) feet_[side] = tracker_.legs()[side].joints().back() + 1;
@@ -139,16 +141,7 @@ void WbcEnvironment::disturb() {
   kick_in_ = random_.uniform(domain.kick_from, domain.kick_to);
   const double direction = random_.uniform(-std::numbers::pi, std::numbers::pi),
                speed = random_.uniform(0.0, domain.kick);
-  RobotState state = backend_->state();
-  state.v_WB.x() += speed * std::cos(direction);
-  state.v_WB.y() += speed * std::sin(direction);
-  try {
-    backend_->reset(state);  // also ends a push
-    push_ticks_ = 0;
-    pushed_ = -1;
-  } catch (const std::invalid_argument&) {
-    return;  // the robot is deeper in itself than a start may be: no kick now
-  }
+  backend_->kick({speed * std::cos(direction), speed * std::sin(direction), 0.0});
 }
 
 // A force on a hand or the torso for a second, about every fifth second.
@@ -182,9 +175,9 @@ void WbcEnvironment::apply(std::span<const float> action) {
 Transition WbcEnvironment::step(std::span<const float> action) {
   apply(action);
   disturb();
-  const int steps = static_cast<int>(std::lround(kTick / task_.dt));
-  Outcome outcome = Outcome::kOk;
-  for (int i = 0; i < steps && outcome == Outcome::kOk; ++i) outcome = backend_->step(i < latency_ ? late_ : command_);
+  const Outcome outcome = step_control_period(
+      *backend_, steps_per_tick(task_.dt),
+      [this](int i) -> const JointCommand& { return i < latency_ ? late_ : command_; }, [](int) { return true; });
   steps_of_body_ += 1;
   ++tick_;
   stream_.advance(random_);
@@ -202,9 +195,8 @@ Transition WbcEnvironment::step(std::span<const float> action) {
 
 bool WbcEnvironment::fell() const {
   const RobotState& state = backend_->state();
-  const double upright = (state.X_WB.R * Eigen::Vector3d::UnitZ()).z();
-  return state.X_WB.p.z() < kLowest || upright < kLeastUpright ||
-         (state.X_WB.p - tracker_.root().p).head<2>().norm() > kFarthest;
+  const FallRule fall{nominal_->fall.height + kHigher, nominal_->fall.cos_tilt - kSlacker};
+  return has_fallen(state, fall) || (state.X_WB.p - tracker_.root().p).head<2>().norm() > kFarthest;
 }
 
 void WbcEnvironment::look() {

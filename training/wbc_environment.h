@@ -6,13 +6,13 @@
 #include <memory>
 #include <span>
 
-#include "backends/backend.h"
-#include "controllers/wbc_sim/network.h"
-#include "controllers/wbc_sim/observation.h"
-#include "controllers/wbc_sim/tracker.h"
-#include "core/random.h"
-#include "training/reference_stream.h"
-#include "training/wbc_task.h"
+#include "duet/backends/backend.h"
+#include "duet/controllers/wbc_sim/network.h"
+#include "duet/controllers/wbc_sim/observation.h"
+#include "duet/controllers/wbc_sim/tracker.h"
+#include "duet/core/random.h"
+#include "duet/rollout/reference_stream.h"
+#include "duet/training/wbc_task.h"
 
 namespace duet {
 

@@ -1,11 +1,11 @@
-#include "training/wbc_task.h"
+#include "duet/training/wbc_task.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "controllers/stance.h"
-#include "core/names.h"
+#include "duet/controllers/stance.h"
+#include "duet/core/names.h"
 
 namespace duet {
 namespace {

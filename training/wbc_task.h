@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "backends/scene.h"
-#include "training/reference_stream.h"
+#include "duet/backends/scene.h"
+#include "duet/rollout/reference_stream.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/bullet/articulation.h"
+#include "duet/backends/bullet/articulation.h"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -77,6 +77,8 @@ void Articulation::write(const RobotState& state) {
     body_->setJointVel(i, state.v[i]);
   }
 }
+
+void Articulation::kick(const Eigen::Vector3d& dv_W) { body_->setBaseVel(body_->getBaseVel() + to_bullet(dv_W)); }
 
 void Articulation::read(RobotState& state) const {
   state.X_WB.R = (from_bullet(body_->getWorldToBaseRot()).conjugate() * R_BP_.conjugate()).normalized();

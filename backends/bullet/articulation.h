@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "backends/scene.h"
-#include "core/robot_state.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 
@@ -24,6 +24,7 @@ class Articulation {
   void set_velocity(const Eigen::VectorXd& velocity);
 
   void write(const RobotState& state);
+  void kick(const Eigen::Vector3d& dv_W);  // adds to the base's velocity
   void read(RobotState& state) const;
 
   // Bullet's articulated-body algorithm: velocity() after dt under gravity and the generalised force `Q` alone (of

@@ -1,10 +1,10 @@
-#include "backends/bullet/bare_loop.h"
+#include "duet/backends/bullet/bare_loop.h"
 
 #include <fmt/format.h>
 
-#include "backends/bullet/bullet_world.h"
-#include "backends/thread_clock.h"
-#include "core/require.h"
+#include "duet/backends/bullet/bullet_world.h"
+#include "duet/backends/thread_clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -1,8 +1,8 @@
 // What Bullet itself costs: the loop against which the overhead of Backend::step is measured.
 #pragma once
 
-#include "backends/scene.h"
-#include "core/robot_state.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

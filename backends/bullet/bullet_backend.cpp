@@ -2,10 +2,10 @@
 
 #include <stdexcept>
 
-#include "backends/bullet/bare_loop.h"
-#include "backends/bullet/bullet_world.h"
-#include "backends/engine_module.h"
-#include "backends/physics_backend.h"
+#include "duet/backends/bullet/bare_loop.h"
+#include "duet/backends/bullet/bullet_world.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 namespace {
@@ -23,6 +23,7 @@ class BulletBackend final : public PhysicsBackend {
 
  private:
   void place() override { world_.articulation().write(state_); }
+  void do_kick(const Eigen::Vector3d& dv_W) override { world_.articulation().kick(dv_W); }
 
   Outcome advance(const JointCommand& command) override {
     if (!world_.begin(state_, command)) return Outcome::kDiverged;

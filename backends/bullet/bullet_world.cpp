@@ -1,4 +1,4 @@
-#include "backends/bullet/bullet_world.h"
+#include "duet/backends/bullet/bullet_world.h"
 
 namespace duet {
 namespace {

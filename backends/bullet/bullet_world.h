@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "backends/bullet/articulation.h"
-#include "backends/bullet/row_solver.h"
-#include "backends/engine_options.h"
-#include "backends/implicit_law.h"
-#include "backends/link_pushes.h"
+#include "duet/backends/bullet/articulation.h"
+#include "duet/backends/bullet/row_solver.h"
+#include "duet/backends/engine_options.h"
+#include "duet/backends/implicit_law.h"
+#include "duet/backends/link_pushes.h"
 
 namespace duet {
 

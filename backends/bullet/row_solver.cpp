@@ -1,4 +1,4 @@
-#include "backends/bullet/row_solver.h"
+#include "duet/backends/bullet/row_solver.h"
 
 #include <algorithm>
 #include <functional>

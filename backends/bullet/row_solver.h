@@ -9,10 +9,10 @@
 #include <span>
 #include <vector>
 
-#include "backends/bullet/articulation.h"
-#include "backends/narrow_phase.h"
-#include "robots/kinematics.h"
-#include "robots/tree_factor.h"
+#include "duet/backends/bullet/articulation.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/robots/kinematics.h"
+#include "duet/robots/tree_factor.h"
 
 namespace duet {
 

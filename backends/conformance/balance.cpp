@@ -1,6 +1,8 @@
-#include "backends/conformance/balance.h"
+#include "duet/backends/conformance/balance.h"
 
 #include <algorithm>
+
+#include "duet/robots/roles.h"
 
 namespace duet::conformance {
 namespace {
@@ -14,10 +16,8 @@ constexpr double kMostPitch = 0.3, kMostRoll = 0.2;   // [rad]
 
 AnkleBalance::AnkleBalance(const RobotModel& robot)
     : robot_(&robot), kinematics_(robot), jacobian_(Eigen::MatrixXd::Zero(3, 6 + robot.dof())) {
-  for (const char* side : {"left", "right"}) {
-    pitch_.push_back(robot.joint_index(std::string(side) + "_ankle_pitch_joint"));
-    roll_.push_back(robot.joint_index(std::string(side) + "_ankle_roll_joint"));
-  }
+  for (const std::vector<int>& leg : robot.roles.legs)
+    for (const int ankle : {leg[leg.size() - 2], leg.back()}) (is_roll(robot, ankle) ? roll_ : pitch_).push_back(ankle);
 }
 
 JointCommand AnkleBalance::command(const RobotState& state, const Eigen::VectorXd& q) {

@@ -1,13 +1,14 @@
-// Ankle feedback on the centre of mass, so that the G1 under plain PD stands. Internal to backends/conformance.
+// Ankle feedback on the centre of mass, so that a robot under plain PD stands. Internal to backends/conformance.
 #pragma once
 
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet::conformance {
 
 class AnkleBalance {
  public:
-  explicit AnkleBalance(const RobotModel& robot);  // keeps a reference
+  // Keeps a reference. The legs of its card have two joints or more, the last two are the ankle's.
+  explicit AnkleBalance(const RobotModel& robot);
   // The card's gains about `q`, with stiffer ankles that are moved by the feedback of `state`; call it every kPeriod.
   static constexpr double kPeriod = 0.01;  // [s]
   JointCommand command(const RobotState& state, const Eigen::VectorXd& q);

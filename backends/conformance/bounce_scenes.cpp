@@ -5,10 +5,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
-#include "core/skeleton.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
+#include "duet/core/skeleton.h"
 
 namespace duet::conformance {
 namespace {

@@ -1,9 +1,9 @@
 // The tumbling box of Open Robotics' benchmark: flight of a single body.
 #include <algorithm>
 
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
 
 namespace duet::conformance {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "backends/scene.h"
+#include "duet/backends/scene.h"
 
 namespace duet::conformance {
 
@@ -21,7 +21,7 @@ struct Settings {
   double dt = 0.002;      // [s]
   EngineOptions options;  // what is not named has the engine's default
   Effort effort = Effort::kQuick;
-  std::shared_ptr<const RobotModel> g1;  // null: the card that ships with duet
+  std::shared_ptr<const RobotModel> robot;  // of the scenes with a whole robot; null: the one that stands in
 };
 
 struct Measurement {
@@ -30,6 +30,7 @@ struct Measurement {
   double value = 0.0, expected = 0.0;
   double tolerance = 0.0;       // of |value - expected|, or of that over |expected|
   bool relative = false;        // which of the two
+  bool of_stand_in = true;      // on the robot that stands in, which bounds of deviations and stored figures are about
   bool across_engines = false;  // `expected` is the median of the engines that ran (agree), until then a stored figure
   std::string note;             // what `expected` is and what the tolerance stands for
 };
@@ -46,6 +47,7 @@ struct AccuracyPoint {
 
 struct SceneRun {
   std::vector<Measurement> measurements;
+  std::string skipped;            // why nothing was measured: what the robot lacks; else ""
   std::string error, error_unit;  // what `accuracy` plots, "" where the scene has no such thing
   std::vector<AccuracyPoint> accuracy;
 };
@@ -56,14 +58,16 @@ struct ConformanceScene {
   std::string_view name;   // "free-flight"
   std::string_view shows;  // one sentence
   void (*measure)(Trial& trial);
+  std::string (*lacks)(const RobotModel& robot) = nullptr;  // what the scene needs of the robot and it has not, or ""
 };
 
 std::span<const ConformanceScene> scenes();
 // Throws std::invalid_argument with the nearest and all known names.
 const ConformanceScene& find_scene(std::string_view name);
 
-// What an engine throws, or its divergence, becomes a failed measurement "ran to its end" with the message. Throws what
-// make_backend throws for an engine's name (unknown, absent).
+// A robot that lacks what the scene needs is no fault: the run says what. What an engine throws, or its divergence,
+// becomes a failed measurement "ran to its end" with the message. Throws what make_backend throws for an engine's name
+// (unknown, absent).
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);
 
 // kDeviation: outside its tolerance, inside the bound of its entry in deviations().

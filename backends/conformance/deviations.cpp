@@ -1,4 +1,4 @@
-#include "backends/conformance/deviations.h"
+#include "duet/backends/conformance/deviations.h"
 
 #include <algorithm>
 #include <array>

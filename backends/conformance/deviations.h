@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "backends/conformance/conformance.h"
+#include "duet/backends/conformance/conformance.h"
 
 namespace duet::conformance {
 

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backends/conformance/reference.h"
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
-#include "backends/implicit_law.h"
+#include "duet/backends/conformance/reference.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
+#include "duet/backends/implicit_law.h"
 
 namespace duet::conformance {
 namespace {
@@ -127,7 +127,7 @@ void measure_step_response(Trial& trial) {
 
 void measure_saturation(Trial& trial) {
   const double seconds = 0.2;
-  const auto robot = without_stops(*trial.g1());
+  const auto robot = without_stops(*trial.robot());
   const RobotState start = state_at(*robot, {0.0, 0.0, 50.0});
   const JointCommand command = step_of_all_joints(*robot);
   const RobotState end = integrate_law(trial.scene(robot, 1e-4), start, command, seconds);

@@ -1,4 +1,4 @@
-#include "backends/conformance/reference.h"
+#include "duet/backends/conformance/reference.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 
-#include "core/random.h"
-#include "robots/dynamics.h"
+#include "duet/core/random.h"
+#include "duet/robots/dynamics.h"
 
 namespace duet::conformance {
 

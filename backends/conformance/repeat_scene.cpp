@@ -3,11 +3,11 @@
 #include <array>
 #include <thread>
 
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
-#include "backends/factory.h"
-#include "core/skeleton.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
+#include "duet/backends/factory.h"
+#include "duet/core/skeleton.h"
 
 namespace duet::conformance {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 constexpr double kBefore = 0.3, kAfter = 0.3;  // of the snapshot [s]
 
 Scene pushed_scene(const Trial& trial) {
-  Scene scene = trial.scene(trial.g1(), trial.dt());
+  Scene scene = trial.scene(trial.robot(), trial.dt());
   scene.partner = PartnerMode::kSolid;
   scene.self_collision = true;
   HumanCapsule capsule;

@@ -1,12 +1,14 @@
 // A hand sent into the trunk, without gravity: the pair stops it and leaves the robot's momentum alone.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
-#include "backends/conformance/reference.h"
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
-#include "backends/narrow_phase.h"
+#include "duet/backends/conformance/reference.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
+#include "duet/backends/narrow_phase.h"
 
 namespace duet::conformance {
 namespace {
@@ -24,28 +26,27 @@ double deepest_pair(const Scene& scene, const RobotState& state) {
   return depth;
 }
 
-// The left hand in front of the trunk, and from there into it.
-Eigen::VectorXd hand_pose(const RobotModel& robot, double inward) {
-  Eigen::VectorXd q = robot.neutral;
-  q[robot.joint_index("left_shoulder_pitch_joint")] = 0.2;
-  q[robot.joint_index("left_shoulder_roll_joint")] = 0.3;
-  q[robot.joint_index("left_elbow_joint")] = 0.6;
-  q[robot.joint_index("left_shoulder_yaw_joint")] = inward;
-  return q;
-}
+constexpr const char* kHandBefore = "hand_before_trunk";  // poses of the card: the hand in front of the trunk,
+constexpr const char* kHandInside = "hand_in_trunk";      // and where it is sent
 
 }  // namespace
 
+std::string lacks_hand_poses(const RobotModel& robot) {
+  for (const char* name : {kHandBefore, kHandInside})
+    if (robot.pose(name) == nullptr) return fmt::format("the card of robot '{}' has no pose '{}'", robot.name, name);
+  return "";
+}
+
 void measure_self_collision(Trial& trial) {
   const double dt = trial.dt();
-  Scene scene = trial.scene(trial.g1(), dt);
+  Scene scene = trial.scene(trial.robot(), dt);
   scene.gravity.setZero();
   scene.self_collision = true;
   const RobotModel& robot = *scene.robot;
   RobotState start = state_at(robot, {0.0, 0.0, 50.0});
-  start.q = hand_pose(robot, 0.0);
+  start.q = *robot.pose(kHandBefore);
   RobotState sent = start;
-  sent.q = hand_pose(robot, -1.2);
+  sent.q = *robot.pose(kHandInside);
   trial.at_most("overlap at the start", "m", dt, deepest_pair(scene, start), 0.0, "of the scene itself");
   const double commanded = deepest_pair(scene, sent);
 

@@ -1,4 +1,4 @@
-#include "backends/conformance/small_robots.h"
+#include "duet/backends/conformance/small_robots.h"
 
 #include <string>
 

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "backends/backend.h"
+#include "duet/backends/backend.h"
 
 namespace duet::conformance {
 

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "backends/conformance/reference.h"
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
-#include "backends/narrow_phase.h"
+#include "duet/backends/conformance/reference.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
+#include "duet/backends/narrow_phase.h"
 
 namespace duet::conformance {
 namespace {
@@ -30,7 +30,7 @@ double velocity_error(const RobotState& a, const RobotState& b) {
 
 // At rest without gravity a step changes nothing, so what comes back is what was set.
 void measure_rest(Trial& trial, Random& random) {
-  Scene scene = trial.scene(trial.g1(), trial.dt());
+  Scene scene = trial.scene(trial.robot(), trial.dt());
   scene.gravity.setZero();
   World world(trial, scene);
   double pose = 0.0, velocity = 0.0;
@@ -49,7 +49,7 @@ void measure_rest(Trial& trial, Random& random) {
 
 // Contact points show where the engine has each link: they are compared with those of our kinematics.
 void measure_contact_points(Trial& trial, Random& random) {
-  World world(trial, trial.scene(trial.g1(), kContactStep));
+  World world(trial, trial.scene(trial.robot(), kContactStep));
   NarrowPhase expected(world.backend().scene());
   Kinematics kinematics(world.robot());
   double worst = 0.0;
@@ -91,7 +91,7 @@ void measure_state(Trial& trial) {
 
 void measure_acceleration(Trial& trial) {
   Random random(3, 2);
-  World world(trial, trial.scene(trial.g1(), kTinyStep));
+  World world(trial, trial.scene(trial.robot(), kTinyStep));
   const RobotModel& robot = world.robot();
   Dynamics dynamics(robot, world.backend().scene().gravity);
   double worst = 0.0;

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "backends/conformance/reference.h"
-#include "backends/conformance/scenes.h"
-#include "backends/conformance/small_robots.h"
-#include "backends/conformance/trial.h"
+#include "duet/backends/conformance/reference.h"
+#include "duet/backends/conformance/scenes.h"
+#include "duet/backends/conformance/small_robots.h"
+#include "duet/backends/conformance/trial.h"
 
 namespace duet::conformance {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "backends/backend.h"
-#include "backends/conformance/conformance.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/conformance/conformance.h"
 
 namespace duet::conformance {
 
@@ -21,7 +21,11 @@ class Trial {
   [[nodiscard]] bool full() const { return settings_.effort == Effort::kFull; }
   // Step sizes for what depends on them, each half of the one before; quick: dt and dt / 2.
   [[nodiscard]] std::vector<double> step_sizes() const;
-  [[nodiscard]] const std::shared_ptr<const RobotModel>& g1() const { return settings_.g1; }
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot() const { return settings_.robot; }
+  [[nodiscard]] bool of_stand_in() const { return of_stand_in_; }
+  // A figure that was measured once on the robot that stands in; of another robot nothing is known, and what was found
+  // here takes its place until there are other engines to compare with.
+  [[nodiscard]] double stored(double figure, double found) const { return of_stand_in_ ? figure : found; }
   // No partner, no self-collision, the engine's options.
   [[nodiscard]] Scene scene(std::shared_ptr<const RobotModel> robot, double dt) const;
 
@@ -33,6 +37,10 @@ class Trial {
                         double tolerance, std::string note);
   // Notes 0 <= value <= bound.
   Measurement& at_most(std::string quantity, std::string unit, double dt, double value, double bound, std::string note);
+  // Notes 0 <= value <= bound, where the bound was found on the robot that stands in; of another robot 15 % about the
+  // median of the engines.
+  Measurement& at_most_found(std::string quantity, std::string unit, double dt, double value, double bound,
+                             std::string note);
   // Notes a dot of error against cost, where error > 0.
   void dot(std::string error, std::string unit, double dt, double value, double cost);
   // Notes the observed order of convergence between consecutive step sizes, log2 of the ratio of errors, as between 0.8
@@ -47,6 +55,7 @@ class Trial {
   const Settings& settings_;
   std::string scene_;
   SceneRun& run_;
+  bool of_stand_in_;
 };
 
 // A backend whose steps are timed (CPU clock of the thread, about a microsecond a step for reading it).

@@ -1,10 +1,10 @@
-#include "backends/dart/bare_loop.h"
+#include "duet/backends/dart/bare_loop.h"
 
 #include <fmt/format.h>
 
-#include "backends/dart/dart_world.h"
-#include "backends/thread_clock.h"
-#include "core/require.h"
+#include "duet/backends/dart/dart_world.h"
+#include "duet/backends/thread_clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/dart/contact_rows.h"
+#include "duet/backends/dart/contact_rows.h"
 
 #include <algorithm>
 #include <limits>

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "backends/dart/link_responses.h"
-#include "backends/narrow_phase.h"
+#include "duet/backends/dart/link_responses.h"
+#include "duet/backends/narrow_phase.h"
 
 namespace duet {
 

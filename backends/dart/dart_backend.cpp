@@ -4,10 +4,10 @@
 #include <exception>
 #include <stdexcept>
 
-#include "backends/dart/bare_loop.h"
-#include "backends/dart/dart_world.h"
-#include "backends/engine_module.h"
-#include "backends/physics_backend.h"
+#include "duet/backends/dart/bare_loop.h"
+#include "duet/backends/dart/dart_world.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 namespace {
@@ -27,6 +27,7 @@ class DartBackend final : public PhysicsBackend {
 
  private:
   void place() override { world_.write_state(state_); }
+  void do_kick(const Eigen::Vector3d& dv_W) override { world_.kick(dv_W); }
 
   Outcome advance(const JointCommand& command) override {
     world_.read_poses(R_WL_, p_WL_);

@@ -1,4 +1,4 @@
-#include "backends/dart/dart_world.h"
+#include "duet/backends/dart/dart_world.h"
 
 #include <fmt/format.h>
 
@@ -10,10 +10,10 @@
 #include <dart/dynamics/FreeJoint.hpp>
 #include <dart/dynamics/Skeleton.hpp>
 
-#include "backends/backend.h"
-#include "backends/dart/contact_rows.h"
-#include "backends/dart/group_solver.h"
-#include "backends/dart/implicit_hinge.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/dart/contact_rows.h"
+#include "duet/backends/dart/group_solver.h"
+#include "duet/backends/dart/implicit_hinge.h"
 
 namespace duet {
 namespace {
@@ -134,6 +134,12 @@ void DartWorld::write_state(const RobotState& state) {
     hinges_[i]->setPosition(0, state.q[static_cast<Eigen::Index>(i)]);
     hinges_[i]->setVelocity(0, state.v[static_cast<Eigen::Index>(i)]);
   }
+}
+
+void DartWorld::kick(const Eigen::Vector3d& dv_W) {
+  Eigen::Vector6d V = base_->getVelocitiesStatic();
+  V.tail<3>() += bodies_[0]->getWorldTransform().linear().transpose() * dv_W;
+  base_->setVelocitiesStatic(V);
 }
 
 void DartWorld::read_state(RobotState& state) const {

@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "backends/dart/alignment.h"
-#include "backends/engine_options.h"
-#include "backends/link_pushes.h"
-#include "backends/narrow_phase.h"
-#include "backends/scene.h"
-#include "core/robot_state.h"
+#include "duet/backends/dart/alignment.h"
+#include "duet/backends/engine_options.h"
+#include "duet/backends/link_pushes.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 
 namespace dart::dynamics {
 class BodyNode;
@@ -34,6 +34,7 @@ class DartWorld {
   ~DartWorld();
 
   void write_state(const RobotState& state);
+  void kick(const Eigen::Vector3d& dv_W);  // adds to the base's velocity
   void read_state(RobotState& state) const;
   // DART's own coordinates, from which a run continues bitwise: 2 (6 + dof) numbers.
   void append_to(std::vector<double>& values) const;

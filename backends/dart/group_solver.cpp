@@ -1,4 +1,4 @@
-#include "backends/dart/group_solver.h"
+#include "duet/backends/dart/group_solver.h"
 
 #include <algorithm>
 #include <cmath>

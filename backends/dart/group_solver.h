@@ -6,7 +6,7 @@
 
 #include <dart/constraint/BoxedLcpConstraintSolver.hpp>
 
-#include "backends/dart/alignment.h"
+#include "duet/backends/dart/alignment.h"
 
 namespace duet {
 

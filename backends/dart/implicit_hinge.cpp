@@ -1,4 +1,4 @@
-#include "backends/dart/implicit_hinge.h"
+#include "duet/backends/dart/implicit_hinge.h"
 
 namespace duet {
 

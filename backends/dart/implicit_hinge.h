@@ -5,7 +5,7 @@
 
 #include <dart/dynamics/RevoluteJoint.hpp>
 
-#include "backends/dart/alignment.h"
+#include "duet/backends/dart/alignment.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/dart/link_responses.h"
+#include "duet/backends/dart/link_responses.h"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "backends/dart/implicit_hinge.h"
-#include "robots/robot_model.h"
+#include "duet/backends/dart/implicit_hinge.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

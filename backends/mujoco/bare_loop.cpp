@@ -1,12 +1,12 @@
-#include "backends/mujoco/bare_loop.h"
+#include "duet/backends/mujoco/bare_loop.h"
 
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
-#include "backends/mujoco/mujoco_law.h"
-#include "backends/mujoco/mujoco_model.h"
-#include "backends/thread_clock.h"
-#include "core/require.h"
+#include "duet/backends/mujoco/mujoco_law.h"
+#include "duet/backends/mujoco/mujoco_model.h"
+#include "duet/backends/thread_clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

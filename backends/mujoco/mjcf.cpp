@@ -1,12 +1,12 @@
-#include "backends/mujoco/mjcf.h"
+#include "duet/backends/mujoco/mjcf.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <iterator>
 
-#include "backends/mujoco/mujoco_options.h"
-#include "robots/dynamics.h"
+#include "duet/backends/mujoco/mujoco_options.h"
+#include "duet/robots/dynamics.h"
 
 namespace duet {
 namespace {

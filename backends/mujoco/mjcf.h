@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "backends/scene.h"
+#include "duet/backends/scene.h"
 
 namespace duet {
 

@@ -7,16 +7,16 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "backends/engine_module.h"
-#include "backends/link_pushes.h"
-#include "backends/mujoco/bare_loop.h"
-#include "backends/mujoco/mjcf.h"
-#include "backends/mujoco/mujoco_law.h"
-#include "backends/mujoco/mujoco_model.h"
-#include "backends/mujoco/mujoco_options.h"
-#include "backends/mujoco/mujoco_skin.h"
-#include "backends/partner.h"
-#include "backends/start_overlap.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/link_pushes.h"
+#include "duet/backends/mujoco/bare_loop.h"
+#include "duet/backends/mujoco/mjcf.h"
+#include "duet/backends/mujoco/mujoco_law.h"
+#include "duet/backends/mujoco/mujoco_model.h"
+#include "duet/backends/mujoco/mujoco_options.h"
+#include "duet/backends/mujoco/mujoco_skin.h"
+#include "duet/backends/partner.h"
+#include "duet/backends/start_overlap.h"
 
 namespace duet {
 namespace {
@@ -88,6 +88,8 @@ class MujocoBackend final : public Backend {
     const int body = compiled_.link_body[link];
     pushes_.set(link, f_W, rotation(body).transpose() * (p_W - position(body)));
   }
+
+  void do_kick(const Eigen::Vector3d& dv_W) override { Eigen::Map<Eigen::Vector3d>(d_.qvel) += dv_W; }
 
   void apply_pushes() {
     for (size_t link = 0; link < pushes_.all().size(); ++link) {

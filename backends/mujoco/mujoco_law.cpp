@@ -1,4 +1,4 @@
-#include "backends/mujoco/mujoco_law.h"
+#include "duet/backends/mujoco/mujoco_law.h"
 
 #include <mujoco/mujoco.h>
 

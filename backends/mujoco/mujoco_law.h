@@ -5,9 +5,9 @@
 
 #include <Eigen/Core>
 
-#include "backends/mujoco/mujoco_model.h"
-#include "backends/scene.h"
-#include "core/robot_state.h"
+#include "duet/backends/mujoco/mujoco_model.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 

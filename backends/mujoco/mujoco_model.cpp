@@ -1,4 +1,4 @@
-#include "backends/mujoco/mujoco_model.h"
+#include "duet/backends/mujoco/mujoco_model.h"
 
 #include <fmt/format.h>
 #include <mujoco/mujoco.h>
@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "backends/mujoco/mjcf.h"
+#include "duet/backends/mujoco/mjcf.h"
 
 namespace duet {
 namespace {

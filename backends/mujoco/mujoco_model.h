@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "backends/scene.h"
-#include "core/contact.h"
-#include "core/robot_state.h"
+#include "duet/backends/scene.h"
+#include "duet/core/contact.h"
+#include "duet/core/robot_state.h"
 
 struct mjModel_;
 struct mjData_;

@@ -1,4 +1,4 @@
-#include "backends/mujoco/mujoco_options.h"
+#include "duet/backends/mujoco/mujoco_options.h"
 
 namespace duet {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "backends/engine_options.h"
+#include "duet/backends/engine_options.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/mujoco/mujoco_skin.h"
+#include "duet/backends/mujoco/mujoco_skin.h"
 
 #include <mujoco/mujoco.h>
 

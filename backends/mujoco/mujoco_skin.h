@@ -2,9 +2,9 @@
 // becomes the skin of the capsule that touches, moving as the partner moves.
 #pragma once
 
-#include "backends/mujoco/mujoco_model.h"
-#include "backends/partner.h"
-#include "backends/scene.h"
+#include "duet/backends/mujoco/mujoco_model.h"
+#include "duet/backends/partner.h"
+#include "duet/backends/scene.h"
 
 namespace duet {
 

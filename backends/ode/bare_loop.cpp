@@ -1,11 +1,11 @@
-#include "backends/ode/bare_loop.h"
+#include "duet/backends/ode/bare_loop.h"
 
 #include <fmt/format.h>
 
-#include "backends/ode/ode_library.h"
-#include "backends/ode/ode_stepper.h"
-#include "backends/thread_clock.h"
-#include "core/require.h"
+#include "duet/backends/ode/ode_library.h"
+#include "duet/backends/ode/ode_stepper.h"
+#include "duet/backends/thread_clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/ode/contact_forecast.h"
+#include "duet/backends/ode/contact_forecast.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "backends/contact_solver.h"
-#include "backends/narrow_phase.h"
-#include "robots/tree_factor.h"
+#include "duet/backends/contact_solver.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/robots/tree_factor.h"
 
 namespace duet {
 

@@ -1,10 +1,10 @@
 // ODE behind the Backend interface. README.md says what maps to what.
-#include "backends/engine_module.h"
-#include "backends/ode/bare_loop.h"
-#include "backends/ode/ode_library.h"
-#include "backends/ode/ode_options.h"
-#include "backends/ode/ode_stepper.h"
-#include "backends/physics_backend.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/ode/bare_loop.h"
+#include "duet/backends/ode/ode_library.h"
+#include "duet/backends/ode/ode_options.h"
+#include "duet/backends/ode/ode_stepper.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 namespace {
@@ -23,6 +23,11 @@ class OdeBackend final : public PhysicsBackend {
   void place() override {
     enter_ode();
     stepper_.world().place(state_);
+  }
+
+  void do_kick(const Eigen::Vector3d& dv_W) override {
+    enter_ode();
+    stepper_.world().kick(dv_W);
   }
 
   Outcome advance(const JointCommand& command) override {

@@ -1,4 +1,4 @@
-#include "backends/ode/ode_library.h"
+#include "duet/backends/ode/ode_library.h"
 
 #include <fmt/format.h>
 #include <ode/ode.h>

@@ -1,4 +1,4 @@
-#include "backends/ode/ode_options.h"
+#include "duet/backends/ode/ode_options.h"
 
 #include <vector>
 

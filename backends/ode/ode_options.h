@@ -3,8 +3,8 @@
 
 #include <span>
 
-#include "backends/contact_solver.h"
-#include "backends/engine_options.h"
+#include "duet/backends/contact_solver.h"
+#include "duet/backends/engine_options.h"
 
 namespace duet {
 

@@ -1,9 +1,9 @@
-#include "backends/ode/ode_stepper.h"
+#include "duet/backends/ode/ode_stepper.h"
 
 #include <algorithm>
 
-#include "backends/backend.h"
-#include "backends/ode/ode_library.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/ode/ode_library.h"
 
 namespace duet {
 namespace {

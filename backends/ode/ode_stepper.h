@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "backends/implicit_law.h"
-#include "backends/link_pushes.h"
-#include "backends/narrow_phase.h"
-#include "backends/ode/contact_forecast.h"
-#include "backends/ode/ode_world.h"
+#include "duet/backends/implicit_law.h"
+#include "duet/backends/link_pushes.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/backends/ode/contact_forecast.h"
+#include "duet/backends/ode/ode_world.h"
 
 namespace duet {
 

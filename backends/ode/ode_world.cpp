@@ -1,4 +1,4 @@
-#include "backends/ode/ode_world.h"
+#include "duet/backends/ode/ode_world.h"
 
 #include <fmt/format.h>
 #include <ode/ode.h>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "backends/backend.h"
+#include "duet/backends/backend.h"
 
 namespace duet {
 namespace {
@@ -147,6 +147,13 @@ void OdeWorld::place(const RobotState& state) {
     const Eigen::Vector3d v_WCom = v[i] + w[i].cross(R_WL_[i] * link.com);
     dBodySetLinearVel(bodies_[i], v_WCom.x(), v_WCom.y(), v_WCom.z());
     dBodySetAngularVel(bodies_[i], w[i].x(), w[i].y(), w[i].z());
+  }
+}
+
+void OdeWorld::kick(const Eigen::Vector3d& dv_W) {
+  for (dxBody* body : bodies_) {
+    const Eigen::Vector3d v_WCom = vector(dBodyGetLinearVel(body)) + dv_W;
+    dBodySetLinearVel(body, v_WCom.x(), v_WCom.y(), v_WCom.z());
   }
 }
 

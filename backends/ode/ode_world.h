@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "backends/ode/ode_options.h"
-#include "backends/scene.h"
-#include "core/robot_state.h"
-#include "robots/kinematics.h"
+#include "duet/backends/ode/ode_options.h"
+#include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/kinematics.h"
 
 struct dxWorld;
 struct dxBody;
@@ -45,6 +45,7 @@ class OdeWorld {
   OdeWorld& operator=(const OdeWorld&) = delete;
 
   void place(const RobotState& state);
+  void kick(const Eigen::Vector3d& dv_W);  // adds to every body's velocity
   // Poses of all links as ODE has them after the last place(), step() or read_from().
   [[nodiscard]] std::span<const Eigen::Matrix3d> rotations() const { return R_WL_; }
   [[nodiscard]] std::span<const Eigen::Vector3d> positions() const { return p_WL_; }

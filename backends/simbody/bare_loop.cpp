@@ -1,10 +1,10 @@
-#include "backends/simbody/bare_loop.h"
+#include "duet/backends/simbody/bare_loop.h"
 
 #include <fmt/format.h>
 
-#include "backends/simbody/simbody_stepper.h"
-#include "backends/thread_clock.h"
-#include "core/require.h"
+#include "duet/backends/simbody/simbody_stepper.h"
+#include "duet/backends/thread_clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

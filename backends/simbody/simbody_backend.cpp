@@ -2,10 +2,10 @@
 
 #include <stdexcept>
 
-#include "backends/engine_module.h"
-#include "backends/physics_backend.h"
-#include "backends/simbody/bare_loop.h"
-#include "backends/simbody/simbody_stepper.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
+#include "duet/backends/simbody/bare_loop.h"
+#include "duet/backends/simbody/simbody_stepper.h"
 
 namespace duet {
 namespace {
@@ -20,6 +20,7 @@ class SimbodyBackend final : public PhysicsBackend {
  private:
   // Simbody's state is written anew from state_ in every step, and nothing else is kept between steps.
   void place() override {}
+  void do_kick(const Eigen::Vector3d&) override {}
   void append_to(std::vector<double>&) const override {}
   void read_from(std::span<const double>) override {}
 

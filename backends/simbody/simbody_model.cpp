@@ -1,4 +1,4 @@
-#include "backends/simbody/simbody_model.h"
+#include "duet/backends/simbody/simbody_model.h"
 
 #include <Simbody.h>
 #include <fmt/format.h>

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/robot_state.h"
-#include "robots/robot_model.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

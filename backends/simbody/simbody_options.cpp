@@ -1,4 +1,4 @@
-#include "backends/simbody/simbody_options.h"
+#include "duet/backends/simbody/simbody_options.h"
 
 #include <array>
 

@@ -3,7 +3,7 @@
 
 #include <span>
 
-#include "backends/engine_options.h"
+#include "duet/backends/engine_options.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/simbody/simbody_stepper.h"
+#include "duet/backends/simbody/simbody_stepper.h"
 
 #include <Eigen/Geometry>
 

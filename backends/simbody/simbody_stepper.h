@@ -5,13 +5,13 @@
 #include <Eigen/Core>
 #include <span>
 
-#include "backends/contact_solver.h"
-#include "backends/implicit_law.h"
-#include "backends/link_pushes.h"
-#include "backends/narrow_phase.h"
-#include "backends/partner.h"
-#include "backends/simbody/simbody_model.h"
-#include "backends/simbody/simbody_options.h"
+#include "duet/backends/contact_solver.h"
+#include "duet/backends/implicit_law.h"
+#include "duet/backends/link_pushes.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/backends/partner.h"
+#include "duet/backends/simbody/simbody_model.h"
+#include "duet/backends/simbody/simbody_options.h"
 
 namespace duet {
 

@@ -6,11 +6,11 @@
 #include <memory>
 #include <thread>
 
-#include "backends/factory.h"
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
-#include "bench/profile.h"
-#include "robots/robot_model.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
+#include "duet/bench/profile.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 namespace {

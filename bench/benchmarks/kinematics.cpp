@@ -1,7 +1,7 @@
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
 
 namespace duet {
 namespace {

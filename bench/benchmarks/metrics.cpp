@@ -1,8 +1,8 @@
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
-#include "metrics/detector.h"
-#include "metrics/retargeting.h"
-#include "retarget/pair.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
+#include "duet/metrics/detector.h"
+#include "duet/metrics/retargeting.h"
+#include "duet/retarget/pair.h"
 
 namespace duet {
 namespace {
@@ -20,7 +20,7 @@ std::vector<Figure> time_detectors(const BenchmarkOptions& options) {
   const Agent b = human_agent(clip.b.joints);
   const double seconds = best_call_seconds(
       [&] {
-        for (const Task task : kTasks) detect(task, a, b, DetectorVersion::kRobot);
+        for (const Task task : kPaperTasks) detect(task, a, b, DetectorVersion::kRobot);
       },
       options.seconds);
   return {at_most("metrics/detectors", 1e3 * seconds, "ms", 1.0)};

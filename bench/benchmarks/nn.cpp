@@ -1,11 +1,12 @@
 // Published policies: one evaluation at batch 1, and what it costs above the bare matrix products of the same sizes.
 #include <fmt/format.h>
 
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
-#include "controllers/published.h"
-#include "nn/dense_kernels.h"
-#include "nn/network.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
+#include "duet/controllers/published.h"
+#include "duet/nn/dense_kernels.h"
+#include "duet/nn/load_network.h"
+#include "duet/nn/network.h"
 
 namespace duet {
 namespace {
@@ -20,7 +21,7 @@ struct PublishedPolicy {
   std::vector<Layer> layers;
 };
 
-const std::vector<PublishedPolicy>& policies() {
+const std::vector<PublishedPolicy>& published_policies() {
   static const std::vector<PublishedPolicy> list = {
       {"homie",
        40.0,
@@ -87,7 +88,7 @@ std::vector<Figure> time_policy(const PublishedPolicy& policy, const BenchmarkOp
 }  // namespace
 
 void add_nn_benchmarks(std::vector<Benchmark>& list) {
-  for (const PublishedPolicy& policy : policies())
+  for (const PublishedPolicy& policy : published_policies())
     list.push_back({fmt::format("nn/{}", policy.name), "one evaluation of a published policy, one core",
                     [policy](const BenchmarkOptions& options) { return time_policy(policy, options); }});
 }

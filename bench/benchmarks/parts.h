@@ -3,12 +3,13 @@
 
 #include <vector>
 
-#include "bench/benchmarks/benchmark.h"
-#include "motion/interaction_clip.h"
+#include "duet/bench/benchmarks/benchmark.h"
+#include "duet/motion/interaction_clip.h"
 
 namespace duet {
 
 void add_pair_benchmarks(std::vector<Benchmark>& list);
+void add_dataset_benchmarks(std::vector<Benchmark>& list);
 void add_metrics_benchmarks(std::vector<Benchmark>& list);
 void add_kinematics_benchmarks(std::vector<Benchmark>& list);
 void add_backend_benchmarks(std::vector<Benchmark>& list);

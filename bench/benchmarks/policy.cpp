@@ -1,10 +1,10 @@
 // Inference of D-STAR: frames, language and noise to a plan, one core.
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "policies/dstar/random_network.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/policies/dstar/random_network.h"
 
 namespace duet {
 namespace {

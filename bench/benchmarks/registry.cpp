@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include "bench/benchmarks/parts.h"
-#include "motion/synthesis.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/motion/synthesis.h"
 
 namespace duet {
 
@@ -9,6 +9,7 @@ const std::vector<Benchmark>& benchmarks() {
   static const std::vector<Benchmark> list = [] {
     std::vector<Benchmark> all;
     add_pair_benchmarks(all);
+    add_dataset_benchmarks(all);
     add_metrics_benchmarks(all);
     add_kinematics_benchmarks(all);
     add_backend_benchmarks(all);

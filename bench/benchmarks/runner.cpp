@@ -1,14 +1,13 @@
-#include "bench/runner.h"
+#include "duet/bench/runner.h"
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "bench/benchmarks/parts.h"
-#include "bench/benchmarks/timer.h"
-#include "bench/suite.h"
+#include "duet/bench/benchmarks/parts.h"
+#include "duet/bench/benchmarks/timer.h"
+#include "duet/bench/suite.h"
 
 namespace duet {
 namespace {
@@ -37,12 +36,6 @@ double run_seconds(const Suite& suite, int threads) {
   const double seconds = wall_seconds() - begin;
   std::filesystem::remove_all(folder);
   return seconds;
-}
-
-double peak_memory_mib() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
 std::vector<Figure> time_scaling(const BenchmarkOptions& options) {

@@ -1,4 +1,6 @@
-#include "bench/benchmarks/timer.h"
+#include "duet/bench/benchmarks/timer.h"
+
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
@@ -15,6 +17,12 @@ double cpu_seconds() {
 
 double wall_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double peak_memory_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
 double best_call_seconds(const std::function<void()>& work, double seconds) {

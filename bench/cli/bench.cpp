@@ -3,13 +3,14 @@
 
 #include <ctime>
 
-#include "bench/benchmarks/benchmark.h"
-#include "bench/cli/command.h"
-#include "bench/parallel.h"
-#include "bench/version.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "results/environment.h"
+#include "duet/bench/benchmarks/benchmark.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/version.h"
+#include "duet/core/names.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/core/version.h"
+#include "duet/results/environment.h"
 
 namespace duet::cli {
 namespace {
@@ -78,7 +79,7 @@ void run_bench(Session& session, const BenchArguments& arguments) {
   check_names(arguments.names);
   if (arguments.names == std::vector<std::string>{"detectors"}) return print_confusion(session, arguments);
   nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
-  json["context"]["duet_version"] = kVersion;
+  json["context"]["duet_version"] = duet_version();
   json["context"]["machine"] = describe_machine();
   if (!session.json) fmt::print("{}\n{}\n", version_text(), describe_machine());
   for (const Benchmark& benchmark : benchmarks()) {

@@ -1,11 +1,11 @@
-#include "bench/cli/command.h"
+#include "duet/bench/cli/command.h"
 
 #include <fmt/format.h>
 
 #include <cstdio>
 
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet::cli {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/progress.h"
+#include "duet/bench/progress.h"
 
 namespace duet::cli {
 
@@ -63,7 +63,9 @@ void add_doctor(CLI::App& app, Session& session);
 void add_list(CLI::App& app, Session& session);
 void add_synth(CLI::App& app, Session& session);
 void add_import(CLI::App& app, Session& session);
+void add_convert(CLI::App& app, Session& session);
 void add_retarget(CLI::App& app, Session& session);
+void add_dataset(CLI::App& app, Session& session);  // `dataset inspect`, `curate`, `retarget`, `convert`, ...
 void add_score(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_report(CLI::App& app, Session& session);

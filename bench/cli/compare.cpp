@@ -1,13 +1,13 @@
 // duet compare: two runs on the same episodes, tested in pairs.
 #include <fmt/format.h>
 
-#include "bench/cli/command.h"
-#include "bench/cli/run_notes.h"
-#include "core/naming_file.h"
-#include "results/distinct_episodes.h"
-#include "results/leaderboard.h"
-#include "results/name_digests.h"
-#include "results/run_directory.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
+#include "duet/core/naming_file.h"
+#include "duet/results/distinct_episodes.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/name_digests.h"
+#include "duet/results/run_directory.h"
 
 namespace duet::cli {
 namespace {

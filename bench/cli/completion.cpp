@@ -4,9 +4,9 @@
 
 #include <algorithm>
 
-#include "bench/cli/command.h"
-#include "bench/shipped_suites.h"
-#include "core/names.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/shipped_suites.h"
+#include "duet/core/names.h"
 
 namespace duet::cli {
 namespace {

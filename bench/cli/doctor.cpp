@@ -3,17 +3,20 @@
 
 #include <algorithm>
 
-#include "backends/factory.h"
-#include "bench/cli/command.h"
-#include "bench/parallel.h"
-#include "bench/version.h"
-#include "controllers/controller.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "results/environment.h"
-#include "retarget/pair.h"
-#include "robots/robot_model.h"
-#include "training/dstar/trainer.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/version.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/core/version.h"
+#include "duet/results/environment.h"
+#include "duet/retarget/pair.h"
+#include "duet/robots/robot_cards.h"
+#include "duet/robots/robot_model.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet::cli {
 namespace {
@@ -24,25 +27,33 @@ struct Finding {
   std::string detail;
 };
 
-Finding robot_finding() {
+Finding robot_finding(const RobotCardFile& card) {
+  const std::string part = "robot " + card.name;
   try {
-    const std::string card = default_card_path();
-    const RobotModel robot = load_robot(card);
-    return {"robot", true,
-            fmt::format("{}: {} joints, {:.4f} kg, card {}", robot.name, robot.dof(), robot.total_mass(), card)};
+    const RobotModel robot = load_robot(card.path);
+    return {part, true, fmt::format("{} joints, {:.4f} kg, card {}", robot.dof(), robot.total_mass(), card.path)};
   } catch (const std::exception& error) {
-    return {"robot", false, error.what()};
+    return {part, false, error.what()};
+  }
+}
+
+void add_robots(std::vector<Finding>& list) {
+  try {
+    for (const RobotCardFile& card : robot_cards()) list.push_back(robot_finding(card));
+  } catch (const std::exception& error) {
+    list.push_back({"robots", false, error.what()});
   }
 }
 
 // Whether it can be made here: its card is there, its network is found and can be read.
 Finding controller_finding(const ControllerInfo& info) {
   try {
-    const auto robot = load_shared_robot(card_path(info.robot));
+    const auto robot = load_shared_robot(info.robot);
     static_cast<void>(make_controller(info.name, robot));
     const bool network = std::any_of(info.options.begin(), info.options.end(),
                                      [](const ControllerOption& option) { return option.name == "network"; });
-    return {"controller " + info.name, true, fmt::format("body {}{}", info.robot, network ? ", network found" : "")};
+    return {"controller " + info.name, true,
+            fmt::format("body {}{}", info.robot.empty() ? "any" : info.robot, network ? ", network found" : "")};
   } catch (const std::exception& error) {
     return {"controller " + info.name, false, error.what()};
   }
@@ -56,7 +67,7 @@ std::vector<Finding> findings() {
   for (const KernelKind kernel : available_kernels())
     kernels += fmt::format("{}{}", kernels.empty() ? "" : ", ", to_string(kernel));
   list.push_back({"PAIR kernels", true, kernels});
-  list.push_back(robot_finding());
+  add_robots(list);
   for (const ControllerInfo& info : controllers()) list.push_back(controller_finding(info));
   list.push_back({"training of policies", can_train_dstar(),
                   can_train_dstar() ? "libtorch with " + training_blas()
@@ -67,7 +78,7 @@ std::vector<Finding> findings() {
 
 void run_doctor(Session& session, const std::vector<std::string>& needed) {
   const std::vector<Finding> list = findings();
-  nlohmann::json json = {{"version", kVersion}, {"parts", nlohmann::json::array()}};
+  nlohmann::json json = {{"version", duet_version()}, {"parts", nlohmann::json::array()}};
   std::string text = version_text() + "\n";
   for (const Finding& finding : list) {
     json["parts"].push_back({{"part", finding.part}, {"present", finding.present}, {"detail", finding.detail}});

@@ -1,15 +1,15 @@
 // duet bless, duet check: golden baselines.
-#include "results/golden.h"
+#include "duet/results/golden.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "bench/cli/command.h"
-#include "bench/cli/run_notes.h"
-#include "core/file.h"
-#include "core/naming_file.h"
-#include "results/run_directory.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
+#include "duet/core/file.h"
+#include "duet/core/naming_file.h"
+#include "duet/results/run_directory.h"
 
 namespace duet::cli {
 namespace {

@@ -1,25 +1,32 @@
-// duet import: motion files of others -> duet's NPZ. A pair of BVH files becomes a clip, a pickled robot motion a
-// recording.
+// duet import: motion files of others -> duet's NPZ. Two people, in any format of motion/people/, become a clip, a
+// robot's motion, in any of formats/, a recording.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
 
-#include "bench/cli/command.h"
-#include "bench/rollout.h"
-#include "core/clock.h"
-#include "core/require.h"
-#include "motion/bvh.h"
-#include "motion/pickle.h"
-#include "robots/kinematics.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/people_arguments.h"
+#include "duet/bench/cli/robot_motion_options.h"
+#include "duet/core/clock.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/formats/robot_motion_format.h"
+#include "duet/motion/people/people_formats.h"
+#include "duet/rollout/play_back.h"
 
 namespace duet::cli {
 namespace {
 
 struct ImportArguments {
   std::vector<std::string> files;
-  std::string output, task, reactor = "B", up, robot;
-  bool drop_t_pose = false, keep_t_pose = false;
-  BvhOptions bvh;
+  std::string output, card, clip;
+  bool list = false;
+  PeopleArguments people;
+  RobotMotionArguments robot_motion;
 };
 
 std::string bulleted(const std::vector<std::string>& lines) {
@@ -28,100 +35,123 @@ std::string bulleted(const std::vector<std::string>& lines) {
   return text;
 }
 
-void import_people(const Session& session, ImportArguments arguments) {
-  require(!arguments.task.empty(), "--task is needed to import a pair of BVH files (hug, handshake, ...)");
-  require(arguments.reactor == "A" || arguments.reactor == "B",
-          fmt::format("--robot: expected A or B, found '{}'", arguments.reactor));
-  if (!arguments.up.empty()) {
-    require(arguments.up == "y" || arguments.up == "z", fmt::format("--up: expected y or z, found '{}'", arguments.up));
-    arguments.bvh.up = arguments.up == "y" ? UpAxis::kY : UpAxis::kZ;
-  }
-  require(!(arguments.drop_t_pose && arguments.keep_t_pose), "--drop-t-pose and --keep-t-pose exclude each other");
-  if (arguments.drop_t_pose) arguments.bvh.drop_t_pose = true;
-  if (arguments.keep_t_pose) arguments.bvh.drop_t_pose = false;
-  BvhImport imported =
-      import_bvh_pair(arguments.files[0], arguments.files[1], parse_task(arguments.task), arguments.bvh);
-  set_reactor(imported.clip, arguments.reactor == "A" ? Person::kA : Person::kB);
-  save_clip(imported.clip, arguments.output);
+nlohmann::json report_of(const SourceClip& imported, const std::string& file) {
   const Phases& phases = imported.clip.phases;
-  print(session, fmt::format("{}{}: clip '{}'", bulleted(imported.verdict), arguments.output, imported.clip.id),
-        {{"file", arguments.output},
-         {"clip", imported.clip.id},
-         {"verdict", imported.verdict},
-         {"frames", imported.clip.frames()},
-         {"act", {phases.act_begin, phases.act_end}}});
+  return {{"file", file},
+          {"clip", imported.clip.id},
+          {"verdict", imported.evidence},
+          {"frames", imported.clip.frames()},
+          {"act", {phases.act_begin, phases.act_end}}};
 }
 
-// Such pickles name no joints. As many columns as the robot has joints are taken in the card's order; six fewer are
-// GMT's 23-joint body: the same order without the wrists, which are then straight. The verdict says which.
-RobotMotion on_robot(const PickledMotion& pickled, const std::string& file, const RobotModel& robot,
-                     std::vector<std::string>& verdict) {
-  std::vector<int> rows;
-  for (int j = 0; j < robot.dof(); ++j)
-    if (robot.joints[j].name.find("wrist") == std::string::npos) rows.push_back(j);
-  const Eigen::MatrixXd& q = pickled.motion.q;
-  RobotMotion motion = pickled.motion;
-  if (q.rows() == static_cast<Eigen::Index>(rows.size()) && q.rows() != robot.dof()) {
-    motion.q = Eigen::MatrixXd::Zero(robot.dof(), q.cols());
-    for (size_t i = 0; i < rows.size(); ++i) motion.q.row(rows[i]) = q.row(static_cast<Eigen::Index>(i));
-    verdict.push_back(fmt::format("{} columns: the joints of '{}' without its wrists, which are held straight",
-                                  q.rows(), robot.name));
-  } else if (q.rows() != robot.dof()) {
-    throw InputError(fmt::format("{}: expected {} joints for robot '{}' ({} without wrists), found {}", file,
-                                 robot.dof(), robot.name, rows.size(), q.rows()));
-  }
-  motion.joint_names = robot.joint_names();
-  return motion;
-}
-
-// Worst distance between the file's own body positions and our forward kinematics, over the robot's links. [m]
-double kinematics_error(const PickledMotion& pickled, const RobotMotion& motion, const RobotModel& robot) {
-  double worst = 0.0;
-  Kinematics kinematics(robot);
-  for (int t = 0; t < pickled.local_body_pos.frames(); ++t) {
-    kinematics.update(Pose(), motion.q.col(t));
-    for (size_t b = 0; b < pickled.link_body_list.size(); ++b) {
-      for (size_t i = 0; i < robot.links.size(); ++i) {
-        if (robot.links[i].name != pickled.link_body_list[b]) continue;
-        worst = std::max(worst, (kinematics.p_WL(static_cast<int>(i)) - pickled.local_body_pos.at(t, b)).norm());
-      }
+// Every clip into a folder; one that is refused is said and counted, the others go on.
+void import_all(const Session& session, const PeopleFormat& format, const std::vector<ClipPlace>& places,
+                const PeopleOptions& options, const std::string& folder) {
+  std::string text;
+  std::set<std::string> written;
+  nlohmann::json clips = nlohmann::json::array(), refused = nlohmann::json::array();
+  for (const ClipPlace& place : places) {
+    try {
+      if (!written.insert(place.id).second)
+        throw InputError(fmt::format("'{}': another clip has the id '{}'", place.files.front(), place.id));
+      const SourceClip imported = read_source_clip(format, place, options);
+      const std::string file = fmt::format("{}/{}.npz", folder, place.id);
+      save_clip(imported.clip, file);
+      clips.push_back(report_of(imported, file));
+    } catch (const StorageError&) {
+      throw;
+    } catch (const InputError& error) {
+      text += fmt::format("refused: {}\n", error.what());
+      refused.push_back({{"clip", place.id}, {"reason", error.what()}});
     }
   }
-  return worst;
+  if (clips.empty()) throw InputError(fmt::format("{}none of {} clips was imported", text, places.size()));
+  print(session,
+        fmt::format("{}{}: {} clips of format {}, {} refused", text, folder, clips.size(), format.name, refused.size()),
+        {{"format", format.name}, {"clips", clips}, {"refused", refused}});
 }
 
+void list_places(const Session& session, const PeopleFormat& format, const std::vector<ClipPlace>& places) {
+  std::string text = fmt::format("{} clips of format {}", places.size(), format.name);
+  nlohmann::json clips = nlohmann::json::array();
+  for (const ClipPlace& place : places) {
+    text += fmt::format("\n  {}  {}", place.id, place.files.front());
+    clips.push_back({{"clip", place.id}, {"files", place.files}, {"notes", place.notes}});
+  }
+  print(session, text, {{"format", format.name}, {"clips", clips}});
+}
+
+void import_people(const Session& session, const ImportArguments& arguments) {
+  const PeopleFormat& format = find_people_format(arguments.files, arguments.people.format);
+  if (format.name == "bvh" && !arguments.list)
+    require(!arguments.people.task.empty(), "--task is needed to import a pair of BVH files (hug, handshake, ...)");
+  const PeopleOptions options = people_options(arguments.people);
+  std::vector<ClipPlace> places = format.find(arguments.files, options);
+  if (arguments.list) return list_places(session, format, places);
+  require(!arguments.output.empty(), "--output is needed: the clip to write, or a folder for several");
+  if (!arguments.clip.empty()) {
+    std::vector<std::string> ids;
+    ids.reserve(places.size());
+    for (const ClipPlace& place : places) ids.push_back(place.id);
+    std::erase_if(places, [&](const ClipPlace& place) { return place.id != arguments.clip; });
+    require(!places.empty(), unknown_name_message("clip", arguments.clip, ids));
+  }
+  const bool one_file = format.name == "bvh" || std::filesystem::path(arguments.output).extension() == ".npz";
+  if (!one_file) return import_all(session, format, places, options, arguments.output);
+  require(places.size() == 1, fmt::format("{} clips were found, and one file to write: name one with --clip, or give a "
+                                          "folder as --output",
+                                          places.size()));
+  SourceClip imported = read_source_clip(format, places.front(), options);
+  if (format.name == "bvh") imported.evidence.erase(imported.evidence.begin());  // its name is in the files'
+  save_clip(imported.clip, arguments.output);
+  print(session, fmt::format("{}{}: clip '{}'", bulleted(imported.evidence), arguments.output, imported.clip.id),
+        report_of(imported, arguments.output));
+}
+
+// Any format of formats/robot_motion_format.h.
 void import_robot(const Session& session, const ImportArguments& arguments) {
-  const auto robot = load_shared_robot(arguments.robot);
-  const PickledMotion pickled = read_motion_pickle(arguments.files[0]);
-  std::vector<std::string> verdict = pickled.verdict;
-  const RobotMotion motion = on_robot(pickled, arguments.files[0], *robot, verdict);
-  const RobotMotion resampled = resample(motion, kTickRate);
-  verdict.push_back(fmt::format("resampled: {} frames at {:.4g} Hz -> {} frames at {:g} Hz", motion.frames(),
-                                motion.rate_hz, resampled.frames(), kTickRate));
-  const double error = kinematics_error(pickled, motion, *robot);
-  if (!pickled.link_body_list.empty())
-    verdict.push_back(fmt::format("its body positions and our kinematics differ by {:.2e} m at most", error));
-  const Recording recording = play_back(resampled, {}, Task::kHug, {0, resampled.frames()}, robot);
+  const auto robot = load_shared_robot(arguments.card);
+  RobotMotionOptions options = options_of(arguments.robot_motion);
+  options.rate_hz = arguments.people.options.rate_hz;
+  options.metres = arguments.people.options.metres_per_unit;
+  RobotMotionFile read = read_robot_motion(arguments.files[0], *robot, options, arguments.people.format);
+  const RobotMotion resampled = resample(read.motion, kTickRate);
+  read.evidence.push_back(fmt::format("resampled: {} frames at {:.4g} Hz -> {} frames at {:g} Hz", read.motion.frames(),
+                                      read.motion.rate_hz, resampled.frames(), kTickRate));
+  const Recording recording = play_back(resampled, {}, std::nullopt, {0, resampled.frames()}, robot);
   save_recording(recording, arguments.output);
-  print(session, fmt::format("{}{}: recording of {} frames", bulleted(verdict), arguments.output, recording.frames()),
-        {{"file", arguments.output},
-         {"frames", recording.frames()},
-         {"kinematics_error_m", error},
-         {"verdict", verdict}});
+  nlohmann::json json = {
+      {"file", arguments.output}, {"format", read.format}, {"frames", recording.frames()}, {"verdict", read.evidence}};
+  if (read.kinematics_error) json["kinematics_error_m"] = *read.kinematics_error;
+  print(session,
+        fmt::format("{}{}: recording of {} frames", bulleted(read.evidence), arguments.output, recording.frames()),
+        json);
+}
+
+// By the format that is named, else by what is in the file; a pickle that is nobody's is a robot's that is broken.
+bool is_robot_motion(const ImportArguments& arguments) {
+  const std::vector<std::string> names = robot_motion_format_names();
+  if (!arguments.people.format.empty()) return std::ranges::count(names, arguments.people.format) > 0;
+  if (arguments.files.size() != 1) return false;
+  const auto people = std::ranges::find_if(
+      people_formats(), [&](const PeopleFormat& format) { return format.recognises(arguments.files); });
+  if (people != people_formats().end() && people->name != "positions") return false;
+  if (std::filesystem::path(arguments.files[0]).extension() == ".pkl") return true;
+  try {
+    const MotionSource source = open_motion_source(arguments.files[0]);
+    return std::ranges::any_of(robot_motion_formats(),
+                               [&](const RobotMotionFormat& format) { return format.recognises(source); });
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 void run_import(const Session& session, const ImportArguments& arguments) {
-  const std::string extension = std::filesystem::path(arguments.files[0]).extension().string();
-  if (extension == ".pkl") {
-    require(arguments.files.size() == 1, "a robot motion (.pkl) is imported alone");
-    import_robot(session, arguments);
-  } else if (extension == ".bvh") {
-    require(arguments.files.size() == 2,
-            fmt::format("expected a pair of BVH files, one a person, found {}", arguments.files.size()));
-    import_people(session, arguments);
-  } else {
-    throw std::invalid_argument(fmt::format("'{}': expected a pair of .bvh files or one .pkl", arguments.files[0]));
-  }
+  if (!is_robot_motion(arguments)) return import_people(session, arguments);
+  require(arguments.files.size() == 1,
+          fmt::format("expected one robot motion, found {} files", arguments.files.size()));
+  require(!arguments.output.empty(), "--output is needed: the recording to write");
+  import_robot(session, arguments);
 }
 
 }  // namespace
@@ -129,24 +159,21 @@ void run_import(const Session& session, const ImportArguments& arguments) {
 void add_import(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "import", "read motion files of others",
                                   "duet import 18_01.bvh 19_01.bvh --task handshake --output handshake.npz\n"
-                                  "  duet import walk_001.pkl --output walk.npz");
+                                  "  duet import walk_001.pkl --output walk.npz\n"
+                                  "  duet import examples/data/inter_x --output people");
   auto arguments = std::make_shared<ImportArguments>();
-  command->add_option("files", arguments->files, "two BVH files, person A then B; or one pickled robot motion")
+  command
+      ->add_option("files", arguments->files,
+                   "motion of two people, in files or folders (`duet list people-formats`); or one robot motion "
+                   "(`duet list robot-formats`)")
       ->required();
-  command->add_option("-o,--output", arguments->output, "clip or recording to write (NPZ)")->required();
-  command->add_option("--task", arguments->task, "task of the clip");
-  command->add_option("--robot", arguments->reactor, "who the robot replaces: A or B")->capture_default_str();
-  command->add_option("--card", arguments->robot,
-                      "robot card of a pickled motion (default: the G1 that ships with duet)");
-  command->add_option_function<double>(
-      "--units", [arguments](double v) { arguments->bvh.metres_per_unit = v; },
-      "metres per unit of the file (default: detected)");
-  command->add_option("--up", arguments->up, "up axis, y or z (default: detected)");
-  command->add_option_function<double>(
-      "--rate", [arguments](double v) { arguments->bvh.rate_hz = v; },
-      "frames per second (default: the file's frame time)");
-  command->add_flag("--drop-t-pose", arguments->drop_t_pose, "frame 0 is an added T pose: drop it (default: detected)");
-  command->add_flag("--keep-t-pose", arguments->keep_t_pose, "keep frame 0 whatever it is");
+  command->add_option("-o,--output", arguments->output,
+                      "clip or recording to write (.npz), or a folder for all clips that are found");
+  command->add_flag("--list", arguments->list, "say which clips are there and write nothing");
+  command->add_option("--clip", arguments->clip, "only the clip of this id");
+  add_people_options(*command, arguments->people);
+  command->add_option("--card", arguments->card, "robot card of a robot motion, by name or path (default: the G1)");
+  add_robot_motion_options(*command, arguments->robot_motion);
   command->callback([&session, arguments] { run_import(session, *arguments); });
 }
 

@@ -5,24 +5,31 @@
 #include <algorithm>
 #include <functional>
 
-#include "backends/factory.h"
-#include "bench/benchmarks/benchmark.h"
-#include "bench/cli/command.h"
-#include "bench/perturbation.h"
-#include "bench/profile.h"
-#include "bench/robot_cards.h"
-#include "bench/shipped_suites.h"
-#include "controllers/controller.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "metrics/catalogue.h"
-#include "metrics/detector.h"
-#include "metrics/detector_catalogue.h"
-#include "metrics/readings.h"
-#include "policies/policy.h"
-#include "retarget/options.h"
-#include "retarget/pair.h"
-#include "robots/robot_model.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/benchmarks/benchmark.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/profile.h"
+#include "duet/bench/shipped_suites.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/datasets/curation.h"
+#include "duet/formats/robot_motion_format.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/metrics/detector.h"
+#include "duet/metrics/detector_catalogue.h"
+#include "duet/metrics/readings.h"
+#include "duet/motion/people/joint_layout.h"
+#include "duet/motion/people/people_formats.h"
+#include "duet/policies/policy.h"
+#include "duet/policies/registry.h"
+#include "duet/results/episode_row.h"
+#include "duet/retarget/options.h"
+#include "duet/retarget/pair.h"
+#include "duet/robots/robot_cards.h"
+#include "duet/robots/robot_model.h"
+#include "duet/rollout/perturbation.h"
 
 namespace duet::cli {
 namespace {
@@ -34,9 +41,11 @@ struct Listed {
 };
 using Listing = std::function<std::vector<Listed>()>;
 
+bool is_of_the_paper(Task task) { return std::ranges::find(kPaperTasks, task) != kPaperTasks.end(); }
+
 std::vector<Listed> list_tasks() {
   std::vector<Listed> list;
-  for (const Task task : kTasks) {
+  for (const Task task : all_tasks()) {
     std::vector<std::string> limits;
     for (const auto& [name, value] : thresholds(task)) limits.push_back(fmt::format("{} {:g}", name, value));
     list.push_back({std::string(to_string(task)), fmt::format("thresholds: {}", fmt::join(limits, ", "))});
@@ -44,13 +53,15 @@ std::vector<Listed> list_tasks() {
   return list;
 }
 
-// One entry per detector: Table S11 beside the strict set, and what the detector prints.
+// One entry per detector: the thresholds of Table S11, or of a task that it does not have, beside the strict set, and
+// what the detector prints.
 std::vector<Listed> list_detectors() {
   std::vector<Listed> list;
-  for (const Task task : kTasks) {
-    Listed entry{std::string(to_string(task)), "thresholds of Table S11, strict in brackets; figures"};
-    for (const ThresholdInfo& info : threshold_catalogue()) {
-      if (info.task != task) continue;
+  for (const Task task : all_tasks()) {
+    Listed entry{std::string(to_string(task)), is_of_the_paper(task)
+                                                   ? "thresholds of Table S11, strict in brackets; figures"
+                                                   : "thresholds of duet, strict in brackets; figures"};
+    for (const ThresholdInfo& info : threshold_catalogue(task)) {
       const std::string strict = info.strict == info.paper ? "" : fmt::format(" (strict {:.4g})", info.strict);
       entry.options.push_back(fmt::format("{} {:g} {}{}: {}", info.name, info.paper, info.unit, strict, info.meaning));
       entry.more["thresholds"][std::string(info.name)] = {
@@ -60,8 +71,7 @@ std::vector<Listed> list_detectors() {
       entry.options.push_back(fmt::format("strict reads {}={}", option, value));
       entry.more["strict_readings"][option] = value;
     }
-    for (const DetectorFigure& figure : detector_figures()) {
-      if (figure.task != task) continue;
+    for (const DetectorFigure& figure : detector_figures(task)) {
       entry.options.push_back(fmt::format("prints {} [{}]: {}", figure.name, figure.unit, figure.meaning));
       entry.more["figures"][std::string(figure.name)] = {{"unit", figure.unit}, {"meaning", figure.meaning}};
     }
@@ -71,7 +81,8 @@ std::vector<Listed> list_detectors() {
 }
 
 std::vector<Listed> list_engines() {
-  std::vector<Listed> list;
+  std::vector<Listed> list = {
+      {std::string(kPlaybackEngine), "no physics: the robot is where its reference was a tick ago (an arm of suites)"}};
   for (const EngineInfo& engine : engines())
     list.push_back({engine.name, engine.available ? engine.version : "absent: " + engine.reason});
   return list;
@@ -86,7 +97,7 @@ std::vector<Listed> list_profiles() {
 std::vector<Listed> list_engine_options() {
   std::vector<Listed> list;
   for (const EngineInfo& engine : engines()) {
-    if (!engine.available || !engine.physics) continue;
+    if (!engine.available) continue;
     for (const EngineOption& option : engine_module(engine.name).options) {
       const std::string values = option.choices.empty() ? fmt::format("{:g} to {:g}", option.low, option.high)
                                                         : fmt::format("{}", fmt::join(option.choices, ", "));
@@ -116,10 +127,40 @@ std::vector<Listed> list_readings() {
   return list;
 }
 
+std::vector<Listed> list_people_formats() {
+  std::vector<Listed> list;
+  for (const PeopleFormat& format : people_formats())
+    list.push_back(
+        {std::string(format.name),
+         fmt::format("{}{}", format.what, format.licence.empty() ? "" : fmt::format("; licence {}", format.licence))});
+  return list;
+}
+
+std::vector<Listed> list_joint_layouts() {
+  std::vector<Listed> list;
+  for (const std::string& name : joint_layout_names()) {
+    const JointLayout& layout = joint_layout(name);
+    list.push_back({name,
+                    fmt::format("{} joints{}{}", layout.names.size(), layout.has_toes() ? "" : ", toes are made up",
+                                layout.has_gaps ? ", short gaps (NaN) are filled" : ""),
+                    {fmt::format("{}", fmt::join(layout.names, ", "))},
+                    {{"joints", layout.names}}});
+  }
+  return list;
+}
+
 std::vector<Listed> list_pair_options() {
   std::vector<Listed> list;
   for (const std::string& name : pair_option_names())
     list.push_back({name, "default " + pair_option(PairOptions(), name)});
+  return list;
+}
+
+std::vector<Listed> list_curation_criteria() {
+  std::vector<Listed> list;
+  for (const CriterionInfo& info : curation_criteria())
+    list.push_back({std::string(info.name), fmt::format("{}: {} {} {:g} {}", to_string(info.gate), info.title,
+                                                        info.at_most ? "at most" : "at least", info.limit, info.unit)});
   return list;
 }
 
@@ -143,7 +184,8 @@ std::vector<Listed> list_controllers() {
   std::vector<Listed> list;
   for (const ControllerInfo& info : controllers())
     list.push_back({info.name,
-                    fmt::format("body {}, {}; {}", info.robot, info.walks ? "walks" : "does not walk", info.about),
+                    fmt::format("body {}, {}; {}", info.robot.empty() ? "any" : info.robot,
+                                info.walks ? "walks" : "does not walk", info.about),
                     option_lines(info.options)});
   return list;
 }
@@ -151,15 +193,39 @@ std::vector<Listed> list_controllers() {
 std::vector<Listed> list_perturbations() {
   std::vector<Listed> list = {{kCleanName, "nothing is disturbed"}};
   for (const std::string& kind : perturbation_kinds())
-    list.push_back({kind, "default " + to_yaml(default_perturbation(kind))});
+    list.push_back(
+        {kind, fmt::format("{}; default {}", meaning_of_perturbation(kind), to_yaml(default_perturbation(kind)))});
   return list;
 }
 
 std::vector<Listed> list_robots() {
   std::vector<Listed> list;
-  for (const std::string& card : shipped_cards()) {
-    const RobotModel robot = load_robot(card);
-    list.push_back({robot.name, fmt::format("{} joints, {:.4f} kg, {}", robot.dof(), robot.total_mass(), card)});
+  for (const RobotCardFile& card : robot_cards()) {
+    try {
+      const RobotModel robot = load_robot(card.path);
+      list.push_back({card.name, fmt::format("{} joints, {:.4f} kg, {} ({})", robot.dof(), robot.total_mass(),
+                                             card.folder, card.path)});
+    } catch (const InputError& error) {
+      list.push_back({card.name, fmt::format("broken: {}", error.what())});
+    }
+  }
+  return list;
+}
+
+std::vector<Listed> list_robot_formats() {
+  std::vector<Listed> list;
+  for (const RobotMotionFormat& format : robot_motion_formats()) {
+    const bool written = format.write != nullptr;
+    Listed entry{format.name, fmt::format("{}; {}", written ? "read and written" : "read", format.about)};
+    entry.options = {format.holds, fmt::format("looked up in {}; licence: {}", format.evidence, format.licence)};
+    entry.more = {{"written", written},
+                  {"quaternion", to_string(format.layout.quaternion)},
+                  {"joints", to_string(format.layout.joints)},
+                  {"angles", to_string(format.layout.angles)},
+                  {"metres", format.layout.metres},
+                  {"rate_hz", format.layout.rate_hz},
+                  {"holds_rate", format.holds_rate}};
+    list.push_back(std::move(entry));
   }
   return list;
 }
@@ -181,13 +247,24 @@ std::vector<Listed> list_benchmarks() {
 
 const std::vector<std::pair<std::string, Listing>>& listings() {
   static const std::vector<std::pair<std::string, Listing>> table = {
-      {"tasks", list_tasks},       {"detectors", list_detectors},
-      {"engines", list_engines},   {"engine-options", list_engine_options},
-      {"profiles", list_profiles}, {"controllers", list_controllers},
-      {"suites", list_suites},     {"perturbations", list_perturbations},
-      {"policies", list_policies}, {"metrics", list_metrics},
-      {"readings", list_readings}, {"pair-options", list_pair_options},
-      {"robots", list_robots},     {"benchmarks", list_benchmarks},
+      {"tasks", list_tasks},
+      {"detectors", list_detectors},
+      {"engines", list_engines},
+      {"engine-options", list_engine_options},
+      {"profiles", list_profiles},
+      {"controllers", list_controllers},
+      {"suites", list_suites},
+      {"perturbations", list_perturbations},
+      {"policies", list_policies},
+      {"metrics", list_metrics},
+      {"readings", list_readings},
+      {"pair-options", list_pair_options},
+      {"people-formats", list_people_formats},
+      {"joint-layouts", list_joint_layouts},
+      {"curation-criteria", list_curation_criteria},
+      {"robots", list_robots},
+      {"benchmarks", list_benchmarks},
+      {"robot-formats", list_robot_formats},
   };
   return table;
 }
@@ -224,7 +301,8 @@ void add_list(CLI::App& app, Session& session) {
   command
       ->add_option("what", *what,
                    "tasks, detectors, engines, engine-options, profiles, controllers, suites, perturbations, policies, "
-                   "metrics, readings, pair-options, robots, benchmarks")
+                   "metrics, readings, pair-options, people-formats, joint-layouts, curation-criteria, robots, "
+                   "robot-formats, benchmarks")
       ->required();
   command->callback([&session, what] { run_list(session, *what); });
 }

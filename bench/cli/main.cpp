@@ -10,11 +10,11 @@
 #include <exception>
 #include <filesystem>
 
-#include "bench/cli/command.h"
-#include "bench/version.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/version.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace {
 
@@ -85,7 +85,9 @@ int main(int argc, char** argv) {
   add_list(app, session);
   add_synth(app, session);
   add_import(app, session);
+  add_convert(app, session);
   add_retarget(app, session);
+  add_dataset(app, session);
   add_score(app, session);
   add_run(app, session);
   add_report(app, session);

@@ -1,9 +1,9 @@
 // duet merge: the runs of several people as one.
-#include "bench/merge.h"
+#include "duet/bench/merge.h"
 
 #include <fmt/format.h>
 
-#include "bench/cli/command.h"
+#include "duet/bench/cli/command.h"
 
 namespace duet::cli {
 namespace {

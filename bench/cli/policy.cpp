@@ -1,11 +1,12 @@
 // duet policy check: one observation for one policy, and what came back.
 #include <fmt/format.h>
 
-#include "bench/cli/command.h"
-#include "bench/policy_check.h"
-#include "bench/trust.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/policy_check.h"
+#include "duet/bench/trust.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/policies/registry.h"
 
 namespace duet::cli {
 namespace {
@@ -64,7 +65,7 @@ void add_policy_check(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<CheckArguments>();
   command->add_option("policy", arguments->policy, "policy descriptor (YAML), or the name of one of duet's own")
       ->required();
-  command->add_option("--robot", arguments->robot, "robot card (default: the G1)");
+  command->add_option("--robot", arguments->robot, "robot card by name or path (default: the G1)");
   command->add_option("--task", arguments->task, "task of the clip")->capture_default_str();
   command->add_option("--option", arguments->options, "name=value, an option of the policy (repeatable)");
   add_allow_programs(*command, arguments->allow_programs);

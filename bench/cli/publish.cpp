@@ -1,10 +1,10 @@
 // duet publish: the rows of a run for others to build tables from.
 #include <fmt/format.h>
 
-#include "bench/cli/command.h"
-#include "bench/cli/run_notes.h"
-#include "results/published.h"
-#include "results/run_directory.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
+#include "duet/results/published.h"
+#include "duet/results/run_directory.h"
 
 namespace duet::cli {
 namespace {

@@ -4,21 +4,21 @@
 #include <filesystem>
 #include <functional>
 
-#include "bench/cli/command.h"
-#include "bench/cli/run_notes.h"
-#include "bench/cli/tables.h"
-#include "bench/parallel.h"
-#include "bench/story.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "results/certificate.h"
-#include "results/database.h"
-#include "results/html_report.h"
-#include "results/interval_plot.h"
-#include "results/leaderboard.h"
-#include "results/policy_report.h"
-#include "results/run_union.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
+#include "duet/bench/cli/tables.h"
+#include "duet/bench/story.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/results/certificate.h"
+#include "duet/results/database.h"
+#include "duet/results/html_report.h"
+#include "duet/results/interval_plot.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/policy_report.h"
+#include "duet/results/run_union.h"
 
 namespace duet::cli {
 namespace {
@@ -85,6 +85,12 @@ void write_tables(const Tables& tables, const std::string& format, const Writer&
     if (format == "json") write("controllers.json", controller_table_json(tables.controllers).dump(2) + "\n", format);
     if (format == "tex") write("controllers.tex", controller_table_latex(tables.controllers), format);
   }
+  if (tables.has_walking()) {
+    if (format == "md") write("walking.md", walk_table_markdown(tables.walking), format);
+    if (format == "csv") write("walking.csv", walk_table_csv(tables.walking), format);
+    if (format == "json") write("walking.json", walk_table_json(tables.walking).dump(2) + "\n", format);
+    if (format == "tex") write("walking.tex", walk_table_latex(tables.walking), format);
+  }
   if (tables.has_contacts()) {
     if (format == "md") write("contacts.md", contact_table_markdown(tables.contacts), format);
     if (format == "csv") write("contacts.csv", contact_table_csv(tables.contacts), format);
@@ -98,7 +104,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   const std::vector<Run> runs = load_runs(arguments.runs);
   const Run run = united(runs);
   const Tables tables = make_tables(run.rows, run.info.certificate);
-  const PolicyReport policies = policy_report(run.rows);
+  const PolicyReport policies = tables.has_walking() ? PolicyReport{} : policy_report(run.rows);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
   const std::vector<std::string> notes = notes_of(arguments.runs, runs, run.rows);
   Progress progress(session.progress());

@@ -3,14 +3,15 @@
 
 #include <filesystem>
 
-#include "bench/cli/command.h"
-#include "bench/clips.h"
-#include "bench/parallel.h"
-#include "core/naming_file.h"
-#include "core/require.h"
-#include "motion/plausibility.h"
-#include "retarget/pair.h"
-#include "retarget/pair_chain.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/retarget_comparison.h"
+#include "duet/core/naming_file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/motion/plausibility.h"
+#include "duet/retarget/pair.h"
+#include "duet/retarget/pair_chain.h"
 
 namespace duet::cli {
 namespace {
@@ -18,7 +19,8 @@ namespace {
 struct RetargetArguments {
   std::vector<std::string> inputs, options;
   std::string output, card, urdf, reactor;
-  bool as_is = false;
+  std::vector<std::string> compare;
+  bool as_is = false, sweep = false, both = false;
   int threads = default_threads();
 };
 
@@ -65,21 +67,49 @@ Retargeted retarget_file(const std::string& file, size_t files, const RetargetAr
           std::move(read.notes)};
 }
 
-PairOptions options_of(const RetargetArguments& arguments) {
-  PairOptions options;
-  for (const std::string& option : arguments.options) {
-    const auto [name, value] = split_assignment(option);
-    set_pair_option(options, name, value);
+PairChoices choices_of(const RetargetArguments& arguments) {
+  PairChoices choices;
+  for (const std::string& option : arguments.options) choices.emplace_back(split_assignment(option));
+  return choices;
+}
+
+std::vector<InteractionClip> clips_to_compare(const Session& session, const RetargetArguments& arguments) {
+  std::vector<InteractionClip> clips;
+  for (const std::string& file : find_motion_files(arguments.inputs)) {
+    naming_file(file, [&] {
+      ForeignClip read =
+          read_foreign_clip(Npz::load(file), arguments.as_is ? Implausible::kTaken : Implausible::kRefused);
+      for (const std::string& sentence : read.notes) note(session, sentence);
+      if (!arguments.reactor.empty()) replace_reactor(arguments.reactor, read.clip);
+      clips.push_back(read.clip);
+      if (!arguments.both) return;
+      set_reactor(clips.back(), clips.back().reactor == Person::kA ? Person::kB : Person::kA);
+      clips.push_back(std::move(read.clip));
+    });
   }
-  return options;
+  return clips;
+}
+
+// No file is written: the table is the result.
+void run_comparison(const Session& session, const RetargetArguments& arguments, const RobotModel& robot) {
+  const PairChoices choices = choices_of(arguments);
+  const std::vector<RetargetVariant> variants =
+      arguments.sweep ? weight_variants(make_pair_options(choices)) : mode_variants(arguments.compare, choices);
+  Progress progress(session.progress());
+  const std::vector<ComparedVariant> compared =
+      compare_retargeting(clips_to_compare(session, arguments), variants, robot, arguments.threads, progress);
+  print(session, arguments.sweep ? weights_table(compared) : comparison_table(compared),
+        {{"compared", comparison_json(compared)}});
 }
 
 void run_retarget(const Session& session, const RetargetArguments& arguments) {
-  const PairOptions options = options_of(arguments);
+  const PairOptions options = make_pair_options(choices_of(arguments));
   require(arguments.reactor.empty() || arguments.reactor == "A" || arguments.reactor == "B",
           fmt::format("--robot: expected A or B, found '{}'", arguments.reactor));
-  const std::string card = arguments.card.empty() ? default_card_path() : arguments.card;
+  const std::string card = arguments.card.empty() ? default_card_path() : card_path(arguments.card);
   const RobotModel robot = load_robot(card, arguments.urdf);
+  if (arguments.sweep || !arguments.compare.empty()) return run_comparison(session, arguments, robot);
+  require(!arguments.output.empty(), "retarget: expected --output FOLDER, or --compare or --sweep");
   naming_file(card, [&] { (void)make_chain(robot, options.keypoints); });
   const std::vector<std::string> files = find_motion_files(arguments.inputs);
   std::vector<Retargeted> made(files.size());
@@ -106,17 +136,24 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
 
 void add_retarget(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "retarget", "PAIR: one person of each clip becomes the robot",
-                                  "duet retarget clips --output paired --option root=per-frame");
+                                  "duet retarget clips --output paired --option mode=best\n"
+                                  "  duet retarget clips --compare paper,grounded,best");
   auto arguments = std::make_shared<RetargetArguments>();
   command->add_option("clips", arguments->inputs, "clips (NPZ) or folders of them")->required();
-  command->add_option("-o,--output", arguments->output, "folder, or a file for one clip")->required();
+  command->add_option("-o,--output", arguments->output, "folder, or a file for one clip");
   command->add_option("--option", arguments->options, "name=value; `duet list pair-options` shows all (repeatable)");
   command->add_option(
       "--robot", arguments->reactor,
       "who the robot replaces: A or B (default: as in the clip); another than in the clip is added to its id");
-  command->add_option("--card", arguments->card, "robot card (default: the G1 that ships with duet)");
+  command->add_option("--card", arguments->card, "robot card by name or path (default: the G1)");
   command->add_flag("--as-is", arguments->as_is, "take clips however implausible their people are");
   command->add_option("--urdf", arguments->urdf, "URDF in the place of the card's");
+  auto* compare = command->add_option("--compare", arguments->compare,
+                                      "modes side by side, as paper,grounded,best: a table instead of motions");
+  compare->delimiter(',');
+  command->add_flag("--sweep", arguments->sweep, "Table S8: each weight times 0.5 and 2; a table instead of motions")
+      ->excludes(compare);
+  command->add_flag("--both", arguments->both, "with --compare and --sweep: each person of a clip is replaced in turn");
   add_threads(command, arguments->threads);
   command->callback([&session, arguments] { run_retarget(session, *arguments); });
 }

@@ -5,23 +5,24 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bench/certificate.h"
-#include "bench/cli/command.h"
-#include "bench/cli/run_notes.h"
-#include "bench/cli/tables.h"
-#include "bench/clips.h"
-#include "bench/interrupt.h"
-#include "bench/parallel.h"
-#include "bench/run_identity.h"
-#include "bench/runner.h"
-#include "bench/shipped_suites.h"
-#include "bench/trust.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/number.h"
-#include "core/require.h"
-#include "metrics/contact_limits.h"
-#include "results/leaderboard_rows.h"
+#include "duet/bench/certificate.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
+#include "duet/bench/cli/tables.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/interrupt.h"
+#include "duet/bench/run_identity.h"
+#include "duet/bench/runner.h"
+#include "duet/bench/shipped_suites.h"
+#include "duet/bench/suite_actors.h"
+#include "duet/bench/trust.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/number.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/metrics/contact_limits.h"
+#include "duet/results/leaderboard_rows.h"
 
 namespace duet::cli {
 namespace {
@@ -36,6 +37,7 @@ struct RunArguments {
 // Clips given on the command line take the place of the suite's; a task without clips is left out.
 void use_clips(const std::vector<std::string>& paths, Suite& suite) {
   if (paths.empty()) return;
+  require(suite.references.empty(), "--clips: the suite has a `reference` and no clips");
   suite.clips = {};
   for (const std::string& file : find_motion_files(paths))
     suite.clips.files.push_back(std::filesystem::absolute(file).string());

@@ -1,9 +1,9 @@
-#include "bench/cli/run_notes.h"
+#include "duet/bench/cli/run_notes.h"
 
 #include <fmt/format.h>
 
-#include "core/require.h"
-#include "results/distinct_episodes.h"
+#include "duet/core/require.h"
+#include "duet/results/distinct_episodes.h"
 
 namespace duet::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "bench/cli/command.h"
-#include "results/run_directory.h"
+#include "duet/bench/cli/command.h"
+#include "duet/results/run_directory.h"
 
 namespace duet::cli {
 

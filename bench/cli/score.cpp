@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <optional>
 
-#include "bench/cli/command.h"
-#include "bench/clips.h"
-#include "bench/motion_scores.h"
-#include "bench/parallel.h"
-#include "bench/recording_scores.h"
-#include "core/naming_file.h"
-#include "core/require.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/motion_scores.h"
+#include "duet/bench/recording_scores.h"
+#include "duet/core/naming_file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
 
 namespace duet::cli {
 namespace {

@@ -1,13 +1,14 @@
 // duet synth: two-person clips made from nothing.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <filesystem>
 
-#include "bench/cli/command.h"
-#include "bench/parallel.h"
-#include "core/digest.h"
-#include "core/require.h"
-#include "motion/synthesis.h"
+#include "duet/bench/cli/command.h"
+#include "duet/core/digest.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
 
 namespace duet::cli {
 namespace {
@@ -22,7 +23,7 @@ struct SynthArguments {
 };
 
 std::vector<Task> chosen_tasks(const std::string& name) {
-  if (name == "all") return {kTasks.begin(), kTasks.end()};
+  if (name == "all") return {kPaperTasks.begin(), kPaperTasks.end()};
   return {parse_task(name)};
 }
 
@@ -60,10 +61,13 @@ void run_synth(const Session& session, SynthArguments arguments) {
 }  // namespace
 
 void add_synth(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "synth", "synthesise two-person clips of a task, or of all six",
+  CLI::App* command = add_command(app, session, "synth", "synthesise two-person clips of a task",
                                   "duet synth handshake --count 20 --seed 7 --output clips");
   auto arguments = std::make_shared<SynthArguments>();
-  command->add_option("task", arguments->task, "hug, handshake, high_five, wave, bend, fly_kiss, or all")->required();
+  command
+      ->add_option("task", arguments->task,
+                   fmt::format("{}; all: the first six", fmt::join(task_names(all_tasks()), ", ")))
+      ->required();
   command->add_option("-o,--output", arguments->output, "folder for the clips (NPZ)")->required();
   command->add_option("-n,--count", arguments->count, "clips of each task")->capture_default_str();
   command->add_option("--seed", arguments->options.seed, "of everything that is drawn")->capture_default_str();

@@ -1,12 +1,12 @@
-#include "bench/cli/tables.h"
+#include "duet/bench/cli/tables.h"
 
 #include <fmt/format.h>
 
 #include <string>
 #include <vector>
 
-#include "bench/story.h"
-#include "results/certificate.h"
+#include "duet/bench/story.h"
+#include "duet/results/certificate.h"
 
 namespace duet::cli {
 
@@ -15,10 +15,12 @@ Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& ce
           .engines = across_engines(rows),
           .contacts = contact_table(rows),
           .controllers = controller_table(rows),
+          .walking = walk_table(rows),
           .certificate = certificate};
 }
 
 std::string tables_text(const Tables& tables) {
+  if (tables.has_walking()) return walk_table_markdown(tables.walking);
   std::vector<std::string> parts = {leaderboard_markdown(tables.leaderboard, !tables.has_engines())};
   if (tables.has_controllers()) parts.push_back(controller_table_markdown(tables.controllers));
   if (tables.has_engines()) {
@@ -33,6 +35,7 @@ void add_tables(const Tables& tables, nlohmann::json& json) {
   json["leaderboard"] = leaderboard_json(tables.leaderboard);
   if (tables.has_engines()) json["engines"] = cross_engine_json(tables.engines);
   if (tables.has_controllers()) json["controllers"] = controller_table_json(tables.controllers);
+  if (tables.has_walking()) json["walking"] = walk_table_json(tables.walking);
   if (tables.has_contacts()) json["contacts"] = contact_table_json(tables.contacts);
 }
 

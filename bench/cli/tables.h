@@ -5,10 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "results/contact_table.h"
-#include "results/controller_table.h"
-#include "results/cross_engine.h"
-#include "results/leaderboard.h"
+#include "duet/results/contact_table.h"
+#include "duet/results/controller_table.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/walk_table.h"
 
 namespace duet::cli {
 
@@ -17,16 +18,19 @@ struct Tables {
   CrossEngine engines;
   ContactTable contacts;
   ControllerTable controllers;
+  WalkTable walking;
   nlohmann::json certificate;  // null: none is attached
 
   [[nodiscard]] bool has_engines() const { return engines.engines.size() > 1; }
   [[nodiscard]] bool has_contacts() const { return !contacts.groups.empty(); }
   [[nodiscard]] bool has_controllers() const { return !controllers.entries.empty(); }
+  [[nodiscard]] bool has_walking() const { return !walking.entries.empty(); }
 };
 
 Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate);
 
-// Markdown for a terminal: with several engines the metrics of each are left to the files; their drift is shown.
+// Markdown for a terminal: where robots walk by command how they do, and nothing of acts; else, with several engines
+// the metrics of each are left to the files; their drift is shown.
 std::string tables_text(const Tables& tables);
 // "leaderboard", and where there are any "engines", "contacts" and "controllers", added to `json`.
 void add_tables(const Tables& tables, nlohmann::json& json);

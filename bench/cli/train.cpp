@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bench/cli/command.h"
-#include "bench/interrupt.h"
-#include "bench/parallel.h"
-#include "bench/training_motions.h"
-#include "core/require.h"
-#include "robots/robot_model.h"
-#include "training/train_wbc.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/interrupt.h"
+#include "duet/bench/training_motions.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/robots/robot_model.h"
+#include "duet/training/train_wbc.h"
 
 namespace duet::cli {
 namespace {
@@ -155,7 +155,7 @@ void add_train(CLI::App& app, Session& session) {
   wbc->add_option("--seed", arguments->run.seed, "of weights, commands and noise")->capture_default_str();
   wbc->add_option("--threads", arguments->run.threads, "the result depends on it")->capture_default_str();
   wbc->add_option("--environments", arguments->run.environments, "a multiple of the threads")->capture_default_str();
-  wbc->add_option("--card", arguments->card, "robot card (default: the G1 that ships with duet)");
+  wbc->add_option("--card", arguments->card, "robot card by name or path (default: the G1)");
   wbc->add_flag("--smoke", arguments->smoke,
                 "a small stand and student stage in minutes; fails (exit 1) where the return does not rise");
   wbc->callback([&session, arguments] { train(session, *arguments); });

@@ -3,18 +3,18 @@
 
 #include <filesystem>
 
-#include "bench/cli/command.h"
-#include "bench/demonstrations.h"
-#include "bench/interrupt.h"
-#include "bench/parallel.h"
-#include "bench/shipped_suites.h"
-#include "core/file.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "policies/dstar/network.h"
-#include "training/dstar/retrieval.h"
-#include "training/dstar/trainer.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/demonstrations.h"
+#include "duet/bench/interrupt.h"
+#include "duet/bench/shipped_suites.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/policies/dstar/network.h"
+#include "duet/training/dstar/retrieval.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet::cli {
 namespace {

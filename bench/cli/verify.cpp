@@ -3,9 +3,9 @@
 
 #include <random>
 
-#include "bench/cli/command.h"
-#include "bench/parallel.h"
-#include "bench/verification.h"
+#include "duet/bench/cli/command.h"
+#include "duet/bench/verification.h"
+#include "duet/core/parallel.h"
 
 namespace duet::cli {
 namespace {

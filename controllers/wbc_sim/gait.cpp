@@ -1,10 +1,10 @@
-#include "controllers/wbc_sim/gait.h"
+#include "duet/controllers/wbc_sim/gait.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "core/clock.h"
+#include "duet/core/clock.h"
 
 namespace duet {
 namespace {

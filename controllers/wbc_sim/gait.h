@@ -6,14 +6,14 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "core/pose.h"
+#include "duet/core/pose.h"
 
 namespace duet {
 
 struct GaitOptions {
   double frequency = 1.4;        // full cycles [Hz]
   double swing_height = 0.08;    // of the ankle over its height in stance [m]
-  double half_width = 0.1185;    // of the stance [m]
+  double half_width = 0.1185;    // of the stance [m]; WbcTracker takes the card's
   double max_speed = 0.6;        // of the root's reference that feet are placed for [m/s]
   double max_turn = 0.8;         // [rad/s]
   double still_speed = 0.04;     // below this the root is at rest [m/s]

@@ -1,4 +1,4 @@
-#include "controllers/wbc_sim/leg_chain.h"
+#include "duet/controllers/wbc_sim/leg_chain.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -5,8 +5,8 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "controllers/stance.h"
-#include "robots/robot_model.h"
+#include "duet/controllers/stance.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

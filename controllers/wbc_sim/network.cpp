@@ -1,15 +1,15 @@
-#include "controllers/wbc_sim/network.h"
+#include "duet/controllers/wbc_sim/network.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "core/clock.h"
-#include "core/json.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "nn/mlp_file.h"
+#include "duet/core/clock.h"
+#include "duet/core/json.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/nn/mlp_file.h"
 
 namespace duet {
 namespace {
@@ -203,7 +203,7 @@ WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   if (kind != "oracle" && kind != "student")
     throw InputError(fmt::format("{}: kind is '{}', expected 'oracle' or 'student'", path, shown(kind)));
   network.kind = kind == "oracle" ? WbcKind::kOracle : WbcKind::kStudent;
-  reader.expect("the robot", robot.name, reader.text("robot"));
+  require_made_for(reader.text("robot"), robot, path);
   check_joints(reader, robot, path);
   check_channels(reader, network.kind, robot.dof(), path);
   reader.expect("the rate_hz", kRate, reader.text("rate_hz"));

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "controllers/wbc_sim/observation.h"
-#include "core/robot_state.h"
-#include "nn/mlp.h"
-#include "nn/safetensors.h"
-#include "robots/robot_model.h"
+#include "duet/controllers/wbc_sim/observation.h"
+#include "duet/core/robot_state.h"
+#include "duet/nn/mlp.h"
+#include "duet/nn/safetensors.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "controllers/wbc_sim/observation.h"
+#include "duet/controllers/wbc_sim/observation.h"
 
 #include <algorithm>
 
@@ -104,18 +104,6 @@ void write_student(const WbcSensors& sensors, const Eigen::VectorXf& action, con
   write_frame(sensors, action, write);
   write_reference(sensors, write);
   std::copy(history.values().begin(), history.values().end(), out.end() - history.values().size());
-}
-
-// Of a chain of links whose origins nearly coincide one stands for all.
-std::vector<int> critic_links(const RobotModel& robot) {
-  std::vector<int> links;
-  for (size_t i = 0; i < robot.links.size(); ++i) {
-    const std::string& name = robot.links[i].name;
-    const bool left_out = name == "waist_yaw_link" || name == "waist_roll_link" || name.ends_with("hip_pitch_link") ||
-                          name.ends_with("ankle_pitch_link") || name.ends_with("wrist_pitch_link");
-    if (!left_out) links.push_back(static_cast<int>(i));
-  }
-  return links;
 }
 
 void write_bodies(const Kinematics& actual, const Pose& X_WRef, const std::vector<int>& links, std::span<float> out) {

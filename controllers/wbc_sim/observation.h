@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "controllers/wbc_sim/tracker.h"
-#include "robots/kinematics.h"
+#include "duet/controllers/wbc_sim/tracker.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 
@@ -71,9 +71,8 @@ class WbcHistory {
 void write_student(const WbcSensors& sensors, const Eigen::VectorXf& action, const WbcHistory& history,
                    std::span<float> out);
 
-// The links that the critic sees (of the G1: 22), and each one's position and orientation (first two columns) from the
-// root's reference, in its frame. Appended to the oracle's observation.
-std::vector<int> critic_links(const RobotModel& robot);
+// Position and orientation (first two columns) of the links that the critic sees, the card's bodies (of the G1: 22),
+// from the root's reference, in its frame. Appended to the oracle's observation.
 void write_bodies(const Kinematics& actual, const Pose& X_WRef, const std::vector<int>& links, std::span<float> out);
 
 }  // namespace duet

@@ -1,13 +1,13 @@
-#include "controllers/wbc_sim/tracker.h"
+#include "duet/controllers/wbc_sim/tracker.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "controllers/stance.h"
-#include "core/clock.h"
-#include "core/require.h"
+#include "duet/controllers/stance.h"
+#include "duet/core/clock.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -48,8 +48,11 @@ Eigen::Vector2d in_heading(double yaw, const Eigen::Vector3d& d_W) {
 
 }  // namespace
 
-WbcTracker::WbcTracker(std::shared_ptr<const RobotModel> robot, const GaitOptions& gait, const RootBounds& bounds)
-    : robot_(std::move(robot)), bounds_(bounds), gait_(gait), legs_(two_legs(*robot_, Stance(*robot_))) {
+WbcTracker::WbcTracker(std::shared_ptr<const RobotModel> robot)
+    : robot_(std::move(robot)),
+      bounds_(robot_->bounds_of_root()),
+      gait_(GaitOptions{.half_width = robot_->stance_size().half_width}),
+      legs_(two_legs(*robot_, Stance(*robot_))) {
   upper_ = Stance(*robot_).upper();
   Eigen::Matrix<double, 6, 1> q;
   for (int i = 0; i < 6; ++i) q[i] = robot_->neutral[legs_[0].joints()[i]];

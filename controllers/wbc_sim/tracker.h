@@ -7,25 +7,18 @@
 #include <array>
 #include <memory>
 
-#include "controllers/wbc_sim/gait.h"
-#include "controllers/wbc_sim/leg_chain.h"
-#include "core/robot_state.h"
-#include "robots/robot_model.h"
+#include "duet/controllers/wbc_sim/gait.h"
+#include "duet/controllers/wbc_sim/leg_chain.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 
-// Bounds of the root's reference that the legs can carry. What is beyond is tracked at the bound.
-struct RootBounds {
-  double lowest = 0.62, highest = 0.77;  // of the pelvis [m]
-  double max_roll = 0.15;                // [rad]
-  double min_pitch = -0.15, max_pitch = 0.45;
-};
-
 class WbcTracker {
  public:
-  // Throws std::invalid_argument for a robot that has not two legs of six joints.
-  explicit WbcTracker(std::shared_ptr<const RobotModel> robot, const GaitOptions& gait = {},
-                      const RootBounds& bounds = {});
+  // Bounds of the root's reference and the width of the stance are the card's; what is beyond a bound is tracked at the
+  // bound. Throws std::invalid_argument for a robot that has not two legs of six joints or whose card lacks either.
+  explicit WbcTracker(std::shared_ptr<const RobotModel> robot);
 
   // Starts at a reference; velocities are zero until the next update.
   void reset(const Reference& reference);

@@ -1,10 +1,10 @@
-#include "controllers/wbc_sim/wbc_sim.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
 
 #include <algorithm>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
 
 namespace duet {
 namespace {

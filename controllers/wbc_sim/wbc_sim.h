@@ -5,8 +5,8 @@
 
 #include <memory>
 
-#include "controllers/controller.h"
-#include "controllers/wbc_sim/network.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/wbc_sim/network.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "motion/synthesis/render.h"
+#include "duet/motion/synthesis/render.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -4,8 +4,8 @@
 
 #include <array>
 
-#include "motion/human_motion.h"
-#include "motion/synthesis/performer.h"
+#include "duet/motion/human_motion.h"
+#include "duet/tasks/synthesis/performer.h"
 
 namespace duet::synthesis {
 

@@ -1,4 +1,4 @@
-#include "motion/synthesis/stage.h"
+#include "duet/motion/synthesis/stage.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/require.h"
+#include "duet/core/require.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet::synthesis {
 namespace {
@@ -177,7 +178,7 @@ void give_ways(Performer& person, const Timing& timing, int k, const Clock& cloc
 }  // namespace
 
 Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
-  const Act& act = act_of(task);
+  const Act& act = definition_of(task).act;
   const double distance = draws.uniform("distance", 2.4, 4.2, options.distance);
   const double angle = draws.uniform("angle", -30.0 * kDegree, 30.0 * kDegree, options.angle);
   const double speed = draws.uniform("speed", 0.75, 1.15, options.speed);

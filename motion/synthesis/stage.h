@@ -1,8 +1,9 @@
 // Sets the scene: two bodies, their ways to each other and apart, and when everything happens.
 #pragma once
 
-#include "motion/synthesis.h"
-#include "motion/synthesis/act.h"
+#include "duet/core/task.h"
+#include "duet/motion/synthesis_options.h"
+#include "duet/tasks/synthesis/act.h"
 
 namespace duet::synthesis {
 

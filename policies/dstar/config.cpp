@@ -1,4 +1,4 @@
-#include "policies/dstar/config.h"
+#include "duet/policies/dstar/config.h"
 
 #include <fmt/format.h>
 
@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "core/json.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
+#include "duet/core/json.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

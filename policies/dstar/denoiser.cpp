@@ -1,4 +1,4 @@
-#include "policies/dstar/denoiser.h"
+#include "duet/policies/dstar/denoiser.h"
 
 #include <fmt/format.h>
 

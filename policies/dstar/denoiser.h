@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "policies/dstar/layers.h"
+#include "duet/policies/dstar/layers.h"
 
 namespace duet {
 

@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/require.h"
-#include "policies/dstar/network.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "policies/dstar/dstar_policy.h"
+#include "duet/policies/dstar/dstar_policy.h"
 
 #include <fmt/format.h>
 
@@ -7,13 +7,13 @@
 #include <optional>
 #include <utility>
 
-#include "core/names.h"
-#include "core/number.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "policies/dstar/past_frames.h"
-#include "policies/scheduler.h"
+#include "duet/core/names.h"
+#include "duet/core/number.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/policies/dstar/past_frames.h"
+#include "duet/policies/scheduler.h"
 
 namespace duet {
 namespace {
@@ -42,6 +42,8 @@ class DstarPolicy final : public Policy {
   [[nodiscard]] std::string_view name() const override { return name_; }
 
   void reset(const EpisodeContext& context) override {
+    if (context.prompt.empty() || context.prompt == task_prompt(context.task))  // else the words say what to do
+      require_known_task(name_, kPaperTasks, context.task);
     if (network_->config.language_on)
       embedding_ = language_->embed(context.prompt.empty() ? task_prompt(context.task) : context.prompt);
     random_ = Random(context.seed, stream_key({"policy", "noise"}));

@@ -4,9 +4,10 @@
 
 #include <memory>
 
-#include "policies/dstar/network.h"
-#include "policies/language.h"
-#include "policies/policy.h"
+#include "duet/core/loaded_file.h"
+#include "duet/policies/dstar/network.h"
+#include "duet/policies/language.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "policies/dstar/encoder.h"
+#include "duet/policies/dstar/encoder.h"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "policies/dstar/layers.h"
+#include "duet/policies/dstar/layers.h"
 
 namespace duet {
 

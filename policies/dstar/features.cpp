@@ -1,4 +1,4 @@
-#include "policies/dstar/features.h"
+#include "duet/policies/dstar/features.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/require.h"
-#include "core/skeleton.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 namespace {

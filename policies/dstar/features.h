@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "policies/dstar/config.h"
-#include "policies/policy.h"
-#include "robots/kinematics.h"
+#include "duet/policies/dstar/config.h"
+#include "duet/policies/policy.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 

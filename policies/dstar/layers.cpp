@@ -1,10 +1,10 @@
-#include "policies/dstar/layers.h"
+#include "duet/policies/dstar/layers.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 namespace duet {
 namespace {

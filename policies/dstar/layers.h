@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "policies/dstar/network.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 

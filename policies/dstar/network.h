@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "nn/safetensors.h"
-#include "policies/dstar/config.h"
-#include "policies/dstar/features.h"
+#include "duet/nn/safetensors.h"
+#include "duet/policies/dstar/config.h"
+#include "duet/policies/dstar/features.h"
 
 namespace duet {
 

@@ -5,12 +5,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/json.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "policies/dstar/network.h"
-#include "policies/dstar/tensors.h"
+#include "duet/core/json.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/policies/dstar/network.h"
+#include "duet/policies/dstar/tensors.h"
 
 namespace duet {
 namespace {
@@ -222,7 +222,7 @@ std::shared_ptr<const DstarNetwork> load_dstar_network(const std::string& path, 
   Golden golden;
   std::shared_ptr<const DstarNetwork> network = read_network(content, path, golden);
   const Reader reader(content, path);
-  reader.expect("the robot", robot.name, network->robot);
+  require_made_for(network->robot, robot, path);
   check_list(reader, "joint", robot.joint_names(), network->joints);
   check_list(reader, "channel", channel_names(robot), network->channels);
   check_golden(content, path, network, golden);

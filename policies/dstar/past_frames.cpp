@@ -1,9 +1,9 @@
-#include "policies/dstar/past_frames.h"
+#include "duet/policies/dstar/past_frames.h"
 
 #include <algorithm>
 #include <iterator>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

@@ -6,7 +6,7 @@
 #include <deque>
 #include <span>
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

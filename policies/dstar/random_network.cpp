@@ -1,12 +1,12 @@
-#include "policies/dstar/random_network.h"
+#include "duet/policies/dstar/random_network.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
 
-#include "core/random.h"
-#include "core/require.h"
-#include "policies/language.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/policies/language.h"
 
 namespace duet {
 namespace {

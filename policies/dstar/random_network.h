@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "policies/dstar/network.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 

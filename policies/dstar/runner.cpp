@@ -3,11 +3,11 @@
 #include <optional>
 #include <utility>
 
-#include "core/require.h"
-#include "policies/dstar/denoiser.h"
-#include "policies/dstar/encoder.h"
-#include "policies/dstar/network.h"
-#include "policies/dstar/tensors.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/denoiser.h"
+#include "duet/policies/dstar/encoder.h"
+#include "duet/policies/dstar/network.h"
+#include "duet/policies/dstar/tensors.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "policies/dstar/tensors.h"
+#include "duet/policies/dstar/tensors.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "policies/dstar/network.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 

@@ -1,14 +1,15 @@
-#include "policies/external/channel_values.h"
+#include "duet/policies/external/channel_values.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/clock.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "policies/dstar/features.h"
+#include "duet/core/clock.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/io/joint_binding.h"
+#include "duet/policies/dstar/features.h"
 
 namespace duet {
 namespace {
@@ -32,17 +33,11 @@ std::vector<int> bind_joints(const PolicyDescriptor& descriptor, const RobotMode
     throw InputError(fmt::format("{}:{}: 'joints' with robot '{}': {}", descriptor.file, descriptor.joints_line,
                                  robot.name, message));
   };
-  std::vector<int> indices;
-  indices.reserve(names.size());
-  for (const std::string& name : names) {
-    const auto it = std::ranges::find(known, name);
-    if (it == known.end()) refuse(unknown_name_message("joint", name, known));
-    indices.push_back(static_cast<int>(it - known.begin()));
-  }
-  for (const std::string& name : known)
-    if (std::ranges::find(names, name) == names.end())
-      refuse(fmt::format("expected its {} joints, found none '{}'", known.size(), name));
-  return indices;
+  JointBinding bound = bind_by_name(names, robot);
+  if (!bound.absent.empty()) refuse(unknown_name_message("joint", bound.absent[0], known));
+  if (!bound.unnamed.empty())
+    refuse(fmt::format("expected its {} joints, found none '{}'", known.size(), bound.unnamed[0]));
+  return std::move(bound.indices);
 }
 
 std::vector<PolicyChannel> frame_channels() {
@@ -55,8 +50,9 @@ std::vector<PolicyChannel> frame_channels() {
   return channels;
 }
 
-ChannelValues::ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, PolicyFrame frame)
-    : robot_(std::move(robot)), joints_(std::move(joints)), frame_(frame) {}
+ChannelValues::ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints,
+                             const PolicyDescriptor& descriptor)
+    : robot_(std::move(robot)), joints_(std::move(joints)), frame_(descriptor.frame), tasks_(descriptor.tasks) {}
 
 void ChannelValues::reset(const EpisodeContext& context, std::vector<float> language) {
   start_ = context.start.X_WB.p;
@@ -79,7 +75,7 @@ void ChannelValues::write_plain(PolicyChannelKind kind, const Observation& obser
       std::ranges::copy(language_, out.begin());
       return;
     case PolicyChannelKind::kTask:
-      for (std::size_t i = 0; i < kTasks.size(); ++i) out[i] = kTasks[i] == task_ ? 1.0F : 0.0F;
+      std::ranges::transform(tasks_, out.begin(), [this](Task task) { return task == task_ ? 1.0F : 0.0F; });
       return;
     case PolicyChannelKind::kTime:
       out[0] = static_cast<float>(observation.tick * kTick);

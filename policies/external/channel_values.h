@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
-#include "core/random.h"
-#include "policies/external/descriptor.h"
-#include "policies/policy.h"
+#include "duet/core/random.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 
@@ -21,7 +21,7 @@ std::vector<PolicyChannel> frame_channels();
 
 class ChannelValues {
  public:
-  ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, PolicyFrame frame);
+  ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, const PolicyDescriptor& descriptor);
   // `language`: the prompt's embedding, where a channel shows it.
   void reset(const EpisodeContext& context, std::vector<float> language);
   // Of the observation's frame `frame` (0 the oldest) and of its tick. `out` has channel_size numbers. No allocation.
@@ -35,8 +35,9 @@ class ChannelValues {
   std::shared_ptr<const RobotModel> robot_;
   std::vector<int> joints_;
   PolicyFrame frame_;
+  std::vector<Task> tasks_;  // of the descriptor
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();
-  Task task_ = Task::kHug;
+  Task task_ = Task::kHug;  // of the episode, since reset
   std::vector<float> language_;
   Random noise_{0, 0};
 };

@@ -1,4 +1,4 @@
-#include "policies/external/child_process.h"
+#include "duet/policies/external/child_process.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,7 +14,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 

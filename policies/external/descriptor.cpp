@@ -1,10 +1,10 @@
-#include "policies/external/descriptor.h"
+#include "duet/policies/external/descriptor.h"
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/task.h"
-#include "policies/language.h"
+#include "duet/core/file.h"
+#include "duet/core/task.h"
+#include "duet/policies/language.h"
 
 namespace duet {
 
@@ -73,10 +73,9 @@ int channel_size(const PolicyChannel& channel, int joints) {
       return 4;
     case PolicyChannelKind::kLanguage:
       return kLanguageSize;
-    case PolicyChannelKind::kTask:
-      return static_cast<int>(kTasks.size());
     case PolicyChannelKind::kTime:
       return 1;
+    case PolicyChannelKind::kTask:
     case PolicyChannelKind::kNoise:
       return channel.size;
     default:

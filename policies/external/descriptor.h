@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 
@@ -41,7 +41,7 @@ enum class PolicyChannelKind {
   kRootOffset,           // 3 [m]
   kRootOrientation,      // 4: quaternion wxyz, w >= 0
   kLanguage,             // 768: the prompt's embedding
-  kTask,                 // 6: 1 for the episode's task, else 0
+  kTask,                 // a number for each of the descriptor's tasks: 1 for the episode's, else 0
   kTime,                 // 1: since the episode's start [s]
   kNoise,                // `size` standard normal numbers, drawn anew at each call
 };
@@ -49,7 +49,7 @@ enum class PolicyChannelKind {
 struct PolicyChannel {
   PolicyChannelKind kind = PolicyChannelKind::kPartnerRoot;
   int line = 0;  // in the descriptor's file
-  int size = 0;  // of kNoise; others know their own
+  int size = 0;  // of kTask (the descriptor's tasks) and kNoise; others know their own
   // Shown is (value - offset) * scale; one number for all or one each.
   std::vector<double> offset = {0.0}, scale = {1.0};
 };
@@ -81,6 +81,8 @@ struct PolicyDescriptor {
   PolicyKind kind = PolicyKind::kOnnx;
   std::vector<std::string> joints;  // order of every joint vector; empty: the robot's
   int joints_line = 0;
+  // What it was made for, in the order of the channel `task`; an episode of another is refused.
+  std::vector<Task> tasks = {kPaperTasks.begin(), kPaperTasks.end()};
   PolicyFrame frame = PolicyFrame::kWorld;
   PlanFormat output;
   // kOnnx

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/clock.h"
-#include "core/names.h"
-#include "policies/external/descriptor.h"
-#include "policies/policy.h"
-#include "robots/yaml_section.h"
+#include "duet/core/clock.h"
+#include "duet/core/names.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/policy.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -76,8 +76,8 @@ class Reader {
  public:
   Reader(const std::string& text, const std::string& file)
       : root_(file, parse_yaml(text, file), "policy descriptor",
-              {"schema", "name", "about", "kind", "joints", "frame_of_reference", "output", "network", "inputs",
-               "command", "socket", "deadline_ms", "hang_ms", "start_ms"}) {
+              {"schema", "name", "about", "kind", "joints", "tasks", "frame_of_reference", "output", "network",
+               "inputs", "command", "socket", "deadline_ms", "hang_ms", "start_ms"}) {
     out_.file = file;
   }
 
@@ -90,6 +90,7 @@ class Reader {
     out_.kind = static_cast<PolicyKind>(choice(root_, "kind", root_.text("kind"), {"onnx", "process"}));
     out_.frame = static_cast<PolicyFrame>(choice(root_, "frame_of_reference", "world", {"world", "ego"}));
     read_joints();
+    read_tasks();
     read_output();
     if (out_.kind == PolicyKind::kOnnx)
       read_network();
@@ -105,6 +106,22 @@ class Reader {
     for (auto it = out_.joints.begin(); it != out_.joints.end(); ++it)
       if (std::find(out_.joints.begin(), it, *it) != it)
         root_.fail(out_.joints_line, fmt::format("'joints': expected each joint once, found '{}' again", *it));
+  }
+
+  void read_tasks() {
+    if (!root_.has("tasks")) return;
+    out_.tasks.clear();
+    const auto fail = [&](const std::string& message) { root_.fail(root_.line("tasks"), "'tasks': " + message); };
+    for (const std::string& name : texts(root_, "tasks")) {
+      try {
+        out_.tasks.push_back(parse_task(name));
+      } catch (const std::invalid_argument& error) {
+        fail(error.what());
+      }
+      if (std::find(out_.tasks.begin(), out_.tasks.end() - 1, out_.tasks.back()) != out_.tasks.end() - 1)
+        fail(fmt::format("expected each task once, found '{}' again", name));
+    }
+    if (out_.tasks.empty()) fail("expected at least one task, found none");
   }
 
   void read_output() {
@@ -165,6 +182,7 @@ class Reader {
     PolicyChannel channel{.line = std::max(node.Mark().line, 0) + 1};
     if (node.IsScalar()) {
       channel.kind = kind_of(input, channel.line, node.Scalar());
+      if (channel.kind == PolicyChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
       refuse_noise_without_size(input, channel);
       return channel;
     }
@@ -172,6 +190,7 @@ class Reader {
     channel.kind = kind_of(s, s.line("channel"), s.text("channel"));
     if (s.has("size") && channel.kind != PolicyChannelKind::kNoise)
       s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", to_string(channel.kind)));
+    if (channel.kind == PolicyChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
     if (s.has("size")) channel.size = whole_or(s, "size", 0, 1, kMostNoise);
     refuse_noise_without_size(s, channel);
     channel.offset = numbers_for(s, "offset", 0.0, channel);

@@ -1,4 +1,4 @@
-#include "policies/external/external_policy.h"
+#include "duet/policies/external/external_policy.h"
 
 #include <fmt/format.h>
 
@@ -6,15 +6,16 @@
 #include <filesystem>
 #include <set>
 
-#include "core/names.h"
-#include "core/require.h"
-#include "core/share.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/child_process.h"
-#include "policies/external/descriptor.h"
-#include "policies/external/onnx_policy.h"
-#include "policies/external/plan_decoder.h"
-#include "policies/external/process_policy.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/nn/load_network.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/child_process.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/external/onnx_policy.h"
+#include "duet/policies/external/plan_decoder.h"
+#include "duet/policies/external/process_policy.h"
 
 namespace duet {
 namespace {
@@ -109,7 +110,8 @@ PolicyInfo external_info(const std::string& name) {
 LoadedFiles external_files(const std::string& name, const PolicyOptions& options) {
   const PolicyDescriptor descriptor = read_policy_descriptor(name);
   LoadedFiles files = {{"descriptor", name}};
-  if (descriptor.kind == PolicyKind::kOnnx) files.push_back({"network", network_path(descriptor, options)});
+  if (descriptor.kind == PolicyKind::kOnnx)
+    for (LoadedFile& file : network_files(network_path(descriptor, options))) files.push_back(std::move(file));
   if (const std::string language = option_or(options, "language"); !language.empty())
     files.push_back({"language", language});
   for (const std::string& file : command_files(descriptor))

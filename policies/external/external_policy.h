@@ -4,7 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "policies/policy.h"
+#include "duet/core/loaded_file.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

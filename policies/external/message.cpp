@@ -1,4 +1,4 @@
-#include "policies/external/message.h"
+#include "duet/policies/external/message.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "core/json.h"
-#include "core/names.h"
-#include "core/require.h"
-#include "core/text.h"
-#include "policies/external/channel_values.h"
+#include "duet/core/json.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/policies/external/channel_values.h"
 
 namespace duet {
 namespace {
@@ -92,13 +92,6 @@ PolicyMessage parse_plan(const Json& json) {
   return message;
 }
 
-std::vector<std::string> task_names() {
-  std::vector<std::string> names;
-  names.reserve(kTasks.size());
-  for (const Task task : kTasks) names.emplace_back(to_string(task));
-  return names;
-}
-
 Json channels_json(int joints) {
   Json channels = Json::array();
   int first = 0;
@@ -162,7 +155,7 @@ std::string hello_message(const PolicyDescriptor& descriptor, const RobotModel& 
                      {"frames", kHistoryFrames},
                      {"frame_of_reference", to_string(descriptor.frame)},
                      {"channels", channels_json(static_cast<int>(joints.size()))},
-                     {"tasks", task_names()},
+                     {"tasks", task_names(descriptor.tasks)},
                      {"anchors", output.anchors},
                      {"ticks_per_anchor", output.ticks_per_anchor},
                      {"anchor_size", kPlanNumbersBeforeJoints + static_cast<int>(joints.size())},

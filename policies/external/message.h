@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "policies/external/descriptor.h"
-#include "policies/policy.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

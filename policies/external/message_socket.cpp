@@ -1,4 +1,4 @@
-#include "policies/external/message_socket.h"
+#include "duet/policies/external/message_socket.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -17,7 +17,7 @@
 #include <memory>
 #include <utility>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-#include "policies/external/message.h"
+#include "duet/policies/external/message.h"
 
 namespace duet {
 

@@ -1,47 +1,20 @@
-#include "policies/external/onnx_policy.h"
+#include "duet/policies/external/onnx_policy.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
-#include "core/names.h"
-#include "core/require.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/plan_decoder.h"
+#include "duet/core/require.h"
+#include "duet/io/bound_network.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/plan_decoder.h"
 
 namespace duet {
 namespace {
 
-int frame_size(const PolicyInput& input, int joints) {
-  int size = 0;
-  for (const PolicyChannel& channel : input.channels) size += channel_size(channel, joints);
-  return size;
-}
-
-// "partner_root 0..2, time 3 (12 frames of 4)": how the size of an input comes about.
-std::string layout(const PolicyInput& input, int joints) {
-  std::string text;
-  int first = 0;
-  for (const PolicyChannel& channel : input.channels) {
-    const int size = channel_size(channel, joints);
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", to_string(channel.kind), first);
-    if (size > 1) text += fmt::format("..{}", first + size - 1);
-    first += size;
-  }
-  if (input.frames > 1) text += fmt::format(" ({} frames of {})", input.frames, first);
-  return text;
-}
-
-// The port that `name` names; "" stands for the only one.
-std::size_t find_port(std::span<const Port> ports, const std::string& name, const char* kind,
-                      const std::string& place) {
-  if (name.empty() && ports.size() == 1) return 0;
-  std::vector<std::string> known;
-  known.reserve(ports.size());
-  for (const Port& port : ports) known.push_back(port.name);
-  const auto it = std::ranges::find(known, name);
-  if (it == known.end()) throw InputError(fmt::format("{}: {}", place, unknown_name_message(kind, name, known)));
-  return static_cast<std::size_t>(it - known.begin());
+std::vector<LayoutBlock> layout_of(const PolicyInput& input, int joints) {
+  LayoutBlock block{.entries = {}, .frames = input.frames};
+  for (const PolicyChannel& channel : input.channels)
+    block.entries.push_back({std::string(to_string(channel.kind)), channel_size(channel, joints)});
+  return {block};
 }
 
 class OnnxPolicy final : public Policy {
@@ -50,23 +23,25 @@ class OnnxPolicy final : public Policy {
              std::unique_ptr<Network> network, const std::string& network_path,
              std::shared_ptr<const LanguageEncoder> language)
       : name_(descriptor.name),
-        network_(std::move(network)),
+        network_(std::move(network), descriptor.file, network_path),
         language_(std::move(language)),
+        tasks_(descriptor.tasks),
         inputs_(descriptor.inputs),
         joints_(robot->dof()),
-        values_(robot, bind_joints(descriptor, *robot), descriptor.frame),
+        values_(robot, bind_joints(descriptor, *robot), descriptor),
         decoder_(descriptor, robot, bind_joints(descriptor, *robot)) {
-    bind_inputs(descriptor, network_path);
-    bind_outputs(descriptor, network_path);
+    bind_inputs();
+    bind_output(descriptor);
   }
 
   [[nodiscard]] std::string_view name() const override { return name_; }
   [[nodiscard]] PolicyFaults faults() const override { return faults_; }
 
   void reset(const EpisodeContext& context) override {
+    require_known_task(name_, tasks_, context.task);
     faults_ = {};
     held_ = {context.start.X_WB, context.start.q};
-    network_->reset();
+    network_.reset();
     values_.reset(context, language_ == nullptr ? std::vector<float>{} : language_->embed(context.prompt));
   }
 
@@ -80,8 +55,8 @@ class OnnxPolicy final : public Policy {
     if (!is_finite(observation))
       return faults_.leave_out(name_, observation.tick, "observation: expected finite numbers, found others");
     for (std::size_t i = 0; i < inputs_.size(); ++i) write(inputs_[i], observation, buffers_[i]);
-    network_->run(network_inputs_, network_outputs_);
-    DecodedPlan decoded = decoder_.decode(network_outputs_[plan_output_], observation.now().robot);
+    network_.run();
+    DecodedPlan decoded = decoder_.decode(network_.output(plan_output_), observation.now().robot);
     if (!decoded.fault.empty()) return faults_.leave_out(name_, observation.tick, decoded.fault);
     held_ = decoded.references.front();
     return std::move(decoded.references);
@@ -101,54 +76,35 @@ class OnnxPolicy final : public Policy {
     }
   }
 
-  void bind_inputs(const PolicyDescriptor& descriptor, const std::string& network_path) {
-    const std::span<const Port> ports = network_->inputs();
-    network_inputs_.resize(ports.size());
+  void bind_inputs() {
     buffers_.resize(inputs_.size());
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
-      const PolicyInput& input = inputs_[i];
-      const std::string place = fmt::format("{}:{}: with {}", descriptor.file, input.line, network_path);
-      const std::size_t port = find_port(ports, input.name, "input", place);
-      const int size = input.frames * frame_size(input, joints_);
-      if (size != ports[port].size)
-        throw InputError(fmt::format("{}: input '{}': expected {} numbers, found {} of the channels: {}", place,
-                                     ports[port].name, ports[port].size, size, layout(input, joints_)));
-      if (network_inputs_[port].data() != nullptr)
-        throw InputError(fmt::format("{}: expected each input once, found '{}' again", place, ports[port].name));
-      buffers_[i].resize(size);
-      network_inputs_[port] = buffers_[i];
+      const std::vector<LayoutBlock> layout = layout_of(inputs_[i], joints_);
+      buffers_[i].resize(layout_size(layout));
+      network_.bind_input(inputs_[i].name, inputs_[i].line, buffers_[i], layout);
     }
-    for (std::size_t port = 0; port < ports.size(); ++port)
-      if (network_inputs_[port].data() == nullptr)
-        throw InputError(
-            fmt::format("{}: with {}: expected every input of the network in 'inputs', found none for '{}'",
-                        descriptor.file, network_path, ports[port].name));
+    network_.require_all_bound();
   }
 
-  void bind_outputs(const PolicyDescriptor& descriptor, const std::string& network_path) {
-    const std::span<const Port> ports = network_->outputs();
-    const std::string place = fmt::format("{}:{}: with {}", descriptor.file, descriptor.output.line, network_path);
-    plan_output_ = find_port(ports, descriptor.output.name, "output", place);
-    if (ports[plan_output_].size != decoder_.size())
-      throw InputError(fmt::format("{}: output '{}': expected {} numbers ({} anchors of {}), found {}", place,
-                                   ports[plan_output_].name, decoder_.size(), descriptor.output.anchors,
-                                   decoder_.anchor_size(), ports[plan_output_].size));
-    results_.reserve(ports.size());
-    for (const Port& port : ports) results_.emplace_back(port.size);
-    network_outputs_.assign(results_.begin(), results_.end());
+  void bind_output(const PolicyDescriptor& descriptor) {
+    plan_output_ = network_.find_output(descriptor.output.name, descriptor.output.line);
+    const Port& port = network_.outputs()[plan_output_];
+    if (port.size != decoder_.size())
+      throw InputError(fmt::format("{}: output '{}': expected {} numbers ({} anchors of {}), found {}",
+                                   network_.place(descriptor.output.line), port.name, decoder_.size(),
+                                   descriptor.output.anchors, decoder_.anchor_size(), port.size));
   }
 
   std::string name_;
-  std::unique_ptr<Network> network_;
+  BoundNetwork network_;
   std::shared_ptr<const LanguageEncoder> language_;  // shared between episodes; null where no channel shows it
+  std::vector<Task> tasks_;
   std::vector<PolicyInput> inputs_;
   int joints_;
   ChannelValues values_;
   PlanDecoder decoder_;
-  std::vector<std::vector<float>> buffers_, results_;   // of inputs_; of the network's outputs
-  std::vector<std::span<const float>> network_inputs_;  // in the network's order
-  std::vector<std::span<float>> network_outputs_;
-  std::size_t plan_output_ = 0;
+  std::vector<std::vector<float>> buffers_;  // of inputs_
+  int plan_output_ = 0;
   Reference held_;
   PolicyFaults faults_;
 };

@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "nn/network.h"
-#include "policies/external/descriptor.h"
-#include "policies/language.h"
-#include "policies/policy.h"
+#include "duet/nn/network.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/language.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,13 +1,13 @@
-#include "policies/external/plan_decoder.h"
+#include "duet/policies/external/plan_decoder.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
-#include "policies/dstar/features.h"
-#include "policies/scheduler.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/features.h"
+#include "duet/policies/scheduler.h"
 
 namespace duet {
 namespace {

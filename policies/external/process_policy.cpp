@@ -1,4 +1,4 @@
-#include "policies/external/process_policy.h"
+#include "duet/policies/external/process_policy.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,11 +10,11 @@
 #include <optional>
 #include <span>
 
-#include "core/require.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/child_process.h"
-#include "policies/external/message_socket.h"
-#include "policies/external/plan_decoder.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/child_process.h"
+#include "duet/policies/external/message_socket.h"
+#include "duet/policies/external/plan_decoder.h"
 
 namespace duet {
 namespace {
@@ -41,7 +41,7 @@ class ProcessPolicy final : public Policy {
       : descriptor_(descriptor),
         joint_names_(names_of(joints, *robot)),
         channels_(frame_channels()),
-        values_(robot, joints, descriptor.frame),
+        values_(robot, joints, descriptor),
         decoder_(descriptor, robot, joints) {
     descriptor_.socket.empty() ? start() : connect();
     hello_ = hello_message(descriptor_, *robot, joint_names_);
@@ -58,6 +58,7 @@ class ProcessPolicy final : public Policy {
   [[nodiscard]] PolicyFaults faults() const override { return faults_; }
 
   void reset(const EpisodeContext& context) override {
+    require_known_task(descriptor_.name, descriptor_.tasks, context.task);
     held_ = {context.start.X_WB, context.start.q};
     values_.reset(context, {});
     ready_ = false;

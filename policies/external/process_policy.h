@@ -4,8 +4,8 @@
 
 #include <memory>
 
-#include "policies/external/descriptor.h"
-#include "policies/policy.h"
+#include "duet/policies/external/descriptor.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
@@ -34,7 +34,6 @@ TEST(Allocation, StepMakesNoneButWhatAnEnginesLibraryDoes) {
     const RobotState state = scene.robot->standing_state();
     backend->reset(state);
     const JointCommand command = scene.robot->default_command(scene.robot->neutral);
-    const Reference reference{state.X_WB, state.q};
     HumanJoints joints = HumanJoints::Constant(0.3);  // a pole before the robot
     joints.row(2).setLinSpaced(0.1, 1.3);
     const HumanJoints velocities = HumanJoints::Constant(0.01);
@@ -42,7 +41,6 @@ TEST(Allocation, StepMakesNoneButWhatAnEnginesLibraryDoes) {
     const long before = test::allocation_count();
     constexpr int kSteps = 500;  // through the fall: contacts of every kind
     for (int i = 0; i < kSteps; ++i) {
-      backend->follow(reference);
       backend->set_partner(joints, velocities);
       backend->push(0, {1.0, 0.0, 0.0}, state.X_WB.p);
       backend->step(command);

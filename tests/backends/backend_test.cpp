@@ -1,5 +1,5 @@
 // What Backend itself promises for every engine: arguments are checked once, with messages that name the joint.
-#include "backends/backend.h"
+#include "duet/backends/backend.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -21,6 +21,23 @@ using ::testing::HasSubstr;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+// An engine in which nothing happens.
+class Still final : public Backend {
+ public:
+  explicit Still(const Scene& scene) : Backend(scene) {}
+  [[nodiscard]] std::string_view name() const override { return "still"; }
+  [[nodiscard]] std::string version() const override { return "1"; }
+
+ private:
+  void do_reset() override {}
+  void do_set_partner(const HumanJoints&, const HumanJoints&) override {}
+  Outcome do_step(const JointCommand&) override { return Outcome::kOk; }
+  void do_push(int, const Eigen::Vector3d&, const Eigen::Vector3d&) override {}
+  void do_kick(const Eigen::Vector3d&) override {}
+  void do_snapshot(Snapshot&) const override {}
+  void do_restore(std::span<const double>) override {}
+};
+
 Scene wheel_scene() {
   Scene scene;
   scene.robot = test::wheel();
@@ -30,11 +47,11 @@ Scene wheel_scene() {
 std::string refused_scene(const std::function<void(Scene&)>& change) {
   Scene scene = wheel_scene();
   change(scene);
-  return thrown_message<std::invalid_argument>([&] { make_backend("playback", scene); });
+  return thrown_message<std::invalid_argument>([&] { Still{scene}; });
 }
 
 struct BackendChecks : ::testing::Test {
-  std::unique_ptr<Backend> backend = make_backend("playback", wheel_scene());
+  std::unique_ptr<Backend> backend = std::make_unique<Still>(wheel_scene());
   RobotState state = test::state_of(*backend->scene().robot, Eigen::Vector3d::Zero());
   JointCommand command = test::no_torque(*backend->scene().robot);
 };
@@ -85,7 +102,7 @@ TEST(Backend, RefusesLinksWithoutMassOrInertiaByName) {
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
   for (const EngineInfo& info : engines())
-    if (info.physics && info.available) names.push_back(info.name);
+    if (info.available) names.push_back(info.name);
   return names;
 }
 
@@ -157,13 +174,7 @@ TEST_F(BackendChecks, StepRefusesBadCommandsByJoint) {
   EXPECT_EQ(backend->time(), 0.0);
 }
 
-TEST_F(BackendChecks, FollowPartnerAndPushRefuseBadValues) {
-  Reference reference{{}, Eigen::VectorXd::Zero(3)};
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->follow(reference); }),
-              HasSubstr("q has 3 entries, expected 1"));
-  reference.q = Eigen::VectorXd::Zero(1);
-  reference.X_WB.R.coeffs().setZero();
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->follow(reference); }), HasSubstr("norm 0"));
+TEST_F(BackendChecks, PartnerPushAndKickRefuseBadValues) {
   HumanJoints joints = HumanJoints::Zero();
   joints(1, 5) = kNan;
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { backend->set_partner(joints, HumanJoints::Zero()); }),
@@ -178,6 +189,62 @@ TEST_F(BackendChecks, FollowPartnerAndPushRefuseBadValues) {
                 backend->push(0, {kNan, 0, 0}, zero);
               }),
               HasSubstr("not finite"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
+                backend->kick({0, kInfinity, 0});
+              }),
+              HasSubstr("Backend::kick: the velocity is not finite"));
+}
+
+// The velocity of every part changes by that of the kick, and nothing is begun anew.
+TEST(EveryEngine, AKickChangesTheVelocityOfTheWholeRobotAndNothingElse) {
+  const Eigen::Vector3d dv(0.4, -0.3, 0.2);
+  for (const std::string& engine : physics_engines()) {
+    Scene scene = test::g1_scene();
+    scene.gravity.setZero();
+    const auto backend = make_backend(engine, scene);
+    RobotState start = scene.robot->standing_state();
+    start.X_WB.p.z() += 1.0;
+    start.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized());
+    start.w_WB_B = {0.3, -0.2, 0.5};
+    start.v.setConstant(0.1);
+    backend->reset(start);
+    const JointCommand command = test::no_torque(*scene.robot);
+    for (int i = 0; i < 10; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk) << engine;
+    const RobotState before = backend->state();
+    const double time = backend->time();
+    const auto straight_on = backend->snapshot();
+    ASSERT_EQ(backend->step(command), Outcome::kOk);
+    const RobotState unkicked = backend->state();
+    backend->restore(straight_on);
+    backend->kick(dv);
+    EXPECT_EQ(backend->state().v_WB, before.v_WB + dv) << engine;
+    EXPECT_EQ(backend->state().v, before.v) << engine;
+    EXPECT_EQ(backend->time(), time) << engine;
+    ASSERT_EQ(backend->step(command), Outcome::kOk) << engine;
+    EXPECT_LT((backend->state().v_WB - unkicked.v_WB - dv).norm(), 1e-6) << engine;
+    EXPECT_LT((backend->state().X_WB.p - unkicked.X_WB.p - scene.dt * dv).norm(), 1e-6) << engine;
+    EXPECT_LT((backend->state().q - unkicked.q).norm(), 1e-6) << engine;
+    EXPECT_LT((backend->state().v - unkicked.v).norm(), 1e-4) << engine;
+  }
+}
+
+// Where a reset would refuse a robot that overlaps itself or take its contacts' warm starts, a kick keeps them.
+TEST(EveryEngine, AKickKeepsPushesAndContacts) {
+  for (const std::string& engine : physics_engines()) {
+    const Scene scene = test::g1_scene();
+    const auto backend = make_backend(engine, scene);
+    backend->reset(scene.robot->standing_state());
+    const JointCommand command = scene.robot->default_command(scene.robot->neutral);
+    for (int i = 0; i < 20; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk) << engine;
+    ASSERT_FALSE(backend->contacts().empty()) << engine;
+    backend->push(0, {30.0, 0.0, 0.0}, backend->state().X_WB.p);
+    backend->kick({0.0, 0.0, 0.0});
+    const std::size_t contacts = backend->contacts().size();
+    EXPECT_GT(contacts, 0U) << engine;
+    const double x = backend->state().X_WB.p.x();
+    for (int i = 0; i < 50; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk) << engine;
+    EXPECT_GT(backend->state().X_WB.p.x(), x + 1e-4) << engine;
+  }
 }
 
 TEST_F(BackendChecks, TimeCountsStepsExactly) {

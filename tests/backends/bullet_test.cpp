@@ -1,10 +1,10 @@
 // Bullet against closed forms: fall, spin, one joint under the torque law, stops, and the repeatability of runs.
 #include <cmath>
 
-#include "backends/factory.h"
-#include "core/random.h"
-#include "robots/dynamics.h"
-#include "robots/kinematics.h"
+#include "duet/backends/factory.h"
+#include "duet/core/random.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/kinematics.h"
 #include "tests/backends/contact_scene.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

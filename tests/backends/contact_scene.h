@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "robots/dynamics.h"
+#include "duet/robots/dynamics.h"
 #include "tests/backends/engine_names.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

@@ -1,9 +1,9 @@
 // Contacts of one step against closed forms and against the laws they must keep, on the sledge and the G1.
-#include "backends/contact_solver.h"
+#include "duet/backends/contact_solver.h"
 
 #include <cmath>
 
-#include "robots/dynamics.h"
+#include "duet/robots/dynamics.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <fstream>
 
-#include "backends/factory.h"
-#include "backends/implicit_law.h"
-#include "core/random.h"
-#include "robots/dynamics.h"
-#include "robots/kinematics.h"
+#include "duet/backends/factory.h"
+#include "duet/backends/implicit_law.h"
+#include "duet/core/random.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/kinematics.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

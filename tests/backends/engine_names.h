@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
 #include "tests/support.h"
 
 namespace duet::test {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <thread>
 
-#include "backends/factory.h"
+#include "duet/backends/factory.h"
 #include "tests/backends/engine_names.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

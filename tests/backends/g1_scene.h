@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "backends/scene.h"
-#include "robots/robot_model.h"
+#include "duet/backends/scene.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet::test {
 

@@ -4,10 +4,10 @@
 
 #include <cmath>
 
-#include "backends/factory.h"
-#include "backends/implicit_law.h"
-#include "core/random.h"
-#include "robots/dynamics.h"
+#include "duet/backends/factory.h"
+#include "duet/backends/implicit_law.h"
+#include "duet/core/random.h"
+#include "duet/robots/dynamics.h"
 #include "tests/backends/contact_scene.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
@@ -18,7 +18,7 @@ namespace {
 
 struct Mujoco : ::testing::Test {
   void SetUp() override {
-    if (!engines()[1].available) GTEST_SKIP() << "not run: " << engines()[1].reason;
+    if (!engines()[0].available) GTEST_SKIP() << "not run: " << engines()[0].reason;
   }
   static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
     Scene scene;

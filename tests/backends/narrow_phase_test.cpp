@@ -1,4 +1,4 @@
-#include "backends/narrow_phase.h"
+#include "duet/backends/narrow_phase.h"
 
 #include <gtest/gtest.h>
 

@@ -1,9 +1,9 @@
 // Simbody against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
 #include <cmath>
 
-#include "backends/factory.h"
-#include "core/random.h"
-#include "robots/dynamics.h"
+#include "duet/backends/factory.h"
+#include "duet/core/random.h"
+#include "duet/robots/dynamics.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

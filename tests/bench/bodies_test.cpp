@@ -1,14 +1,14 @@
-#include "bench/bodies.h"
+#include "duet/bench/bodies.h"
 
 #include <gmock/gmock.h>
 
-#include "bench/episode.h"
-#include "bench/runner.h"
-#include "bench/scoring.h"
-#include "core/require.h"
-#include "policies/observation_history.h"
-#include "policies/on_other_body.h"
-#include "robots/joint_map.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/runner.h"
+#include "duet/bench/scoring.h"
+#include "duet/core/require.h"
+#include "duet/policies/observation_history.h"
+#include "duet/policies/on_other_body.h"
+#include "duet/robots/joint_map.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 

@@ -1,8 +1,8 @@
 // Variants of synthesised clips: the same people, another hand or height.
 #include <gmock/gmock.h>
 
-#include "bench/clips.h"
-#include "bench/progress.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/progress.h"
 #include "tests/bench/fixtures.h"
 
 namespace duet {

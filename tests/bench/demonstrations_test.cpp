@@ -1,5 +1,5 @@
 // Demonstrations for D-STAR, made small.
-#include "bench/demonstrations.h"
+#include "duet/bench/demonstrations.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,15 +1,15 @@
-#include "bench/episode_recording.h"
+#include "duet/bench/episode_recording.h"
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
-#include "bench/profile.h"
-#include "bench/robot_cards.h"
-#include "bench/runner.h"
-#include "core/require.h"
-#include "metrics/catalogue.h"
-#include "results/row_identity.h"
+#include "duet/bench/profile.h"
+#include "duet/bench/runner.h"
+#include "duet/core/require.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/results/row_identity.h"
+#include "duet/rollout/play_back.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 
@@ -63,7 +63,7 @@ std::vector<std::string> different(const Kept& kept) {
 TEST(EpisodeRecording, ScoringAgainGivesTheSameRowToTheBit) {
   const PairedMotion clip = short_clip(*test::g1());
   for (const std::string engine : {"playback", "mujoco", "bullet"}) {
-    if (!is_available(engine)) continue;
+    if (!can_run_in(engine)) continue;
     const test::ScratchFolder folder;
     const Kept kept = run_and_keep(recording_suite(engine), clip, folder / engine);
     ASSERT_NE(kept.row.outcome, Outcome::kError) << kept.row.message;
@@ -126,15 +126,6 @@ TEST(EpisodeRecording, AnotherRobotIsRefused) {
   other.digest = "0123456789";
   EXPECT_THAT(thrown_message<InputError>([&] { (void)score_again(episode.recording, *episode.kept, other); }),
               HasSubstr("expected the robot card of digest"));
-}
-
-TEST(RobotCards, AreFoundByTheirDigest) {
-  const std::vector<std::string> cards = shipped_cards();
-  ASSERT_GE(cards.size(), 2u);
-  EXPECT_EQ(cards.front(), default_card_path());
-  const auto last = load_shared_robot(cards.back());
-  EXPECT_EQ(robot_of_digest(last->digest)->name, last->name);
-  EXPECT_EQ(robot_of_digest("nobody's"), nullptr);
 }
 
 }  // namespace

@@ -87,6 +87,8 @@ void make_world(const std::string& root) {
   std::filesystem::copy(clip, root + "/handshake.npz");
   std::filesystem::copy(std::filesystem::directory_iterator(root + "/paired")->path().string(),
                         root + "/handshake_paired.npz");
+  std::filesystem::create_directories(root + "/examples");
+  std::filesystem::create_directory_symlink(DUET_SOURCE_DIR "/examples/data", root + "/examples/data");
   const std::string bvh = test::shared_file("data/cmu_handshake"),
                     pickle = test::shared_file("data/g1_motions/twist2/walk_001.pkl");
   if (!bvh.empty()) std::filesystem::copy(bvh, root);
@@ -96,9 +98,9 @@ void make_world(const std::string& root) {
 // What an example needs besides; those of commands that are not named take long or need what is not everywhere.
 const std::map<std::string, std::string>& quick_commands() {
   static const std::map<std::string, std::string> commands = {
-      {"bless", ""},   {"check", ""},  {"compare", ""},    {"import", ""},       {"list", ""},
-      {"publish", ""}, {"report", ""}, {"retarget", ""},   {"run", "--dry-run"}, {"score", ""},
-      {"synth", ""},   {"verify", ""}, {"train split", ""}};
+      {"bless", ""}, {"check", ""},   {"compare", ""}, {"convert", ""},    {"import", ""},
+      {"list", ""},  {"publish", ""}, {"report", ""},  {"retarget", ""},   {"run", "--dry-run"},
+      {"score", ""}, {"synth", ""},   {"verify", ""},  {"train split", ""}};
   return commands;
 }
 

@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <map>
 
-#include "core/file.h"
-#include "results/run_directory.h"
+#include "duet/core/file.h"
+#include "duet/results/run_directory.h"
 #include "tests/bench/program.h"
 #include "tests/support.h"
 

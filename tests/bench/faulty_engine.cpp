@@ -2,8 +2,8 @@
 // at half a second it does what its option `fault` says.
 #include <stdexcept>
 
-#include "backends/engine_module.h"
-#include "backends/physics_backend.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 namespace {
@@ -19,6 +19,7 @@ class FaultyBackend final : public PhysicsBackend {
 
  private:
   void place() override {}
+  void do_kick(const Eigen::Vector3d&) override {}
   Outcome advance(const JointCommand&) override {
     if (time() < 0.5) return Outcome::kOk;
     if (fault_ == "throw") throw std::runtime_error("faulty: an error of the engine itself");

@@ -4,11 +4,11 @@
 #include <memory>
 #include <string>
 
-#include "bench/suite.h"
-#include "motion/paired_motion.h"
-#include "motion/synthesis.h"
-#include "retarget/pair.h"
-#include "robots/robot_model.h"
+#include "duet/bench/suite.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/motion/synthesis.h"
+#include "duet/retarget/pair.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet::test {
 

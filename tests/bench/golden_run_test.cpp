@@ -2,10 +2,10 @@
 // `duet bless RUN -o results/golden/baseline.json` where they change on purpose.
 #include <gmock/gmock.h>
 
-#include "bench/profile.h"
-#include "bench/runner.h"
-#include "core/file.h"
-#include "results/golden.h"
+#include "duet/bench/profile.h"
+#include "duet/bench/runner.h"
+#include "duet/core/file.h"
+#include "duet/results/golden.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -18,7 +18,7 @@ TEST(GoldenRun, AgreesWithTheBlessedBaseline) {
   const std::string folder = std::string(DUET_SOURCE_DIR) + "/results/golden/";
   const Suite suite = load_suite(folder + "suite.yaml");
   for (const std::string& engine : suite.engines)
-    if (!is_available(engine)) GTEST_SKIP() << "not run: " << engine << " absent";
+    if (!can_run_in(engine)) GTEST_SKIP() << "not run: " << engine << " absent";
   const test::ScratchFolder scratch;
   Progress quiet(Progress::Style::kQuiet);
   RunOptions options;

@@ -5,11 +5,12 @@
 #include <cstring>
 #include <filesystem>
 
-#include "bench/clips.h"
-#include "bench/run_inputs.h"
-#include "core/digest.h"
-#include "core/require.h"
-#include "core/share.h"
+#include "duet/bench/bodies.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/verified_run.h"
 #include "tests/support.h"
@@ -69,6 +70,25 @@ TEST_F(KeptRun, HoldsWhatItWasMadeFrom) {
   EXPECT_EQ(index.at("files").size(), 4U);
   EXPECT_EQ(index.at("files").at(3).at("of"), "policy mine");
   EXPECT_EQ(index.at("files").at(3).at("kept"), false);
+}
+
+// What a controller's descriptor names by a path from its folder is found from there alone.
+TEST_F(KeptRun, ADescriptorWithACardOfItsOwnStaysWhereItIs) {
+  fs::create_directories(scratch_ / "here/cards");
+  for (const char* file : {"g1.yaml", "g1.urdf"})
+    fs::copy(std::string(DUET_SOURCE_DIR) + "/robots/g1/" + file, scratch_ / (std::string("here/cards/") + file));
+  std::string text = read_file(std::string(DUET_SOURCE_DIR) + "/controllers/descriptors/twist2.yaml");
+  write_file(scratch_ / "here/plain.yaml", text);
+  text.replace(text.find("robot: g1_twist2"), 16, "robot: cards/g1.yaml");
+  write_file(scratch_ / "here/mine.yaml", text);
+  write_file(scratch_ / "here/twist2_1017_20k.onnx", "a network");
+  Suite suite = load_suite(scratch_ / "here/suite.yaml");
+  suite.controllers = {{"mine", scratch_ / "here/mine.yaml", {}}, {"plain", scratch_ / "here/plain.yaml", {}}};
+  const KeptSuite kept = kept_suite(suite, scratch_ / "run");
+  EXPECT_EQ(kept.suite.controllers[0].use, "../here/mine.yaml");
+  EXPECT_EQ(kept.suite.controllers[1].use, "inputs/controllers/plain/plain.yaml");
+  for (const RunInput& input : kept.inputs) EXPECT_FALSE(input.of == "controller mine" && input.kept) << input.role;
+  EXPECT_EQ(card_of(suite, suite.controllers[0]), scratch_ / "here/cards/g1.yaml");
 }
 
 TEST_F(KeptRun, IsVerifiedElsewhereWithoutTheOriginals) {

@@ -1,4 +1,4 @@
-#include "bench/motion_scores.h"
+#include "duet/bench/motion_scores.h"
 
 #include <gtest/gtest.h>
 
@@ -32,15 +32,26 @@ TEST(Score, UndefinedFiguresStayOutOfMeans) {
   EXPECT_DOUBLE_EQ(summarize_scores({a, b}, {}).at("hug").at("jpe"), 0.2);
 }
 
-TEST(Score, RetargetedClipHasAllEighteenAndTwoOtherReadings) {
+TEST(Score, RetargetedClipHasTheEighteenTwoOtherReadingsAndHowItStands) {
   const auto robot = test::g1();
   const ClipScore score = score_clip(test::paired(Task::kHandshake, *robot), robot, {});
-  EXPECT_EQ(score.metrics.size(), 20u);
+  EXPECT_EQ(score.metrics.size(), 18u + 2u + 13u);
   EXPECT_LT(score.metrics.at("large_angle_ratio.entry"), score.metrics.at("large_angle_ratio"));
   EXPECT_TRUE(score.source_detected);
   EXPECT_TRUE(score.robot_detected);
   EXPECT_NE(score_table(summarize_scores({score}, {})).find("jpe"), std::string::npos);
   EXPECT_EQ(score_json({score}, summarize_scores({score}, {})).at("clips").size(), 1u);
+}
+
+TEST(Score, TheTableHasTheGroupsOfAMotionAndNoOther) {
+  std::map<std::string, double> figures = {{"clips", 1.0},          {"jpe", 0.1},           {"jpe.pelvis", 0.2},
+                                           {"sole_height", 0.3},    {"hf_ratio", 0.4},      {"source_detected", 1.0},
+                                           {"robot_detected", 1.0}, {"paper_detected", 1.0}};
+  const std::string table = score_table({{"hug", figures}});
+  for (const char* row : {"jpe ", "jpe.pelvis", "sole_height "})
+    EXPECT_NE(table.find(std::string("\n") + row), std::string::npos) << row;
+  EXPECT_EQ(table.find("hf_ratio"), std::string::npos);
+  EXPECT_EQ(table.find("awd"), std::string::npos) << "which the summary does not have";
 }
 
 // The whole way of a clip, person to robot to figures, as it is. The kernel without fused operations is the one whose

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/require.h"
-#include "policies/external/child_process.h"
-#include "results/run_directory.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/child_process.h"
+#include "duet/results/run_directory.h"
 #include "tests/bench/program.h"
 
 namespace duet {

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 #include "tests/support.h"
 
 namespace duet::test {

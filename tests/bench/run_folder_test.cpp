@@ -10,11 +10,11 @@
 #include <map>
 #include <thread>
 
-#include "backends/factory.h"
-#include "bench/clips.h"
-#include "bench/prepared_clips.h"
-#include "bench/runner.h"
-#include "core/file.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/prepared_clips.h"
+#include "duet/bench/runner.h"
+#include "duet/core/file.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"
 #include "tests/support.h"

@@ -1,15 +1,16 @@
 // What a suite's hash and the digests of its policies and controllers cover, and what they do not.
-#include "bench/run_identity.h"
+#include "duet/bench/run_identity.h"
 
 #include <gmock/gmock.h>
 
 #include <cstdlib>
 #include <filesystem>
 
-#include "bench/suite_names.h"
-#include "core/file.h"
-#include "core/share.h"
-#include "metrics/contact_limits.h"
+#include "duet/bench/suite_names.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/file.h"
+#include "duet/core/share.h"
+#include "duet/metrics/contact_limits.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -66,6 +67,14 @@ TEST(SuiteHash, DoesNotDependOnWhichEnginesAreInstalled) {
   Suite silent = suite;
   silent.profile.engines["bullet"].options.clear();
   EXPECT_THAT(resolved_yaml(silent), HasSubstr("bullet: {dt: 0.002}\n"));
+}
+
+// Suites that leave the link to the card have the hash of before the card named it.
+TEST(SuiteHash, ALinkThatIsNotNamedCountsAsTheCards) {
+  EXPECT_EQ(suite_hash(suite_with({{"perturbations", "[push, mass]"}})),
+            suite_hash(suite_with({{"perturbations", "[{push: {link: torso_link}}, {mass: {link: torso_link}}]"}})));
+  EXPECT_NE(suite_hash(suite_with({{"perturbations", "[push]"}})),
+            suite_hash(suite_with({{"perturbations", "[{push: {link: pelvis}}]"}})));
 }
 
 TEST(SuiteHash, LimitsCountByContentWhereThePartnerIsSolid) {
@@ -185,6 +194,31 @@ TEST(ControllerDigest, CoversTheNetworkFoundThroughTheEnvironment) {
   unsetenv("DUET_MODELS");
   EXPECT_THAT(one.digest, SizeIs(64));
   EXPECT_NE(one.digest, two.digest);
+}
+
+// An ONNX file whose numbers lie in another: tensor W, (1) of float, data_location EXTERNAL, location "w.data".
+std::string external_model() {
+  const std::string location = "\x0a\x08location\x12\x06w.data";
+  const std::string tensor =
+      "\x08\x01\x10\x01\x42\x01W\x6a" + std::string(1, static_cast<char>(location.size())) + location + "\x70\x01";
+  const std::string graph = "\x2a" + std::string(1, static_cast<char>(tensor.size())) + tensor;
+  return "\x3a" + std::string(1, static_cast<char>(graph.size())) + graph;
+}
+
+TEST(ControllerDigest, CoversTheExternalDataOfItsNetwork) {
+  const test::ScratchFolder folder;
+  write_file(folder / "net.onnx", external_model());
+  write_file(folder / "w.data", "one!");
+  SuiteController controller{"twist2"};
+  controller.options = {{"network", folder / "net.onnx"}};
+  const ActorIdentity one = identity_of(controller);
+  ASSERT_THAT(one.files, SizeIs(3));
+  EXPECT_EQ(one.files[2].role, "network data w.data");
+  EXPECT_EQ(one.files[2].path, folder / "w.data");
+  write_file(folder / "w.data", "two!");
+  EXPECT_NE(identity_of(controller).digest, one.digest);
+  write_file(folder / "w.data", "one!");
+  EXPECT_EQ(identity_of(controller).digest, one.digest);
 }
 
 TEST(ControllerDigest, OfOneThatIsAbsentIsEmptyAndSaysWhy) {

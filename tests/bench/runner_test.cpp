@@ -1,14 +1,15 @@
-#include "bench/runner.h"
+#include "duet/bench/runner.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <filesystem>
 #include <fstream>
 
-#include "backends/factory.h"
-#include "bench/parallel.h"
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/backends/factory.h"
+#include "duet/core/file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 
@@ -107,6 +108,19 @@ TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
   EXPECT_EQ(row.outcome, Outcome::kError);
   EXPECT_EQ(row.success, false);
   EXPECT_FALSE(row.message.empty());
+}
+
+TEST(Runner, ATaskThatThePolicyWasNotMadeForIsAnUnsupportedRow) {
+  const auto robot = test::g1();
+  PairedMotion clip = test::paired(Task::kWave, *robot);
+  clip.task = all_tasks().back();
+  ASSERT_GT(clip.task, Task::kFlyKiss) << "the list has a seventh task";
+  Suite suite = test::playback_suite();
+  suite.policies = {SuitePolicy{"dstar"}};
+  const EpisodeRow row = run_episode({&clip, "playback", "pd", "dstar", "main", 0, 1}, suite, {"hash"}, robot);
+  EXPECT_EQ(row.outcome, Outcome::kUnsupported);
+  EXPECT_EQ(row.success, false);
+  EXPECT_THAT(row.message, HasSubstr(fmt::format("was not made for the task '{}'", to_string(clip.task))));
 }
 
 TEST(Runner, PairedClipsOfTheSameIdAreRefused) {

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/npz.h"
-#include "motion/interaction_clip.h"
-#include "motion/synthesis.h"
+#include "duet/core/npz.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/motion/synthesis.h"
 #include "tests/bench/program.h"
 
 namespace duet {
@@ -138,7 +138,7 @@ TEST(ScoreCommand, AllDetectorsShowValuesThresholdsAndMargins) {
   EXPECT_EQ(five["thresholds"]["contact"], 0.15);
   EXPECT_TRUE(five["values"].contains("distance_min"));
   EXPECT_TRUE(five["margins"].contains("max_sustained"));
-  EXPECT_EQ(json["clips"][0]["detectors"].size(), 6u);
+  EXPECT_EQ(json["clips"][0]["detectors"].size(), all_tasks().size());
 }
 
 TEST(ScoreCommand, AllReadingsArePrintedWithTheirUnits) {
@@ -266,7 +266,7 @@ TEST(ScoreCommand, ListDetectorsPrintsTableS11AndTheStrictSet) {
                            "strict reads bend.direction=forward", "prints shoulder_distance_both_min [m]"})
     EXPECT_THAT(answer.out, HasSubstr(text));
   const nlohmann::json json = nlohmann::json::parse(duet_program("list detectors --json").out);
-  EXPECT_EQ(json.size(), 6u);
+  EXPECT_EQ(json.size(), all_tasks().size());
   EXPECT_EQ(json[0]["thresholds"]["min_frames"]["strict"], 25);
   EXPECT_EQ(json[4]["strict_readings"]["bend.direction"], "forward");
 }

@@ -1,12 +1,14 @@
 // The rules that make a row of a rollout: what is a success, what is a fall.
-#include "bench/scoring.h"
+#include "duet/bench/scoring.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "backends/factory.h"
-#include "bench/runner.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/runner.h"
+#include "duet/controllers/registry.h"
+#include "duet/policies/registry.h"
 #include "tests/bench/fixtures.h"
 
 namespace duet {
@@ -26,13 +28,8 @@ class WaveThatSucceeds : public testing::Test {
   Suite suite_ = test::playback_suite();
   RolloutSetup setup_ = episode_setup({&clip_, "playback", "pd", "replay", "main", 0, 1}, suite_, *robot_);
   Rollout rollout_ = [this] {
-    Scene scene;
-    scene.robot = robot_;
-    scene.human = make_human_body(bone_lengths(clip_.partner));
-    const auto backend = make_backend("playback", scene);
-    const auto controller = make_controller("pd", robot_);
     const auto policy = make_policy("replay_dense", robot_);
-    return roll_out(setup_, *backend, *controller, *policy);
+    return play_back(setup_, *policy);
   }();
 };
 

@@ -1,9 +1,9 @@
-#include "bench/shipped_suites.h"
+#include "duet/bench/shipped_suites.h"
 
 #include <filesystem>
 
-#include "bench/demonstrations.h"
-#include "bench/training_motions.h"
+#include "duet/bench/demonstrations.h"
+#include "duet/bench/training_motions.h"
 #include "tests/support.h"
 
 namespace duet {

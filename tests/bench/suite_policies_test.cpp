@@ -5,15 +5,17 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "backends/factory.h"
-#include "bench/bodies.h"
-#include "bench/episode.h"
-#include "bench/rollout.h"
-#include "bench/run_identity.h"
-#include "bench/runner.h"
-#include "bench/trust.h"
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/backends/factory.h"
+#include "duet/bench/bodies.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/run_identity.h"
+#include "duet/bench/runner.h"
+#include "duet/bench/trust.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/policies/registry.h"
+#include "duet/rollout/act_episode.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
 
@@ -236,9 +238,7 @@ class Watcher final : public Policy {
 
 Rollout watch(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
               Policy& policy) {
-  const auto backend = make_backend("playback", episode_scene(spec, suite, robot));
-  const auto controller = make_controller("pd", robot);
-  return roll_out(episode_setup(spec, suite, *robot), *backend, *controller, policy);
+  return play_back(episode_setup(spec, suite, *robot), policy);
 }
 
 class ShuffledPartner : public ::testing::Test {

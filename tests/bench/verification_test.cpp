@@ -1,5 +1,5 @@
 // Runs that somebody changed: each is refused, and what is wrong is named.
-#include "bench/verification.h"
+#include "duet/bench/verification.h"
 
 #include <gmock/gmock.h>
 
@@ -7,11 +7,11 @@
 #include <functional>
 #include <sstream>
 
-#include "bench/clips.h"
-#include "bench/run_inputs.h"
-#include "bench/runner.h"
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/bench/runner.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/verified_run.h"
 #include "tests/support.h"

@@ -5,9 +5,9 @@
 
 #include <string>
 
-#include "bench/runner.h"
-#include "bench/verification.h"
-#include "core/file.h"
+#include "duet/bench/runner.h"
+#include "duet/bench/verification.h"
+#include "duet/core/file.h"
 
 namespace duet::test {
 

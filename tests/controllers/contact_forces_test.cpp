@@ -1,6 +1,6 @@
-#include "controllers/contact_forces.h"
+#include "duet/controllers/contact_forces.h"
 
-#include "core/random.h"
+#include "duet/core/random.h"
 #include "tests/support.h"
 
 namespace duet {

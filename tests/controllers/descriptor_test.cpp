@@ -1,9 +1,10 @@
-#include "controllers/descriptor.h"
+#include "duet/controllers/descriptor.h"
 
 #include <gmock/gmock.h>
 
-#include "controllers/published.h"
-#include "core/require.h"
+#include "duet/controllers/published.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -52,7 +53,7 @@ TEST(IoDescriptor, IsReadAsWritten) {
   EXPECT_FALSE(d.joints[1].action.has_value());
   EXPECT_EQ(d.groups[0].channels[0].joints, (std::vector<int>{1, 0}));
   EXPECT_EQ(d.groups[0].channels[1].clip, 4.0);
-  EXPECT_TRUE(d.inputs[0].parts[0].starts_full);
+  EXPECT_TRUE(d.inputs[0].parts[0].history.starts_full);
   EXPECT_EQ(d.input_size(d.inputs[0]), 3 * 6 + 5);
   EXPECT_EQ(
       d.input_layout(d.inputs[0]),
@@ -105,18 +106,114 @@ TEST(IoDescriptor, RefusesValuesOutOfRange) {
               HasSubstr("forward: 'limits': expected [lower, upper], found a list of 2"));
 }
 
+constexpr const char* kWalking =
+    "command: {forward: {limits: [-1, 1]}, lateral: {limits: [-1, 1]}, yaw: {limits: [-1, 1]}, "
+    "stands_below: {speed: 0.1, yaw_rate: 0.2}}\n";
+
+TEST(IoDescriptor, ACommandIsShownByItsAxesInTheirOrder) {
+  const Descriptor d = parse_descriptor(
+      changed("{channel: previous_action}", "{channel: command_velocity, axes: [2, 0], scale: [0.25, 2]}"), "x.yaml");
+  EXPECT_EQ(d.groups[1].channels[0].axes, (std::vector<int>{2, 0}));
+  EXPECT_EQ(d.group_size(d.groups[1]), 2);
+  EXPECT_THAT(message(changed("{channel: previous_action}", "{channel: command_velocity, axes: [3]}")),
+              HasSubstr("x.yaml:15: channel 'command_velocity': 'axes': expected a whole number in [0, 2], found 3"));
+  EXPECT_THAT(message(changed("{channel: previous_action}", "{channel: command_velocity, axes: []}")),
+              HasSubstr("'axes': expected numbers, found none"));
+}
+
+TEST(IoDescriptor, AChannelOfStandingNeedsToKnowWhichCommandIsOne) {
+  const auto with = [](const std::string& channel) { return changed("{channel: previous_action}", channel); };
+  EXPECT_EQ(
+      message(with("{channel: command_stand}")),
+      "x.yaml:15: IO descriptor: channel 'command_stand': expected the key 'stands_below' in 'command', found none");
+  const std::string gated = with("{channel: gait_sine, frequency_hz: 1, standing: [3]}");
+  EXPECT_THAT(message(gated), HasSubstr("x.yaml:15: IO descriptor: channel 'gait_sine' with 'standing': expected"));
+  const Descriptor d = parse_descriptor(gated + kWalking, "x.yaml");
+  EXPECT_EQ(d.groups[1].channels[0].gait.standing, std::vector<double>{3.0});
+  ASSERT_TRUE(d.command->stands_below.has_value());
+  EXPECT_EQ(d.command->stands_below->speed, 0.1);
+  EXPECT_EQ(d.command->stands_below->yaw_rate, 0.2);
+}
+
+TEST(IoDescriptor, RefusesBoundsOfStandingThatAreNone) {
+  const auto with = [](const std::string& bounds) {
+    const std::string direction = "{limits: [-1, 1]}";
+    return message(std::string(kSmall) + "command: {forward: " + direction + ", lateral: " + direction +
+                   ", yaw: " + direction + ", stands_below: " + bounds + "}\n");
+  };
+  EXPECT_THAT(with("{speed: 0, yaw_rate: 1}"), HasSubstr("stands_below: 'speed': expected a number > 0, found 0"));
+  EXPECT_THAT(with("{speed: 1}"), HasSubstr("stands_below: expected the key 'yaw_rate'"));
+  EXPECT_THAT(with("{speed: 1, yaw_rate: 1, height: 2}"), HasSubstr("unknown key 'height'"));
+  EXPECT_THAT(with("0.1"), HasSubstr("stands_below: expected a mapping, found '0.1'"));
+}
+
+TEST(IoDescriptor, RefusesAGaitThatDoesNotFitItself) {
+  const auto gait = [](const std::string& keys) {
+    return message(changed("{channel: previous_action}", "{channel: gait_cosine, frequency_hz: 1, " + keys + "}") +
+                   kWalking);
+  };
+  EXPECT_THAT(gait("phases: [0, 3], standing: [3]"),
+              HasSubstr("'standing': expected one number for each of the 2 phases, found 1"));
+  for (const char* stance : {"0", "1", "-0.5", "1.5"})
+    EXPECT_THAT(gait(std::string("stance: ") + stance),
+                HasSubstr(std::string("'stance': expected a number in (0, 1), found ") + stance));
+  EXPECT_THAT(message(changed("{channel: previous_action}", "{channel: tick, stance: 0.5}")),
+              HasSubstr("expected no key 'stance' in a tick, found one"));
+}
+
+TEST(IoDescriptor, AnActionIsAroundWhatItsJointOrElseAllJointsSay) {
+  const auto around = [](const std::string& all, const std::string& one) {
+    const std::string text = changed("action: 0.25}", "action: 0.25" + one + "}") + all;
+    return parse_descriptor(text, "x.yaml").joints[0].around_reference;
+  };
+  EXPECT_FALSE(around("", ""));
+  EXPECT_TRUE(around("", ", around: reference"));
+  EXPECT_TRUE(around("action: {around: reference}\n", ""));
+  EXPECT_FALSE(around("action: {around: reference}\n", ", around: default"));
+  EXPECT_THAT(message(changed("action: 0.25}", "action: 0.25, around: zero}")), HasSubstr("unknown around 'zero'"));
+  EXPECT_THAT(message(changed("effort: 5}", "effort: 5, around: reference}")),
+              HasSubstr("x.yaml:9: joint 'b': 'around': expected the key 'action' beside it, found none"));
+}
+
+TEST(IoDescriptor, AnInputIsMadeOfPartsOrIsAState) {
+  const Descriptor d = parse_descriptor(std::string(kSmall) + "  - {name: h, state: next_h}\n", "x.yaml");
+  EXPECT_EQ(d.inputs[1].state, "next_h");
+  EXPECT_TRUE(d.inputs[1].parts.empty());
+  EXPECT_THAT(message(std::string(kSmall) + "  - {name: h, state: next_h, parts: [{groups: [first]}]}\n"),
+              HasSubstr("x.yaml:21: input 'h': expected 'parts' or 'state', found both"));
+  EXPECT_THAT(message(std::string(kSmall) + "  - {name: h}\n"),
+              HasSubstr("'parts': expected at least one, found none"));
+}
+
+TEST(IoDescriptor, ACardByPathIsLookedForFromTheDescriptor) {
+  const std::string text = changed("robot: g1", "robot: ../cards/mine.yaml");
+  EXPECT_EQ(parse_descriptor(text, "/a/descriptors/x.yaml").robot, "/a/cards/mine.yaml");
+  EXPECT_EQ(parse_descriptor(changed("robot: g1", "robot: /b/mine.yaml"), "/a/x.yaml").robot, "/b/mine.yaml");
+  EXPECT_EQ(parse_descriptor(kSmall, "/a/x.yaml").robot, "g1");
+}
+
+TEST(IoDescriptor, ATextWithAColonIsRefusedWithTheRemedy) {
+  EXPECT_THAT(
+      message(changed("about: two joints", "about: legs: two joints")),
+      HasSubstr("x.yaml:2: expected YAML, found: illegal map value (a text that holds \": \" stands in quotes)"));
+  EXPECT_EQ(parse_descriptor(changed("about: two joints", "about: 'legs: two'"), "x.yaml").about, "legs: two");
+}
+
 TEST(IoDescriptor, RefusesWhatIsNoDescriptorAtAll) {
   for (const char* text : {"", "[]", "name: [", "joints: 3", "\xff\xfe"})
     EXPECT_THAT(message(text), HasSubstr("x.yaml:")) << text;
 }
 
 TEST(IoDescriptor, AllThatShipAreReadAndNameTheirCards) {
-  for (const char* name : {"homie", "twist2", "playground", "rl_gym", "gmt", "beyond_mimic"}) {
-    const Descriptor descriptor = load_descriptor(name);
-    EXPECT_EQ(descriptor.name, name);
-    const std::string card = std::string(DUET_SOURCE_DIR) + "/robots/g1/" + descriptor.robot + ".yaml";
-    EXPECT_TRUE(std::filesystem::exists(card)) << card;
+  int shipped = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(DUET_SOURCE_DIR "/controllers/descriptors")) {
+    const Descriptor descriptor = read_descriptor(entry.path().string());
+    EXPECT_EQ(descriptor.name, entry.path().stem());
+    EXPECT_THAT(controller_names(), testing::Contains(descriptor.name));
+    EXPECT_TRUE(std::filesystem::exists(card_path(descriptor.robot))) << descriptor.name;
+    ++shipped;
   }
+  EXPECT_GE(shipped, 14);
 }
 
 }  // namespace

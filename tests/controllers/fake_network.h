@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "controllers/published.h"
-#include "nn/network.h"
+#include "duet/controllers/published.h"
+#include "duet/nn/network.h"
 
 namespace duet::test {
 
@@ -38,8 +38,7 @@ class FakeNetwork final : public Network {
   FakeMemory& memory_;
 };
 
-inline std::shared_ptr<const RobotModel> body(const std::string& card) {
-  return load_shared_robot(DUET_SOURCE_DIR "/robots/g1/" + card + ".yaml");
-}
+// Of a card by name or path.
+inline std::shared_ptr<const RobotModel> body(const std::string& card) { return load_shared_robot(card_path(card)); }
 
 }  // namespace duet::test

@@ -1,4 +1,4 @@
-#include "controllers/guard.h"
+#include "duet/controllers/guard.h"
 
 #include <gmock/gmock.h>
 

@@ -1,88 +1,24 @@
 // What each published controller's network is shown, number by number, against the tables of its own documentation, and
 // what becomes of its answer. The network is a fake.
+#include "tests/controllers/layout.h"
+
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "controllers/descriptor_controller.h"
-#include "controllers/observer.h"
-#include "core/require.h"
+#include "duet/controllers/observer.h"
+#include "duet/core/require.h"
 #include "tests/backends/allocation_count.h"
-#include "tests/controllers/fake_network.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
+using test::kNear;
+using test::Layout;
 using test::thrown_message;
 using ::testing::HasSubstr;
-
-// Of float arithmetic on numbers of size 1 to 30.
-constexpr double kNear = 4e-6;
-
-// A controller over a fake network, in a state whose numbers can be told apart.
-struct Layout {
-  Layout(const std::string& name, int input, int output, const ControllerOptions& options = {}, const char* in = "x",
-         const char* out = "y")
-      : descriptor(load_descriptor(name)), robot(test::body(descriptor.robot)) {
-    std::vector<Port> inputs = {{in, input}};
-    if (name == "beyond_mimic") inputs.push_back({"time_step", 1});
-    controller = make_descriptor_controller(
-        descriptor, robot, std::make_unique<test::FakeNetwork>(inputs, std::vector<Port>{{out, output}}, memory),
-        "fake", options);
-    state = robot->standing_state();
-    state.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()) *
-                   Eigen::AngleAxisd(-0.1, Eigen::Vector3d::UnitX());
-    state.v_WB = {0.3, -0.2, 0.1};
-    state.w_WB_B = {0.11, 0.22, 0.33};
-    for (int j = 0; j < robot->dof(); ++j) {
-      state.q[j] = 0.01 * (j + 1);
-      state.v[j] = 1.0 + 0.1 * j;
-    }
-    reference = {robot->standing_state().X_WB, Eigen::VectorXd::Zero(robot->dof())};
-    for (int j = 0; j < robot->dof(); ++j) reference.q[j] = 2.0 + 0.01 * j;
-    reference.X_WB.R =
-        Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX());
-    controller->reset(state);
-    for (size_t a = 0; a < memory.answered[0].size(); ++a) memory.answered[0][a] = 0.1F * static_cast<float>(a + 1);
-  }
-  void act() { controller->act(state, reference, command); }
-  // The reference goes on for a tick: 1 cm in x, 2 cm in y of W, turns about its own z axis by 0.01 rad.
-  void go_on() {
-    reference.X_WB.p += Eigen::Vector3d(0.01, 0.02, 0.0);
-    reference.X_WB.R = reference.X_WB.R * Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitZ());
-  }
-  [[nodiscard]] double shown(int index) const { return memory.shown[0][index]; }
-  [[nodiscard]] int joint(const std::string& name) const { return robot->joint_index(name + "_joint"); }
-  [[nodiscard]] double neutral(int j) const {
-    for (const DescriptorJoint& each : descriptor.joints)
-      if (each.name == robot->joints[j].name) return each.neutral;
-    return 0.0;
-  }
-  void expect_vector(int first, const Eigen::Vector3d& v, const char* what) const {
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(shown(first + i), v[i], kNear) << what << " " << i;
-  }
-  // q - default, scaled speeds, previous action: of the first `joints` joints of the robot's order.
-  void expect_joints(int positions, int velocities, double scale, int joints) const {
-    for (int j = 0; j < joints; ++j) {
-      EXPECT_NEAR(shown(positions + j), state.q[j] - neutral(j), kNear) << robot->joints[j].name;
-      EXPECT_NEAR(shown(velocities + j), scale * state.v[j], kNear) << robot->joints[j].name;
-    }
-  }
-  void expect_action(int first, int count, double factor) const {
-    for (int a = 0; a < count; ++a) EXPECT_NEAR(shown(first + a), factor * 0.1 * (a + 1), kNear) << a;
-  }
-  [[nodiscard]] Eigen::Vector3d gravity() const { return state.X_WB.R.conjugate() * Eigen::Vector3d(0, 0, -1); }
-
-  Descriptor descriptor;
-  std::shared_ptr<const RobotModel> robot;
-  test::FakeMemory memory;
-  std::unique_ptr<Controller> controller;
-  RobotState state;
-  Reference reference;
-  JointCommand command;
-};
 
 TEST(RlGymLayout, IsThe47NumbersOfItsDeployment) {
   Layout l("rl_gym", 47, 12, {{"command", "0.5,-0.3,0.8"}});
@@ -292,6 +228,142 @@ TEST(BeyondMimicLayout, ShowsTheReferenceInTheRobotsAnchorInIsaacLabsOrder) {
   EXPECT_NEAR(l.command.q_target[l.joint("right_knee")], 0.669 + 0.3507 * 1.1, kNear);
 }
 
+// The terms of holosoma's observation stand in alphabetical order.
+TEST(HolosomaLayout, IsThe100NumbersInAlphabeticalOrder) {
+  for (const char* name : {"holosoma", "holosoma_fastsac"}) {
+    Layout l(name, 100, 29, {{"command", "0.5,-0.3,0.8"}});
+    l.act();
+    l.expect_action(0, 29, 0.0);
+    l.act();
+    l.expect_action(0, 29, 1.0);
+    l.expect_vector(29, 0.25 * l.state.w_WB_B, "gyro");
+    EXPECT_NEAR(l.shown(32), 0.8, kNear);
+    EXPECT_NEAR(l.shown(33), 0.5, kNear);
+    EXPECT_NEAR(l.shown(34), -0.3, kNear);
+    const double phase = 2.0 * std::numbers::pi * 0.02;
+    EXPECT_NEAR(l.shown(35), std::cos(phase), kNear);
+    EXPECT_NEAR(l.shown(36), -std::cos(phase), kNear);
+    l.expect_joints(37, 66, 0.05, 29);
+    l.expect_vector(95, l.gravity(), "gravity");
+    EXPECT_NEAR(l.shown(98), std::sin(phase), kNear);
+    EXPECT_NEAR(l.shown(99), -std::sin(phase), kNear);
+    EXPECT_NEAR(l.command.q_target[l.joint("left_elbow")], 0.6 + 0.25 * 1.9, kNear);
+  }
+}
+
+TEST(HolosomaLayout, StandsWithBothFeetAtHalfOfTheCycle) {
+  Layout l("holosoma", 100, 29, {{"command", "0.005,0,0.005"}});
+  for (int tick = 0; tick < 3; ++tick) {
+    l.act();
+    for (const int i : {32, 33, 34}) EXPECT_EQ(l.shown(i), 0.0) << i;
+    for (const int i : {35, 36}) EXPECT_NEAR(l.shown(i), -1.0, kNear) << i;
+    for (const int i : {98, 99}) EXPECT_NEAR(l.shown(i), 0.0, kNear) << i;
+  }
+}
+
+TEST(FalconLayout, IsFiveFramesOf115OldestFirstFromZeros) {
+  Layout l("falcon", 575, 29, {{"command", "0.5,-0.3,0.8,0.7"}});
+  l.act();
+  for (int i = 0; i < 460; ++i) EXPECT_EQ(l.shown(i), 0.0) << i;
+  l.act();
+  const int f = 460;
+  l.expect_action(f, 29, 1.0);
+  l.expect_vector(f + 29, 0.25 * l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(f + 32), 0.8, kNear);
+  EXPECT_NEAR(l.shown(f + 33), 1.4, kNear);
+  EXPECT_NEAR(l.shown(f + 34), 0.5, kNear);
+  EXPECT_NEAR(l.shown(f + 35), -0.3, kNear);
+  EXPECT_EQ(l.shown(f + 36), 1.0);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(l.shown(f + 37 + i), l.reference.q[12 + i], kNear);
+  l.expect_joints(f + 40, f + 69, 0.05, 29);
+  l.expect_vector(f + 98, l.gravity(), "gravity");
+  for (int i = 0; i < 14; ++i) EXPECT_NEAR(l.shown(f + 101 + i), l.reference.q[15 + i], kNear);
+}
+
+TEST(FalconLayout, LegsAndWaistActAroundTheDefaultArmsAroundTheReference) {
+  Layout l("falcon", 575, 29, {{"command", "0,0,0"}});
+  l.act();
+  for (int j = 0; j < 29; ++j)
+    EXPECT_NEAR(l.command.q_target[j], (j < 15 ? l.neutral(j) : l.reference.q[j]) + 0.25 * 0.1 * (j + 1), kNear) << j;
+  EXPECT_EQ(l.shown(460 + 36), 0.0);
+  EXPECT_NEAR(l.shown(460 + 33), 1.5, kNear);
+}
+
+TEST(FalconDecLocoLayout, IsThe102NumbersWithOnePhaseThatHoldsAtZero) {
+  Layout l("falcon_dec_loco", 102, 15, {{"command", "0.5,-0.3,0.8"}});
+  l.act();
+  l.act();
+  l.expect_action(0, 15, 1.0);
+  l.expect_vector(15, 0.25 * l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(18), 0.8, kNear);
+  EXPECT_NEAR(l.shown(19), 0.5, kNear);
+  EXPECT_NEAR(l.shown(20), -0.3, kNear);
+  EXPECT_EQ(l.shown(21), 1.0);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(l.shown(22 + i), l.reference.q[12 + i], kNear);
+  const double phase = 2.0 * std::numbers::pi * 0.02 / 0.9;
+  EXPECT_NEAR(l.shown(25), std::cos(phase), kNear);
+  l.expect_joints(26, 55, 0.05, 29);
+  l.expect_vector(84, l.gravity(), "gravity");
+  for (int i = 0; i < 14; ++i) EXPECT_NEAR(l.shown(87 + i), l.reference.q[15 + i], kNear);
+  EXPECT_NEAR(l.shown(101), std::sin(phase), kNear);
+  for (int j = 15; j < 29; ++j) EXPECT_EQ(l.command.q_target[j], l.reference.q[j]) << j;
+  Layout standing("falcon_dec_loco", 102, 15, {{"command", "0,0,0"}});
+  standing.act();
+  standing.act();
+  EXPECT_EQ(standing.shown(21), 0.0);
+  EXPECT_NEAR(standing.shown(25), 1.0, kNear);
+  EXPECT_NEAR(standing.shown(101), 0.0, kNear);
+}
+
+// Each term has its own five frames, the first repeated.
+TEST(UnitreeRlLabLayout, IsSixTermsOfFiveFramesInIsaacLabsOrder) {
+  Layout l("unitree_rl_lab", 480, 29, {{"command", "0.5,-0.3,0.1"}});
+  l.act();
+  for (int k = 0; k < 5; ++k) {
+    l.expect_vector(3 * k, 0.2 * l.state.w_WB_B, "gyro");
+    l.expect_vector(15 + 3 * k, l.gravity(), "gravity");
+    l.expect_vector(30 + 3 * k, {0.5, -0.3, 0.1}, "command");
+    EXPECT_NEAR(l.shown(45 + 29 * k + 1), l.state.q[6] + 0.1, kNear);     // right hip pitch
+    EXPECT_NEAR(l.shown(190 + 29 * k + 2), 0.05 * l.state.v[12], kNear);  // waist yaw
+    l.expect_action(335 + 29 * k, 29, 0.0);
+  }
+  l.act();
+  l.expect_action(335 + 3 * 29, 29, 0.0);
+  l.expect_action(335 + 4 * 29, 29, 1.0);
+  EXPECT_NEAR(l.command.q_target[l.joint("right_knee")], 0.3 + 0.25 * 1.1, kNear);
+  EXPECT_EQ(l.command.kp[l.joint("right_knee")], 150.0);
+}
+
+TEST(UnitreeRlMjlabLayout, IsThe96NumbersWithoutScales) {
+  Layout l("unitree_rl_mjlab", 96, 29, {{"command", "0.5,-0.3,0.8"}});
+  l.act();
+  l.act();
+  l.expect_vector(0, l.state.w_WB_B, "gyro");
+  l.expect_vector(3, l.gravity(), "gravity");
+  l.expect_vector(6, {0.5, -0.3, 0.8}, "command");
+  l.expect_joints(9, 38, 1.0, 29);
+  l.expect_action(67, 29, 1.0);
+  EXPECT_NEAR(l.command.q_target[12], 0.35 * 1.3, kNear);
+}
+
+TEST(RlSarDanceLayout, ShowsTheReferenceAndTheAnchorsAttitudeInIsaacLabsOrder) {
+  Layout l("rl_sar_dance", 154, 29);
+  l.act();
+  l.act();
+  EXPECT_NEAR(l.shown(2), l.reference.q[l.joint("waist_yaw")], kNear);
+  for (int j = 29; j < 58; ++j) EXPECT_EQ(l.shown(j), 0.0);
+  Kinematics robot(*l.robot), wanted(*l.robot);
+  robot.update(l.state.X_WB, l.state.q);
+  wanted.update(l.reference.X_WB, l.reference.q);
+  const int torso = l.robot->frame_index("torso_link");
+  const Eigen::Matrix3d R = (robot.frame_pose(torso).inverse() * wanted.frame_pose(torso)).R.toRotationMatrix();
+  for (int k = 0; k < 6; ++k) EXPECT_NEAR(l.shown(58 + k), R(k / 2, k % 2), kNear);
+  l.expect_vector(64, l.state.w_WB_B, "gyro");
+  EXPECT_NEAR(l.shown(67), l.state.q[0] + 0.312, kNear);
+  EXPECT_NEAR(l.shown(96 + 2), l.state.v[12], kNear);
+  l.expect_action(125, 29, 1.0);
+}
+
 TEST(Layouts, StartAgainAtAReset) {
   for (const auto& [name, input, output] :
        {std::tuple{"homie", 456, 12}, std::tuple{"twist2", 1432, 29}, std::tuple{"rl_gym", 47, 12}}) {
@@ -310,8 +382,12 @@ TEST(Layouts, StartAgainAtAReset) {
 TEST(Layouts, AreFilledWithoutAllocation) {
   if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: the sanitizer counts";
   const std::tuple<const char*, int, int, const char*, const char*> all[] = {
-      {"homie", 456, 12, "x", "y"},      {"twist2", 1432, 29, "x", "y"}, {"rl_gym", 47, 12, "x", "y"},
-      {"playground", 103, 29, "x", "y"}, {"gmt", 2154, 23, "x", "y"},    {"beyond_mimic", 160, 29, "obs", "actions"}};
+      {"homie", 456, 12, "x", "y"},          {"twist2", 1432, 29, "x", "y"},
+      {"rl_gym", 47, 12, "x", "y"},          {"playground", 103, 29, "x", "y"},
+      {"gmt", 2154, 23, "x", "y"},           {"holosoma", 100, 29, "x", "y"},
+      {"falcon", 575, 29, "x", "y"},         {"falcon_dec_loco", 102, 15, "x", "y"},
+      {"unitree_rl_lab", 480, 29, "x", "y"}, {"unitree_rl_mjlab", 96, 29, "x", "y"},
+      {"rl_sar_dance", 154, 29, "x", "y"},   {"beyond_mimic", 160, 29, "obs", "actions"}};
   for (const auto& [name, input, output, in, out] : all) {
     Layout l(name, input, output, {}, in, out);
     l.act();

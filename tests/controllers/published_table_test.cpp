@@ -91,6 +91,46 @@ TEST(DISABLED_PublishedTable, OfTheControllersInMujoco) {
   }
 }
 
+constexpr const char* kWalkers[] = {
+    "holosoma",       "holosoma_fastsac", "holosoma_t1", "falcon",     "falcon_dec_loco",
+    "unitree_rl_lab", "unitree_rl_mjlab", "homie",       "playground", "rl_gym"};
+
+bool can_walk_here(const std::string& name) {
+  return !test::shared_file("models/" + load_descriptor(name).network).empty();
+}
+
+TEST(DISABLED_PublishedTable, OfTheWalkers) {
+  print("| controller | engine | stands: drift | at 0.3 m/s | at 0.5 m/s | at 1.0 m/s |\n|---|---|---|---|---|---|");
+  for (const char* name : kWalkers)
+    for (const std::string& engine : test::engine_names()) {
+      if (!test::is_here(engine) || !can_walk_here(name)) continue;
+      std::string line = fmt::format("| `{}` | {} |", name, engine);
+      for (const char* command : {"0,0,0", "0.3,0,0", "0.5,0,0", "1.0,0,0"}) {
+        WalkSetup setup = test::walker(name, command, 14.0);
+        setup.engine = engine;
+        const Walk result = walk(setup);
+        const std::string said = command[0] == '0' && command[1] == ',' ? fmt::format("{:.2f} m", result.drift)
+                                                                        : fmt::format("{:.3f}", result.forward);
+        line += result.upright ? fmt::format(" {} |", said) : fmt::format(" falls at {:.1f} s |", result.seconds);
+      }
+      print(line);
+    }
+}
+
+TEST(DISABLED_PublishedTable, OfTheMotionsOfTrackers) {
+  print("| controller | engine | seconds | joints, RMS | root, RMS |\n|---|---|---|---|---|");
+  if (!can_walk_here("beyond_mimic") || !can_walk_here("rl_sar_dance")) GTEST_SKIP() << "not run: models/ absent";
+  for (WalkSetup setup : {test::tracked("beyond_mimic", test::beyond_mimic_motion(307)),
+                          test::tracked("rl_sar_dance", test::rl_sar_dance())})
+    for (const std::string& engine : test::engine_names()) {
+      if (!test::is_here(engine)) continue;
+      setup.engine = engine;
+      const Walk result = walk(setup);
+      print(fmt::format("| `{}` | {} | {:.1f}{} | {:.3f} rad | {:.3f} m |", setup.controller, engine, result.seconds,
+                        result.upright ? "" : " (falls)", result.joint_rms, result.root_rms));
+    }
+}
+
 TEST(DISABLED_PublishedTable, OfTheEngines) {
   if (!networks_are_here()) GTEST_SKIP() << "not run: models/ absent";
   print("| engine | `homie` 0.3 m/s | `rl_gym` 0.3 m/s | `playground` 0.8 m/s | `twist2` idle, drift |");

@@ -1,4 +1,4 @@
-#include "controllers/root_conversion.h"
+#include "duet/controllers/root_conversion.h"
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,8 @@
-#include "controllers/stance.h"
+#include "duet/controllers/stance.h"
 
 #include <gmock/gmock.h>
 
-#include "controllers/vmc.h"
+#include "duet/controllers/vmc.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

@@ -4,8 +4,9 @@
 
 #include <cmath>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/controllers/fake_network.h"
 #include "tests/nn/onnx_writer.h"
 #include "tests/support.h"
@@ -57,7 +58,7 @@ TEST_P(StandIn, TheNetworksAnswerReachesTheJointsOfTheDescriptorWithItsScalesAnd
     const int j = robot_->joint_index(joint.name);
     EXPECT_EQ(command.kp[j], joint.kp) << joint.name;
     EXPECT_EQ(command.kd[j], joint.kd) << joint.name;
-    const double from = joint.action && !descriptor_.around_reference ? joint.neutral : reference.q[j];
+    const double from = joint.action && !joint.around_reference ? joint.neutral : reference.q[j];
     const double wanted = joint.action ? from + *joint.action * answer[action++] : from;
     const bool locked =
         descriptor_.waist_locked && (joint.name == "waist_roll_joint" || joint.name == "waist_pitch_joint");
@@ -76,7 +77,9 @@ TEST_P(StandIn, ANetworkOfAnotherLayoutIsRefusedWithBothNumbers) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Published, StandIn,
-                         testing::Values("beyond_mimic", "gmt", "homie", "playground", "rl_gym", "twist2"),
+                         testing::Values("beyond_mimic", "falcon", "falcon_dec_loco", "gmt", "holosoma",
+                                         "holosoma_fastsac", "holosoma_t1", "homie", "playground", "rl_gym",
+                                         "rl_sar_dance", "twist2", "unitree_rl_lab", "unitree_rl_mjlab"),
                          [](const auto& info) { return std::string(info.param); });
 
 }  // namespace

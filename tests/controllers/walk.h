@@ -5,9 +5,11 @@
 #include <cmath>
 #include <functional>
 
-#include "backends/factory.h"
-#include "controllers/controller.h"
-#include "core/require.h"
+#include "duet/backends/factory.h"
+#include "duet/controllers/controller.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/require.h"
+#include "duet/rollout/control_period.h"
 #include "tests/controllers/fake_network.h"
 
 namespace duet::test {
@@ -31,15 +33,13 @@ struct Walk {
   double forward = 0.0, yaw_rate = 0.0, height = 0.0;  // mean forward speed in the heading, rate, pelvis height
   double drift = 0.0;                                  // of the root in the plane from its start [m]
   double joint_rms = 0.0;                              // of the angles at a tick to the reference's [rad]
+  double root_rms = 0.0;                               // of the root's distance in the plane to the reference's [m]
   RobotState last;
 };
 
-inline bool stands(const RobotState& state) {
-  return state.X_WB.p.z() >= 0.3 && (state.X_WB.R * Eigen::Vector3d::UnitZ()).z() > 0.5;
-}
+inline bool stands(const RobotState& state) { return !has_fallen(state, {0.3, 0.5}); }
 
 inline Walk walk(const WalkSetup& setup) {
-  constexpr int kStepsPerTick = 10;
   Scene scene;
   scene.robot = body(setup.card.empty() ? controller_info(setup.controller).robot : setup.card);
   scene.partner = PartnerMode::kNone;
@@ -55,11 +55,12 @@ inline Walk walk(const WalkSetup& setup) {
   JointCommand command;
   Walk result;
   int measured = 0, ticks = 0;
-  double squares = 0.0;
+  double squares = 0.0, root_squares = 0.0;
   for (int tick = 0; tick < std::lround(setup.seconds * 50.0) && result.upright; ++tick, ++ticks) {
     const Reference reference = setup.reference ? setup.reference(tick, neutral) : neutral;
     const RobotState& now = backend->state();
     squares += (now.q - reference.q).squaredNorm() / static_cast<double>(now.q.size());
+    root_squares += (now.X_WB.p - reference.X_WB.p).head<2>().squaredNorm();
     if (tick >= 100) {
       result.forward += (yaw_rotation(-yaw_of(now.X_WB.R)) * now.v_WB).x();
       result.yaw_rate += now.w_WB_B.z();
@@ -67,11 +68,13 @@ inline Walk walk(const WalkSetup& setup) {
       ++measured;
     }
     controller->act(now, reference, command);
-    for (int i = 0; i < kStepsPerTick && result.upright; ++i)
-      result.upright = backend->step(command) == Outcome::kOk && stands(backend->state());
+    const auto same = [&](int) -> const JointCommand& { return command; };
+    const auto upright = [&](int) { return stands(backend->state()); };
+    result.upright = step_control_period(*backend, steps_per_tick(scene.dt), same, upright) == Outcome::kOk;
   }
   for (double* mean : {&result.forward, &result.yaw_rate, &result.height}) *mean /= std::max(measured, 1);
   result.joint_rms = std::sqrt(squares / std::max(ticks, 1));
+  result.root_rms = std::sqrt(root_squares / std::max(ticks, 1));
   result.seconds = backend->time();
   result.last = backend->state();
   result.drift = (result.last.X_WB.p - neutral.X_WB.p).head<2>().norm();

@@ -1,4 +1,4 @@
-#include "controllers/wbc_sim/wbc_sim.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,11 +7,13 @@
 #include <filesystem>
 #include <numbers>
 
-#include "controllers/wbc_sim/leg_chain.h"
-#include "core/file.h"
-#include "core/require.h"
-#include "robots/kinematics.h"
+#include "duet/controllers/registry.h"
+#include "duet/controllers/wbc_sim/leg_chain.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/robots/kinematics.h"
 #include "tests/deep_json.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {
@@ -184,7 +186,7 @@ TEST(WbcTracker, ALowerRootBendsTheKnees) {
   Reference low = standing_reference();
   low.X_WB.p.z() = 0.3;
   tracker.reset(low);
-  EXPECT_EQ(tracker.root().p.z(), RootBounds{}.lowest);
+  EXPECT_EQ(tracker.root().p.z(), g1()->bounds_of_root().lowest);
   EXPECT_GT(tracker.q()[g1()->joint_index("left_knee_joint")],
             g1()->neutral[g1()->joint_index("left_knee_joint")] + 0.2);
 }
@@ -194,7 +196,7 @@ TEST(WbcLayout, SizesAreThePrintedTotals) {
   EXPECT_EQ(layout.oracle(), 163);
   EXPECT_EQ(layout.student(), 1090);
   EXPECT_EQ(layout.critic(22), 361);
-  EXPECT_EQ(critic_links(*g1()).size(), 22U);
+  EXPECT_EQ(g1()->roles.bodies.size(), 22U);
   int sum = 0;
   for (const ChannelSpan& channel : layout.student_channels()) sum += channel.size;
   EXPECT_EQ(sum, 1090);
@@ -271,7 +273,7 @@ TEST(WbcNetwork, BadFilesAreRefusedByWhatIsWrong) {
     EXPECT_THAT([&] { load_wbc_network(path, *g1()); }, ThrowsMessage<InputError>(HasSubstr(message)));
   };
   refused([](SafeTensors& t) { t.metadata.erase("format"); }, "no 'format' in the header");
-  refused([](SafeTensors& t) { t.metadata["robot"] = "h1"; }, "the robot is 'h1', expected 'g1'");
+  refused([](SafeTensors& t) { t.metadata["robot"] = "h1"; }, "made for 'h1', the robot is 'g1'");
   refused([](SafeTensors& t) { t.metadata["joints"] = R"(["a", "b"])"; }, "made for 2 joints, robot 'g1' has 29");
   refused([](SafeTensors& t) { t.metadata["joints"].replace(t.metadata["joints"].find("left_knee"), 9, "left_elbo"); },
           "joint 3 is 'left_elbo_joint', expected 'left_knee_joint'");
@@ -356,6 +358,11 @@ TEST(Gait, AFootIsOnTheGroundWhereItsSwingBeginsAndEndsAndHighestInTheMiddle) {
     const double share = std::sin(std::numbers::pi * gait.swing_progress());
     EXPECT_NEAR(lift, gait.options().swing_height * share * share, 1e-12) << gait.swing_progress();
   }
+}
+
+TEST(Tracker, OfARobotWhoseCardSaysNoBoundsIsRefused) {
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { const WbcTracker tracker(load_shared_robot("t1")); }),
+            "robot 't1': expected 'root_bounds' in its card, found none");
 }
 
 }  // namespace

@@ -1,10 +1,10 @@
-#include "core/digest.h"
+#include "duet/core/digest.h"
 
 #include <functional>
 #include <vector>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {

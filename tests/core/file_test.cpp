@@ -1,4 +1,4 @@
-#include "core/file.h"
+#include "duet/core/file.h"
 
 #include <fcntl.h>
 #include <sys/resource.h>
@@ -9,7 +9,7 @@
 #include <fstream>
 #include <vector>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,11 +1,11 @@
-#include "core/json.h"
+#include "duet/core/json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "core/names.h"
+#include "duet/core/names.h"
 
 #include "tests/support.h"
 

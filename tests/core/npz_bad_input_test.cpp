@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cstring>
 
-#include "core/file.h"
-#include "core/npy.h"
-#include "core/npz.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "core/zip.h"
+#include "duet/core/file.h"
+#include "duet/core/npy.h"
+#include "duet/core/npz.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/core/zip.h"
 #include "tests/support.h"
 
 namespace duet {

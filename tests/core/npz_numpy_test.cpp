@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <limits>
 
-#include "core/file.h"
-#include "core/npz.h"
+#include "duet/core/file.h"
+#include "duet/core/npz.h"
 #include "tests/support.h"
 
 namespace duet {

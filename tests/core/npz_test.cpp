@@ -1,11 +1,11 @@
-#include "core/npz.h"
+#include "duet/core/npz.h"
 
 #include <cstring>
 #include <limits>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/zip.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/zip.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "core/number.h"
+#include "duet/core/number.h"
 
 #include <gtest/gtest.h>
 

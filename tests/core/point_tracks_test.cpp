@@ -1,4 +1,4 @@
-#include "core/point_tracks.h"
+#include "duet/core/point_tracks.h"
 
 #include <numeric>
 

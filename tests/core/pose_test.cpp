@@ -1,9 +1,9 @@
-#include "core/pose.h"
+#include "duet/core/pose.h"
 
 #include <numbers>
 #include <vector>
 
-#include "core/random.h"
+#include "duet/core/random.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "core/random.h"
+#include "duet/core/random.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "core/robot_motion.h"
+#include "duet/core/robot_motion.h"
 
 #include <functional>
 #include <limits>

@@ -1,9 +1,9 @@
-#include "core/share.h"
+#include "duet/core/share.h"
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {

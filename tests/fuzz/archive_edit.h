@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "core/npz.h"
+#include "duet/core/npz.h"
 
 namespace duet::fuzz {
 

@@ -1,13 +1,13 @@
 // What a benchmark is told: suites, profiles of engines, limits of contacts, certificates of parity.
 #include <nlohmann/json.hpp>
 
-#include "bench/certificate.h"
-#include "bench/episode.h"
-#include "bench/profile.h"
-#include "bench/suite.h"
-#include "core/file.h"
-#include "metrics/contact_limits.h"
-#include "robots/yaml_section.h"
+#include "duet/bench/certificate.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/profile.h"
+#include "duet/bench/suite.h"
+#include "duet/core/file.h"
+#include "duet/metrics/contact_limits.h"
+#include "duet/robots/yaml_section.h"
 #include "tests/fuzz/reader.h"
 
 namespace duet::fuzz {

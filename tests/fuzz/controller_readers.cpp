@@ -1,9 +1,9 @@
 // What controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
-#include "controllers/descriptor.h"
-#include "controllers/wbc_sim/network.h"
-#include "controllers/wbc_sim/observation.h"
-#include "core/file.h"
-#include "core/random.h"
+#include "duet/controllers/descriptor.h"
+#include "duet/controllers/wbc_sim/network.h"
+#include "duet/controllers/wbc_sim/observation.h"
+#include "duet/core/file.h"
+#include "duet/core/random.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
 
@@ -16,7 +16,8 @@ const RobotModel& robot() {
 }
 
 std::string descriptor_sample(unsigned seed) {
-  constexpr const char* kNames[] = {"twist2", "homie", "rl_gym", "playground", "gmt", "beyond_mimic"};
+  constexpr const char* kNames[] = {"twist2",       "homie",    "rl_gym", "playground",    "gmt",
+                                    "beyond_mimic", "holosoma", "falcon", "unitree_rl_lab"};
   return read_file(std::string(DUET_SOURCE_DIR "/controllers/descriptors/") + kNames[seed / 64 % std::size(kNames)] +
                    ".yaml");
 }

@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/random.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
 #include "tests/deep_json.h"
 #include "tests/fuzz/reader.h"
 

@@ -1,13 +1,18 @@
-// Motions of people and robots: BVH, pickles, clips, paired motions.
-#include "motion/bvh.h"
-#include "motion/interaction_clip.h"
-#include "motion/paired_motion.h"
-#include "motion/pickle.h"
+// Motions of people and robots: BVH, pickles, clips, paired motions, data sets of two people.
+#include <filesystem>
+#include <fstream>
+
+#include "duet/formats/motion_pickle.h"
+#include "duet/motion/bvh.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/motion/people/people_formats.h"
+#include "tests/core/pickle_bytes.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/motion/people.h"
-#include "tests/motion/pickle_bytes.h"
+#include "tests/motion/people_files.h"
 
 namespace duet::fuzz {
 namespace {
@@ -74,13 +79,66 @@ void read_paired_motion(std::string_view bytes) {
   (void)paired_motion_bytes(parse_paired_motion(archive_of(sample, bytes), "fuzz.npz"));
 }
 
+// ---- two people in files of others: the stand-ins of tests/motion/people_files.h, the first file damaged
+// --------------
+
+std::string people_sample(const test::Standin& standin, std::size_t file) { return standin.files.at(file).bytes; }
+
+void read_people(const test::Standin& standin, std::size_t file, std::string_view bytes) {
+  const std::string folder = scratch_folder() + "/" + standin.name;
+  for (std::size_t i = 0; i < standin.files.size(); ++i) {
+    const std::string path = folder + "/" + standin.files[i].path;
+    if (i != file && std::filesystem::exists(path)) continue;
+    std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+    std::ofstream out(path, std::ios::binary | std::ios::trunc);  // no sync: this is done ten thousand times
+    out << (i == file ? bytes : std::string_view(standin.files[i].bytes));
+  }
+  std::vector<std::string> paths;
+  for (const std::string& path : standin.paths) paths.push_back(folder + (path.empty() ? "" : "/" + path));
+  PeopleOptions options;
+  options.task = Task::kHug;
+  options.rate_hz = 60.0;
+  if (standin.name == "npy") options.skeleton = "kinect-25";
+  const PeopleFormat& format = find_people_format(paths, standin.format);
+  for (const ClipPlace& place : format.find(paths, options))
+    (void)clip_bytes(read_source_clip(format, place, options).clip);
+}
+
+template <test::Standin (*make)(), std::size_t file>
+Reader people_reader(const char* name) {
+  return {name, [](unsigned) { return people_sample(make(), file); },
+          [](std::string_view bytes) {
+            static const test::Standin standin = make();
+            read_people(standin, file, bytes);
+          }};
+}
+
+std::string names_sample(unsigned /*seed*/) {
+  return "nose\nleft_ear\nright_ear # an ear\nl_shoulder\nr_shoulder\nl_elbow\nr_elbow\nl_wrist\nr_wrist\nl_hip\n"
+         "r_hip\nl_knee\nr_knee\nl_ankle\nr_ankle\n";
+}
+void read_names(std::string_view bytes) { (void)read_joint_layout(scratch_file("names.txt", bytes)); }
+
 }  // namespace
 
 std::vector<Reader> motion_readers() {
   return {{"bvh", bvh_sample, read_bvh_pair},
           {"pickle", pickle_sample, read_pickle},
           {"clip", clip_sample, read_clip},
-          {"paired_motion", paired_motion_sample, read_paired_motion}};
+          {"paired_motion", paired_motion_sample, read_paired_motion},
+          people_reader<test::inter_x_standin, 0>("inter_x_skeleton"),
+          people_reader<test::inter_x_standin, 2>("inter_x_order"),
+          people_reader<test::inter_x_standin, 3>("inter_x_split"),
+          people_reader<test::interhuman_standin, 0>("interhuman"),
+          people_reader<test::core4d_standin, 0>("core4d_person"),
+          people_reader<test::core4d_standin, 2>("core4d_object"),
+          people_reader<test::harmony4d_standin, 0>("harmony4d"),
+          people_reader<test::hi4d_standin, 1>("hi4d"),
+          people_reader<test::chi3d_standin, 0>("chi3d"),
+          people_reader<test::kinect_standin, 0>("positions_npz"),
+          people_reader<test::npy_standin, 0>("positions_npy"),
+          people_reader<test::csv_standin, 0>("positions_csv"),
+          {"joint_names", names_sample, read_names}};
 }
 
 }  // namespace duet::fuzz

@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "core/zip.h"
-#include "nn/mlp_file.h"
-#include "nn/onnx_network.h"
-#include "nn/torch_script.h"
+#include "duet/core/zip.h"
+#include "duet/nn/mlp_file.h"
+#include "duet/nn/onnx_network.h"
+#include "duet/nn/torch_script.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
 

@@ -21,11 +21,14 @@ inline void PrintTo(const Reader& reader, std::ostream* out) { *out << reader.na
 
 std::vector<Reader> core_readers();
 std::vector<Reader> motion_readers();
+std::vector<Reader> body_readers();
+std::vector<Reader> format_readers();
 std::vector<Reader> robot_readers();
 std::vector<Reader> network_readers();
 std::vector<Reader> controller_readers();
 std::vector<Reader> policy_readers();
 std::vector<Reader> result_readers();
+std::vector<Reader> dataset_readers();
 std::vector<Reader> bench_readers();
 std::vector<Reader> training_readers();
 

@@ -2,11 +2,11 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/digest.h"
-#include "results/golden.h"
-#include "results/published.h"
-#include "results/run_directory.h"
-#include "results/training_curves.h"
+#include "duet/core/digest.h"
+#include "duet/results/golden.h"
+#include "duet/results/published.h"
+#include "duet/results/run_directory.h"
+#include "duet/results/training_curves.h"
 #include "tests/fuzz/reader.h"
 #include "tests/results/rows.h"
 

@@ -1,5 +1,5 @@
 // A robot card and its URDF, as two files.
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 #include "tests/fuzz/reader.h"
 #include "tests/robots/fixtures.h"
 

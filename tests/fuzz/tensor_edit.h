@@ -5,7 +5,7 @@
 
 #include <iterator>
 
-#include "nn/safetensors.h"
+#include "duet/nn/safetensors.h"
 #include "tests/fuzz/archive_edit.h"
 
 namespace duet::fuzz {

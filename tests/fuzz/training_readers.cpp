@@ -1,9 +1,9 @@
 // What trainings leave behind: checkpoints of WBC-Sim, demonstrations, lists of held-out clips.
-#include "core/file.h"
+#include "duet/core/file.h"
+#include "duet/training/agent.h"
+#include "duet/training/dstar/demonstrations.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
-#include "training/agent.h"
-#include "training/dstar/demonstrations.h"
 
 namespace duet::fuzz {
 namespace {

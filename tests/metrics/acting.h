@@ -7,8 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include "core/random.h"
-#include "metrics/detector.h"
+#include "duet/core/random.h"
+#include "duet/metrics/detector.h"
 
 namespace duet::test {
 
@@ -42,7 +42,7 @@ struct Scene {
 // some do not. 60 frames.
 inline Scene acting(Task task, std::uint64_t seed) {
   constexpr int kFrames = 60;
-  Random random(seed, static_cast<std::uint64_t>(task) + 1);
+  Random random(seed, static_cast<std::uint64_t>(task.index()) + 1);
   const double distance = random.uniform(0.35, task == Task::kHug ? 1.6 : 1.1);
   Scene scene{standing({0.0, 0.0, 0.9}, 1.0, kFrames), standing({distance, 0.05, 0.85}, -1.0, kFrames)};
   const Eigen::Vector3d middle(0.5 * distance, 0.0, random.uniform(1.0, 1.4));

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "metrics/retargeting.h"
+#include "duet/metrics/retargeting.h"
 #include "tests/metrics/points.h"
 #include "tests/support.h"
 

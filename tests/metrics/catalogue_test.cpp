@@ -1,4 +1,4 @@
-#include "metrics/catalogue.h"
+#include "duet/metrics/catalogue.h"
 
 #include <gmock/gmock.h>
 

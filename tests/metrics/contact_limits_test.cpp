@@ -1,13 +1,13 @@
-#include "metrics/contact_limits.h"
+#include "duet/metrics/contact_limits.h"
 
 #include <gmock/gmock.h>
 
 #include <array>
 #include <set>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "robots/human_body.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/robots/human_body.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "metrics/contact_safety.h"
+#include "duet/metrics/contact_safety.h"
 
 #include <gmock/gmock.h>
 
@@ -10,7 +10,7 @@
 #include <span>
 #include <utility>
 
-#include "metrics/catalogue.h"
+#include "duet/metrics/catalogue.h"
 #include "tests/robots/allocations.h"
 #include "tests/support.h"
 

@@ -1,10 +1,10 @@
-#include "metrics/detector_catalogue.h"
+#include "duet/metrics/detector_catalogue.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "core/file.h"
-#include "metrics/detector.h"
+#include "duet/core/file.h"
+#include "duet/metrics/detector.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -14,16 +14,14 @@ using ::testing::HasSubstr;
 
 // Nothing that a detector prints is without unit and meaning.
 TEST(DetectorCatalogue, EveryFigureAndThresholdIsInTheCatalogue) {
-  for (const Task task : kTasks) {
+  for (const Task task : all_tasks()) {
     for (const auto& [name, value] : thresholds(task)) EXPECT_FALSE(threshold_info(task, name).meaning.empty());
     Agent agent;
     for (Eigen::Matrix3Xd* track :
          {&agent.lhand, &agent.rhand, &agent.head, &agent.root, &agent.torso, &agent.lshoulder, &agent.rshoulder})
       *track = Eigen::Matrix3Xd::Random(3, 40);
     const DetectorResult result = detect(task, agent, agent, DetectorVersion::kRobot);
-    std::size_t figures = 0;
-    for (const DetectorFigure& figure : detector_figures()) figures += figure.task == task ? 1 : 0;
-    EXPECT_EQ(result.values.size(), figures) << to_string(task);
+    EXPECT_EQ(result.values.size(), detector_figures(task).size()) << to_string(task);
     for (const auto& [name, value] : result.values) EXPECT_EQ(detector_figure(task, name).name, name);
   }
   EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)detector_figure(Task::kHug, "hands_distance"); }),
@@ -40,14 +38,15 @@ TEST(DetectorCatalogue, StrictChoicesAreTheReadingsThatTheSetBrings) {
 // docs/detectors.md has every line of both tables.
 TEST(DetectorCatalogue, TheDocsHaveEveryThresholdAndFigure) {
   const std::string docs = read_file(fmt::format("{}/docs/detectors.md", DUET_SOURCE_DIR));
-  for (const ThresholdInfo& info : threshold_catalogue())
-    EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {:g} | {:g} | {} | {} |", info.name, info.paper, info.strict,
-                                            info.unit, info.meaning)));
-  for (const DetectorFigure& figure : detector_figures())
-    EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {} | {} |", figure.name, figure.unit, figure.meaning)));
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks()) {
+    for (const ThresholdInfo& info : threshold_catalogue(task))
+      EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {:g} | {:g} | {} | {} |", info.name, info.paper, info.strict,
+                                              info.unit, info.meaning)));
+    for (const DetectorFigure& figure : detector_figures(task))
+      EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {} | {} |", figure.name, figure.unit, figure.meaning)));
     for (const auto& [option, value] : strict_choices(task))
       EXPECT_THAT(docs, HasSubstr(fmt::format("`{}={}`", option, value)));
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "metrics/detector.h"
+#include "duet/metrics/detector.h"
 
 #include <gmock/gmock.h>
 
@@ -37,7 +37,7 @@ std::string label(Task task, int seed) { return std::string(to_string(task)) + "
 // Runs `check(task, seed, scene)` over all tasks and seeds.
 template <typename Check>
 void for_each_scene(Check check) {
-  for (const Task task : kTasks)
+  for (const Task task : kPaperTasks)
     for (int seed = 0; seed < kSeeds; ++seed) check(task, seed, acting(task, seed));
 }
 
@@ -95,7 +95,7 @@ TEST(Detector, NamesOfVersionsAndSets) {
 
 // The scenes are of use only if both verdicts occur.
 TEST(Detector, TestScenesSucceedAndFail) {
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     int successes = 0;
     for (int seed = 0; seed < kSeeds; ++seed) {
       const Scene s = acting(task, seed);
@@ -225,7 +225,7 @@ TEST(Detector, GivenThresholdsReplaceThePrintedOnesAndTheRestStay) {
 }
 
 TEST(Detector, OneFrameIsJudged) {
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     const Agent a = test::standing({0.0, 0.0, 0.9}, 1.0, 1);
     const Agent b = test::standing({1.0, 0.0, 0.9}, -1.0, 1);
     EXPECT_FALSE(detect_performer(task, a, b, {}).success) << to_string(task);

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "core/digest.h"
-#include "core/task.h"
-#include "metrics/detector.h"
+#include "duet/core/digest.h"
+#include "duet/core/task.h"
+#include "duet/metrics/detector.h"
 #include "tests/metrics/acting.h"
 
 namespace duet {
@@ -30,7 +30,7 @@ std::string text_of(const DetectorResult& result) {
 
 std::string verdicts_of_fixed_motions() {
   std::string text;
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     for (std::uint64_t seed = 1; seed <= 40; ++seed) {
       const test::Scene scene = test::acting(task, seed);
       for (const DetectorVersion version : {DetectorVersion::kPaper, DetectorVersion::kRobot})
@@ -51,7 +51,7 @@ TEST(DetectorsVersion, StandsForTheseVerdicts) {
 
 TEST(DetectorsVersion, FixedMotionsSucceedAndFail) {
   const std::string text = verdicts_of_fixed_motions();
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     const std::string name(to_string(task));
     int successes = 0, failures = 0;
     for (std::size_t at = 0; (at = text.find(name + " ", at)) != std::string::npos; ++at) {

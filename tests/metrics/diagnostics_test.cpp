@@ -1,4 +1,4 @@
-#include "metrics/diagnostics.h"
+#include "duet/metrics/diagnostics.h"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <complex>
 #include <numbers>
 
-#include "core/random.h"
-#include "metrics/spectrum.h"
+#include "duet/core/random.h"
+#include "duet/metrics/spectrum.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -197,6 +197,7 @@ TEST(RootError, OfAKnownShiftAndRotation) {
   found[0].p = Eigen::Vector3d(0.3, 0.4, 0.0);
   found[1].R = Eigen::AngleAxisd(kPi / 3, Eigen::Vector3d(1, -2, 0.5).normalized());
   EXPECT_NEAR(root_error(found, reference).position, 0.25, 1e-15);
+  EXPECT_LE(root_error(found, reference).horizontal, root_error(found, reference).position);
   EXPECT_NEAR(root_error(found, reference).angle_deg, 30.0, 1e-12);
   found[1].R.coeffs() *= -1.0;  // the same rotation
   EXPECT_NEAR(root_error(found, reference).angle_deg, 30.0, 1e-12);
@@ -264,6 +265,16 @@ TEST(ControllerDiagnostics, ComparesExecutedAndReferenceFrameByFrame) {
       speed += std::abs(r.reference[b].q[j] - r.reference[a].q[j]) * 50.0 / (b - a);
     }
   EXPECT_NEAR(d.at("dof_velocity_error"), speed / 80, 1e-12);
+}
+
+TEST(ControllerDiagnostics, PartsOfTheRootsErrorAreAlongTheFloorAndInHeight) {
+  Recording r = recording(40);
+  EXPECT_NEAR(root_error_parts(r).at("root_error.horizontal"), 0.05, 1e-15);
+  EXPECT_NEAR(root_error_parts(r).at("root_error.vertical"), 0.0, 1e-15);
+  for (Reference& reference : r.reference) reference.X_WB.p.z() -= 0.12;
+  EXPECT_NEAR(root_error_parts(r).at("root_error.horizontal"), 0.05, 1e-15);
+  EXPECT_NEAR(root_error_parts(r).at("root_error.vertical"), 0.12, 1e-15);
+  EXPECT_NEAR(controller_diagnostics(r).at("root_error"), 0.13, 1e-15);  // 5, 12, 13
 }
 
 TEST(ControllerDiagnostics, RefusesBadRecordings) {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "metrics/retargeting.h"
+#include "duet/metrics/retargeting.h"
 #include "tests/metrics/points.h"
 #include "tests/support.h"
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "metrics/task_detectors.h"
+#include "duet/metrics/detector.h"
 #include "tests/metrics/acting.h"
 
 namespace duet {

@@ -1,12 +1,12 @@
-#include "metrics/onset.h"
+#include "duet/metrics/onset.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "core/skeleton.h"
-#include "robots/kinematics.h"
+#include "duet/core/skeleton.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {

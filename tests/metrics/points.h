@@ -4,8 +4,8 @@
 #include <Eigen/Geometry>
 #include <functional>
 
-#include "core/point_tracks.h"
-#include "core/random.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/random.h"
 
 namespace duet::test {
 

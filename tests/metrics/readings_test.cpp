@@ -1,4 +1,4 @@
-#include "metrics/readings.h"
+#include "duet/metrics/readings.h"
 
 #include <gmock/gmock.h>
 

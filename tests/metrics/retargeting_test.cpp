@@ -1,14 +1,14 @@
-#include "metrics/retargeting.h"
+#include "duet/metrics/retargeting.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <set>
 
-#include "core/skeleton.h"
-#include "metrics/catalogue.h"
-#include "metrics/detector.h"
-#include "robots/kinematics.h"
+#include "duet/core/skeleton.h"
+#include "duet/metrics/catalogue.h"
+#include "duet/metrics/detector.h"
+#include "duet/robots/kinematics.h"
 #include "tests/metrics/points.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "metrics/sliding_window.h"
+#include "duet/metrics/sliding_window.h"
 
 #include <gtest/gtest.h>
 

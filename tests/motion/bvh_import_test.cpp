@@ -4,9 +4,9 @@
 #include <functional>
 #include <numbers>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "motion/bvh.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/bvh.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/support.h"
 
@@ -69,6 +69,34 @@ TEST(BvhImport, PeopleThatAreNotAsExpectedAreInTheVerdict) {
   EXPECT_THAT(import_pair({}).verdict, Not(Contains(HasSubstr("not as expected"))));
   EXPECT_THAT(import_pair({}, {.metres_per_unit = 0.5}).verdict,
               Contains(HasSubstr("not as expected: person A measures")));
+}
+
+// Every way of naming finds the same person: 1.7 m in the T pose, whose joints stand in bvh_text.h.
+TEST(BvhImport, NamesOfEachMakerFindTheSamePerson) {
+  for (const auto& [naming, bones] :
+       {std::pair{"Xsens", test::xsens_bones()}, {"SOMA", test::soma_bones()}, {"common", test::lafan_bones()}}) {
+    BvhWriter writer{.bones = bones};
+    writer.arm_drop = 0.0;
+    writer.swing = 0.0;
+    const BvhImport found = import_pair(writer);
+    EXPECT_THAT(found.verdict, Contains(HasSubstr(std::string("joint names: ") + naming)));
+    const PointTracks& joints = found.clip.a.joints;
+    const double pelvis = joints.at(0, kPelvis).z();
+    for (const auto& [joint, height] : {std::pair{kLeftHip, -0.07},
+                                        {kRightKnee, -0.47},
+                                        {kLeftAnkle, -0.87},
+                                        {kRightToe, -0.91},
+                                        {kSpine1, 0.10},
+                                        {kSpine3, 0.34},
+                                        {kNeck, 0.52},
+                                        {kHead, 0.62},
+                                        {kLeftCollar, 0.44},
+                                        {kRightShoulder, 0.44},
+                                        {kLeftHand, 0.44}})
+      EXPECT_NEAR(joints.at(0, joint).z() - pelvis, height, kDigits) << naming << " " << kSmplNames[joint];
+    EXPECT_NEAR((joints.at(0, kLeftWrist) - joints.at(0, kLeftShoulder)).norm(), 0.53, kDigits) << naming;
+    EXPECT_NEAR((joints.at(0, kLeftHand) - joints.at(0, kLeftWrist)).norm(), 0.09, kDigits) << naming;
+  }
 }
 
 TEST(BvhImport, UpAxisIsToldFromHeadsAboveFeet) {

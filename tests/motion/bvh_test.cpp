@@ -1,12 +1,12 @@
-#include "motion/bvh.h"
+#include "duet/motion/bvh.h"
 
 #include <gmock/gmock.h>
 
 #include <numbers>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "motion/bvh_kinematics.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/bvh_kinematics.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/support.h"
 

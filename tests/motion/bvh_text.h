@@ -82,6 +82,58 @@ inline std::vector<BvhBone> common_bones() {
           {"mixamorig:RightToeBase", 22, {0, -0.04, 0.12}}};
 }
 
+// As Xsens MVN exports it: joints by their anatomy, the vertebrae Chest to Chest4.
+inline std::vector<BvhBone> xsens_bones() {
+  std::vector<BvhBone> bones = {{"Hips", -1, {0, 0, 0}},     {"Chest", 0, {0, 0.10, 0}},   {"Chest2", 1, {0, 0.08, 0}},
+                                {"Chest3", 2, {0, 0.08, 0}}, {"Chest4", 3, {0, 0.08, 0}},  {"Neck", 4, {0, 0.18, 0}},
+                                {"Head", 5, {0, 0.10, 0}},   {"Head/end", 6, {0, 0.15, 0}}};
+  for (const double side : {1.0, -1.0}) {
+    const std::string name = side > 0.0 ? "Left" : "Right";
+    const int first = static_cast<int>(bones.size());
+    bones.push_back({name + "Collar", 4, {0.06 * side, 0.1, 0}});
+    bones.push_back({name + "Shoulder", first, {0.12 * side, 0, 0}});
+    bones.push_back({name + "Elbow", first + 1, {0.28 * side, 0, 0}});
+    bones.push_back({name + "Wrist", first + 2, {0.25 * side, 0, 0}});
+    bones.push_back({name + "Wrist/end", first + 3, {0.09 * side, 0, 0}});
+    bones.push_back({name + "Hip", 0, {0.09 * side, -0.07, 0}});
+    bones.push_back({name + "Knee", first + 5, {0, -0.4, 0}});
+    bones.push_back({name + "Ankle", first + 6, {0, -0.4, 0}});
+    bones.push_back({name + "Toe", first + 7, {0, -0.04, 0.12}});
+  }
+  return bones;
+}
+
+// As SOMA's skeleton has it: Leg is the thigh, Shin the lower leg.
+inline std::vector<BvhBone> soma_bones() {
+  std::vector<BvhBone> bones = {{"Hips", -1, {0, 0, 0}},    {"Spine1", 0, {0, 0.10, 0}}, {"Spine2", 1, {0, 0.12, 0}},
+                                {"Chest", 2, {0, 0.12, 0}}, {"Neck1", 3, {0, 0.18, 0}},  {"Neck2", 4, {0, 0.05, 0}},
+                                {"Head", 5, {0, 0.05, 0}}};
+  for (const double side : {1.0, -1.0}) {
+    const std::string name = side > 0.0 ? "Left" : "Right";
+    const int first = static_cast<int>(bones.size());
+    bones.push_back({name + "Shoulder", 3, {0.06 * side, 0.1, 0}});
+    bones.push_back({name + "Arm", first, {0.12 * side, 0, 0}});
+    bones.push_back({name + "ForeArm", first + 1, {0.28 * side, 0, 0}});
+    bones.push_back({name + "Hand", first + 2, {0.25 * side, 0, 0}});
+    bones.push_back({name + "HandMiddle1", first + 3, {0.09 * side, 0, 0}});
+    bones.push_back({name + "Leg", 0, {0.09 * side, -0.07, 0}});
+    bones.push_back({name + "Shin", first + 5, {0, -0.4, 0}});
+    bones.push_back({name + "Foot", first + 6, {0, -0.4, 0}});
+    bones.push_back({name + "ToeBase", first + 7, {0, -0.04, 0.12}});
+  }
+  return bones;
+}
+
+// As LAFAN1 has it: the common names, feet that end in Toe, three vertebrae, no fingers.
+inline std::vector<BvhBone> lafan_bones() {
+  std::vector<BvhBone> bones = common_bones();
+  for (BvhBone& bone : bones) {
+    bone.name = bone.name.substr(std::string("mixamorig:").size());
+    if (bone.name.ends_with("ToeBase")) bone.name = bone.name.substr(0, bone.name.size() - 4);
+  }
+  return bones;
+}
+
 struct BvhWriter {
   std::vector<BvhBone> bones = cmu_bones();
   double metres_per_unit = 0.01;

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "core/npz.h"
-#include "motion/interaction_clip.h"
+#include "duet/core/npz.h"
+#include "duet/motion/interaction_clip.h"
 
 namespace duet::test {
 

@@ -1,4 +1,4 @@
-#include "motion/human_motion.h"
+#include "duet/motion/human_motion.h"
 
 #include <gmock/gmock.h>
 

@@ -1,12 +1,13 @@
-#include "motion/interaction_clip.h"
+#include "duet/motion/interaction_clip.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <functional>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
 #include "tests/motion/npz_edit.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"
@@ -247,6 +248,24 @@ TEST(InteractionClip, EmptyAndTruncatedFilesAreRefused) {
     EXPECT_THROW((void)parse_clip(good.substr(0, size), "cut.npz"), InputError) << size;
   const test::ScratchFolder folder;
   EXPECT_THAT(thrown_message<InputError>([&] { (void)load_clip(folder / "absent.npz"); }), HasSubstr("absent.npz"));
+}
+
+TEST(InteractionClip, PaddingHoldsTheFirstAndTheLastFrame) {
+  const InteractionClip clip = synthesize(Task::kHandshake, {.seed = 5});
+  const InteractionClip longer = padded(clip, 1.0, 0.5);
+  EXPECT_NO_THROW(validate(longer));
+  ASSERT_EQ(longer.frames(), clip.frames() + 75);
+  EXPECT_EQ(longer.a.joints.frame(0), clip.a.joints.frame(0));
+  EXPECT_EQ(longer.a.joints.frame(50), clip.a.joints.frame(0));
+  EXPECT_EQ(longer.b.joints.frame(57), clip.b.joints.frame(7));
+  EXPECT_EQ(longer.b.joints.frame(longer.frames() - 1), clip.b.joints.frame(clip.frames() - 1));
+  EXPECT_EQ(longer.a.rotations.size(), static_cast<std::size_t>(longer.frames()) * kSmplJoints);
+  EXPECT_EQ(longer.phases.act_begin, clip.phases.act_begin + 50);
+  EXPECT_EQ(longer.phases.act_end, clip.phases.act_end + 50);
+  ASSERT_FALSE(clip.contacts.empty());
+  EXPECT_EQ(longer.contacts[0].begin, clip.contacts[0].begin + 50);
+  EXPECT_THROW(padded(clip, -1.0, 0.0), std::invalid_argument);
+  EXPECT_THROW(padded(clip, 0.0, std::nan("")), std::invalid_argument);
 }
 
 }  // namespace

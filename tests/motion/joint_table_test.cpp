@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <sstream>
 
-#include "core/file.h"
-#include "motion/synthesis/body.h"
+#include "duet/core/file.h"
+#include "duet/tasks/synthesis/body.h"
 
 namespace duet {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "core/npz.h"
+#include "duet/core/npz.h"
 
 namespace duet::test {
 

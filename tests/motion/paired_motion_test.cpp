@@ -1,10 +1,10 @@
-#include "motion/paired_motion.h"
+#include "duet/motion/paired_motion.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/motion/npz_edit.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string>
 
-#include "core/pose.h"
-#include "motion/interaction_clip.h"
+#include "duet/core/pose.h"
+#include "duet/motion/interaction_clip.h"
 
 namespace duet::test {
 

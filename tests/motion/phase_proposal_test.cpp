@@ -1,12 +1,12 @@
-#include "motion/phase_proposal.h"
+#include "duet/motion/phase_proposal.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <numbers>
 
-#include "core/require.h"
-#include "motion/synthesis.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"
 
@@ -91,7 +91,7 @@ TEST(PhaseProposal, WithoutAGestureItIsTheMiddleThird) {
 }
 
 TEST(PhaseProposal, AlwaysHoldsAnActInsideTheMotion) {
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     for (const int frames : {1, 2, 3, 10}) {
       const Pair pair(frames);
       const Phases phases = propose_phases(pair.a, pair.b, task);
@@ -110,7 +110,7 @@ TEST(PhaseProposal, MotionsOfDifferentLengthAreRefused) {
 
 // Synthetic clips know their phases. Agreement: frames in both acts over frames in either.
 TEST(PhaseProposal, AgreesWithSyntheticClips) {
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     for (int index = 0; index < 4; ++index) {
       SynthesisOptions options;
       options.index = index;

@@ -1,12 +1,12 @@
-#include "motion/plausibility.h"
+#include "duet/motion/plausibility.h"
 
 #include <gmock/gmock.h>
 
 #include <functional>
 #include <numbers>
 
-#include "core/require.h"
-#include "motion/synthesis.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
 #include "tests/motion/fifteen_joints.h"
 #include "tests/motion/npz_edit.h"
 #include "tests/support.h"
@@ -40,7 +40,7 @@ std::string refusal(const InteractionClip& clip) {
 }
 
 TEST(Plausibility, SyntheticPeopleAreBeyondDoubt) {
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     for (int index = 0; index < 5; ++index) {
       const Plausibility found = judge_people(synthetic(task, index));
       EXPECT_THAT(found.faults, IsEmpty()) << to_string(task) << " " << index;
@@ -113,7 +113,7 @@ TEST(Plausibility, AFaultThatIsTakenIsNoted) {
 // Boundaries that are proposed for clips whose true ones are known.
 TEST(Plausibility, AClipWithoutPhasesGetsProposedOnesAndSaysSo) {
   constexpr double kWorst = 1.6;  // [s]; docs/conventions.md: late by 0.3 to 1 s on average
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     for (int index = 0; index < 3; ++index) {
       const InteractionClip clip = synthetic(task, index);
       const Npz npz = Npz::parse(test::without_key(clip_bytes(clip), "phases"), "bare.npz");

@@ -4,7 +4,7 @@
 #include <functional>
 #include <numbers>
 
-#include "motion/synthesis.h"
+#include "duet/motion/synthesis.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -20,7 +20,7 @@ constexpr double kStill = 1e-9;
 const std::vector<InteractionClip>& clips() {
   static const std::vector<InteractionClip> kClips = [] {
     std::vector<InteractionClip> made;
-    for (const Task task : kTasks) {
+    for (const Task task : all_tasks()) {
       for (int index = 0; index < 3; ++index) made.push_back(synthesize(task, {.seed = 11, .index = index}));
       made.push_back(synthesize(task, {.seed = 12, .height_a = 1.95, .height_b = 1.5, .speed = 1.2, .style = 1.0}));
     }
@@ -194,7 +194,7 @@ TEST(SynthesisMotion, VelocitiesDoNotJump) {
           most = std::max(most, (me->at(t, j) - 2.0 * me->at(t - 1, j) + me->at(t - 2, j)).norm() * clip.rate_hz());
     return most;
   };
-  for (const Task task : kTasks) {
+  for (const Task task : all_tasks()) {
     const InteractionClip coarse = synthesize(task, {.seed = 11, .rate_hz = 50.0});
     const InteractionClip fine = synthesize(task, {.seed = 11, .rate_hz = 200.0});
     const double change = largest_change(coarse, 0, coarse.frames());

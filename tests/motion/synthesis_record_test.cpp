@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "motion/synthesis.h"
+#include "duet/motion/synthesis.h"
 
 namespace duet {
 namespace {

@@ -1,11 +1,11 @@
-#include "motion/synthesis.h"
+#include "duet/motion/synthesis.h"
 
 #include <cmath>
 #include <set>
 
-#include "core/digest.h"
-#include "motion/synthesis/act.h"
-#include "motion/synthesis/stage.h"
+#include "duet/core/digest.h"
+#include "duet/motion/synthesis/stage.h"
+#include "duet/tasks/task_definition.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -45,7 +45,7 @@ double path_length(const PointTracks& joints, int joint, int begin, int end) {
 }
 
 TEST(Synthesis, SameArgumentsGiveTheSameBytes) {
-  for (const Task task : kTasks) {
+  for (const Task task : all_tasks()) {
     SynthesisOptions options;
     options.index = 4;
     const InteractionClip first = synthesize(task, options), second = synthesize(task, options);
@@ -75,7 +75,7 @@ TEST(Synthesis, NamesTheClipAndRecordsWhatWasDrawn) {
 }
 
 void expect_contacts_hold(const InteractionClip& clip) {
-  const double within = synthesis::act_of(clip.task).touch_distance;
+  const double within = definition_of(clip.task).act.touch_distance;
   EXPECT_EQ(clip.contacts.empty(), within == 0.0) << clip.id;
   for (const ContactWindow& window : clip.contacts) {
     EXPECT_GE(window.begin, clip.phases.act_begin);
@@ -87,7 +87,7 @@ void expect_contacts_hold(const InteractionClip& clip) {
 }
 
 TEST(Synthesis, TwentyClipsOfEachTaskAreValidAndTheirContactsHold) {
-  for (const Task task : kTasks)
+  for (const Task task : all_tasks())
     for (int index = 0; index < 20; ++index) {
       const InteractionClip clip = synthesize(task, {.seed = 5, .index = index});
       ASSERT_NO_THROW(validate(clip)) << clip.id;
@@ -103,7 +103,7 @@ TEST(Synthesis, TwentyClipsOfEachTaskAreValidAndTheirContactsHold) {
 
 TEST(Synthesis, ContactsHoldForAllBodiesSidesAndTargetHeights) {
   for (const Task task : {Task::kHug, Task::kHandshake, Task::kHighFive}) {
-    const synthesis::Act& act = synthesis::act_of(task);
+    const synthesis::Act& act = definition_of(task).act;
     for (int corner = 0; corner < 32; ++corner) {
       SynthesisOptions options;
       options.height_a = corner & 1 ? 1.5 : 1.95;
@@ -121,7 +121,7 @@ TEST(Synthesis, MeanDurationsAreThoseOfTableS6) {
   const std::map<Task, double> mean = {{Task::kHug, 25.9},  {Task::kHandshake, 22.9}, {Task::kHighFive, 16.1},
                                        {Task::kBend, 17.6}, {Task::kFlyKiss, 17.9},   {Task::kWave, 18.6}};
   constexpr int kClips = 200;
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     double sum = 0.0;
     for (int index = 0; index < kClips; ++index) {
       synthesis::Draws draws(42, task, index);
@@ -179,7 +179,7 @@ TEST(Synthesis, HonoursSideAndMirrorsTheHandedness) {
 
 TEST(Synthesis, HonoursTheTargetHeight) {
   for (const Task task : {Task::kHug, Task::kHandshake, Task::kHighFive}) {
-    const synthesis::Act& act = synthesis::act_of(task);
+    const synthesis::Act& act = definition_of(task).act;
     for (const double z : {act.lowest, act.highest}) {
       SynthesisOptions options;
       options.target_height = z;

@@ -1,4 +1,4 @@
-#include "nn/dense_kernels.h"
+#include "duet/nn/dense_kernels.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/random.h"
+#include "duet/core/random.h"
 
 namespace duet {
 namespace {

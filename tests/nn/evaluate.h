@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "nn/network.h"
+#include "duet/nn/network.h"
 
 namespace duet::test {
 

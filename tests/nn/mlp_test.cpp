@@ -1,4 +1,4 @@
-#include "nn/mlp.h"
+#include "duet/nn/mlp.h"
 
 #include <gtest/gtest.h>
 

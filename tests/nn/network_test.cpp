@@ -1,4 +1,4 @@
-#include "nn/network.h"
+#include "duet/nn/network.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,11 +7,12 @@
 #include <cstdint>
 #include <cstring>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/zip.h"
-#include "nn/mlp_file.h"
-#include "nn/safetensors.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/zip.h"
+#include "duet/nn/load_network.h"
+#include "duet/nn/mlp_file.h"
+#include "duet/nn/safetensors.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/nn/evaluate.h"
 #include "tests/support.h"

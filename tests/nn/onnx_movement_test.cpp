@@ -126,6 +126,31 @@ TEST(OnnxMovement, SplitTakesSizesAsAttributeThenAsInput) {
   EXPECT_THAT(parts(13, last, {1, 3}), uneven);
 }
 
+TEST(OnnxMovement, SplitTakesTheNumberOfPartsFromOperatorSet18) {
+  const Attributes two = {{"axis", std::int64_t{1}}, {"num_outputs", std::int64_t{2}}};
+  EXPECT_THAT(parts(18, two, {}), ElementsAre(ElementsAre(0, 1, 4, 5), ElementsAre(2, 3, 6, 7)));
+  EXPECT_THAT(parts(18, {{"axis", std::int64_t{1}}}, {1, 3}),
+              ElementsAre(ElementsAre(0, 4), ElementsAre(1, 2, 3, 5, 6, 7)));
+  OnnxWriter uneven(18);  // the last part is the smaller one
+  uneven.input("x", {5}).node("Split", {"x"}, {"a", "b"}, {{"num_outputs", std::int64_t{2}}}).output("a").output("b");
+  EXPECT_THAT(evaluate(*uneven.network(), {counted({5}).values}), ElementsAre(ElementsAre(0, 1, 2), ElementsAre(3, 4)));
+}
+
+TEST(OnnxMovement, SplitInOperatorSet18RefusesWhatDoesNotSayItsParts) {
+  const auto refusal = [](const Attributes& attributes, std::int64_t size, int outputs) {
+    OnnxWriter writer(18);
+    std::vector<std::string> names;
+    for (int i = 0; i < outputs; ++i) names.push_back("out" + std::to_string(i));
+    writer.input("x", {size}).node("Split", {"x"}, names, attributes);
+    for (const std::string& name : names) writer.output(name);
+    return writer.refusal();
+  };
+  const auto count = [](std::int64_t parts) { return Attributes{{"num_outputs", parts}}; };
+  EXPECT_THAT(refusal({}, 4, 2), HasSubstr("expected sizes as an input or num_outputs, one of the two"));
+  EXPECT_THAT(refusal(count(3), 4, 2), HasSubstr("num_outputs: expected 2, found 3"));
+  EXPECT_THAT(refusal(count(4), 5, 4), HasSubstr("5 numbers are not 4 parts"));
+}
+
 // PyTorch's way to write x.reshape(batch, -1): the batch is taken from the shape of the input.
 TEST(OnnxMovement, ShapeArithmeticIsFoldedInEveryOperatorSet) {
   for (const int opset : {11, 13}) {

@@ -41,9 +41,9 @@ TEST(OnnxReduction, SumsMeansAndNormsOverAnyAxes) {
     for (double& value : norm) value = std::sqrt(value);
     for (const std::int64_t keep : {0, 1}) {
       const Attributes attributes = {{"axes", axes}, {"keepdims", keep}};
-      expect_node("ReduceMean", {x}, mean, attributes);
-      expect_node("ReduceL2", {x}, norm, attributes);
-      expect_node("ReduceSumSquare", {x}, squares, attributes);
+      expect_node("ReduceMean", {x}, mean, attributes, {11, 13, 17});
+      expect_node("ReduceL2", {x}, norm, attributes, {11, 13, 17});
+      expect_node("ReduceSumSquare", {x}, squares, attributes, {11, 13, 17});
       expect_node("ReduceSum", {x}, sum, attributes, {11, 12});
     }
   }
@@ -59,6 +59,23 @@ TEST(OnnxReduction, SumTakesItsAxesAsAnInputFromOperatorSet13) {
   for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(found[k], expected[k], 1e-6);
   expect_node("ReduceSum", {x}, {sums(x, true, true, true, itself)[0]}, {}, {13, 17});
   EXPECT_EQ(through("ReduceSum", {x}, {{"noop_with_empty_axes", std::int64_t{1}}}, 13, 0), x.values);
+}
+
+TEST(OnnxReduction, AllTakeTheirAxesAsAnInputFromOperatorSet18) {
+  const Operand x = operand({2, 3, 4});
+  std::vector<double> mean = sums(x, false, true, false, itself);
+  std::vector<double> squares = sums(x, false, true, false, square), norm = squares;
+  for (double& value : mean) value /= 3.0;
+  for (double& value : norm) value = std::sqrt(value);
+  for (const auto& [op, expected] :
+       {std::pair{"ReduceMean", mean}, std::pair{"ReduceL2", norm}, std::pair{"ReduceSumSquare", squares}}) {
+    OnnxWriter writer(18);
+    writer.input("x", {2, 3, 4}).whole("axes", {1}).node(op, {"x", "axes"}, {"y"}).output("y", {2, 1, 4});
+    const std::vector<float> found = evaluate(*writer.network(), {x.values})[0];
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(found[k], expected[k], 1e-6) << op;
+  }
+  EXPECT_EQ(through("ReduceMean", {x}, {{"noop_with_empty_axes", std::int64_t{1}}}, 18, 0), x.values);
 }
 
 std::vector<double> softmax_of_lines(const Operand& x, int outer, int count, int stride) {
@@ -111,6 +128,12 @@ TEST(OnnxReduction, MisfitsAreRefused) {
             "'test.onnx': node 'ReduceMean#0', operator ReduceMean: expected an axis of a tensor of rank 2, found 2");
   EXPECT_THAT(refusal("ReduceSum", 11, {}, 2), HasSubstr("expected axes as an attribute"));
   EXPECT_THAT(refusal("ReduceSum", 13, {}, 2), HasSubstr("input 1: expected whole numbers"));
+  EXPECT_THAT(refusal("ReduceL2", 17, {}, 2), HasSubstr("expected axes as an attribute in this operator set"));
+  EXPECT_THAT(refusal("ReduceMean", 18, {{"axes", Whole{1}}}, 1),
+              HasSubstr("expected axes as an input in this operator set"));
+  for (const char* op : {"ReduceL2", "ReduceSumSquare"})
+    EXPECT_THAT(refusal(op, 18, {{"noop_with_empty_axes", std::int64_t{1}}}, 1),
+                HasSubstr("attribute 'noop_with_empty_axes' without axes is not supported"));
   EXPECT_THAT(refusal("Softmax", 13, {{"axis", std::int64_t{-3}}}, 1), HasSubstr("rank 2, found -3"));
   EXPECT_THAT(refusal("LayerNormalization", 16, {}, 2), HasSubstr("expected operator set 17, found 16"));
   EXPECT_THAT(refusal("LayerNormalization", 17, {}, 2), HasSubstr("input 1: expected 3 numbers, found shape (2)"));

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
-#include "nn/onnx_network.h"
+#include "duet/core/require.h"
+#include "duet/nn/onnx_network.h"
 #include "tests/nn/evaluate.h"
 #include "tests/support.h"
 

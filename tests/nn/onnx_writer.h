@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "nn/network.h"
-#include "nn/onnx_model.h"
+#include "duet/nn/network.h"
+#include "duet/nn/onnx_model.h"
 
 namespace onnx {
 class ModelProto;
@@ -57,6 +57,6 @@ std::vector<float> through(const std::string& op, const std::vector<Operand>& op
 
 // The node gives `expected` within 1e-6 of its size whichever operands are constants, in each of these operator sets.
 void expect_node(const std::string& op, const std::vector<Operand>& operands, const std::vector<double>& expected,
-                 const Attributes& attributes = {}, const std::vector<int>& opsets = {11, 13, 17});
+                 const Attributes& attributes = {}, const std::vector<int>& opsets = {11, 13, 17, 18});
 
 }  // namespace duet::test

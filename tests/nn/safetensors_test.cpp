@@ -1,4 +1,4 @@
-#include "nn/safetensors.h"
+#include "duet/nn/safetensors.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/deep_json.h"
 #include "tests/support.h"
 

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "core/require.h"
-#include "policies/dstar/config.h"
-#include "policies/dstar/network.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/config.h"
+#include "duet/policies/dstar/network.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"
 

@@ -8,9 +8,9 @@
 #include <limits>
 #include <set>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "policies/dstar/network.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/network.h"
 #include "tests/deep_json.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"
@@ -128,7 +128,7 @@ TEST(DstarFile, RefusesHeadersThatAreNotOfThisNetworkAndRobot) {
   EXPECT_EQ(refusal([](SafeTensors& content) { content.metadata.erase("config"); }),
             "expected 'config' in the header, found none: not a network of D-STAR");
   EXPECT_EQ(header_refusal("config", "{}"), "configuration of D-STAR: expected a field 'long_frames', found none");
-  EXPECT_EQ(header_refusal("robot", "h1"), "the robot: expected '" + g1()->name + "', found 'h1'");
+  EXPECT_EQ(header_refusal("robot", "h1"), "made for 'h1', the robot is '" + g1()->name + "'");
   EXPECT_EQ(header_refusal("joints", "3"),
             "'joints' in the header: expected a JSON list of texts, found something else");
   EXPECT_EQ(header_refusal("channels", "[1]"),

@@ -1,4 +1,4 @@
-#include "policies/dstar/dstar_policy.h"
+#include "duet/policies/dstar/dstar_policy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,10 +7,11 @@
 #include <functional>
 #include <limits>
 
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "policies/observation_history.h"
-#include "policies/scheduler.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/policies/observation_history.h"
+#include "duet/policies/registry.h"
+#include "duet/policies/scheduler.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"
 

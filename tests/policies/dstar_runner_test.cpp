@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "policies/dstar/network.h"
+#include "duet/policies/dstar/network.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"

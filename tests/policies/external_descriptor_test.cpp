@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 
-#include "core/require.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/descriptor.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/descriptor.h"
 #include "tests/policies/external_fixtures.h"
 
 namespace duet {
@@ -105,6 +105,24 @@ TEST(PolicyDescriptor, RefusesWhatItDoesNotUnderstand) {
             "mine.yaml:6: policy descriptor: 'deadline_ms': expected a whole number in [1, 600000], found 0");
   EXPECT_EQ(refusal(kProcess + "hang_ms: 1.5\n"),
             "mine.yaml:6: policy descriptor: 'hang_ms': expected a whole number in [1, 600000], found 1.5");
+}
+
+// What was made before there was a seventh task keeps its six numbers.
+TEST(PolicyDescriptor, KnowsTheSixTasksOfTheSupplementUnlessItSaysOthers) {
+  const PolicyDescriptor six = parse_policy_descriptor(replaced(kNetwork, "noise, size: 180", "task"), "mine.yaml");
+  EXPECT_EQ(six.tasks, std::vector<Task>(kPaperTasks.begin(), kPaperTasks.end()));
+  EXPECT_EQ(channel_size(six.inputs[1].channels[0], 2), 6);
+  const PolicyDescriptor two = parse_policy_descriptor(
+      replaced(kNetwork, "noise, size: 180", "task") + "tasks: [wave, high-five]\n", "mine.yaml");
+  EXPECT_EQ(two.tasks, (std::vector<Task>{Task::kWave, Task::kHighFive}));
+  EXPECT_EQ(channel_size(two.inputs[1].channels[0], 2), 2);
+
+  EXPECT_THAT(refusal(kProcess + "tasks: [wafe]\n"),
+              HasSubstr("mine.yaml:6: policy descriptor: 'tasks': unknown task 'wafe': did you mean 'wave'?"));
+  EXPECT_EQ(refusal(kProcess + "tasks: [wave, wave]\n"),
+            "mine.yaml:6: policy descriptor: 'tasks': expected each task once, found 'wave' again");
+  EXPECT_EQ(refusal(kProcess + "tasks: []\n"),
+            "mine.yaml:6: policy descriptor: 'tasks': expected at least one task, found none");
 }
 
 TEST(PolicyDescriptor, JointsAreThoseOfTheRobotInAnyOrder) {

@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 

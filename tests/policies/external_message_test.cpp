@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "core/require.h"
-#include "policies/external/message.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/message.h"
 #include "tests/deep_json.h"
 #include "tests/policies/external_fixtures.h"
 
@@ -96,6 +96,7 @@ TEST(PolicyMessage, DuetSpeaksJson) {
   EXPECT_THAT(json::parse(reset_message(context))["prompt"].get<std::string>(), HasSubstr("say \"hello\""));
   EXPECT_EQ(json::parse(bye_message())["type"], "bye");
   const json hello = json::parse(hello_message({}, *test::g1(), test::g1()->joint_names()));
+  EXPECT_EQ(hello["tasks"], json(task_names(kPaperTasks)));
   const json last = hello["channels"].back();
   EXPECT_EQ(last["name"], "root_orientation");
   EXPECT_EQ(last["first"].get<int>() + last["size"].get<int>(), kObservationSize);

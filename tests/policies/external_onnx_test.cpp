@@ -2,12 +2,13 @@
 
 #include <algorithm>
 
-#include "core/require.h"
-#include "policies/dstar/features.h"
-#include "policies/external/channel_values.h"
-#include "policies/external/external_policy.h"
-#include "policies/external/plan_decoder.h"
-#include "policies/scheduler.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/features.h"
+#include "duet/policies/external/channel_values.h"
+#include "duet/policies/external/external_policy.h"
+#include "duet/policies/external/plan_decoder.h"
+#include "duet/policies/registry.h"
+#include "duet/policies/scheduler.h"
 #include "tests/nn/onnx_writer.h"
 #include "tests/policies/external_fixtures.h"
 
@@ -150,7 +151,9 @@ TEST(OnnxPolicy, RootsComeBackFromEveryFrame) {
 std::vector<float> shown(PolicyFrame frame, const std::vector<PolicyChannel>& channels, const MovingHistory& history,
                          int index, std::vector<int> joints) {
   const int count = static_cast<int>(joints.size());
-  ChannelValues values(g1(), std::move(joints), frame);
+  PolicyDescriptor of_the_frame;
+  of_the_frame.frame = frame;
+  ChannelValues values(g1(), std::move(joints), of_the_frame);
   values.reset(test::episode({.X_WB = {Eigen::Quaterniond::Identity(), {0.1, 0.2, 0.3}}, .q = {}, .v = {}}), {});
   std::vector<float> numbers;
   for (const PolicyChannel& channel : channels) {
@@ -195,12 +198,41 @@ TEST(PolicyChannels, AreInTheDescriptorsOrderScaledAndOffset) {
   for (int i = 0; i < 29; ++i) joints[i] = 28 - i;
   const std::vector<PolicyChannel> channels = {
       {.kind = PolicyChannelKind::kJointVelocities, .offset = {1.0}, .scale = {0.5}},
-      {.kind = PolicyChannelKind::kTask},
+      {.kind = PolicyChannelKind::kTask, .size = 6},
       {.kind = PolicyChannelKind::kTime}};
   const std::vector<float> numbers = shown(PolicyFrame::kWorld, channels, history, 3, joints);
   const Eigen::VectorXd& v = history.at(0).history[3].robot.v;
   for (int j = 0; j < 29; ++j) EXPECT_NEAR(numbers[j], 0.5 * (v[28 - j] - 1.0), kFloat);
   EXPECT_EQ((std::vector<float>(numbers.begin() + 29, numbers.end())), (std::vector<float>{0, 0, 0, 1, 0, 0, 2.0F}));
+}
+
+// A plan whose x is 1 for the second of the descriptor's tasks.
+TEST(OnnxPolicy, IsShownTheTasksOfItsDescriptorAndRefusesOthers) {
+  std::vector<float> weights(2 * 36, 0.0F);
+  weights[36] = 1.0F;
+  std::vector<float> plan(36, 0.0F);
+  plan[3] = 1.0F;
+  OnnxWriter network;
+  network.input("task", {1, 2}).constant("W", {2, 36}, weights).constant("b", {1, 36}, plan);
+  network.node("MatMul", {"task", "W"}, {"y"}).node("Add", {"y", "b"}, {"plan"}).output("plan", {1, 36});
+  const std::string text = replaced(replaced(descriptor(), "anchors: 5", "anchors: 1"),
+                                    "{name: obs, frames: 12, channels: [partner_root]}", "{channels: [task]}");
+  const Files files;
+  files.write(text + "tasks: [bend, wave]\n", network.bytes());
+  const auto policy = make_policy(files.path(), g1());
+  const MovingHistory history(1);
+  EpisodeContext context = test::episode(history.at(0).now().robot);
+  for (const auto& [task, x] : {std::pair{Task::kWave, 1.0}, {Task::kBend, 0.0}}) {
+    context.task = task;
+    policy->reset(context);
+    EXPECT_EQ(policy->plan(history.at(0)).at(0).X_WB.p.x(), x) << to_string(task);
+  }
+  context.task = Task::kHug;
+  EXPECT_EQ(thrown_message<MissingError>([&] { policy->reset(context); }),
+            "policy 'mine' was not made for the task 'hug': it knows bend, wave");
+
+  files.write(text, network.bytes());
+  EXPECT_THAT(files.refusal(), HasSubstr("expected 2 numbers, found 6 of the channels: task 0..5"));
 }
 
 // The sum of x of the partner's root over the frames, the newest one weighing 100: the order of frames shows.

@@ -8,10 +8,11 @@
 #include <filesystem>
 #include <thread>
 
-#include "core/require.h"
-#include "policies/external/child_process.h"
-#include "policies/external/external_policy.h"
-#include "robots/kinematics.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/child_process.h"
+#include "duet/policies/external/external_policy.h"
+#include "duet/policies/registry.h"
+#include "duet/robots/kinematics.h"
 #include "tests/policies/process_fixtures.h"
 
 namespace duet {

@@ -1,13 +1,16 @@
 // The G1 of the project and seeded motions and references for the tests of policies.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <numbers>
+#include <vector>
 
-#include "core/random.h"
-#include "core/robot_motion.h"
-#include "policies/policy.h"
-#include "robots/robot_model.h"
+#include "duet/core/random.h"
+#include "duet/core/robot_motion.h"
+#include "duet/policies/policy.h"
+#include "duet/robots/robot_model.h"
+#include "duet/robots/roles.h"
 
 namespace duet::test {
 
@@ -17,6 +20,17 @@ inline constexpr double kAlgebra = 1e-13;
 inline std::shared_ptr<const RobotModel> g1() {
   static const auto robot = load_shared_robot();
   return robot;
+}
+
+inline std::shared_ptr<const RobotModel> t1() {
+  static const auto robot = load_shared_robot("t1");
+  return robot;
+}
+
+// Of the G1.
+inline bool is_leg(int joint) {
+  const std::vector<int> legs = leg_joints(*g1());
+  return std::find(legs.begin(), legs.end(), joint) != legs.end();
 }
 
 inline Eigen::Quaterniond random_rotation(Random& random) {

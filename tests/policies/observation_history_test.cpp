@@ -1,4 +1,4 @@
-#include "policies/observation_history.h"
+#include "duet/policies/observation_history.h"
 
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"

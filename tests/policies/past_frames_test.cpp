@@ -1,11 +1,11 @@
-#include "policies/dstar/past_frames.h"
+#include "duet/policies/dstar/past_frames.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "policies/observation_history.h"
+#include "duet/policies/observation_history.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "policies/phase_adaptation.h"
+#include "duet/policies/phase_adaptation.h"
 
 #include <gmock/gmock.h>
 
@@ -36,15 +36,6 @@ double largest_step(const RobotMotion& motion, int begin, int end) {
   for (int t = begin + 1; t < end; ++t)
     largest = std::max(largest, (motion.q.col(t) - motion.q.col(t - 1)).cwiseAbs().maxCoeff());
   return largest;
-}
-
-TEST(IsLegJoint, FindsTheLegsOfTheG1) {
-  int legs = 0;
-  for (const RobotJoint& joint : g1()->joints) legs += is_leg_joint(joint.name) ? 1 : 0;
-  EXPECT_EQ(legs, 12);
-  EXPECT_FALSE(is_leg_joint("waist_pitch_joint"));
-  EXPECT_FALSE(is_leg_joint("left_shoulder_roll_joint"));
-  EXPECT_TRUE(is_leg_joint("left_hip_yaw_joint"));
 }
 
 TEST(ClipAdaptation, IsTheClip) {
@@ -95,7 +86,7 @@ TEST(ApproachAdaptation, GoesStraightFromNeutralToTheAct) {
     EXPECT_NEAR((result.root[static_cast<std::size_t>(t)].p - expected.p).norm(), 0.0, kAlgebra);
     EXPECT_NEAR(result.root[static_cast<std::size_t>(t)].R.angularDistance(expected.R), 0.0, 1e-7);
     for (int j = 0; j < g1()->dof(); ++j) {
-      const bool leg = is_leg_joint(g1()->joints[static_cast<std::size_t>(j)].name);
+      const bool leg = test::is_leg(j);
       const double angle = leg ? motion.q(j, t) : (1.0 - s) * g1()->neutral[j] + s * motion.q(j, kPhases.act_begin);
       EXPECT_NEAR(result.q(j, t), angle, kAlgebra);
     }
@@ -110,7 +101,7 @@ TEST(ApproachAdaptation, StandsStillAfterTheActAndReturnsToNeutral) {
     EXPECT_EQ(result.root[static_cast<std::size_t>(t)].p, motion.root[static_cast<std::size_t>(last)].p);
     const double s = std::min(1.0, (t - last) / 60.0);
     for (int j = 0; j < g1()->dof(); ++j) {
-      const bool leg = is_leg_joint(g1()->joints[static_cast<std::size_t>(j)].name);
+      const bool leg = test::is_leg(j);
       EXPECT_NEAR(result.q(j, t), motion.q(j, last) + (leg ? 0.0 : s * (g1()->neutral[j] - motion.q(j, last))),
                   kAlgebra);
     }
@@ -137,7 +128,7 @@ TEST(SimToRealAdaptation, WalksStraightTurnsMildlyAndRaisesTheArmsInTheLastSixte
     const double up = std::max(0.0, (t - (kPhases.act_begin - 16)) / 16.0);
     for (int j = 0; j < g1()->dof(); ++j) {
       const double raised = (1.0 - up) * g1()->neutral[j] + up * motion.q(j, kPhases.act_begin);
-      EXPECT_NEAR(result.q(j, t), is_leg_joint(g1()->joints[j].name) ? motion.q(j, t) : raised, kAlgebra);
+      EXPECT_NEAR(result.q(j, t), test::is_leg(j) ? motion.q(j, t) : raised, kAlgebra);
     }
   }
   for (int t = kPhases.act_begin; t < kPhases.act_end; ++t) expect_same_frame(result, t, motion, t);
@@ -148,7 +139,7 @@ TEST(SimToRealAdaptation, StandsStillAfterTheActAndLowersTheArmsInSixteenFrames)
   const RobotMotion result = adapted(motion, {.start = StartMode::kSimToReal}).motion;
   const int last = kPhases.act_end - 1;
   for (int j = 0; j < g1()->dof(); ++j) {
-    const bool leg = is_leg_joint(g1()->joints[j].name);
+    const bool leg = test::is_leg(j);
     EXPECT_NEAR(result.q(j, last + 8), leg ? motion.q(j, last) : 0.5 * (motion.q(j, last) + g1()->neutral[j]),
                 kAlgebra);
     EXPECT_NEAR(result.q(j, last + 16), leg ? motion.q(j, last) : g1()->neutral[j], kAlgebra);

@@ -1,6 +1,7 @@
-#include "policies/policy.h"
+#include "duet/policies/policy.h"
 
-#include "policies/scheduler.h"
+#include "duet/policies/registry.h"
+#include "duet/policies/scheduler.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 

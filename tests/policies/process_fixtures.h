@@ -8,10 +8,11 @@
 #include <memory>
 #include <string>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "policies/external/child_process.h"
-#include "policies/external/external_policy.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/policies/external/child_process.h"
+#include "duet/policies/external/external_policy.h"
+#include "duet/policies/registry.h"
 #include "tests/policies/external_fixtures.h"
 
 namespace duet::test {

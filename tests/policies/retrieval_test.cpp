@@ -1,12 +1,13 @@
-#include "policies/retrieval.h"
+#include "duet/policies/retrieval.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "core/require.h"
-#include "robots/robot_model.h"
+#include "duet/core/require.h"
+#include "duet/policies/registry.h"
+#include "duet/robots/robot_model.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -100,8 +101,8 @@ TEST(Retrieval, RefusesATaskThatTheLibraryLacks) {
   const auto policy = made_policy();
   EpisodeContext context;
   context.task = Task::kWave;
-  EXPECT_THAT([&] { policy->reset(context); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("no window of task wave")));
+  EXPECT_EQ(test::thrown_message<MissingError>([&] { policy->reset(context); }),
+            "policy 'retrieval' was not made for the task 'wave': it knows hug, handshake");
 }
 
 TEST(Retrieval, RefusesALibraryOfAnotherRobotOrShape) {
@@ -110,7 +111,7 @@ TEST(Retrieval, RefusesALibraryOfAnotherRobotOrShape) {
   library.robot = "h1";
   save_retrieval_library(folder / "robot.safetensors", library);
   EXPECT_THAT([&] { load_retrieval_library(folder / "robot.safetensors", *robot()); },
-              testing::ThrowsMessage<InputError>(testing::HasSubstr("robot: expected 'g1', found 'h1'")));
+              testing::ThrowsMessage<InputError>(testing::HasSubstr("made for 'h1', the robot is 'g1'")));
   library = made_library();
   library.plans.conservativeResize(kPlanSize - 1, 3);
   save_retrieval_library(folder / "shape.safetensors", library);

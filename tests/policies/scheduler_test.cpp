@@ -1,4 +1,4 @@
-#include "policies/scheduler.h"
+#include "duet/policies/scheduler.h"
 
 #include <limits>
 

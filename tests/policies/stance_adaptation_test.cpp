@@ -1,6 +1,7 @@
 // StartMode::kAct: for controllers that cannot walk.
-#include "policies/phase_adaptation.h"
-#include "policies/torso_orientation.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/torso_orientation.h"
+#include "duet/robots/roles.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 
@@ -53,7 +54,7 @@ TEST(StanceAdaptation, RootStandsUprightWhereItIsInMidAct) {
 TEST(StanceAdaptation, LegsStand) {
   const RobotMotion result = in_place(swinging_motion(kFrames, 2)).motion;
   for (int j = 0; j < g1()->dof(); ++j)
-    if (is_leg_joint(g1()->joints[static_cast<std::size_t>(j)].name)) {
+    if (test::is_leg(j)) {
       EXPECT_TRUE((result.q.row(j).array() == g1()->neutral[j]).all());
     }
 }
@@ -109,6 +110,47 @@ TEST(StanceAdaptation, WithoutStanceTheActIsKeptToTheBit) {
     if (t == 0) {
       EXPECT_EQ(result.motion.q(arm, t), g1()->neutral[arm]);
     }
+  }
+}
+
+// A T1 that turns and leans forward while its waist swings.
+RobotMotion turning_t1() {
+  const RobotModel& robot = *test::t1();
+  RobotMotion motion{50.0, robot.joint_names(), std::vector<Pose>(kFrames), robot.neutral.replicate(1, kFrames)};
+  for (int t = 0; t < kFrames; ++t) {
+    const double s = t / 50.0;
+    motion.q(robot.joint_index("Waist"), t) = 0.4 * std::sin(2.0 * s);
+    motion.q(robot.joint_index("Left_Knee_Pitch"), t) = 0.8;
+    motion.root[static_cast<std::size_t>(t)] = {
+        yaw_rotation(0.5 + 0.1 * s) * Eigen::AngleAxisd(0.2 * std::sin(s), Eigen::Vector3d::UnitY()),
+        {1.0 + 0.1 * s, -2.0, 0.66}};
+  }
+  return motion;
+}
+
+// Where the base is the trunk, the pelvis stands and the trunk turns over it.
+TEST(StanceAdaptation, ThePelvisBelowAWaistStandsStillAndUpright) {
+  const RobotModel& robot = *test::t1();
+  const RobotMotion motion = turning_t1();
+  const AdaptedMotion result = adapt_by_phase(motion, kPhases, robot, {.start = StartMode::kAct}, 1);
+  const auto pelvis = [&](int t) {
+    return result.motion.root[static_cast<std::size_t>(t)] * pelvis_in_base(robot, result.motion.q.col(t));
+  };
+  const Pose first = pelvis(0);
+  for (int t = 0; t < result.motion.frames(); ++t) {
+    EXPECT_LT((pelvis(t).p - first.p).norm(), test::kAlgebra);
+    EXPECT_NEAR(pelvis(t).R.angularDistance(first.R), 0.0, 1e-7);
+    for (const int j : leg_joints(robot)) EXPECT_EQ(result.motion.q(j, t), robot.neutral[j]);
+  }
+  EXPECT_NEAR((first.R * Eigen::Vector3d::UnitZ()).z(), 1.0, 1e-12);
+  EXPECT_NEAR(first.p.z(), robot.standing_height - 0.1155, 1e-12);
+  const auto middle = static_cast<std::size_t>((kPhases.act_begin + kPhases.act_end) / 2);
+  const Pose then = motion.root[middle] * pelvis_in_base(robot, motion.q.col(static_cast<Eigen::Index>(middle)));
+  EXPECT_LT((first.p - then.p).head<2>().norm(), test::kAlgebra);
+  // The trunk keeps its heading as far as the waist goes.
+  for (int t = kPhases.act_begin; t < kPhases.act_end; ++t) {
+    const auto f = static_cast<std::size_t>(t - result.clip_frame);
+    EXPECT_NEAR(yaw_of(result.motion.root[f].R), yaw_of(motion.root[static_cast<std::size_t>(t)].R), 0.02) << t;
   }
 }
 

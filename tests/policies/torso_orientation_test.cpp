@@ -1,4 +1,4 @@
-#include "policies/torso_orientation.h"
+#include "duet/policies/torso_orientation.h"
 
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
@@ -96,13 +96,37 @@ TEST(TorsoOrientation, ComesAsNearAsTheLimitsAllow) {
 
 TEST(TorsoOrientation, OfARobotWithoutAWaistIsTheBase) {
   RobotModel robot = *g1();
-  for (RobotJoint& each : robot.joints)
-    if (each.name.starts_with("waist")) each.name = "spine" + each.name.substr(5);
+  robot.roles.waist.clear();
   const TorsoOrientation torso(robot);
   Eigen::VectorXd q = Eigen::VectorXd::Constant(29, 0.2);
   EXPECT_EQ(torso.at(q).w(), 1.0);
   torso.solve(yaw_rotation(0.5), q);
   EXPECT_EQ(q, Eigen::VectorXd::Constant(29, 0.2));
+}
+
+// The waist of the T1 is below its trunk, which is the base: it turns the pelvis the other way.
+TEST(TorsoOrientation, OfAWaistBelowTheBaseIsThatOfTheBaseInThePelvis) {
+  const RobotModel& robot = *test::t1();
+  const TorsoOrientation torso(robot);
+  const int waist = robot.joint_index("Waist");
+  Eigen::VectorXd q = robot.neutral;
+  for (const double angle : {-1.2, -1e-9, 0.0, 0.4, 1.5}) {
+    q[waist] = angle;
+    EXPECT_NEAR(torso.at(q).angularDistance(pelvis_in_base(robot, q).R.conjugate()), 0.0, kSolved);
+  }
+}
+
+TEST(TorsoOrientation, AWaistBelowTheBaseIsTurnedUnderIt) {
+  const RobotModel& robot = *test::t1();
+  const TorsoOrientation torso(robot);
+  Eigen::VectorXd q = robot.neutral;
+  torso.solve(yaw_rotation(0.6), q);
+  EXPECT_NEAR(q[robot.joint_index("Waist")], -0.6, 1e-9);
+  torso.solve(yaw_rotation(0.6) * Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitY()), q);  // which it cannot tilt
+  EXPECT_NEAR(torso.at(q).angularDistance(yaw_rotation(0.6)), 0.0, 1e-6);
+  Eigen::VectorXd rest = q - robot.neutral;
+  rest[robot.joint_index("Waist")] = 0.0;
+  EXPECT_EQ(rest.norm(), 0.0);
 }
 
 }  // namespace

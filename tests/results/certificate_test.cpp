@@ -1,4 +1,4 @@
-#include "results/certificate.h"
+#include "duet/results/certificate.h"
 
 #include <gmock/gmock.h>
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "core/require.h"
-#include "results/leaderboard.h"
+#include "duet/core/require.h"
+#include "duet/results/leaderboard.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

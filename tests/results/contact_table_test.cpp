@@ -1,11 +1,11 @@
-#include "results/contact_table.h"
+#include "duet/results/contact_table.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

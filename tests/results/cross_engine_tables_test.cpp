@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "results/cross_engine.h"
-#include "results/interval_plot.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/interval_plot.h"
 #include "tests/results/rows.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "results/cross_engine.h"
+#include "duet/results/cross_engine.h"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/require.h"
-#include "results/cross_engine_parts.h"
+#include "duet/core/require.h"
+#include "duet/results/cross_engine_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

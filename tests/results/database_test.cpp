@@ -1,4 +1,4 @@
-#include "results/database.h"
+#include "duet/results/database.h"
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>
@@ -7,8 +7,8 @@
 #include <limits>
 #include <memory>
 
-#include "core/require.h"
-#include "results/leaderboard.h"
+#include "duet/core/require.h"
+#include "duet/results/leaderboard.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

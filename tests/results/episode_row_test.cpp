@@ -1,11 +1,11 @@
-#include "results/episode_row.h"
+#include "duet/results/episode_row.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <limits>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -1,10 +1,10 @@
-#include "results/golden.h"
+#include "duet/results/golden.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"

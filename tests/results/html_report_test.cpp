@@ -1,4 +1,4 @@
-#include "results/html_report.h"
+#include "duet/results/html_report.h"
 
 #include <gmock/gmock.h>
 
@@ -6,7 +6,8 @@
 #include <limits>
 #include <regex>
 
-#include "results/report_parts.h"
+#include "duet/results/escape_html.h"
+#include "duet/results/report_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

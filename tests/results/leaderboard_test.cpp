@@ -1,13 +1,13 @@
-#include "results/leaderboard.h"
+#include "duet/results/leaderboard.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/require.h"
-#include "results/interval_plot.h"
-#include "results/leaderboard_rows.h"
+#include "duet/core/require.h"
+#include "duet/results/interval_plot.h"
+#include "duet/results/leaderboard_rows.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "results/controller_table.h"
-#include "results/degradation.h"
-#include "results/leaderboard.h"
-#include "results/policy_table.h"
+#include "duet/results/controller_table.h"
+#include "duet/results/degradation.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/policy_table.h"
 #include "tests/results/policy_rows.h"
 
 namespace duet {

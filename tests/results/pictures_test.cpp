@@ -4,11 +4,11 @@
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "results/cross_engine.h"
-#include "results/interval_plot.h"
-#include "results/line_plot.h"
-#include "results/report_parts.h"
+#include "duet/core/file.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/interval_plot.h"
+#include "duet/results/line_plot.h"
+#include "duet/results/report_parts.h"
 #include "tests/results/rows.h"
 
 namespace duet {

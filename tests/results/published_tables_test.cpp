@@ -4,12 +4,12 @@
 
 #include <sstream>
 
-#include "core/file.h"
-#include "results/controller_table.h"
-#include "results/cross_engine.h"
-#include "results/leaderboard.h"
-#include "results/policy_report.h"
-#include "results/run_directory.h"
+#include "duet/core/file.h"
+#include "duet/results/controller_table.h"
+#include "duet/results/cross_engine.h"
+#include "duet/results/leaderboard.h"
+#include "duet/results/policy_report.h"
+#include "duet/results/run_directory.h"
 
 namespace duet {
 namespace {

@@ -1,12 +1,12 @@
-#include "results/published.h"
+#include "duet/results/published.h"
 
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "results/run_directory.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/run_directory.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"

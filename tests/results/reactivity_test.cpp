@@ -1,10 +1,10 @@
-#include "results/reactivity.h"
+#include "duet/results/reactivity.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 

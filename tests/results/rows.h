@@ -4,8 +4,8 @@
 #include <fstream>
 #include <string>
 
-#include "results/episode_row.h"
-#include "results/run_directory.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/run_directory.h"
 
 namespace duet::test {
 

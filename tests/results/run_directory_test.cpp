@@ -1,4 +1,4 @@
-#include "results/run_directory.h"
+#include "duet/results/run_directory.h"
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/require.h"
-#include "results/environment.h"
+#include "duet/core/require.h"
+#include "duet/results/environment.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"

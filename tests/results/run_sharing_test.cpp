@@ -10,9 +10,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "results/run_directory.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/run_directory.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

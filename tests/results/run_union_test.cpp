@@ -1,8 +1,8 @@
-#include "results/run_union.h"
+#include "duet/results/run_union.h"
 
 #include <gmock/gmock.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

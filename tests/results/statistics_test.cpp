@@ -1,4 +1,4 @@
-#include "results/statistics.h"
+#include "duet/results/statistics.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "core/random.h"
+#include "duet/core/random.h"
 #include "tests/support.h"
 
 namespace duet {

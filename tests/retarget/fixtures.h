@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "core/skeleton.h"
-#include "motion/interaction_clip.h"
-#include "robots/robot_model.h"
+#include "duet/core/skeleton.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet::test {
 

@@ -1,4 +1,4 @@
-#include "retarget/gaussian_filter.h"
+#include "duet/retarget/gaussian_filter.h"
 
 #include <gtest/gtest.h>
 

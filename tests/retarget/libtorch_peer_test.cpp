@@ -1,9 +1,9 @@
-#include "retarget/libtorch_peer.h"
+#include "duet/retarget/libtorch_peer.h"
 
 #include <gmock/gmock.h>
 
-#include "core/require.h"
-#include "retarget/pair_solver.h"
+#include "duet/core/require.h"
+#include "duet/retarget/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

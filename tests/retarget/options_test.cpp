@@ -1,4 +1,4 @@
-#include "retarget/options.h"
+#include "duet/retarget/options.h"
 
 #include <gmock/gmock.h>
 
@@ -29,12 +29,16 @@ TEST(PairOptions, DefaultsArePrintedValues) {
 }
 
 TEST(PairOptions, TextFormsRoundTrip) {
-  const std::vector<std::pair<std::string, std::string>> values = {{"w-kin", "0.3"},
+  const std::vector<std::pair<std::string, std::string>> values = {{"mode", "grounded"},
+                                                                   {"w-kin", "0.3"},
                                                                    {"w-con", "1e-05"},
                                                                    {"w-hum", "2"},
                                                                    {"w-temp", "0"},
                                                                    {"w-acceleration", "10"},
                                                                    {"w-pose", "0.5"},
+                                                                   {"w-bone", "1"},
+                                                                   {"w-partner", "0.7"},
+                                                                   {"w-collision", "3"},
                                                                    {"stage1-iterations", "7"},
                                                                    {"stage1-rate", "0.125"},
                                                                    {"stage2-iterations", "0"},
@@ -44,12 +48,16 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"adam-epsilon", "0.001"},
                                                                    {"kin-loss", "mean-norm"},
                                                                    {"contact-reduction", "mean"},
-                                                                   {"contact-blocks", "cross-and-human"},
+                                                                   {"contact-blocks", "cross"},
                                                                    {"root", "per-frame"},
                                                                    {"keypoints", "eleven"},
                                                                    {"filter", "off"},
                                                                    {"adapt-human", "off"},
                                                                    {"kernel", "scalar"},
+                                                                   {"optimizer", "lbfgs"},
+                                                                   {"lbfgs-iterations", "7"},
+                                                                   {"ground", "off"},
+                                                                   {"root-smoothing", "0.3"},
                                                                    {"smpl", "a path.npz"}};
   PairOptions options;
   ASSERT_EQ(values.size(), pair_option_names().size());
@@ -60,7 +68,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
     set_pair_option(options, name, value);
     EXPECT_EQ(pair_option(options, name), value) << name;
   }
-  EXPECT_EQ(options.contact_blocks, ContactBlocks::kCrossAndHuman);
+  EXPECT_EQ(options.contact_blocks, ContactBlocks::kCross);
   EXPECT_EQ(options.keypoints, ContactKeypoints::kEleven);
   EXPECT_EQ(options.kernel, KernelKind::kScalar);
   EXPECT_DOUBLE_EQ(options.weights.kin, 0.3);
@@ -73,7 +81,7 @@ TEST(PairOptions, UnknownNameOrValueListsTheKnownOnes) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "w-kim", "1"); }),
               HasSubstr("'w-kim'"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { static_cast<void>(pair_option(options, "rot")); }),
-              HasSubstr("keypoints"));
+              HasSubstr("root"));
   for (const char* bad : {"", "nan", "inf", "-1", "1x", " 1"}) {
     EXPECT_THAT(thrown_message<std::invalid_argument>([&] { set_pair_option(options, "w-kin", bad); }),
                 HasSubstr("a finite number"))

@@ -1,8 +1,8 @@
-#include "retarget/pair_chain.h"
+#include "duet/retarget/pair_chain.h"
 
 #include <gmock/gmock.h>
 
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

@@ -4,7 +4,7 @@
 // moving the data of the double reference by 1e-7 m changes its own result by 1e-6 to 3e-4 of the objective. Agreement
 // of the gradients is therefore tested with a large epsilon, where the descent is smooth, to rounding; that of the
 // paper's schedule to what its own sensitivity allows.
-#include "retarget/pair_kernel.h"
+#include "duet/retarget/pair_kernel.h"
 
 #include <gmock/gmock.h>
 
@@ -12,8 +12,9 @@
 #include <map>
 #include <thread>
 
-#include "core/require.h"
-#include "retarget/pair.h"
+#include "duet/core/require.h"
+#include "duet/retarget/pair.h"
+#include "duet/retarget/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

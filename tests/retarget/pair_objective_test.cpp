@@ -1,4 +1,4 @@
-#include "retarget/pair_objective.h"
+#include "duet/retarget/pair_objective.h"
 
 #include <gtest/gtest.h>
 

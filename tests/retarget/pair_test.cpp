@@ -1,12 +1,12 @@
-#include "retarget/pair.h"
+#include "duet/retarget/pair.h"
 
 #include <gmock/gmock.h>
 
 #include <ctime>
 #include <limits>
 
-#include "core/require.h"
-#include "retarget/pair_solver.h"
+#include "duet/core/require.h"
+#include "duet/retarget/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 
@@ -264,6 +264,32 @@ TEST(PairTiming, IsNoLongerThanWhatTheThreadSpent) {
   const double begin = spent();
   const PairTiming timing = time_pair(test::random_clip(25, 15, 100.0), test::g1(), options, 3);
   EXPECT_LE(3 * timing.frames * (1.0 / timing.solver + 1.0 / timing.whole), spent() - begin);
+}
+
+// The base of the T1 is its trunk: it starts where the pelvis below it is on the person's.
+TEST(Pair, StartsWithThePelvisOnThePersonsWhereverTheBaseIs) {
+  const auto t1 = load_shared_robot("t1");
+  const InteractionClip clip = test::random_clip(20, 1);
+  const PairProblem problem = make_pair_problem(clip, *t1, {});
+  const PairProblem of_g1 = make_pair_problem(clip, test::g1(), {});
+  ChainPose pose;
+  for (int t = 0; t < problem.frames(); ++t) {
+    const Eigen::Matrix3d R_WB = yaw_rotation(problem.yaw[t]).toRotationMatrix();
+    forward(problem.chain, R_WB, problem.root.col(t), t1->neutral, pose);
+    const Eigen::Vector3d target = problem.targets.at(t, 0);
+    EXPECT_LT((pose.points.col(problem.chain.pair_points[0]) - target).norm(), 1e-12);
+    EXPECT_EQ(of_g1.root.col(t), of_g1.targets.at(t, 0));
+  }
+}
+
+TEST(Pair, ARobotWhoseBaseIsItsTrunkIsRetargeted) {
+  const auto t1 = load_shared_robot("t1");
+  const PairedMotion motion = retarget(test::random_clip(60, 1), *t1);
+  EXPECT_EQ(motion.robot.joint_names, t1->joint_names());
+  for (int j = 0; j < t1->dof(); ++j) {
+    EXPECT_GE(motion.robot.q.row(j).minCoeff(), t1->joints[j].lower);
+    EXPECT_LE(motion.robot.q.row(j).maxCoeff(), t1->joints[j].upper);
+  }
 }
 
 }  // namespace

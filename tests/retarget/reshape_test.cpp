@@ -1,9 +1,9 @@
-#include "retarget/reshape.h"
+#include "duet/retarget/reshape.h"
 
 #include <gmock/gmock.h>
 
-#include "core/npz.h"
-#include "core/require.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

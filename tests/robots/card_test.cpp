@@ -1,5 +1,4 @@
-#include "robots/card.h"
-
+#include "duet/robots/card_reader.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {
@@ -32,7 +31,7 @@ TEST(Card, ReadsEveryKey) {
   ASSERT_EQ(card.joints.size(), 2u);
   EXPECT_EQ(card.joints[0].neutral, 0.5);
   EXPECT_EQ(card.joints[1].neutral, 0.0);
-  EXPECT_EQ(card.joints[1].line, 6);
+  EXPECT_EQ(card.joints[1].place.line, 6);
   EXPECT_EQ(card.frames[0].link, "lower");
   EXPECT_EQ(card.pairs[0].smpl, 0);
   EXPECT_EQ(card.keypoints[0].smpl, 23);
@@ -138,8 +137,8 @@ TEST(CardErrors, Yaml) {
 
 TEST(CardErrors, Keys) {
   EXPECT_EQ(card_error("urdf:", "urfd:"),
-            "c.yaml:2: robot card: unknown key 'urfd': did you mean 'urdf'? Known: name, urdf, base, joints, locked, "
-            "frames, shapes, pairs, keypoints, tracks, self_collision");
+            "c.yaml:2: robot card: unknown key 'urfd': did you mean 'urdf'? Nearest of 25: urdf, arms, name, base, "
+            "legs");
   EXPECT_EQ(card_error("armature: 0.01", "armatur: 0.01"),
             "c.yaml:5: joint 'shoulder': unknown key 'armatur': did you mean 'armature'? Known: name, armature, kp, "
             "kd, neutral, lower, upper, effort, velocity");

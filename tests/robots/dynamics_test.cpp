@@ -1,4 +1,4 @@
-#include "robots/dynamics.h"
+#include "duet/robots/dynamics.h"
 
 #include <Eigen/Cholesky>
 

@@ -7,10 +7,10 @@
 #include <Eigen/Geometry>
 #include <string>
 
-#include "core/file.h"
-#include "core/random.h"
-#include "core/require.h"
-#include "robots/robot_model.h"
+#include "duet/core/file.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/robots/robot_model.h"
 #include "tests/support.h"
 
 namespace duet::test {

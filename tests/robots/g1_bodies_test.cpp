@@ -1,5 +1,5 @@
 // The bodies that published controllers were made for, against the maker's descriptions.
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

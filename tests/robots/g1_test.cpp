@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <map>
 
-#include "core/skeleton.h"
-#include "motion/pickle.h"
-#include "robots/kinematics.h"
-#include "robots/urdf.h"
+#include "duet/core/skeleton.h"
+#include "duet/formats/motion_pickle.h"
+#include "duet/robots/kinematics.h"
+#include "duet/robots/urdf.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

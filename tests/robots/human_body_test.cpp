@@ -1,10 +1,10 @@
-#include "robots/human_body.h"
+#include "duet/robots/human_body.h"
 
 #include <limits>
 #include <map>
 #include <set>
 
-#include "core/skeleton.h"
+#include "duet/core/skeleton.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

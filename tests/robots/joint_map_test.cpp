@@ -1,4 +1,4 @@
-#include "robots/joint_map.h"
+#include "duet/robots/joint_map.h"
 
 #include <gtest/gtest.h>
 
@@ -48,6 +48,14 @@ TEST(JointMap, AMotionOfTheSameJointsInAnotherOrderIsTheSameMotion) {
   EXPECT_EQ(back.joint_names, motion.joint_names);
   EXPECT_EQ(back.q, motion.q);
   EXPECT_EQ(on_body(motion, robot).q, motion.q);
+}
+
+TEST(JointMap, RobotsWithoutAJointInCommonAreRefused) {
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] {
+              JointMap({"Waist", "Left_Hip_Pitch"}, test::g1());
+            }),
+            "expected a motion with joints of robot 'g1' ('left_hip_pitch_joint', ...), found one of 'Waist', ...");
+  EXPECT_NO_THROW(JointMap({}, test::g1()));
 }
 
 }  // namespace

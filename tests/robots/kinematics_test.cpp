@@ -1,4 +1,4 @@
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
 #include <cstdlib>
 

@@ -1,10 +1,10 @@
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 
 #include <cstdlib>
 #include <filesystem>
 #include <thread>
 
-#include "core/share.h"
+#include "duet/core/share.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {
@@ -61,12 +61,23 @@ TEST(RobotModel, DefaultCommandCarriesTheCardsGains) {
       "default command of 'g1': expected 29 joint targets, found 12");
 }
 
-TEST(RobotModel, DigestTellsCardsAndUrdfsApart) {
-  const std::string digest = test::load_small().digest;
-  EXPECT_EQ(digest.size(), 64u);
-  EXPECT_EQ(test::load_small().digest, digest);
-  EXPECT_NE(test::load_small(test::kSmallCard + "# a comment\n").digest, digest);
-  EXPECT_NE(test::load_small(test::kSmallCard, test::kSmallUrdf + "\n").digest, digest);
+TEST(RobotModel, FallsBelowItsCardsHeightOrBeyondItsTilt) {
+  const FallRule rule{0.45, 0.7};
+  RobotState state;
+  state.X_WB.p.z() = 0.75;
+  EXPECT_FALSE(has_fallen(state, rule));
+  state.X_WB.p.z() = 0.44;
+  EXPECT_TRUE(has_fallen(state, rule));
+  EXPECT_FALSE(has_fallen(state, {0.38, 0.7}));
+  state.X_WB.p.z() = 0.75;
+  state.X_WB.R = Eigen::AngleAxisd(std::acos(0.7) + 1e-6, Eigen::Vector3d::UnitX());
+  EXPECT_TRUE(has_fallen(state, rule));
+}
+
+TEST(RobotModel, WhatWasMadeForAnotherIsRefusedByName) {
+  EXPECT_EQ(thrown_message<InputError>([] { require_made_for("t1", g1(), "weights.safetensors"); }),
+            "weights.safetensors: made for 't1', the robot is 'g1'");
+  EXPECT_NO_THROW(require_made_for("g1", g1(), ""));
 }
 
 TEST(LoadRobot, UrdfByPathReplacesTheCards) {

@@ -1,11 +1,11 @@
 // The factor of a humanoid's mass matrix against a dense one.
-#include "robots/tree_factor.h"
+#include "duet/robots/tree_factor.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 
-#include "robots/dynamics.h"
+#include "duet/robots/dynamics.h"
 
 namespace duet {
 namespace {

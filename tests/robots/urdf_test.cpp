@@ -1,9 +1,9 @@
-#include "robots/urdf.h"
+#include "duet/robots/urdf.h"
 
 #include <Eigen/Geometry>
 #include <numbers>
 
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -1,6 +1,6 @@
-#include "robots/xml_nesting.h"
+#include "duet/robots/xml_nesting.h"
 
-#include "robots/urdf.h"
+#include "duet/robots/urdf.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -1,8 +1,8 @@
-#include "robots/yaml_section.h"
+#include "duet/robots/yaml_section.h"
 
 #include <gmock/gmock.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,10 +1,10 @@
-#include "training/batch_mlp.h"
+#include "duet/training/batch_mlp.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "training/normaliser.h"
+#include "duet/training/normaliser.h"
 
 namespace duet {
 namespace {

@@ -3,16 +3,16 @@
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "policies/language.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/policies/language.h"
+#include "duet/training/dstar/demonstrations.h"
+#include "duet/training/dstar/log.h"
+#include "duet/training/dstar/trainer.h"
+#include "duet/training/dstar/windows.h"
 #include "tests/support.h"
 #include "tests/training/fixtures.h"
-#include "training/dstar/demonstrations.h"
-#include "training/dstar/log.h"
-#include "training/dstar/trainer.h"
-#include "training/dstar/windows.h"
 
 namespace duet {
 namespace {

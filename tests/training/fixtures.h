@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "robots/robot_model.h"
+#include "duet/robots/robot_model.h"
 #include "tests/backends/engine_names.h"
 
 namespace duet::test {

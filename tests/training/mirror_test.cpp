@@ -1,9 +1,9 @@
-#include "training/mirror.h"
+#include "duet/training/mirror.h"
 
 #include <gtest/gtest.h>
 
-#include "controllers/wbc_sim/observation.h"
-#include "core/random.h"
+#include "duet/controllers/wbc_sim/observation.h"
+#include "duet/core/random.h"
 #include "tests/training/fixtures.h"
 
 namespace duet {
@@ -44,7 +44,7 @@ RobotState some_state() {
 }
 
 TEST(Mirror, TwiceIsTheIdentity) {
-  for (const Mirror& mirror : {mirror_joints(*g1()), mirror_actor(*g1()), mirror_critic(*g1(), critic_links(*g1()))}) {
+  for (const Mirror& mirror : {mirror_joints(*g1()), mirror_actor(*g1()), mirror_critic(*g1(), g1()->roles.bodies)}) {
     std::vector<float> x(mirror.size()), once(mirror.size()), twice(mirror.size());
     for (size_t i = 0; i < x.size(); ++i) x[i] = static_cast<float>(i) + 0.5F;
     mirror.apply(x, once);
@@ -61,7 +61,7 @@ TEST(Mirror, ObservationsOfMirroredStatesAreMirroredObservations) {
   reference_state.X_WB.p = {0.0, -0.1, 0.74};
   reference_state.X_WB.R = yaw_rotation(-0.2) * Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY());
   const RobotState other_reference = mirrored(reference_state);
-  const std::vector<int> links = critic_links(*g1());
+  const std::vector<int> links = g1()->roles.bodies;
   const Mirror mirror = mirror_critic(*g1(), links);
   const auto observe = [&](const RobotState& robot, const RobotState& wanted) {
     WbcTracker tracker(g1());

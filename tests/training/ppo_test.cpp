@@ -1,11 +1,11 @@
-#include "training/ppo.h"
+#include "duet/training/ppo.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/require.h"
+#include "duet/core/require.h"
+#include "duet/training/distill.h"
 #include "tests/training/fixtures.h"
-#include "training/distill.h"
 
 namespace duet {
 namespace {

@@ -1,12 +1,12 @@
-#include "training/train_wbc.h"
+#include "duet/training/train_wbc.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "core/file.h"
-#include "core/require.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
 #include "tests/training/fixtures.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "training/wbc_environment.h"
+#include "duet/training/wbc_environment.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

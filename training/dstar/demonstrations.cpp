@@ -1,4 +1,4 @@
-#include "training/dstar/demonstrations.h"
+#include "duet/training/dstar/demonstrations.h"
 
 #include <fmt/format.h>
 
@@ -7,12 +7,12 @@
 #include <set>
 #include <sstream>
 
-#include "core/file.h"
-#include "core/json.h"
-#include "core/require.h"
-#include "core/skeleton.h"
-#include "core/text.h"
-#include "nn/stored_values.h"
+#include "duet/core/file.h"
+#include "duet/core/json.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/core/text.h"
+#include "duet/nn/stored_values.h"
 
 namespace duet {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "core/point_tracks.h"
-#include "core/robot_motion.h"
-#include "core/robot_state.h"
-#include "core/task.h"
+#include "duet/core/point_tracks.h"
+#include "duet/core/robot_motion.h"
+#include "duet/core/robot_state.h"
+#include "duet/core/task.h"
 
 namespace duet {
 

@@ -1,11 +1,11 @@
-#include "training/dstar/log.h"
+#include "duet/training/dstar/log.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
 
-#include "core/file.h"
+#include "duet/core/file.h"
 
 namespace duet {
 namespace {

@@ -1,8 +1,8 @@
 // What a training of D-STAR reports: sums between reports, the curve as CSV, and when it is time to print and to save.
 #pragma once
 
-#include "training/dstar/trainer.h"
-#include "training/pace.h"
+#include "duet/training/dstar/trainer.h"
+#include "duet/training/pace.h"
 
 namespace duet {
 

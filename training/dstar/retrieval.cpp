@@ -1,8 +1,8 @@
-#include "training/dstar/retrieval.h"
+#include "duet/training/dstar/retrieval.h"
 
 #include <cmath>
 
-#include "core/require.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

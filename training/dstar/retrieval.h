@@ -1,8 +1,8 @@
 // The library of `retrieval`: windows of demonstrations as they are.
 #pragma once
 
-#include "policies/retrieval.h"
-#include "training/dstar/windows.h"
+#include "duet/policies/retrieval.h"
+#include "duet/training/dstar/windows.h"
 
 namespace duet {
 

@@ -7,10 +7,10 @@
 #include <memory>
 #include <string>
 
-#include "policies/dstar/network.h"
-#include "policies/language.h"
-#include "training/dstar/demonstrations.h"
-#include "training/dstar/windows.h"
+#include "duet/policies/dstar/network.h"
+#include "duet/policies/language.h"
+#include "duet/training/dstar/demonstrations.h"
+#include "duet/training/dstar/windows.h"
 
 namespace duet {
 

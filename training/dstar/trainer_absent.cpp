@@ -1,5 +1,5 @@
-#include "core/require.h"
-#include "training/dstar/trainer.h"
+#include "duet/core/require.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet {
 namespace {

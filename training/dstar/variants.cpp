@@ -1,7 +1,7 @@
 #include <filesystem>
 
-#include "core/names.h"
-#include "training/dstar/trainer.h"
+#include "duet/core/names.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet {
 namespace {

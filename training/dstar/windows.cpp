@@ -1,11 +1,11 @@
-#include "training/dstar/windows.h"
+#include "duet/training/dstar/windows.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "core/skeleton.h"
-#include "policies/language.h"
+#include "duet/core/skeleton.h"
+#include "duet/policies/language.h"
 
 namespace duet {
 namespace {
@@ -178,7 +178,7 @@ void WindowMaker::make(const Window& window, Random& random, WindowBatch& batch,
   }
   encode_plan(anchors, X_WE, *robot_, {batch.plan.col(column).data(), kPlanSize});
   batch.phase[column] = static_cast<int>(entry.phases.at(frame));
-  batch.task[column] = static_cast<int>(entry.task);
+  batch.task[column] = entry.task.index();
   const int paraphrases = static_cast<int>(task_paraphrases(entry.task).size());
   batch.prompt[column] = options_.augment && random.chance(0.5) ? random.below(paraphrases) : -1;
 }

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "core/random.h"
-#include "policies/dstar/features.h"
-#include "training/dstar/demonstrations.h"
+#include "duet/core/random.h"
+#include "duet/policies/dstar/features.h"
+#include "duet/training/dstar/demonstrations.h"
 
 namespace duet {
 

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "training/dstar/torch/blas.h"
-#include "training/dstar/torch/units.h"
-#include "training/dstar/trainer.h"
+#include "duet/training/dstar/torch/blas.h"
+#include "duet/training/dstar/torch/units.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet {
 

@@ -1,11 +1,11 @@
-#include "training/dstar/torch/blas.h"
+#include "duet/training/dstar/torch/blas.h"
 
 #include <dlfcn.h>
 #include <torch/torch.h>
 
 #include <filesystem>
 
-#include "training/dstar/trainer.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet {
 

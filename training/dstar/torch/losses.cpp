@@ -1,6 +1,6 @@
-#include "training/dstar/torch/losses.h"
+#include "duet/training/dstar/torch/losses.h"
 
-#include "robots/kinematics.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <memory>
 
-#include "training/dstar/trainer.h"
+#include "duet/training/dstar/trainer.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "training/dstar/torch/model.h"
+#include "duet/training/dstar/torch/model.h"
 
 #include <fmt/format.h>
 

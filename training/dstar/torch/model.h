@@ -7,7 +7,7 @@
 #include <map>
 #include <string>
 
-#include "policies/dstar/network.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 

@@ -1,4 +1,4 @@
-#include "training/dstar/trainer.h"
+#include "duet/training/dstar/trainer.h"
 
 #include <fmt/format.h>
 
@@ -7,15 +7,15 @@
 #include <filesystem>
 #include <numbers>
 
-#include "core/require.h"
-#include "nn/dense_kernels.h"
-#include "training/checkpoint.h"
-#include "training/dstar/log.h"
-#include "training/dstar/torch/blas.h"
-#include "training/dstar/torch/losses.h"
-#include "training/dstar/torch/units.h"
-#include "training/dstar/torch/weight_block.h"
-#include "training/threads.h"
+#include "duet/core/require.h"
+#include "duet/nn/dense_kernels.h"
+#include "duet/training/checkpoint.h"
+#include "duet/training/dstar/log.h"
+#include "duet/training/dstar/torch/blas.h"
+#include "duet/training/dstar/torch/losses.h"
+#include "duet/training/dstar/torch/units.h"
+#include "duet/training/dstar/torch/weight_block.h"
+#include "duet/training/threads.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "training/dstar/torch/units.h"
+#include "duet/training/dstar/torch/units.h"
 
 #include <algorithm>
 
@@ -27,9 +27,9 @@ Units::Units(const WindowStatistics& statistics, const LanguageEncoder& encoder)
       frame_deviation_(vector_tensor(statistics.frame_deviation)),
       mean_(vector_tensor(statistics.plan_mean).view({kAnchors, kAnchorSize})),
       deviation_(vector_tensor(statistics.plan_deviation).view({kAnchors, kAnchorSize})) {
-  for (const Task task : kTasks) {
+  for (const Task task : kPaperTasks) {
     std::vector<std::vector<float>> rows = {encoder.embed(task_prompt(task))};
-    for (const std::string& text : task_paraphrases(task)) rows.push_back(encoder.embed(text));
+    for (const std::string_view text : task_paraphrases(task)) rows.push_back(encoder.embed(text));
     prompts_.push_back(std::move(rows));
   }
 }

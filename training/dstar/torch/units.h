@@ -5,9 +5,9 @@
 
 #include <vector>
 
-#include "policies/language.h"
-#include "training/dstar/torch/model.h"
-#include "training/dstar/windows.h"
+#include "duet/policies/language.h"
+#include "duet/training/dstar/torch/model.h"
+#include "duet/training/dstar/windows.h"
 
 namespace duet {
 

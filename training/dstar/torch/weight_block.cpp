@@ -1,9 +1,9 @@
-#include "training/dstar/torch/weight_block.h"
+#include "duet/training/dstar/torch/weight_block.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "core/random.h"
+#include "duet/core/random.h"
 
 namespace duet {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "training/dstar/torch/model.h"
+#include "duet/training/dstar/torch/model.h"
 
 namespace duet {
 

@@ -1,0 +1,28 @@
+// One episode of a suite: its scene, its setup, and the row that it leaves.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "duet/backends/scene.h"
+#include "duet/bench/episode.h"
+#include "duet/policies/registry.h"
+#include "duet/rollout/act_episode.h"
+
+namespace duet {
+
+std::string utc_now();  // "2026-11-23T15:00:00Z"
+
+// The scene with the perturbation's ground and robot; `robot` is the controller's nominal one.
+Scene episode_scene(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot);
+
+// One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`, but StorageError (a full
+// disk): it says nothing of the episode. Without `policy` the suite's own is loaded for this episode alone; without
+// `stop_asked` signals alone stop it.
+RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot);
+EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
+                       const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "",
+                       const PolicyMaker& policy = {}, const std::function<bool()>& stop_asked = {});
+
+}  // namespace duet

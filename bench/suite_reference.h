@@ -1,0 +1,44 @@
+// The key `reference` of a suite: roots that move by command in the place of clips and policies. Does the robot walk,
+// how fast, does it fall: nobody else is there, and no clip gives the episode its length.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "duet/controllers/controller.h"
+#include "duet/robots/yaml_section.h"
+#include "duet/rollout/reference_stream.h"
+
+namespace duet {
+
+// In rows the policy's name; their task is kWalkRows (results/walk_table.h).
+inline constexpr const char* kVelocityPolicy = "velocity";
+
+struct SuiteReference {
+  std::string name;                                    // in rows the clip; once per suite
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // forward, to the left [m/s], yaw rate [rad/s], in the heading
+  double seconds = 14.0;                               // of the episode
+  double begin = 0.0, end = 14.0;                      // when the command holds; else the root stands [s]
+  double pause = 0.0;                                  // above 0: on and off in turn, each for so long [s]
+  bool moves_upper_body = false;                       // between poses that are drawn for the episode
+
+  // Whether the command holds from the first tick to the last.
+  [[nodiscard]] bool constant() const { return begin <= 0.0 && end >= seconds && pause <= 0.0; }
+};
+
+// A mapping or a list of them. Throws InputError: file, line, expected, found.
+std::vector<SuiteReference> read_references(const YamlSection& suite, const std::string& file);
+std::string references_yaml(const std::vector<SuiteReference>& references);  // "" where there are none
+
+// The reference by its name; throws std::invalid_argument with those that are there.
+const SuiteReference& reference_of(const std::vector<SuiteReference>& references, const std::string& name);
+
+StreamOptions stream_options(const SuiteReference& reference);
+
+// A controller that takes a velocity by its option `command` gets the reference's, unless the suite gives it one.
+bool takes_command(const std::string& controller);
+ControllerOptions with_command(const std::string& controller, ControllerOptions options,
+                               const SuiteReference& reference);
+
+}  // namespace duet

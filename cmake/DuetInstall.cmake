@@ -1,0 +1,63 @@
+# What `cmake --install` puts below a prefix: headers, the libraries duet::<room> and duet::duet, engines, shipped files, the
+# program, and the packages that CMake and pkg-config find (docs/using-the-library.md).
+include(CMakePackageConfigHelpers)
+
+# Rooms that others may link; training and bench are the program's own.
+set(rooms ${DUET_ROOMS})
+list(REMOVE_ITEM rooms training bench)
+set(libraries ${rooms})
+list(TRANSFORM libraries PREPEND duet_)
+
+add_library(duet_library INTERFACE)
+target_link_libraries(duet_library INTERFACE ${libraries})
+set_target_properties(duet_library PROPERTIES EXPORT_NAME duet)
+add_library(duet::duet ALIAS duet_library)
+
+install(TARGETS ${libraries} duet_library duet_options EXPORT duetTargets
+        ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/duet)
+install(EXPORT duetTargets NAMESPACE duet:: DESTINATION ${package} COMPONENT library)
+
+# Headers that only files of their own room include: an engine's adapter, kernels, steps of one implementation.
+set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|motion/synthesis)/|_parts\\.h$|kernels?_body\\.h$|/(kernel_(types|frame|ground)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
+foreach(room IN LISTS rooms)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${room}/*.h)
+  list(FILTER headers EXCLUDE REGEX "${internal}")
+  foreach(header IN LISTS headers)
+    cmake_path(GET header PARENT_PATH folder)
+    install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/duet/${folder} COMPONENT library)
+  endforeach()
+endforeach()
+
+# What share_file finds (core/share.h): the same folders as in the tree.
+foreach(folder robots controllers policies metrics profiles suites)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${folder} DESTINATION ${CMAKE_INSTALL_DATADIR}/duet COMPONENT share
+          FILES_MATCHING PATTERN "*.yaml" PATTERN "*.urdf" PATTERN "*.safetensors" PATTERN "test_split.txt")
+endforeach()
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT share)
+
+get_property(engines GLOBAL PROPERTY DUET_ENGINE_TARGETS)
+if(engines)
+  install(TARGETS ${engines} LIBRARY DESTINATION ${DUET_ENGINES_FOLDER} COMPONENT program)
+endif()
+if(TARGET duet)
+  install(TARGETS duet RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+endif()
+
+set(DUET_INSTALLED_ROOMS ${rooms})
+configure_package_config_file(cmake/duetConfig.cmake.in ${PROJECT_BINARY_DIR}/package/duetConfig.cmake
+                              INSTALL_DESTINATION ${package})
+# Until 1.0 each minor version may break what the one before it promised.
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/package/duetConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/package/duetConfig.cmake ${PROJECT_BINARY_DIR}/package/duetConfigVersion.cmake
+              cmake/duet_engine_module.cmake cmake/duet_location.cpp.in
+        DESTINATION ${package} COMPONENT library)
+
+# Static libraries: whoever links by pkg-config needs all that they need, in the order of the rooms from above.
+set(ordered ${libraries})
+list(REVERSE ordered)
+list(TRANSFORM ordered PREPEND -l)
+list(JOIN ordered " " DUET_LIBRARY_FLAGS)
+file(RELATIVE_PATH DUET_UP /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+configure_file(cmake/duet.pc.in ${PROJECT_BINARY_DIR}/package/duet.pc @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/package/duet.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT library)

@@ -1,0 +1,35 @@
+#include "duet/core/parallel.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+
+namespace duet {
+
+void parallel_for_each(int count, int threads, const std::function<void(int)>& work) {
+  // Indices are handed out in order, so that a stopped run has finished the first episodes and not scattered ones.
+  std::atomic<int> next{0};
+  tbb::task_arena arena(threads);
+  arena.execute([&] {
+    tbb::parallel_for(
+        0, std::min(threads, count),
+        [&](int) {
+          for (int i = next++; i < count; i = next++) {
+            try {
+              work(i);
+            } catch (...) {
+              next = count;
+              throw;
+            }
+          }
+        },
+        tbb::static_partitioner());
+  });
+}
+
+int default_threads() { return std::max(1U, std::thread::hardware_concurrency()); }
+
+}  // namespace duet

@@ -1,0 +1,21 @@
+// The part of Python's pickle format (protocols 2 to 5) that dicts of NumPy arrays, numbers, strings and lists use. A
+// file builds passive nodes and nothing else: no class is ever looked up, and no call made; the names that its flavour
+// knows stand for arrays. Work and memory are linear in the size of the file; nothing recurses. Thread-safe.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/core/pickle_node.h"
+
+namespace duet {
+
+// `bytes` must outlive the result. Throws InputError naming file, byte offset, expected and found.
+Pickle parse_pickle(std::string_view bytes, const std::string& name, PickleFlavour flavour = PickleFlavour::kNumPy);
+
+// Values of an array or NumPy scalar of f4, f8, i4 or i8, in C order. `what` stands in messages. Throws InputError for
+// another node or type, or a size that does not match the shape.
+std::vector<double> array_values(const Pickle& pickle, const PickleNode& node, const std::string& what);
+
+}  // namespace duet

@@ -1,0 +1,12 @@
+// Names that stand in tables, keys and file names: letters, digits and _ . + - only.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace duet {
+
+bool is_plain_name(std::string_view name);
+std::string plain_name_message(std::string_view name);  // the sentence for one that is not
+
+}  // namespace duet

@@ -1,0 +1,129 @@
+#include "duet/formats/robot_motion_format.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/formats/pickle_formats.h"
+#include "duet/formats/qpos_formats.h"
+#include "duet/formats/table_formats.h"
+#include "duet/formats/tracking_formats.h"
+
+namespace duet {
+namespace {
+
+std::vector<RobotMotionFormat> all_formats() {
+  std::vector<RobotMotionFormat> formats;
+  for (const auto& part : {pickle_formats(), tracking_formats(), qpos_formats(), table_formats()})
+    formats.insert(formats.end(), part.begin(), part.end());
+  return formats;
+}
+
+const RobotMotionFormat& format_of(const MotionSource& source, const std::string& name) {
+  if (!name.empty()) {
+    const RobotMotionFormat& format = robot_motion_format(name);
+    if (format.container != source.container)
+      throw InputError(fmt::format("'{}': format '{}' is {}, found {}", source.path, name, to_string(format.container),
+                                   to_string(source.container)));
+    return format;
+  }
+  for (const RobotMotionFormat& format : robot_motion_formats())
+    if (format.recognises(source)) return format;
+  std::vector<std::string> known;
+  for (const RobotMotionFormat& format : robot_motion_formats())
+    if (format.container == source.container) known.push_back(fmt::format("{} ({})", format.name, format.holds));
+  throw InputError(fmt::format("'{}': {} of none of the known robot motions: {}", source.path,
+                               to_string(source.container), fmt::join(known, "; ")));
+}
+
+void require_writable(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format) {
+  require(format.write != nullptr, fmt::format("format '{}' is read, not written", format.name));
+  require(motion.joint_names == robot.joint_names(),
+          fmt::format("format '{}': expected the joints of robot '{}' in its order, found {}", format.name, robot.name,
+                      fmt::join(motion.joint_names, ", ")));
+  validate(motion, fmt::format("motion to be written as '{}'", format.name));
+}
+
+std::string layout_text(const RobotMotionFormat& format) {
+  const MotionLayout& layout = format.layout;
+  return fmt::format("{}, {}, {}, {}", layout.turns ? "turns xyz" : to_string(layout.quaternion),
+                     to_string(layout.joints), to_string(layout.angles),
+                     layout.metres == 1.0 ? "m" : fmt::format("{:g} m", layout.metres));
+}
+
+}  // namespace
+
+std::span<const RobotMotionFormat> robot_motion_formats() {
+  static const std::vector<RobotMotionFormat> formats = all_formats();
+  return formats;
+}
+
+std::vector<std::string> robot_motion_format_names() {
+  std::vector<std::string> names;
+  for (const RobotMotionFormat& format : robot_motion_formats()) names.emplace_back(format.name);
+  return names;
+}
+
+const RobotMotionFormat& robot_motion_format(std::string_view name) {
+  for (const RobotMotionFormat& format : robot_motion_formats())
+    if (format.name == name) return format;
+  throw std::invalid_argument(unknown_name_message("robot motion format", name, robot_motion_format_names()));
+}
+
+RobotMotionFile read_robot_motion(const MotionSource& source, const RobotModel& robot,
+                                  const RobotMotionOptions& options, const std::string& format) {
+  const RobotMotionFormat& row = format_of(source, format);
+  RobotMotionFile file = interpret(row.read(source, robot, options), row.layout, robot, options);
+  file.format = row.name;
+  file.evidence.insert(file.evidence.begin(), fmt::format("format: {} ({}): {}", row.name,
+                                                          format.empty() ? "by its content" : "as told", row.about));
+  return file;
+}
+
+RobotMotionFile read_robot_motion(const std::string& path, const RobotModel& robot, const RobotMotionOptions& options,
+                                  const std::string& format) {
+  return read_robot_motion(open_motion_source(path), robot, options, format);
+}
+
+double written_rate(const RobotMotionFormat& format, double rate_hz, const RobotMotionWriting& writing) {
+  if (writing.rate_hz) return *writing.rate_hz;
+  return format.holds_rate || format.layout.rate_hz == 0.0 ? rate_hz : format.layout.rate_hz;
+}
+
+MotionFiles robot_motion_files(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format,
+                               const RobotMotionWriting& writing) {
+  require_writable(motion, robot, format);
+  const double rate_hz = written_rate(format, motion.rate_hz, writing);
+  require(rate_hz >= kLowestRate && rate_hz <= kHighestRate,
+          fmt::format("format '{}': expected a rate of {} to {} Hz, found {}", format.name, kLowestRate, kHighestRate,
+                      rate_hz));
+  const RobotMotion written = rate_hz == motion.rate_hz ? motion : resample(motion, rate_hz);
+  require(written.frames() >= 2, fmt::format("format '{}': expected at least 2 frames at {} Hz, found {}", format.name,
+                                             rate_hz, written.frames()));
+  return format.write(written, robot, writing);
+}
+
+void write_robot_motion(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format,
+                        const std::string& path, const RobotMotionWriting& writing) {
+  const MotionFiles files = robot_motion_files(motion, robot, format, writing);
+  for (const auto& [name, content] : files) write_file(name.empty() ? path : fmt::format("{}/{}", path, name), content);
+}
+
+std::string robot_motion_table() {
+  std::string table =
+      "| name | what | files hold | quaternion, order, angles, length as documented | rate [Hz] | written | looked up "
+      "in; licence |\n|---|---|---|---|---|---|---|\n";
+  for (const RobotMotionFormat& format : robot_motion_formats())
+    table += fmt::format("| `{}` | {} | {} | {} | {} | {} | {}; {} |\n", format.name, format.about, format.holds,
+                         layout_text(format),
+                         format.layout.rate_hz == 0.0 ? "inside"
+                         : format.holds_rate          ? fmt::format("inside, else {:g}", format.layout.rate_hz)
+                                                      : fmt::format("{:g}", format.layout.rate_hz),
+                         format.write != nullptr ? "yes" : "no", format.evidence, format.licence);
+  return table;
+}
+
+}  // namespace duet

@@ -1,0 +1,27 @@
+// How a retargeted motion stands and moves, beside the 18 metrics: soles over the floor, skating, bodies in each other,
+// the partner's bones, peaks of the joints, limits, the base's lean. What the supplement does not ask and physics does.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "duet/motion/paired_motion.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+// By catalogue name; NaN where undefined (no foot stands, a robot without soles).
+//   sole_height, sole_height_max  [m]      distance of the middle of a sole from the floor z = 0 while the person's
+//   foot
+//                                          stands (motion/foot_contact.h): median and largest
+//   foot_skate, foot_skate_max    [m/s]    horizontal speed of the middle of a sole meanwhile: mean and 99th percentile
+//   penetration, penetration_max  [m]      depth of the robot's shapes in the partner's capsules, but for hands and
+//                                          forearms of the two, which are meant to meet: mean over frames and largest
+//   self_penetration_max          [m]      of the pairs of shapes that the card lists
+//   bone_change_max               [m]      of the partner's arm bones against the source, any frame
+//   joint_speed_max               [rad/s]  joint_acceleration_max [rad/s^2] of any joint
+//   limit_violations              [1]      frames and joints outside the limits by more than 1e-9 rad
+//   root_roll_max, root_tilt_max  [rad]    of the base: sideways, and between its z axis and the vertical
+std::map<std::string, double> grounding_metrics(const PairedMotion& motion, const RobotModel& robot);
+
+}  // namespace duet

@@ -1,0 +1,277 @@
+#include "duet/motion/people/source_clip.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/motion/people/joint_gaps.h"
+#include "duet/motion/people/people_detection.h"
+#include "duet/motion/phase_proposal.h"
+#include "duet/motion/plausibility.h"
+
+namespace duet {
+namespace {
+
+constexpr double kSlowest = 0.01, kFastest = 1e5;  // [Hz]
+constexpr double kLevelArmSine = 0.34;             // arms of a T pose are within 20 degrees of level
+constexpr double kStraightArmShare = 0.95;         // shoulder to wrist, of the arm's length
+constexpr double kTPoseJump = 5.0,
+                 kTPoseJumpMetres = 0.08;  // first step after a T pose: in steps that follow, at least
+
+[[noreturn]] void refuse(const RawPeople& people, const std::string& fault) {
+  throw InputError(fmt::format("'{}': {}", shown(people.name, kShownSentence), fault));
+}
+
+void check_sizes(const RawPeople& people) {
+  require(people.layout != nullptr, "people without a joint layout");
+  const auto columns = static_cast<int>(people.layout->names.size());
+  for (const PointTracks& joints : people.joints)
+    if (joints.points() != columns)
+      refuse(people, fmt::format("expected the {} joints of '{}', found {}", columns, shown(people.layout->name),
+                                 joints.points()));
+  const int a = people.joints[0].frames(), b = people.joints[1].frames();
+  if (a != b) refuse(people, fmt::format("person A has {} frames and person B {}: expected the same", a, b));
+  if (a < 2) refuse(people, fmt::format("expected at least 2 frames, found {}", a));
+  for (const auto& rotations : people.rotations)
+    if (!rotations.empty() && rotations.size() != static_cast<std::size_t>(a) * kSmplJoints)
+      refuse(people,
+             fmt::format("expected {} rotations (frames x 24) or none, found {}", a * kSmplJoints, rotations.size()));
+  if (!people.object.empty() && people.object.size() != static_cast<std::size_t>(a))
+    refuse(people, fmt::format("the object has {} poses and the people {} frames", people.object.size(), a));
+}
+
+PeopleFinding<double> find_rate_of(const RawPeople& people, const PeopleOptions& options) {
+  const double rate_hz = options.rate_hz.value_or(people.rate_hz);
+  if (!options.rate_hz && people.rate_hz == 0.0) refuse(people, "the file does not say its rate; state the rate");
+  if (!(rate_hz >= kSlowest && rate_hz <= kFastest))
+    refuse(people, fmt::format("a rate of {} Hz is out of range ({:g} to {:g} Hz)", rate_hz, kSlowest, kFastest));
+  const std::string file =
+      people.rate_hz == 0.0 ? "; the file does not say" : fmt::format("; the file: {:g} Hz", people.rate_hz);
+  return {rate_hz, fmt::format("rate: {:g} Hz{}", rate_hz, options.rate_hz ? " (as told" + file + ")" : "")};
+}
+
+SmplFrame frame_in(const RawPeople& people, std::size_t who, int t, const WorldOfFile& world) {
+  PointTracks moved(1, people.joints[who].points());
+  moved.frame(0) = (world.M * people.joints[who].frame(t)).colwise() + world.p;
+  SmplFrame smpl;
+  make_smpl(*people.layout, std::as_const(moved).frame(0), true, smpl);
+  return smpl;
+}
+
+bool has_t_pose(const RawPeople& people, std::size_t who, const WorldOfFile& world) {
+  if (people.joints[who].frames() < 4) return false;
+  const SmplFrame first = frame_in(people, who, 0, world), second = frame_in(people, who, 1, world),
+                  third = frame_in(people, who, 2, world);
+  for (const auto& [shoulder, elbow, wrist] :
+       {std::array{kLeftShoulder, kLeftElbow, kLeftWrist}, std::array{kRightShoulder, kRightElbow, kRightWrist}}) {
+    const Eigen::Vector3d arm = first.col(wrist) - first.col(shoulder);
+    const double length =
+        (first.col(elbow) - first.col(shoulder)).norm() + (first.col(wrist) - first.col(elbow)).norm();
+    if (std::abs(arm.z()) > kLevelArmSine * arm.norm() || arm.norm() < kStraightArmShare * length) return false;
+  }
+  const double jump = (second - first).colwise().norm().maxCoeff();
+  return jump > kTPoseJumpMetres && jump > kTPoseJump * (third - second).colwise().norm().maxCoeff();
+}
+
+PeopleFinding<bool> find_t_pose_of(const RawPeople& people, const WorldOfFile& world, const PeopleOptions& options) {
+  if (options.drop_t_pose)
+    return {*options.drop_t_pose, *options.drop_t_pose ? "frame 0 dropped (as told)" : "frame 0 kept (as told)"};
+  const bool in_a = has_t_pose(people, 0, world), in_b = has_t_pose(people, 1, world);
+  if (in_a != in_b)
+    refuse(people,
+           fmt::format("frame 0 of person {} is an added T pose, that of person {} is not: state whether to drop it",
+                       in_a ? "A" : "B", in_a ? "B" : "A"));
+  return {in_a, in_a ? "frame 0 dropped: an added T pose (straight horizontal arms, then a jump)"
+                     : "frame 0 kept: not an added T pose"};
+}
+
+// The way from the file to the clip.
+struct Plan {
+  WorldOfFile world;
+  bool mirrored = false;
+  double metres_per_unit = 1.0;
+  Axis up = Axis::kPlusZ;
+  double rate_hz = 0.0;
+  int first = 0;
+  int frames = 0;  // of the clip
+  double output_rate_hz = 50.0;
+};
+
+// Axes, mirror, level and floor, one after the other: each looks at people in the world that the ones before made.
+void find_world(const RawPeople& people, const PeopleSamples& samples, const PeopleOptions& options, Plan& plan,
+                std::vector<std::string>& evidence) {
+  const SampledPeople raw = samples.in(plan.world, false);
+  const PeopleFinding<double> unit = find_unit(people, raw, options);
+  const PeopleFinding<Axis> up = find_up(people, raw, options);
+  plan.metres_per_unit = unit.value;
+  plan.up = up.value;
+  plan.world.M = unit.value * rotation_of(up.value);
+  const PeopleFinding<bool> mirror =
+      find_mirror(samples.in(plan.world, false), samples.faces_in(plan.world), people.layout->has_toes(), options);
+  plan.mirrored = mirror.value;
+  if (mirror.value) plan.world.M.row(1) *= -1.0;
+  const PeopleFinding<Eigen::Matrix3d> level = find_level(people, samples.in(plan.world, true), options);
+  plan.world.M = level.value * plan.world.M;
+  const PeopleFinding<double> floor = find_floor(samples.in(plan.world, true), options);
+  plan.world.p.z() += floor.value;
+  for (const std::string& sentence : {unit.sentence, up.sentence, mirror.sentence, level.sentence, floor.sentence})
+    evidence.push_back(sentence);
+}
+
+Plan plan_of(const RawPeople& people, const PeopleOptions& options, std::vector<std::string>& evidence) {
+  require(std::isfinite(options.output_rate_hz) && options.output_rate_hz > 0.0,
+          fmt::format("import: expected a positive output rate, found {} Hz", options.output_rate_hz));
+  Plan plan;
+  plan.output_rate_hz = options.output_rate_hz;
+  find_world(people, PeopleSamples(people, people.joints[0].frames() > 4 ? 1 : 0), options, plan, evidence);
+  const PeopleFinding<double> rate = find_rate_of(people, options);
+  const PeopleFinding<bool> t_pose = find_t_pose_of(people, plan.world, options);
+  plan.rate_hz = rate.value;
+  plan.first = t_pose.value ? 1 : 0;
+  const int frames = people.joints[0].frames() - plan.first;
+  plan.frames = frames < 1 ? 0 : resampled_frames(frames, plan.rate_hz, plan.output_rate_hz);
+  if (plan.frames < 2)
+    refuse(people, fmt::format("{} frames at {:g} Hz are fewer than 2 frames at {:g} Hz", frames, plan.rate_hz,
+                               plan.output_rate_hz));
+  evidence.push_back(t_pose.sentence);
+  evidence.push_back(fmt::format("{}; resampled: {} frames -> {} frames at {:g} Hz", rate.sentence, frames, plan.frames,
+                                 plan.output_rate_hz));
+  return plan;
+}
+
+// A rotation of the file's axes in W's, from SMPL's rest axes (left, up, forward) to those of docs/conventions.md
+// (forward, left, up).
+Eigen::Quaterniond rotation_in_world(const Eigen::Quaterniond& R_FJ, const Eigen::Quaterniond& R_WF) {
+  Eigen::Matrix3d R_JB;
+  R_JB << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  return (R_WF * R_FJ * Eigen::Quaterniond(R_JB)).normalized();
+}
+
+Eigen::Quaterniond rotation_of(const Plan& plan) {
+  return Eigen::Quaterniond(Eigen::Matrix3d(plan.world.M / plan.metres_per_unit)).normalized();
+}
+
+HumanMotion motion_of(const RawPeople& people, std::size_t who, const Plan& plan) {
+  const PointTracks& source = people.joints[who];
+  const std::vector<Eigen::Quaterniond>& rotations = people.rotations[who];
+  HumanMotion motion{.rate_hz = plan.output_rate_hz, .joints = PointTracks(plan.frames, kSmplJoints), .rotations = {}};
+  const bool turns = !rotations.empty() && !plan.mirrored;
+  if (turns) motion.rotations.reserve(static_cast<std::size_t>(plan.frames) * kSmplJoints);
+  const Eigen::Quaterniond R_WF = plan.mirrored ? Eigen::Quaterniond::Identity() : rotation_of(plan);
+  PointTracks columns(1, source.points());
+  for (int t = 0; t < plan.frames; ++t) {
+    const FrameBetween at = frame_between(t * (plan.rate_hz / plan.output_rate_hz), source.frames() - plan.first);
+    const int frame = plan.first + at.frame, next = at.part > 0.0 ? frame + 1 : frame;
+    PointTracks::Frame moved = columns.frame(0);
+    if (at.part > 0.0)
+      moved.noalias() = plan.world.M * (source.frame(frame) + at.part * (source.frame(next) - source.frame(frame)));
+    else
+      moved.noalias() = plan.world.M * source.frame(frame);
+    moved.colwise() += plan.world.p;
+    make_smpl(*people.layout, std::as_const(columns).frame(0), true, motion.joints.frame(t));
+    for (int j = 0; j < (turns ? kSmplJoints : 0); ++j) {
+      const Eigen::Quaterniond& R = rotations[static_cast<std::size_t>(frame) * kSmplJoints + j];
+      const Eigen::Quaterniond& R_next = rotations[static_cast<std::size_t>(next) * kSmplJoints + j];
+      motion.rotations.push_back(rotation_in_world(at.part > 0.0 ? R.slerp(at.part, R_next) : R, R_WF));
+    }
+  }
+  return motion;
+}
+
+std::vector<Pose> object_of(const RawPeople& people, const Plan& plan) {
+  std::vector<Pose> object;
+  if (people.object.empty() || plan.mirrored) return object;
+  const Eigen::Quaterniond R_WF = rotation_of(plan);
+  for (int t = 0; t < plan.frames; ++t) {
+    const FrameBetween at =
+        frame_between(t * (plan.rate_hz / plan.output_rate_hz), people.joints[0].frames() - plan.first);
+    const Pose& before = people.object[plan.first + at.frame];
+    const Pose X_FO = at.part > 0.0 ? interpolate(before, people.object[plan.first + at.frame + 1], at.part) : before;
+    object.push_back({(R_WF * X_FO.R).normalized(), plan.world.M * X_FO.p + plan.world.p});
+  }
+  return object;
+}
+
+Phases phases_of(const RawPeople& people, const Plan& plan, const InteractionClip& clip, std::string& sentence) {
+  if (!people.phases) {
+    const Phases phases = propose_phases(clip.a, clip.b, clip.task);
+    sentence =
+        fmt::format("phases: act [{}, {}) of {} frames (proposed)", phases.act_begin, phases.act_end, clip.frames());
+    return phases;
+  }
+  const auto moved = [&](int frame) {
+    return static_cast<int>(std::lround((frame - plan.first) * plan.output_rate_hz / plan.rate_hz));
+  };
+  const int begin = std::clamp(moved(people.phases->act_begin), 0, clip.frames() - 1);
+  const int end = std::clamp(moved(people.phases->act_end), begin + 1, clip.frames());
+  sentence = fmt::format("phases: act [{}, {}) of {} frames (the file's)", begin, end, clip.frames());
+  return {.act_begin = begin, .act_end = end};
+}
+
+Task task_for(const RawPeople& people, const PeopleOptions& options) {
+  if (options.task) return *options.task;
+  if (people.task) return *people.task;
+  const auto label = people.source.find("label");
+  if (label == people.source.end()) refuse(people, "nothing says which task it is; state the task");
+  refuse(people, fmt::format("its label '{}' is none of the tasks; state the task", shown(label->second)));
+}
+
+std::map<std::string, std::string> provenance(const RawPeople& people, const Plan& plan) {
+  std::map<std::string, std::string> source = people.source;
+  source["skeleton"] = people.layout->name;
+  source["metres_per_unit"] = fmt::format("{}", plan.metres_per_unit);
+  source["source_rate_hz"] = fmt::format("{}", plan.rate_hz);
+  source["first_frame"] = fmt::format("{}", plan.first);
+  source["up"] = std::string(to_string(plan.up));
+  if (plan.mirrored) source["mirrored"] = "true";
+  if (!people.phases) source["phases"] = "proposed";
+  return source;
+}
+
+void judge(const RawPeople& people, const InteractionClip& clip, std::vector<std::string>& evidence) {
+  const Plausibility found = judge_people(clip);
+  if (!found.faults.empty()) refuse(people, found.faults.front());
+  for (const std::string& sentence : found.oddities) evidence.push_back("not as expected: " + sentence);
+}
+
+}  // namespace
+
+SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
+  check_sizes(given);
+  SourceClip result;
+  result.evidence = given.evidence;
+  const Task task = task_for(given, options);
+  std::optional<RawPeople> filled;
+  if (const std::string sentence = fill_gaps(given, options.rate_hz.value_or(given.rate_hz), filled); !sentence.empty())
+    result.evidence.push_back(sentence);
+  const RawPeople& people = filled ? *filled : given;
+  try {
+    const Plan plan = plan_of(people, options, result.evidence);
+    InteractionClip& clip = result.clip;
+    clip.id = people.id;
+    clip.task = task;
+    clip.a = motion_of(people, 0, plan);
+    clip.b = motion_of(people, 1, plan);
+    if (plan.mirrored && !people.rotations[0].empty())
+      result.evidence.emplace_back("rotations: left out, since the world is reflected");
+    clip.phases = {.act_begin = 0, .act_end = plan.frames};
+    validate(clip);
+    std::string sentence;
+    clip.phases = phases_of(people, plan, clip, sentence);
+    result.evidence.push_back(sentence);
+    clip.source = provenance(people, plan);
+    if (filled) clip.source["interpolated"] = "true";
+    result.object = object_of(people, plan);
+    judge(people, clip, result.evidence);
+    set_reactor(clip, options.reactor.value_or(people.reactor.value_or(Person::kB)));
+  } catch (const std::invalid_argument& error) {
+    refuse(people, error.what());
+  }
+  return result;
+}
+
+}  // namespace duet

@@ -1,0 +1,27 @@
+// Numbers of an ONNX file that lie in files beside it ("external data"). A model comes from others: it names files of
+// its own folder alone. Internal to nn/. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace duet {
+
+struct ExternalPlace {
+  std::string location;                // of the file, from the model's folder
+  std::int64_t offset = 0;             // [bytes]
+  std::optional<std::int64_t> length;  // [bytes]; to the end of the file where none is given
+};
+
+inline constexpr std::int64_t kMostExternalBytes = std::int64_t{1} << 30;  // of one tensor
+
+// What is wrong with a location, as the end of a sentence; empty where nothing is: it is relative, without "..", and
+// what it leads to, links followed, is a file of `folder` or below it.
+std::string location_fault(const std::string& folder, const std::string& location);
+
+// Those bytes. Throws InputError beginning with `where` ("'net.onnx': constant 'W'"): a location with a fault, a file
+// that is not there or shorter than is said, a tensor of more than kMostExternalBytes.
+std::string read_external(const std::string& folder, const ExternalPlace& place, const std::string& where);
+
+}  // namespace duet

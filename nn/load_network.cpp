@@ -1,0 +1,96 @@
+#include "duet/nn/load_network.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/nn/external_data.h"
+#include "duet/nn/mlp_file.h"
+#include "duet/nn/network_engines.h"
+#include "duet/nn/onnx_network.h"
+#include "duet/nn/torch_script.h"
+
+namespace duet {
+namespace {
+
+class MlpNetwork final : public Network {
+ public:
+  explicit MlpNetwork(Mlp mlp)
+      : mlp_(std::move(mlp)), runner_(mlp_), inputs_{{"input", mlp_.inputs()}}, outputs_{{"output", mlp_.outputs()}} {}
+
+  [[nodiscard]] std::span<const Port> inputs() const override { return inputs_; }
+  [[nodiscard]] std::span<const Port> outputs() const override { return outputs_; }
+
+  void run(std::span<const std::span<const float>> inputs, std::span<const std::span<float>> outputs) override {
+    std::ranges::copy(runner_.run(inputs[0]), outputs[0].begin());
+  }
+
+ private:
+  Mlp mlp_;
+  MlpRunner runner_;
+  std::vector<Port> inputs_, outputs_;
+};
+
+// The one perceptron that a file holds: "<prefix>.0.weight" names it.
+std::unique_ptr<Network> mlp_network(const SafeTensors& content, const std::string& file) {
+  constexpr std::string_view kFirst = ".0.weight";
+  std::vector<std::string> prefixes;
+  for (const auto& [name, tensor] : content.tensors)
+    if (name.ends_with(kFirst)) prefixes.push_back(name.substr(0, name.size() - kFirst.size()));
+  if (prefixes.size() != 1)
+    throw InputError(fmt::format("'{}': expected one multilayer perceptron ('<name>.0.weight'), found {} [{}]", file,
+                                 prefixes.size(), shown(fmt::format("{}", fmt::join(prefixes, ", ")))));
+  return std::make_unique<MlpNetwork>(read_mlp(content, prefixes[0], file));
+}
+
+bool is_zip(std::string_view bytes) { return bytes.starts_with("PK"); }
+
+// A header length that fits and a brace: no ONNX model begins so.
+bool is_safetensors(std::string_view bytes) {
+  std::uint64_t length = 0;
+  if (bytes.size() <= sizeof length) return false;
+  std::memcpy(&length, bytes.data(), sizeof length);
+  return bytes[sizeof length] == '{' && length <= (std::uint64_t{1} << 32);
+}
+
+std::string folder_of(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+}  // namespace
+
+std::vector<std::string> network_engines() {
+  std::vector<std::string> engines = {"duet"};
+  if (libtorch_built_in()) engines.emplace_back("libtorch");
+  return engines;
+}
+
+std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine) {
+  const std::vector<std::string> engines = network_engines();
+  require(std::ranges::find(engines, engine) != engines.end(),
+          fmt::format("no network engine '{}' in this build. It has: {}", engine, fmt::join(engines, ", ")));
+  if (engine == "libtorch") return libtorch_network(path);
+  const std::string bytes = read_file(path);
+  if (is_zip(bytes)) return torch_script_network(bytes, path);
+  if (is_safetensors(bytes)) return mlp_network(parse_safetensors(bytes, path), path);
+  return onnx_network(bytes, path, folder_of(path));
+}
+
+LoadedFiles network_files(const std::string& path) {
+  const std::string bytes = read_file(path), folder = folder_of(path);
+  LoadedFiles files = {{"network", path}};
+  if (is_zip(bytes) || is_safetensors(bytes)) return files;
+  for (const std::string& location : external_locations(bytes))
+    if (location_fault(folder, location).empty())
+      files.push_back({"network data " + location, (std::filesystem::path(folder) / location).string()});
+  return files;
+}
+
+}  // namespace duet

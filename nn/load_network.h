@@ -1,0 +1,25 @@
+// Networks from files of every kind that duet reads.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "duet/core/loaded_file.h"
+#include "duet/nn/network.h"
+
+namespace duet {
+
+// By content, not by name: ONNX with its external data, TorchScript of the kinds in nn/torch_script.h, safetensors of
+// nn/mlp_file.h. Throws InputError (file, place, expected, found) for a file that is not readable, truncated, of
+// another kind, with an operator or a shape that is not supported (by name), or with weights that are not finite.
+// `engine`: "duet" (ours), or "libtorch" where it was built in (std::invalid_argument otherwise, naming those present).
+std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine = "duet");
+std::vector<std::string> network_engines();
+
+// What the network of that path is loaded from: "network", and for each file of an ONNX model's external data "network
+// data NAME"; those that load_network refuses (absent, outside of its folder) are left out. Throws InputError where the
+// network cannot be read.
+LoadedFiles network_files(const std::string& path);
+
+}  // namespace duet

@@ -1,0 +1,25 @@
+// The parts of a TorchScript archive that say what its module is. Nothing in it is executed. Internal to nn/.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace duet {
+
+struct TorchArchive {
+  std::string file;                              // for messages
+  std::map<int, std::vector<float>> tensors{};   // numbers of data/0, data/1, ...
+  std::string pickle{};                          // data.pkl: the module's members
+  std::map<std::string, std::string> sources{};  // its classes' code by path: "__torch__/torch/nn/modules/linear.py"
+
+  // Throws InputError("'policy.pt': TorchScript: PROBLEM").
+  [[noreturn]] void refuse(const std::string& problem) const;
+};
+
+// Throws InputError naming file, place, expected and found: no archive, no data.pkl, numbers that are not finite floats
+// in little-endian order.
+TorchArchive read_torch_archive(std::string_view bytes, const std::string& file);
+
+}  // namespace duet

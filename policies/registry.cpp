@@ -1,0 +1,127 @@
+#include "duet/policies/registry.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "duet/core/names.h"
+#include "duet/core/open_registry.h"
+#include "duet/core/require.h"
+#include "duet/policies/dstar/dstar_policy.h"
+#include "duet/policies/external/external_policy.h"
+#include "duet/policies/null_policy.h"
+#include "duet/policies/replay_policy.h"
+#include "duet/policies/retrieval.h"
+
+namespace duet {
+namespace {
+
+using Robot = std::shared_ptr<const RobotModel>;
+
+// A policy by name: what is said of it, and how it is made once its options are known to be its own.
+struct Entry {
+  const char* name;
+  PolicyInfo (*info)(const std::string& name);
+  PolicyMaker (*maker)(const std::string& name, Robot robot, const PolicyOptions& options);
+  LoadedFiles (*files)(const std::string& name, const PolicyOptions& options);
+};
+
+template <typename T>
+PolicyMaker of(const std::string& name, Robot robot, const PolicyOptions&) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  return [robot] { return std::make_unique<T>(robot); };
+}
+
+PolicyInfo replay_info(const std::string& name) {
+  return {name, "The retargeted motion with hindsight, as anchors", {}};
+}
+LoadedFiles no_files(const std::string&, const PolicyOptions&) { return {}; }
+PolicyInfo dense_info(const std::string& name) { return {name, "The same at 50 Hz, past the anchors", {}}; }
+PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral pose where it stands", {}}; }
+
+constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files},
+                               {"replay_dense", dense_info, of<DenseReplayPolicy>, no_files},
+                               {"null", null_info, of<NullPolicy>, no_files},
+                               {"dstar", dstar_info, dstar_maker, dstar_files},
+                               {"dp", dstar_info, dstar_maker, dstar_files},
+                               {"retrieval", retrieval_info, retrieval_maker, retrieval_files}};
+
+// A name that is the path of a policy descriptor.
+constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};
+
+// One that a program has added.
+struct Registered {
+  std::string name;
+  PolicyInfo about;
+  PolicyLoader load;
+};
+
+// The one list that changes while a program runs: what a program adds has to be found by name wherever names are read.
+OpenRegistry<Registered>& registered() {
+  static OpenRegistry<Registered> registry;
+  return registry;
+}
+
+PolicyInfo registered_info(const std::string& name) { return registered().find(name)->about; }
+PolicyMaker registered_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  PolicyMaker maker = registered().find(name)->load(std::move(robot), options);
+  require(maker != nullptr, fmt::format("policy '{}': its loader returned no maker", name));
+  return maker;
+}
+constexpr Entry kRegistered = {"", registered_info, registered_maker, no_files};
+
+std::vector<std::string> shipped_names() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kPolicies) names.emplace_back(entry.name);
+  return names;
+}
+
+const Entry& find_entry(const std::string& name) {
+  if (name.ends_with(".yaml")) return kDescriptor;
+  for (const Entry& entry : kPolicies)
+    if (name == entry.name) return entry;
+  if (registered().find(name) != nullptr) return kRegistered;
+  throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
+}
+
+}  // namespace
+
+std::vector<PolicyInfo> policies() {
+  std::vector<PolicyInfo> infos;
+  for (const Entry& entry : kPolicies) infos.push_back(entry.info(entry.name));
+  for (const Registered* entry : registered().all()) infos.push_back(entry->about);
+  return infos;
+}
+
+std::vector<std::string> policy_names() {
+  std::vector<std::string> names = shipped_names();
+  for (const Registered* entry : registered().all()) names.push_back(entry->name);
+  return names;
+}
+
+void register_policy(const PolicyInfo& info, PolicyLoader load) {
+  require(load != nullptr, fmt::format("policy '{}': expected a function that loads it, found none", info.name));
+  registered().add("policy", {info.name, info, std::move(load)}, shipped_names());
+}
+
+PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }
+
+LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) {
+  return find_entry(name).files(name, options);
+}
+
+PolicyMaker policy_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
+  const Entry& entry = find_entry(name);
+  const PolicyInfo info = entry.info(name);
+  std::vector<std::string> known;
+  for (const PolicyOption& option : info.options) known.push_back(option.name);
+  check_options("policy", name, options, known);
+  return entry.maker(name, std::move(robot), options);
+}
+
+std::unique_ptr<Policy> make_policy(const std::string& name, Robot robot, const PolicyOptions& options) {
+  return policy_maker(name, std::move(robot), options)();
+}
+
+}  // namespace duet

@@ -1,0 +1,114 @@
+#include "duet/retarget/body_spheres.h"
+
+#include <array>
+#include <string>
+
+#include "duet/core/skeleton.h"
+#include "duet/retarget/partner_arms.h"
+#include "duet/robots/human_body.h"
+
+namespace duet {
+namespace {
+
+struct RobotSphere {
+  int shape = 0;
+  double radius = 0.0;
+  bool arm = false, trunk = false;  // forearm or hand; torso, head or pelvis
+};
+
+struct HumanSphere {
+  double radius = 0.0;
+  bool arm = false;
+};
+
+// Links of `robot` as links of the chain; -1 for those of the legs.
+std::vector<int> chain_links(const RobotModel& robot, const UprightChain& upright) {
+  std::vector<int> links(robot.links.size(), -1);
+  links[0] = 1;
+  for (std::size_t j = 1; j < upright.robot_joint.size(); ++j)
+    links[upright.robot_joint[j] + 1] = static_cast<int>(j) + 1;
+  return links;
+}
+
+// A chain's link may be turned against the model's (its hinge lies along a coordinate axis).
+Eigen::Matrix3d turn_of(const RobotModel& robot, const UprightChain& upright, int link) {
+  if (link == 0) return Eigen::Matrix3d::Identity();
+  for (std::size_t j = 1; j < upright.robot_joint.size(); ++j) {
+    if (upright.robot_joint[j] + 1 != link) continue;
+    const Eigen::Vector3d& axis = robot.links[link].axis;
+    if (axis == Eigen::Vector3d(Eigen::Vector3d::Unit(upright.chain.joints[j].axis))) break;
+    return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+  }
+  return Eigen::Matrix3d::Identity();
+}
+
+std::vector<RobotSphere> add_robot_spheres(const RobotModel& robot, UprightChain& upright, BodySpheres& out) {
+  const std::vector<int> links = chain_links(robot, upright);
+  std::vector<RobotSphere> spheres;
+  for (std::size_t i = 0; i < robot.shapes.size(); ++i) {
+    const RobotShape& shape = robot.shapes[i];
+    const bool arm = shape.region == "hand" || shape.region == "forearm";
+    const bool trunk = shape.region == "torso" || shape.region == "head" || shape.region == "pelvis";
+    if (links[shape.link] < 0 || (!arm && !trunk)) continue;
+    const bool two = trunk && shape.half_length > shape.radius;
+    for (const double along : two ? std::vector<double>{-0.6, 0.6} : std::vector<double>{0.0}) {
+      const Eigen::Vector3d p = shape.X_LS * Eigen::Vector3d(0.0, 0.0, along * shape.half_length);
+      out.robot_point.push_back(static_cast<int>(upright.chain.points.size()));
+      upright.chain.points.push_back({links[shape.link], turn_of(robot, upright, shape.link).transpose() * p});
+      spheres.push_back({static_cast<int>(i), shape.radius, arm, trunk});
+    }
+  }
+  return spheres;
+}
+
+std::vector<HumanSphere> add_human_spheres(const HumanMotion& partner, BodySpheres& out) {
+  constexpr std::array<const char*, 5> kTrunk = {"head", "upper_chest", "lower_chest", "abdomen", "lower_trunk"};
+  constexpr std::array<const char*, 4> kArms = {"left_forearm", "right_forearm", "left_hand", "right_hand"};
+  const HumanBody body = make_human_body(bone_lengths(partner));
+  std::vector<HumanSphere> spheres;
+  std::vector<const HumanCapsule*> capsules;
+  for (const HumanCapsule& capsule : body.capsules) {
+    bool trunk = false, arm = false;
+    for (const char* name : kTrunk) trunk = trunk || capsule.name == name;
+    for (const char* name : kArms) arm = arm || capsule.name == name;
+    if (!trunk && !arm) continue;
+    capsules.push_back(&capsule);
+    spheres.push_back({capsule.radius, arm});
+    // A forearm's sphere sits at its elbow and a hand's beyond its wrist: each moves with one offset.
+    out.human_offset.push_back(arm ? human_offset_of(capsule.joint_a) : -1);
+  }
+  out.human = PointTracks(partner.frames(), static_cast<int>(spheres.size()));
+  for (int t = 0; t < partner.frames(); ++t) {
+    for (std::size_t i = 0; i < spheres.size(); ++i) {
+      const std::array<Eigen::Vector3d, 2> ends = capsules[i]->ends(partner.joints.frame(t));
+      const bool elbow = human_offset_of(capsules[i]->joint_a) == 2 || human_offset_of(capsules[i]->joint_a) == 3;
+      out.human.at(t, static_cast<int>(i)) = elbow ? ends[0] : Eigen::Vector3d(0.5 * (ends[0] + ends[1]));
+    }
+  }
+  return spheres;
+}
+
+bool may_touch(const RobotModel& robot, int a, int b) {
+  for (const auto& [first, second] : robot.self_collision)
+    if ((first == a && second == b) || (first == b && second == a)) return true;
+  return false;
+}
+
+}  // namespace
+
+BodySpheres make_body_spheres(const RobotModel& robot, UprightChain& chain, const HumanMotion& partner) {
+  BodySpheres out;
+  const std::vector<RobotSphere> robots = add_robot_spheres(robot, chain, out);
+  const std::vector<HumanSphere> humans = add_human_spheres(partner, out);
+  const int first = static_cast<int>(robots.size());
+  for (int a = 0; a < first; ++a) {
+    for (int b = a + 1; b < first; ++b)
+      if (may_touch(robot, robots[a].shape, robots[b].shape))
+        out.pairs.push_back({a, b, robots[a].radius + robots[b].radius});
+    for (int h = 0; h < static_cast<int>(humans.size()); ++h)
+      if (robots[a].trunk || !humans[h].arm) out.pairs.push_back({a, first + h, robots[a].radius + humans[h].radius});
+  }
+  return out;
+}
+
+}  // namespace duet

@@ -1,0 +1,103 @@
+// The vectors of L-BFGS in lanes (kernel_types.h, VectorSweep). Included by kernel_v2/v3/v4.cpp only, after
+// kernel_body.h; everything has internal linkage.
+#pragma once
+
+namespace duet::pair_kernel {
+namespace {
+
+inline void filter_gradient(const VectorSweep& at, const Row* x, const Row* gradient, Row* out) {
+  const Filter& f = *at.filter;
+  for (int block = 0; block < at.blocks; ++block) {
+    const std::size_t first = static_cast<std::size_t>(block) * at.rows;
+    for (std::size_t i = 0; i < at.rows; ++i) {
+      for (int lane = 0; lane < kLanes; lane += kWidth) {
+        V g = load(gradient[first + i], lane);
+        if (static_cast<int>(i) < at.setup->dof) {
+          const V here = load(x[first + i], lane);
+          const V zero = V{};
+          const VI out_low = (here <= at.setup->lower[i]) & (g > zero);
+          const VI out_high = (here >= at.setup->upper[i]) & (g < zero);
+          g = (out_low | out_high) != 0 ? zero : g;
+        }
+        V y = g * f.inverse[i];
+        if (block > 0) y -= f.first[i] * load(out[first - at.rows + i], lane);
+        if (block > 1) y -= f.second[i] * load(out[first - 2 * at.rows + i], lane);
+        store(out[first + i], lane, y);
+      }
+    }
+  }
+}
+
+inline void step(const VectorSweep& at, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y) {
+  const Filter& f = *at.filter;
+  for (int block = 0; block < at.blocks; ++block) {
+    const std::size_t first = static_cast<std::size_t>(block) * at.rows;
+    for (std::size_t i = 0; i < at.rows; ++i) {
+      const std::size_t here = first + i, after = here + at.rows, second = after + at.rows;
+      for (int lane = 0; lane < kLanes; lane += kWidth) {
+        const V d0 = load(x1[here], lane) - load(x0[here], lane);
+        const V d1 = load(x1[after], lane) - load(x0[after], lane);
+        const V d2 = load(x1[second], lane) - load(x0[second], lane);
+        store(s[here], lane, f.scale[i] * (d0 + f.first[i] * d1 + f.second[i] * d2));
+        store(y[here], lane, load(g1[here], lane) - load(g0[here], lane));
+      }
+    }
+  }
+}
+
+inline void dots(const VectorSweep& at, const Row* const* vectors, int count, int newest, const Row* g, Row* sums) {
+  const std::size_t begin = static_cast<std::size_t>(at.begin) * at.rows,
+                    end = static_cast<std::size_t>(at.end) * at.rows;
+  for (int lane = 0; lane < kLanes; lane += kWidth) {
+    V sum[3 * (2 * kMemory + 1)] = {};
+    for (std::size_t i = begin; i < end; ++i) {
+      const V s = load(vectors[newest][i], lane), y = load(vectors[newest + 1][i], lane), here = load(g[i], lane);
+      for (int k = 0; k < count; ++k) {
+        const V v = load(vectors[k][i], lane);
+        sum[3 * k] += v * s;
+        sum[3 * k + 1] += v * y;
+        sum[3 * k + 2] += v * here;
+      }
+      sum[3 * count] += here * s;
+      sum[3 * count + 1] += here * y;
+      sum[3 * count + 2] += here * here;
+    }
+    for (int k = 0; k < 3 * (count + 1); ++k) store(sums[k], lane, sum[k]);
+  }
+}
+
+inline void combine(const VectorSweep& at, const Row* const* vectors, const float* factors, int count, Row* out) {
+  const Filter& f = *at.filter;
+  for (int block = at.blocks - 1; block >= 0; --block) {
+    const std::size_t first = static_cast<std::size_t>(block) * at.rows;
+    for (std::size_t i = 0; i < at.rows; ++i) {
+      for (int lane = 0; lane < kLanes; lane += kWidth) {
+        V sum = V{};
+        for (int k = 0; k < count; ++k) sum += factors[k] * load(vectors[k][first + i], lane);
+        V d = sum * f.inverse[i];
+        if (block + 1 < at.blocks) d -= f.first[i] * load(out[first + at.rows + i], lane);
+        if (block + 2 < at.blocks) d -= f.second[i] * load(out[first + 2 * at.rows + i], lane);
+        store(out[first + i], lane, d);
+      }
+    }
+  }
+}
+
+inline void move(const VectorSweep& at, const Row* x, const Row* direction, float rate, Row* next) {
+  for (int block = 0; block < at.blocks; ++block) {
+    const std::size_t first = static_cast<std::size_t>(block) * at.rows;
+    for (std::size_t i = 0; i < at.rows; ++i) {
+      for (int lane = 0; lane < kLanes; lane += kWidth) {
+        V v = load(x[first + i], lane) + rate * load(direction[first + i], lane);
+        if (static_cast<int>(i) < at.setup->dof) {
+          v = v < at.setup->lower[i] ? V{} + at.setup->lower[i] : v;
+          v = v > at.setup->upper[i] ? V{} + at.setup->upper[i] : v;
+        }
+        store(next[first + i], lane, v);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace duet::pair_kernel

@@ -1,0 +1,224 @@
+#include "duet/robots/card_reader.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/robots/card_digest.h"
+#include "duet/robots/card_roles.h"
+#include "duet/robots/yaml_section.h"
+
+namespace duet {
+namespace {
+
+const std::vector<std::string>& smpl_names() {
+  static const std::vector<std::string> names(kSmplNames.begin(), kSmplNames.end());
+  return names;
+}
+
+std::string name_of(const YAML::Node& node) {
+  return node.IsMap() && node["name"] && node["name"].IsScalar() ? node["name"].Scalar() : "";
+}
+
+void refuse_negative(const YamlSection& section, const char* key, std::optional<double> value) {
+  if (value && *value < 0.0)
+    section.fail(section.line(key), fmt::format("'{}': expected a number >= 0, found {}", key, *value));
+}
+
+double positive(const YamlSection& section, const char* key) {
+  const double value = section.number(key);
+  if (value <= 0.0) section.fail(section.line(key), fmt::format("'{}': expected a number > 0, found {}", key, value));
+  return value;
+}
+
+CardJoint read_joint(const std::string& file, const YAML::Node& node) {
+  const YamlSection section(file, node, fmt::format("joint '{}'", name_of(node)),
+                            {"name", "armature", "kp", "kd", "neutral", "lower", "upper", "effort", "velocity"});
+  CardJoint joint{.name = section.text("name"),
+                  .place = {file, section.line()},
+                  .armature = section.number("armature"),
+                  .kp = section.number("kp"),
+                  .kd = section.number("kd"),
+                  .neutral = section.optional_number("neutral").value_or(0.0),
+                  .lower = section.optional_number("lower"),
+                  .upper = section.optional_number("upper"),
+                  .effort = section.optional_number("effort"),
+                  .velocity = section.optional_number("velocity")};
+  refuse_negative(section, "armature", joint.armature);
+  refuse_negative(section, "kp", joint.kp);
+  refuse_negative(section, "kd", joint.kd);
+  if (joint.effort) joint.effort = positive(section, "effort");
+  if (joint.velocity) joint.velocity = positive(section, "velocity");
+  return joint;
+}
+
+CardLock read_lock(const std::string& file, const YAML::Node& node) {
+  const YamlSection section(file, node, fmt::format("locked joint '{}'", name_of(node)), {"name", "position"});
+  return {.joint = section.text("name"), .place = {file, section.line()}, .position = section.number("position")};
+}
+
+// URDF's fixed-axis roll, pitch, yaw.
+Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy) {
+  return Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX());
+}
+
+CardFrame read_frame(const std::string& file, const YAML::Node& node) {
+  const YamlSection section(file, node, fmt::format("frame '{}'", name_of(node)),
+                            {"name", "link", "xyz", "rpy", "replaces_urdf_link"});
+  CardFrame frame{.name = section.text("name"),
+                  .place = {file, section.line()},
+                  .link = section.text("link"),
+                  .X_LF = {},
+                  .replaces_urdf_link = section.flag_or("replaces_urdf_link", false)};
+  frame.X_LF.p = section.vector3("xyz");
+  if (section.has("rpy")) frame.X_LF.R = from_rpy(section.vector3("rpy"));
+  return frame;
+}
+
+CardShape read_shape(const std::string& file, const YAML::Node& node) {
+  const YamlSection section(file, node, "shape", {"link", "kind", "center", "from", "to", "radius", "region", "sole"});
+  CardShape shape;
+  shape.place = {file, section.line()};
+  shape.link = section.text("link");
+  const std::string kind = section.text("kind");
+  if (kind != "sphere" && kind != "capsule")
+    section.fail(section.line("kind"), fmt::format("'kind': expected sphere or capsule, found '{}'", kind));
+  shape.kind = kind == "sphere" ? ShapeKind::kSphere : ShapeKind::kCapsule;
+  const bool sphere = shape.kind == ShapeKind::kSphere;
+  for (const char* key : {"center", "from", "to"})
+    if (section.has(key) != (sphere == (std::string_view(key) == "center")))
+      section.fail(shape.place.line, fmt::format("expected {} for a {}, found {} '{}'",
+                                                 sphere ? "'center' alone" : "'from' and 'to' alone", kind,
+                                                 section.has(key) ? "also" : "no", key));
+  shape.from = section.vector3(sphere ? "center" : "from");
+  shape.to = section.vector3(sphere ? "center" : "to");
+  if (!sphere && (shape.to - shape.from).norm() < 1e-6)
+    section.fail(shape.place.line, "expected two different ends of the capsule, found the same point");
+  shape.radius = positive(section, "radius");
+  shape.region = section.text("region");
+  shape.sole = section.flag_or("sole", false);
+  return shape;
+}
+
+CardPoint read_human_point(const std::string& file, const YAML::Node& node, const char* what, bool named) {
+  const YamlSection section =
+      named ? YamlSection(file, node, fmt::format("{} '{}'", what, name_of(node)), {"name", "frame", "smpl"})
+            : YamlSection(file, node, what, {"frame", "smpl"});
+  const std::string joint = section.text("smpl");
+  CardPoint point{.name = named ? section.text("name") : "",
+                  .place = {file, section.line()},
+                  .frame = section.text("frame"),
+                  .smpl = smpl_index(joint)};
+  if (point.smpl < 0) section.fail(section.line("smpl"), unknown_name_message("SMPL joint", joint, smpl_names()));
+  return point;
+}
+
+CardRegions read_regions(const YamlSection& root, const std::string& file, const YAML::Node& node) {
+  const int line = node.Mark().line + 1;
+  if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar() || !node[1].IsScalar())
+    root.fail(line, fmt::format("'self_collision': expected a pair of regions, found {}", describe(node)));
+  return {.place = {file, line}, .first = node[0].Scalar(), .second = node[1].Scalar()};
+}
+
+std::vector<CardPoint> read_tracks(const std::string& file, const YamlSection& root) {
+  const YamlSection section(file, root.node("tracks"), "tracks",
+                            {"head", "lhand", "rhand", "torso", "lshoulder", "rshoulder"});
+  std::vector<CardPoint> tracks;
+  for (const char* name : kTrackNames)
+    if (section.has(name))
+      tracks.push_back({.name = name, .place = {file, section.line(name)}, .frame = section.text(name)});
+  return tracks;
+}
+
+template <typename Entry, typename Name>
+void refuse_repeats(const YamlSection& root, const std::vector<Entry>& entries, const char* what, Name name) {
+  std::set<std::string> seen;
+  for (const Entry& entry : entries)
+    if (!seen.insert(name(entry)).second)
+      root.fail(entry.place.line, fmt::format("expected each {} once, found '{}' again", what, name(entry)));
+}
+
+// A card and those that extended it on the way here, the outermost first.
+class CardReader {
+ public:
+  RobotCard read(const std::string& text, const std::string& file) {
+    const YamlSection root(file, parse_yaml(text, file), "robot card",
+                           {"name",   "extends",     "urdf",        "base",          "joints", "locked", "frames",
+                            "shapes", "pairs",       "keypoints",   "tracks",        "legs",   "arms",   "waist",
+                            "wrists", "compound",    "bodies",      "push_link",     "imu",    "fall",   "stance",
+                            "poses",  "root_bounds", "pose_ranges", "self_collision"});
+    RobotCard card = root.has("extends") ? extended(root, file) : RobotCard{};
+    card.files.insert(card.files.begin(), file);
+    take_names(root, file, card);
+    take_lists(root, file, card);
+    read_roles(root, file, card.roles);
+    for (const auto& [key, value] : content_of(root.keys())) card.content[key] = value;
+    return card;
+  }
+
+ private:
+  RobotCard extended(const YamlSection& root, const std::string& file) {
+    namespace fs = std::filesystem;
+    const std::string base = root.text("extends");
+    const int line = root.line("extends");
+    if (fs::path(base).is_absolute() || !base.ends_with(".yaml"))
+      root.fail(line, fmt::format("'extends': expected the path of a card (.yaml) from this one, found '{}'", base));
+    const std::string path = (fs::path(file).parent_path() / base).lexically_normal().string();
+    chain_.push_back(fs::path(file).lexically_normal().string());
+    if (std::ranges::find(chain_, path) != chain_.end())
+      root.fail(line, fmt::format("'extends': expected cards without a cycle, found {}, which extends {}", path, file));
+    if (chain_.size() > kMostExtended)
+      root.fail(line, fmt::format("'extends': expected at most {} cards in a row, found one more", kMostExtended));
+    RobotCard card = read(read_text(path), path);
+    card.urdf = (fs::path(base).parent_path() / card.urdf).lexically_normal().string();
+    return card;
+  }
+
+  static void take_names(const YamlSection& root, const std::string& file, RobotCard& card) {
+    card.name = root.text("name");
+    if (card.urdf.empty() || root.has("urdf")) card.urdf = root.text("urdf");
+    if (!card.base.empty() && !root.has("base")) return;
+    card.base = root.text("base");
+    card.base_place = {file, root.line("base")};
+  }
+
+  static void take_lists(const YamlSection& root, const std::string& file, RobotCard& card) {
+    const auto take = [&](const char* key, auto& entries, auto read_entry) {
+      if (!root.has(key)) return;
+      entries.clear();
+      for (const YAML::Node& node : root.items(key)) entries.push_back(read_entry(node));
+    };
+    take("joints", card.joints, [&](const YAML::Node& node) { return read_joint(file, node); });
+    take("locked", card.locked, [&](const YAML::Node& node) { return read_lock(file, node); });
+    take("frames", card.frames, [&](const YAML::Node& node) { return read_frame(file, node); });
+    take("shapes", card.shapes, [&](const YAML::Node& node) { return read_shape(file, node); });
+    take("pairs", card.pairs, [&](const YAML::Node& node) { return read_human_point(file, node, "pair", false); });
+    take("keypoints", card.keypoints,
+         [&](const YAML::Node& node) { return read_human_point(file, node, "keypoint", true); });
+    take("self_collision", card.self_collision, [&](const YAML::Node& node) { return read_regions(root, file, node); });
+    if (root.has("tracks")) card.tracks = read_tracks(file, root);
+    refuse_repeats(root, card.joints, "joint", [](const CardJoint& joint) { return joint.name; });
+    refuse_repeats(root, card.locked, "locked joint", [](const CardLock& lock) { return lock.joint; });
+    refuse_repeats(root, card.frames, "frame", [](const CardFrame& frame) { return frame.name; });
+    refuse_repeats(root, card.keypoints, "keypoint", [](const CardPoint& keypoint) { return keypoint.name; });
+    refuse_repeats(root, card.self_collision, "pair of regions", [](const CardRegions& pair) {
+      return fmt::format("{}, {}", std::min(pair.first, pair.second), std::max(pair.first, pair.second));
+    });
+  }
+
+  std::vector<std::string> chain_;
+};
+
+}  // namespace
+
+RobotCard parse_card(const std::string& text, const std::string& file) { return CardReader().read(text, file); }
+
+}  // namespace duet

@@ -1,0 +1,66 @@
+#include "duet/rollout/act_episode.h"
+
+#include <algorithm>
+
+#include "duet/policies/language.h"
+#include "duet/rollout/policy_reference.h"
+
+namespace duet {
+namespace {
+
+Episode episode_of(const RolloutSetup& setup) { return {setup, episode_ticks(setup), episode_partner(setup).joints}; }
+
+PolicyReference reference_of(const RolloutSetup& setup, Policy& policy) {
+  const Task task = setup.clip->task;
+  return {policy,
+          {.context = {task, setup.prompt.empty() ? std::string(task_prompt(task)) : setup.prompt, setup.start,
+                       &setup.reference.motion, setup.seed, setup.stop_asked},
+           .seen_partner = setup.seen_partner,
+           .perception = setup.perturbation.perception,
+           .perception_seed = setup.perturbation_seed,
+           .plan_latency_ms = setup.perturbation.plan_latency_ms,
+           .fuse_ticks = setup.fuse_ticks}};
+}
+
+Rollout finished(Rollout rollout, const RolloutSetup& setup, const PolicyReference& reference) {
+  rollout.recording.task = setup.clip->task;
+  rollout.recording.phases = setup.reference.phases;
+  reference.finish(rollout);
+  return rollout;
+}
+
+}  // namespace
+
+Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy) {
+  PolicyReference reference = reference_of(setup, policy);
+  return finished(roll_out(episode_of(setup), backend, controller, reference), setup, reference);
+}
+
+Rollout play_back(const RolloutSetup& setup, Policy& policy) {
+  PolicyReference reference = reference_of(setup, policy);
+  return finished(play_back(episode_of(setup), reference), setup, reference);
+}
+
+int episode_ticks(const RolloutSetup& setup) {
+  const int ticks = setup.reference.motion.frames();
+  return setup.perturbation.partner ? episode_ticks(*setup.perturbation.partner, ticks) : ticks;
+}
+
+HumanMotion episode_partner(const RolloutSetup& setup) {
+  return partner_motion(setup.clip->partner, setup.perturbation.partner, setup.reference.phases,
+                        setup.reference.clip_frame, episode_ticks(setup) + 1);
+}
+
+PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotion& theirs, const AdaptedMotion& ours) {
+  const Pose &from = theirs.motion.root.front(), &to = ours.motion.root.front();
+  const Eigen::Quaterniond turn = yaw_rotation(yaw_of(to.R) - yaw_of(from.R));
+  const Eigen::Vector3d level(1.0, 1.0, 0.0);
+  const PointTracks& joints = other.partner.joints;
+  PointTracks seen = joints.slice(std::min(theirs.clip_frame, joints.frames() - 1), joints.frames());
+  for (int t = 0; t < seen.frames(); ++t)
+    for (int j = 0; j < seen.points(); ++j)
+      seen.at(t, j) = (turn * (seen.at(t, j) - from.p.cwiseProduct(level)) + to.p.cwiseProduct(level)).eval();
+  return seen;
+}
+
+}  // namespace duet

@@ -1,0 +1,41 @@
+// An episode of a suite: the robot's side of a clip, begun by A.4.4, led by a policy beside a person who acts.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "duet/motion/paired_motion.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/policy.h"
+#include "duet/rollout/rollout.h"
+
+namespace duet {
+
+struct RolloutSetup : EpisodeConditions {
+  const PairedMotion* clip = nullptr;
+  AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
+  std::string prompt;       // the policy's language command; empty: the task's own
+  // What the policy sees of a partner in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
+  // none.
+  PointTracks seen_partner;
+  std::uint64_t seed = 0;
+  bool foot_trace = false;         // whether the row is to have one
+  int fuse_ticks = kTicksPerPlan;  // SchedulerOptions
+};
+
+// Runs until the reference ends (and the partner with it, where it is varied: episode_ticks), or as roll_out of an
+// Episode does. A policy that is dead ends it as kError, with its message.
+Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
+// The same without physics.
+Rollout play_back(const RolloutSetup& setup, Policy& policy);
+
+// What the partner does from tick 0 on, one frame more than the episode has ticks; and the number of those.
+HumanMotion episode_partner(const RolloutSetup& setup);
+int episode_ticks(const RolloutSetup& setup);
+
+// The partner of another clip as it would stand to the robot there: moved on the ground and turned about z so that the
+// first frame of `theirs` (that clip's reference) comes to lie on the first frame of `ours`. Frame 0 is tick 0.
+PointTracks partner_from_elsewhere(const PairedMotion& other, const AdaptedMotion& theirs, const AdaptedMotion& ours);
+
+}  // namespace duet

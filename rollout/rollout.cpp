@@ -1,0 +1,241 @@
+#include "duet/rollout/rollout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "duet/core/clock.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
+#include "duet/rollout/control_period.h"
+#include "duet/rollout/deadline.h"
+#include "duet/rollout/disturbance.h"
+#include "duet/rollout/kinematic_follower.h"
+
+namespace duet {
+namespace {
+
+// What is measured at every physics step.
+class StepMeter {
+ public:
+  StepMeter(const Backend& backend, const std::optional<ContactLimits>& limits) : backend_(backend) {
+    const Scene& scene = backend.scene();
+    if (scene.partner != PartnerMode::kSolid || !limits) return;
+    ContactSafetyOptions options;
+    options.link_radius = link_radii(*scene.robot);
+    safety_.emplace(scene.human, *limits, scene.dt, options);
+  }
+
+  void add() {
+    Eigen::Vector3d ground = Eigen::Vector3d::Zero();
+    for (const Contact& contact : backend_.contacts())
+      if (contact.side == ContactSide::kGround) ground += contact.f_W;
+    ++steps_;
+    ++steps_of_tick_;
+    vertical_ += ground.z();
+    tick_ += ground;
+    if (safety_) safety_->add(backend_.contacts());
+  }
+
+  void end_tick() {
+    if (steps_of_tick_ > 0) peak_ = std::max(peak_, tick_.norm() / steps_of_tick_);
+    tick_.setZero();
+    steps_of_tick_ = 0;
+  }
+
+  void finish(Rollout& rollout) const {
+    rollout.ground = {steps_ > 0 ? vertical_ / static_cast<double>(steps_) : 0.0, peak_};
+    if (safety_) rollout.safety = safety_->result();
+  }
+
+ private:
+  const Backend& backend_;
+  std::optional<ContactSafety> safety_;
+  long steps_ = 0;
+  int steps_of_tick_ = 0;
+  double vertical_ = 0.0, peak_ = 0.0;
+  Eigen::Vector3d tick_ = Eigen::Vector3d::Zero();  // sum over the steps of this tick
+};
+
+void trim(Recording& recording, int frames) {
+  if (!recording.partner.empty() && frames < recording.partner.frames())
+    recording.partner = recording.partner.slice(0, frames);
+}
+
+std::string describe(Outcome outcome, int tick, std::string_view engine) {
+  switch (outcome) {
+    case Outcome::kFell:
+      return fmt::format("the robot fell at {:.2f} s", tick / kTickRate);
+    case Outcome::kDiverged:
+      return fmt::format("the state of {} diverged at {:.2f} s", engine, tick / kTickRate);
+    case Outcome::kTimedOut:
+      return fmt::format("the wall-clock limit passed at {:.2f} s of the episode", tick / kTickRate);
+    default:
+      return "";
+  }
+}
+
+// What a tick does to the robot, be it in an engine or without physics.
+class World {
+ public:
+  virtual ~World() = default;
+  virtual void begin(const RobotState& start) = 0;
+  [[nodiscard]] virtual const RobotState& state() const = 0;
+  [[nodiscard]] virtual std::span<const Contact> contacts() const { return {}; }  // of the last physics step
+  // What the joints are sent for this reference.
+  virtual const Eigen::VectorXd& target(const Reference& reference) = 0;
+  virtual Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) = 0;
+  virtual void finish(Rollout&) const {}
+};
+
+// Steps between two looks at the clock within a control period: only a step far below the usual ones has so many.
+constexpr int kStepsPerLook = 64;
+
+class Simulated final : public World {
+ public:
+  Simulated(const Episode& episode, Backend& backend, Controller& controller)
+      : episode_(episode),
+        backend_(backend),
+        controller_(controller),
+        steps_(steps_per_tick(backend.scene().dt)),
+        command_(backend.scene().robot->default_command(episode.start.q)),
+        disturbance_(episode.perturbation, *backend.scene().robot, episode.start, steps_, backend.scene().dt,
+                     episode.perturbation_seed),
+        meter_(backend, episode.limits) {}
+
+  void begin(const RobotState& start) override {
+    backend_.reset(start);
+    controller_.reset(start);
+  }
+  [[nodiscard]] const RobotState& state() const override { return backend_.state(); }
+  [[nodiscard]] std::span<const Contact> contacts() const override { return backend_.contacts(); }
+
+  const Eigen::VectorXd& target(const Reference& reference) override {
+    controller_.act(disturbance_.seen(backend_.state()), reference, command_);
+    disturbance_.send(command_);
+    return command_.q_target;
+  }
+
+  Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) override {
+    if (!partner.empty())
+      backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
+    disturbance_.push(tick, backend_);
+    const Outcome outcome = step_control_period(
+        backend_, steps_, [this](int i) -> const JointCommand& { return disturbance_.in_effect(i); },
+        [&](int i) {
+          meter_.add();
+          const bool look = (i + 1) % kStepsPerLook == kStepsPerLook - 1 && i + 1 < steps_;
+          return !look || (!deadline.passed() && !deadline.stop_asked());
+        });
+    if (outcome != Outcome::kOk) return outcome;
+    meter_.end_tick();
+    return has_fallen(backend_.state(), episode_.fall) ? Outcome::kFell : Outcome::kOk;
+  }
+
+  void finish(Rollout& rollout) const override {
+    meter_.finish(rollout);
+    rollout.faults = controller_.faults();
+  }
+
+ private:
+  const Episode& episode_;
+  Backend& backend_;
+  Controller& controller_;
+  int steps_;
+  JointCommand command_;
+  Disturbance disturbance_;
+  StepMeter meter_;
+};
+
+// Without physics: the robot is where its reference was a tick ago.
+class Moved final : public World {
+ public:
+  explicit Moved(const Episode& episode) : episode_(episode) {}
+
+  void begin(const RobotState& start) override { follower_ = KinematicFollower(start); }
+  [[nodiscard]] const RobotState& state() const override { return follower_.state(); }
+  const Eigen::VectorXd& target(const Reference& reference) override {
+    reference_ = reference;
+    return reference_.q;
+  }
+  Outcome advance(int, const PointTracks&, const Deadline&) override {
+    follower_.go_to(reference_, kTick);
+    return has_fallen(follower_.state(), episode_.fall) ? Outcome::kFell : Outcome::kOk;
+  }
+
+ private:
+  const Episode& episode_;
+  Reference reference_;
+  KinematicFollower follower_;
+};
+
+void record_tick(Recording& recording, int tick, const World& world, const HumanJoints* partner,
+                 const Reference& reference, const Eigen::VectorXd& target) {
+  recording.robot.push_back(world.state());
+  recording.reference.push_back(reference);
+  recording.q_target.push_back(target);
+  if (partner != nullptr) recording.partner.frame(tick) = *partner;
+  for (const Contact& contact : world.contacts()) recording.contacts.push_back({tick, contact});
+}
+
+Rollout run(const Episode& episode, World& world, ReferenceSource& source, std::string_view engine) {
+  Rollout rollout;
+  Recording& recording = rollout.recording;
+  const bool somebody = !episode.partner.empty();
+  if (somebody) recording.partner = PointTracks(episode.ticks, kSmplJoints);
+  world.begin(episode.start);
+  source.begin(episode.start);
+  Deadline deadline(episode.wall_limit, episode.stop_asked);  // from here on: a program that starts is not simulated
+  Sha256 hash;
+  HumanJoints partner;
+
+  int tick = 0;
+  for (; tick < episode.ticks && recording.outcome == Outcome::kOk; ++tick) {
+    if (somebody) partner = partner_joints(episode.partner, tick);
+    const Reference* reference = source.at({tick, world.state(), somebody ? &partner : nullptr});
+    deadline.extend(source.waited());
+    if (reference == nullptr) {
+      recording.outcome = Outcome::kError;
+      break;
+    }
+    const Eigen::VectorXd& target = world.target(*reference);
+    record_tick(recording, tick, world, somebody ? &partner : nullptr, *reference, target);
+    hash.update(world.state());
+    recording.outcome = world.advance(tick, episode.partner, deadline);
+    if (recording.outcome == Outcome::kOk && deadline.passed()) recording.outcome = Outcome::kTimedOut;
+    if (deadline.stop_asked()) {
+      rollout.interrupted = true;
+      recording.outcome = Outcome::kTimedOut;
+    }
+  }
+  world.finish(rollout);
+  trim(recording, tick);
+  recording.message =
+      recording.outcome == Outcome::kError ? source.message() : describe(recording.outcome, tick, engine);
+  rollout.state_hash = hash.hex();
+  return rollout;
+}
+
+}  // namespace
+
+Rollout roll_out(const Episode& episode, Backend& backend, Controller& controller, ReferenceSource& source) {
+  Simulated world(episode, backend, controller);
+  return run(episode, world, source, backend.name());
+}
+
+Rollout play_back(const Episode& episode, ReferenceSource& source) {
+  Moved world(episode);
+  return run(episode, world, source, "playback");
+}
+
+HumanJoints partner_joints(const PointTracks& joints, int frame) {
+  return joints.frame(std::clamp(frame, 0, joints.frames() - 1));
+}
+
+HumanJoints partner_velocities(const PointTracks& joints, int frame, double rate_hz) {
+  return (partner_joints(joints, frame + 1) - partner_joints(joints, frame)) * rate_hz;
+}
+
+}  // namespace duet

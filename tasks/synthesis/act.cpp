@@ -1,0 +1,41 @@
+#include "duet/tasks/synthesis/act.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace duet::synthesis {
+namespace {
+
+// How far in front of the root a hand at height z is when it uses `share` of the arm.
+double reach_ahead(const Body& body, int side, double z, double share, const Lean& lean) {
+  const Eigen::Vector3d shoulder = shoulder_at(body, side, lean);
+  const double length = share * body.arm();
+  const double square = length * length - std::pow(z - shoulder.z(), 2) - std::pow(shoulder.y(), 2);
+  return shoulder.x() + std::sqrt(std::max(square, 0.0));
+}
+
+}  // namespace
+
+Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d origin(placement.position.x(), placement.position.y(), 0.0);
+  return origin + rot_z(placement.yaw) * point;
+}
+
+Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a) {
+  if (person == 0) return point_of_a;
+  return {layout.distance - point_of_a.x(), layout.lateral - point_of_a.y(), point_of_a.z()};
+}
+
+Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean) {
+  std::array<double, 2> ahead;
+  for (const int k : {0, 1})
+    ahead[k] = std::clamp(reach_ahead(cast.body[k], cast.side, z, share, lean), nearest, farthest);
+  Layout layout;
+  layout.distance = ahead[0] + ahead[1];
+  layout.meet = {ahead[0], 0.0, z};
+  for (const int k : {0, 1})
+    layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.93);
+  return layout;
+}
+
+}  // namespace duet::synthesis

@@ -1,0 +1,92 @@
+// What a task is: its words, how two people do it, and how it is told whether they did. One file a task
+// (docs/adding-a-task.md), which says all of this; one table of them, made from tasks/list.cmake. The rooms above ask
+// the table: motion/ synthesises and proposes phases, metrics/ detects, policies/ embed the prompt.
+#pragma once
+
+#include <array>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/core/task.h"
+#include "duet/tasks/agent.h"
+#include "duet/tasks/detector_readings.h"
+#include "duet/tasks/synthesis/act.h"
+
+namespace duet {
+
+// A phrase of one to three words that means the task; the language encoder compares stems and leaves function words
+// out. No phrase belongs to two tasks.
+struct TaskPhrase {
+  std::string_view phrase;
+  double weight;  // 1: says it outright; less: a hint that a plainer phrase overrules
+};
+
+// What says how far an act is under way; larger is more. Phases are proposed from it (docs/conventions.md, "Phases").
+enum class ActSignal {
+  kHandsTogether,  // nearness of the nearest hands of the two; the act is the contact
+  kHandAtChest,    // nearness of a hand of either to the other's chest; likewise
+  kHandsUp,        // rise of the higher hand of either; the act is the gesture
+  kTrunksLean,     // inclination of the trunk of either; likewise
+};
+// Where a contact is reached for before it is there.
+enum class OnsetSignal { kNone, kHandsCoverTheGap, kHandsUp };
+
+struct PhaseSignal {
+  ActSignal act = ActSignal::kHandsTogether;
+  OnsetSignal onset = OnsetSignal::kNone;
+};
+
+struct ThresholdInfo {
+  std::string_view name;  // of Table S11 without tau_, where the task is the supplement's
+  double paper, strict;
+  std::string_view unit;
+  std::string_view meaning;
+};
+
+struct DetectorFigure {
+  std::string_view name;  // in DetectorResult::values
+  std::string_view unit;
+  std::string_view meaning;
+};
+
+using Thresholds = std::map<std::string, double>;  // "contact", "min_frames", ...
+
+struct DetectorResult {
+  bool success = false;
+  std::vector<bool> frames;              // evidence mask, T entries
+  std::map<std::string, bool> parts;     // the printed sub-conditions by name
+  std::map<std::string, double> values;  // what was measured: each of the detector's figures that the readings have
+  // Per threshold, signed: by how much it could be tightened (positive) or must be loosened (negative) with the others
+  // as they are; at exactly 0 the printed comparison decides. -infinity with fewer frames than are asked for. The
+  // smallest has the sign of the verdict, for a hug "overall" (the best of its three modes) has.
+  std::map<std::string, double> margins;
+};
+
+struct TaskDetector {
+  std::span<const ThresholdInfo> thresholds;
+  std::span<const DetectorFigure> figures;
+  // The tracks that it looks at under these readings.
+  Tracks (*tracks)(const Agent& performer, const Agent& partner, const DetectorReadings& readings);
+  // Takes checked input: those tracks are there, equally long and finite, and every threshold is in the map.
+  DetectorResult (*detect)(const Agent& performer, const Agent& partner, const Thresholds& tau,
+                           const DetectorReadings& readings);
+  // Sets the readings that come with the strict thresholds, leaving others as they are; null: none.
+  void (*read_strictly)(DetectorReadings& readings) = nullptr;
+};
+
+struct TaskDefinition {
+  std::string_view name;                          // as in tasks/list.cmake
+  std::string_view prompt;                        // the command that stands for the task where no other is given
+  std::span<const std::string_view> paraphrases;  // of it, that training uses and that measure the language encoder
+  std::span<const TaskPhrase> phrases;            // by which the built-in encoder knows it
+  PhaseSignal phases;
+  synthesis::Act act;
+  TaskDetector detector;
+};
+
+const TaskDefinition& definition_of(Task task);
+
+}  // namespace duet

@@ -1,0 +1,113 @@
+// Controllers that a program adds. Each test ends its own process: what is added stays.
+#include "duet/controllers/registry.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "duet/core/require.h"
+#include "tests/backends/g1_scene.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+class Still final : public Controller {
+ public:
+  explicit Still(std::shared_ptr<const RobotModel> robot, double stiffness)
+      : robot_(std::move(robot)), stiffness_(stiffness) {}
+  [[nodiscard]] std::string_view name() const override { return "still"; }
+  void reset(const RobotState&) override {}
+  void act(const RobotState&, const Reference& reference, JointCommand& command) override {
+    command = robot_->default_command(reference.q);
+    command.kp.setConstant(stiffness_);
+  }
+
+ private:
+  std::shared_ptr<const RobotModel> robot_;
+  double stiffness_;
+};
+
+void add_still() {
+  register_controller({.name = "still",
+                       .about = "Stiff",
+                       .robot = "g1",
+                       .walks = false,
+                       .options = {{"stiffness", "7", "of each joint [N m/rad]"}}},
+                      [](std::shared_ptr<const RobotModel> robot, const ControllerOptions& options) {
+                        const auto found = options.find("stiffness");
+                        return std::make_unique<Still>(robot, found == options.end() ? 7.0 : std::stod(found->second));
+                      });
+}
+
+double stiffness_of(Controller& controller) {
+  const RobotState state = test::g1()->standing_state();
+  JointCommand command;
+  controller.reset(state);
+  controller.act(state, {state.X_WB, state.q}, command);
+  return command.kp[0];
+}
+
+void is_one_like_those_that_ship() {
+  add_still();
+  EXPECT_EQ(controller_names().back(), "still");
+  EXPECT_EQ(controllers().size(), controller_names().size());
+  EXPECT_EQ(controller_info("still").about, "Stiff");
+  EXPECT_TRUE(controller_files("still").empty());
+  EXPECT_EQ(stiffness_of(*make_controller("still", test::g1())), 7.0);
+  EXPECT_EQ(stiffness_of(*make_controller("still", test::g1(), {{"stiffness", "3"}})), 3.0);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] {
+                make_controller("still", test::g1(), {{"gain", "2"}});
+              }),
+              HasSubstr("controller 'still'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_controller("stil", test::g1()); }),
+              HasSubstr("did you mean 'still'?"));
+}
+
+void numbers_that_are_not_finite_never_reach_the_motors() {
+  add_still();
+  const auto controller = make_controller("still", test::g1(), {{"stiffness", "nan"}});
+  EXPECT_TRUE(std::isfinite(stiffness_of(*controller)));
+  EXPECT_GT(controller->faults().actions, 0);
+}
+
+ControllerInfo named(const std::string& name) { return {name, "", "g1", false, {}}; }
+
+void takes_no_name_twice() {
+  add_still();
+  EXPECT_EQ(thrown_message<std::invalid_argument>(add_still),
+            "controller 'still' is there already: choose another name");
+  const auto none = [](std::shared_ptr<const RobotModel>, const ControllerOptions&) {
+    return std::unique_ptr<Controller>();
+  };
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { register_controller(named("pd"), none); }),
+            "controller 'pd' is there already: choose another name");
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { register_controller(named("empty"), nullptr); }),
+              HasSubstr("controller 'empty': expected a function that makes it, found none"));
+  register_controller(named("none"), none);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { make_controller("none", test::g1()); }),
+              HasSubstr("controller 'none': its maker made none"));
+}
+
+template <typename Check>
+[[noreturn]] void end_with(const Check& check) {
+  check();
+  std::exit(::testing::Test::HasFailure() ? 1 : 0);
+}
+
+TEST(AddedController, IsOneLikeThoseThatShip) {
+  EXPECT_EXIT(end_with(is_one_like_those_that_ship), ::testing::ExitedWithCode(0), "");
+}
+TEST(AddedController, IsGuardedAsThoseThatShip) {
+  EXPECT_EXIT(end_with(numbers_that_are_not_finite_never_reach_the_motors), ::testing::ExitedWithCode(0), "");
+}
+TEST(AddedController, TakesNoNameThatIsThere) {
+  EXPECT_EXIT(end_with(takes_no_name_twice), ::testing::ExitedWithCode(0), "");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,64 @@
+#include "duet/core/open_registry.h"
+
+#include <atomic>
+#include <thread>
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+struct Item {
+  std::string name;
+  int value = 0;
+};
+
+TEST(OpenRegistry, KeepsWhatIsAddedInOrderAndAtOnePlace) {
+  OpenRegistry<Item> registry;
+  registry.add("item", {"a", 1}, {});
+  const Item* first = registry.find("a");
+  for (int i = 0; i < 100; ++i) registry.add("item", {"b" + std::to_string(i), i}, {});
+  EXPECT_EQ(registry.find("a"), first);
+  EXPECT_EQ(first->value, 1);
+  EXPECT_EQ(registry.find("c"), nullptr);
+  ASSERT_EQ(registry.all().size(), 101u);
+  EXPECT_EQ(registry.all()[1]->name, "b0");
+}
+
+TEST(OpenRegistry, RefusesANameThatIsTakenEmptyOrADescriptors) {
+  OpenRegistry<Item> registry;
+  registry.add("item", {"mine"}, {"theirs"});
+  for (const char* name : {"mine", "theirs"})
+    EXPECT_EQ(thrown_message<std::invalid_argument>([&] { registry.add("item", {name}, {"theirs"}); }),
+              std::string("item '") + name + "' is there already: choose another name");
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { registry.add("item", {""}, {}); }),
+              HasSubstr("item: expected a name, found none"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { registry.add("item", {"my.yaml"}, {}); }),
+              HasSubstr("item 'my.yaml': a name that ends in .yaml is the path of a descriptor"));
+  EXPECT_EQ(registry.all().size(), 1u);
+}
+
+TEST(OpenRegistry, OfTwoThreadsThatAddOneNameOneSucceeds) {
+  for (int round = 0; round < 50; ++round) {
+    OpenRegistry<Item> registry;
+    std::atomic<int> refused = 0;
+    const auto add = [&] {
+      try {
+        registry.add("item", {"one"}, {});
+      } catch (const std::invalid_argument&) {
+        ++refused;
+      }
+    };
+    std::thread other(add);
+    add();
+    other.join();
+    EXPECT_EQ(refused, 1);
+    EXPECT_EQ(registry.all().size(), 1u);
+  }
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,15 @@
+#include "duet/core/plain_name.h"
+
+#include <gtest/gtest.h>
+
+namespace duet {
+namespace {
+
+TEST(PlainName, HasLettersDigitsAndFourSigns) {
+  for (const char* name : {"a", "kick_0.5", "push+delay", "A-1"}) EXPECT_TRUE(is_plain_name(name)) << name;
+  for (const char* name : {"", "a b", "a/b", "a,b", "\xc3\xa4"}) EXPECT_FALSE(is_plain_name(name)) << name;
+  EXPECT_EQ(plain_name_message("a b"), "expected letters, digits and _ . + - only, found 'a b'");
+}
+
+}  // namespace
+}  // namespace duet

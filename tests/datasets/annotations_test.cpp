@@ -1,0 +1,86 @@
+#include "duet/datasets/annotations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kHeader = "clip,task,reactor,act_begin_s,act_end_s,note\n";
+
+std::string refusal(const std::string& text) {
+  try {
+    (void)parse_annotations(text, "phases.csv");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "(taken)";
+}
+
+TEST(Annotations, WhatIsWrittenIsRead) {
+  const InteractionClip clip = synthesize(Task::kHug, {.seed = 3});
+  Annotation written = annotation_of(clip);
+  written.note = "says \"hello\", twice";
+  const Annotations read = parse_annotations(annotations_csv({written}), "phases.csv");
+  ASSERT_EQ(read.size(), 1U);
+  const Annotation& found = read.at(clip.id);
+  EXPECT_EQ(found.task, clip.task);
+  EXPECT_EQ(found.reactor, clip.reactor);
+  EXPECT_NEAR(*found.act_begin, clip.phases.act_begin / 50.0, 0.005);
+  EXPECT_NEAR(*found.act_end, clip.phases.act_end / 50.0, 0.005);
+  EXPECT_EQ(found.note, written.note);
+}
+
+TEST(Annotations, APersonsTimesBecomeTheClipsPhases) {
+  InteractionClip clip = synthesize(Task::kHug, {.seed = 3});
+  annotate(clip, {.clip = clip.id, .task = Task::kHandshake, .reactor = Person::kA, .act_begin = 1.0, .act_end = 2.5});
+  EXPECT_EQ(clip.phases.act_begin, 50);
+  EXPECT_EQ(clip.phases.act_end, 125);
+  EXPECT_EQ(clip.task, Task::kHandshake);
+  EXPECT_EQ(clip.reactor, Person::kA);
+  EXPECT_EQ(clip.source.at("phases"), "annotated");
+}
+
+TEST(Annotations, EmptyFieldsKeepWhatTheClipHas) {
+  InteractionClip clip = synthesize(Task::kHug, {.seed = 3});
+  const InteractionClip before = clip;
+  annotate(clip, parse_annotations(std::string(kHeader) + "x,,,,,\n", "f").at("x"));
+  EXPECT_EQ(clip.phases.act_begin, before.phases.act_begin);
+  EXPECT_EQ(clip.task, before.task);
+  EXPECT_EQ(clip.reactor, before.reactor);
+}
+
+TEST(Annotations, AnActAfterTheEndIsRefusedAndOneBeyondItIsCut) {
+  InteractionClip clip = synthesize(Task::kHug, {.seed = 3});
+  annotate(clip, {.clip = "x", .act_begin = 1.0, .act_end = 1e6});
+  EXPECT_EQ(clip.phases.act_end, clip.frames());
+  EXPECT_THROW(annotate(clip, {.clip = "x", .act_begin = 1e5, .act_end = 1e6}), InputError);
+}
+
+TEST(Annotations, ABadFileIsRefusedByLine) {
+  EXPECT_THAT(refusal(""), HasSubstr("'phases.csv': expected the header 'clip,task"));
+  EXPECT_THAT(refusal("clip,begin\n"), HasSubstr("line 1: expected the header"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,B,1\n"), HasSubstr("line 2: expected 6 fields"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hugg,B,1,2,\n"), HasSubstr("line 2: unknown task 'hugg'"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,C,1,2,\n"), HasSubstr("reactor: expected A or B, found 'C'"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,B,x,2,\n"), HasSubstr("act_begin_s: expected seconds"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,B,-1,2,\n"), HasSubstr("act_begin_s: expected seconds"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,B,2,2,\n"), HasSubstr("the act ends at 2 s and begins at 2 s"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,hug,B,,2,\n"), HasSubstr("expected both act_begin_s and act_end_s"));
+  EXPECT_THAT(refusal(std::string(kHeader) + ",hug,B,1,2,\n"), HasSubstr("expected the name of a clip"));
+  EXPECT_THAT(refusal(std::string(kHeader) + "a,,,,,\na,,,,,\n"), HasSubstr("line 3: clip 'a' is there twice"));
+}
+
+TEST(Annotations, LineEndsOfOtherSystemsAreTaken) {
+  const Annotations read =
+      parse_annotations("clip,task,reactor,act_begin_s,act_end_s,note\r\na,hug,B,1,2,fine\r\n", "f");
+  EXPECT_EQ(read.at("a").note, "fine");
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,134 @@
+// Containers of other programs (joblib, torch.save, NumPy's objects), and two people as parameters of body models.
+#include "duet/core/joblib.h"
+#include "duet/core/npy_objects.h"
+#include "duet/core/pickle_machine.h"
+#include "duet/core/torch_tensors.h"
+#include "duet/motion/people/amass.h"
+#include "duet/motion/people/body_model.h"
+#include "duet/motion/people/gvhmr.h"
+#include "duet/motion/people/inter_x.h"
+#include "duet/motion/people/interhuman_raw.h"
+#include "duet/motion/people/motion_rows.h"
+#include "duet/motion/people/video_tracks.h"
+#include "tests/fuzz/archive_edit.h"
+#include "tests/fuzz/reader.h"
+#include "tests/motion/body_files.h"
+#include "tests/motion/body_model_files.h"
+
+namespace duet::fuzz {
+namespace {
+
+test::BodyParameters fuzz_body(double seed, int body_joints = 21) {
+  return test::body_parameters(3, seed, body_joints, {seed, 0.0, 0.0});
+}
+
+// The file stands for both people where a format has one file for each.
+void read_people(const PeopleFormat& format, const std::string& name, std::string_view bytes) {
+  const std::string path = scratch_file(name, bytes);
+  PeopleOptions options;
+  options.align = Alignment::kFloor;
+  (void)format.read({.id = "fuzz", .files = {path, path}, .entry = ""}, options);
+}
+
+std::string inter_x_sample(unsigned seed) {
+  return seed % 2 == 0 ? test::inter_x_npz(fuzz_body(0.3), seed % 4 == 0).bytes() : std::string(kEdit);
+}
+void read_inter_x_file(std::string_view bytes) {
+  static const Npz sample = test::inter_x_npz(fuzz_body(0.3));
+  read_people(inter_x_format(), "P1.npz", archive_of(sample, bytes));
+}
+
+std::string amass_sample(unsigned seed) {
+  if (seed % 2 != 0) return std::string(kEdit);
+  return (seed % 4 == 0 ? test::amass_poses_npz(fuzz_body(0.3)) : test::amass_stageii_npz(fuzz_body(0.3))).bytes();
+}
+void read_amass_file(std::string_view bytes) {
+  static const Npz sample = test::amass_poses_npz(fuzz_body(0.3));
+  read_people(amass_format(), "a_poses.npz", archive_of(sample, bytes));
+}
+
+std::string interhuman_sample(unsigned seed) {
+  return test::interhuman_pickle(fuzz_body(0.3), fuzz_body(1.2), 2 + static_cast<int>(seed % 3), 60.0);
+}
+void read_interhuman_file(std::string_view bytes) { read_people(interhuman_raw_format(), "1.pkl", bytes); }
+
+std::string motion_x_sample(unsigned /*seed*/) { return test::motion_x_npy(fuzz_body(0.3)); }
+void read_motion_x_file(std::string_view bytes) { read_people(motion_x_format(), "a.npy", bytes); }
+
+std::string gvhmr_sample(unsigned /*seed*/) { return test::gvhmr_pt(fuzz_body(0.3)); }
+void read_gvhmr_file(std::string_view bytes) { read_people(gvhmr_format(), "a.pt", bytes); }
+
+std::string wham_sample(unsigned /*seed*/) {
+  return test::wham_pkl({{0, 0, fuzz_body(0.3, 23)}, {1, 1, fuzz_body(1.2, 23)}});
+}
+void read_wham_file(std::string_view bytes) { read_people(wham_format(), "wham_output.pkl", bytes); }
+
+std::string phalp_sample(unsigned /*seed*/) {
+  return test::phalp_pkl({{1, 0, fuzz_body(0.3, 23)}, {2, 0, fuzz_body(1.2, 23)}}, 3);
+}
+void read_phalp_file(std::string_view bytes) { read_people(four_d_humans_format(), "video.pkl", bytes); }
+
+std::string body_model_sample(unsigned seed) {
+  const test::SmallModel small(24);
+  if (seed % 3 == 0) return small.npz().bytes();
+  return small.pickle(seed % 3 == 1 ? test::SmallModel::Matrix::kColumns : test::SmallModel::Matrix::kRows,
+                      seed % 2 == 0);
+}
+void read_body_model(std::string_view bytes) {
+  std::remove((scratch_folder() + "/model.bin.duet-joints.npz").c_str());
+  (void)load_body_model(scratch_file("model.bin", bytes));
+}
+
+// data.pkl alone: a zip's checksums keep a fuzzer from reaching it.
+std::string torch_pickle_sample(unsigned /*seed*/) {
+  test::TorchWriter out;
+  out.pickle.raw("}(").text("x");
+  out.floats(2, 3, {1, 2, 3, 4, 5, 6}, true);
+  return out.pickle.raw("u.").str();
+}
+void read_torch_pickle_bytes(std::string_view bytes) {
+  TorchFile file;
+  file.pickle = parse_pickle(bytes, "fuzz.pt", PickleFlavour::kTorch);
+  file.storages["0"] = std::string(24, '\0');
+  for (const PickleNode& node : file.pickle.nodes)
+    if (node.kind == PickleKind::kTensor) (void)tensor_values(file, node, "tensor");
+}
+
+std::string joblib_sample(unsigned /*seed*/) {
+  test::PickleWriter out;
+  out.raw("}(").text("x").joblib_doubles({2, 2}, {1, 2, 3, 4}).text("y").joblib_array({2}, "abcdefgh", "f4", true, 0);
+  return out.raw("u.").str();
+}
+void read_joblib_bytes(std::string_view bytes) {
+  const Pickle pickle = parse_joblib(bytes, "fuzz.pkl");
+  for (const PickleNode& node : pickle.nodes)
+    if (node.kind == PickleKind::kArray && node.built) (void)array_values(pickle, node, "array");
+}
+
+std::string object_npy_sample(unsigned /*seed*/) {
+  std::string dictionary = "{'descr': '|O', 'fortran_order': False, 'shape': (), }";
+  dictionary += std::string(63 - (10 + dictionary.size()) % 64, ' ') + "\n";
+  test::PickleWriter out(3);
+  out.call("numpy.core.multiarray", "_reconstruct").call("numpy", "ndarray").integer(0).raw("\x85").bytes("b");
+  out.raw("\x87R(").integer(1).raw(")").dtype("O8", "|").raw("\x89](}").text("x").doubles({2}, {1, 2}).raw("setb.");
+  return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(dictionary.size()) + '\0' + dictionary + out.str();
+}
+void read_object_npy(std::string_view bytes) { (void)parse_object_npy(bytes, "fuzz.npy"); }
+
+}  // namespace
+
+std::vector<Reader> body_readers() {
+  return {{"joblib", joblib_sample, read_joblib_bytes},
+          {"torch_pickle", torch_pickle_sample, read_torch_pickle_bytes},
+          {"object_npy", object_npy_sample, read_object_npy},
+          {"body_model", body_model_sample, read_body_model},
+          {"inter_x", inter_x_sample, read_inter_x_file},
+          {"interhuman_raw", interhuman_sample, read_interhuman_file},
+          {"amass", amass_sample, read_amass_file},
+          {"motion_x", motion_x_sample, read_motion_x_file},
+          {"gvhmr", gvhmr_sample, read_gvhmr_file},
+          {"wham", wham_sample, read_wham_file},
+          {"four_d_humans", phalp_sample, read_phalp_file}};
+}
+
+}  // namespace duet::fuzz

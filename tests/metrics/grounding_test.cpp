@@ -1,0 +1,80 @@
+#include "duet/metrics/grounding.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "duet/core/skeleton.h"
+#include "duet/motion/interaction_clip.h"
+
+namespace duet {
+namespace {
+
+const RobotModel& g1() {
+  static const RobotModel model = load_robot(default_card_path());
+  return model;
+}
+
+// Two people who stand still 2 m apart, and the robot standing in the place of one.
+PairedMotion standing(int frames) {
+  PairedMotion motion;
+  HumanMotion person;
+  person.joints = PointTracks(frames, kSmplJoints);
+  for (int t = 0; t < frames; ++t) {
+    for (int j = 0; j < kSmplJoints; ++j) {
+      const bool left = kSmplMirror[j] > j, middle = kSmplMirror[j] == j;
+      person.joints.at(t, j) = Eigen::Vector3d(0.01 * j, middle ? 0.0 : left ? 0.1 : -0.1, 0.05 * j + 0.1);
+    }
+    for (const int foot : {kLeftAnkle, kRightAnkle, kLeftToe, kRightToe}) person.joints.at(t, foot).z() = 0.08;
+  }
+  motion.source_reactor = person;
+  for (int t = 0; t < frames; ++t) person.joints.frame(t).row(0).array() += 2.0;
+  motion.source_partner = motion.partner = person;
+  const RobotState state = g1().standing_state();
+  motion.robot.rate_hz = 50.0;
+  motion.robot.joint_names = g1().joint_names();
+  motion.robot.q = g1().neutral.replicate(1, frames);
+  motion.robot.root.assign(frames, state.X_WB);
+  return motion;
+}
+
+TEST(GroundingMetrics, ARobotThatStandsIsAtZero) {
+  const auto figures = grounding_metrics(standing(30), g1());
+  EXPECT_NEAR(figures.at("sole_height"), 0.0, 2e-3);
+  EXPECT_NEAR(figures.at("foot_skate"), 0.0, 1e-12);
+  EXPECT_EQ(figures.at("penetration_max"), 0.0);
+  EXPECT_EQ(figures.at("bone_change_max"), 0.0);
+  EXPECT_EQ(figures.at("joint_speed_max"), 0.0);
+  EXPECT_EQ(figures.at("limit_violations"), 0.0);
+  EXPECT_NEAR(figures.at("root_roll_max"), 0.0, 1e-12);
+}
+
+TEST(GroundingMetrics, EachFaultIsSeen) {
+  PairedMotion motion = standing(30);
+  for (int t = 0; t < 30; ++t) {
+    motion.robot.root[t].p += Eigen::Vector3d(0.002 * t, 0.0, 0.1);  // 0.1 m/s, 10 cm up
+    motion.robot.root[t].R = motion.robot.root[t].R * Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitX());
+  }
+  motion.robot.q(28, 10) = g1().joints[28].upper + 0.1;
+  motion.partner.joints.at(5, kLeftElbow).x() += 0.03;
+  const auto figures = grounding_metrics(motion, g1());
+  EXPECT_NEAR(figures.at("sole_height"), 0.1, 0.03);
+  EXPECT_NEAR(figures.at("foot_skate"), 0.1, 1e-9);
+  EXPECT_EQ(figures.at("limit_violations"), 1.0);
+  EXPECT_GT(figures.at("bone_change_max"), 1e-3);
+  EXPECT_GT(figures.at("joint_speed_max"), 5.0);
+  EXPECT_NEAR(figures.at("root_roll_max"), 0.2, 1e-9);
+  EXPECT_NEAR(figures.at("root_tilt_max"), 0.2, 1e-9);
+  motion = standing(30);
+  for (int t = 0; t < 30; ++t) motion.partner.joints.frame(t).row(0).array() -= 1.95;  // he stands in the robot
+  EXPECT_GT(grounding_metrics(motion, g1()).at("penetration_max"), 0.03);
+}
+
+TEST(GroundingMetrics, OfAnotherRobotIsRefused) {
+  PairedMotion motion = standing(10);
+  motion.robot.q.conservativeResize(5, 10);
+  EXPECT_THROW(grounding_metrics(motion, g1()), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,151 @@
+#include "duet/motion/people/joint_layout.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/motion/synthesis.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+double weight_of(const std::vector<JointRecipe::Part>& parts) {
+  double weight = 0.0;
+  for (const JointRecipe::Part& part : parts) weight += part.weight;
+  return weight;
+}
+
+TEST(JointLayout, WeightsOfEachJointAddUpToOneAndDirectionsToZero) {
+  for (const std::string& name : joint_layout_names()) {
+    const JointLayout& layout = joint_layout(name);
+    for (int j = 0; j < kSmplJoints; ++j) {
+      EXPECT_NEAR(weight_of(layout.smpl[j].parts), 1.0, 1e-12) << name << " " << kSmplNames[j];
+      EXPECT_NEAR(weight_of(layout.smpl[j].toward), 0.0, 1e-12) << name << " " << kSmplNames[j];
+    }
+  }
+}
+
+// A recipe uses columns of the file, and SMPL joints that stand before it in the order of making.
+TEST(JointLayout, RecipesUseOnlyWhatIsMadeBefore) {
+  for (const std::string& name : joint_layout_names()) {
+    const JointLayout& layout = joint_layout(name);
+    const auto size = static_cast<int>(layout.names.size());
+    std::array<bool, kSmplJoints> made{};
+    for (const SmplJoint joint : kRecipeOrder) {
+      for (const auto* parts : {&layout.smpl[joint].parts, &layout.smpl[joint].toward})
+        for (const JointRecipe::Part& part : *parts) {
+          ASSERT_GE(part.column, 0);
+          ASSERT_LT(part.column, size + kSmplJoints);
+          if (part.column >= size) {
+            EXPECT_TRUE(made[part.column - size]) << name << " " << kSmplNames[joint];
+          }
+        }
+      made[joint] = true;
+    }
+  }
+}
+
+TEST(JointLayout, SizesAreTheNumbersInTheNames) {
+  for (const std::string& name : joint_layout_names())
+    EXPECT_EQ(std::to_string(joint_layout(name).names.size()), name.substr(name.rfind('-') + 1)) << name;
+}
+
+// Where a skeleton has a joint of SMPL's, that is it.
+TEST(JointLayout, ColumnsOfKnownSkeletonsAreTheirJoints) {
+  const auto column = [](const char* layout, SmplJoint joint) {
+    const JointLayout& found = joint_layout(layout);
+    const JointRecipe& recipe = found.smpl[joint];
+    return recipe.parts.size() == 1 && recipe.parts[0].column < static_cast<int>(found.names.size())
+               ? found.names[recipe.parts[0].column]
+               : "(made)";
+  };
+  for (int j = 0; j < kSmplJoints; ++j) EXPECT_EQ(column("smpl-24", static_cast<SmplJoint>(j)), kSmplNames[j]);
+  EXPECT_EQ(column("kinect-15", kLeftAnkle), "lfoot");
+  EXPECT_EQ(column("kinect-15", kLeftToe), "lfoot");  // and ahead of it
+  EXPECT_FALSE(joint_layout("kinect-15").has_toes());
+  EXPECT_EQ(column("kinect-25", kRightToe), "FootRight");
+  EXPECT_EQ(column("kinect-25", kRightHand), "HandRight");
+  EXPECT_EQ(column("kinect-25", kNeck), "Neck");
+  EXPECT_EQ(column("kinect-20", kNeck), "ShoulderCenter");
+  EXPECT_EQ(column("coco-17", kLeftWrist), "left_wrist");
+  EXPECT_EQ(column("optitrack-64", kLeftShoulder), "LeftArm");
+  EXPECT_EQ(column("optitrack-64", kLeftCollar), "LeftShoulder");
+  EXPECT_EQ(column("optitrack-64", kLeftWrist), "LeftHand");
+  EXPECT_EQ(column("optitrack-64", kLeftHand), "LeftHandMiddle1");
+  EXPECT_EQ(column("optitrack-64", kRightToe), "RightToeBase");
+  EXPECT_EQ(column("smplx-127", kLeftHand), "left_middle1");
+  EXPECT_EQ(column("imar-25", kNeck), "thorax");
+}
+
+TEST(JointLayout, ASmplPersonComesBackFromEveryPartOfItsJoints) {
+  const InteractionClip clip = synthesize(Task::kHandshake, {.seed = 3});
+  const JointLayout& layout = joint_layout("smpl-22");
+  for (const int t : {0, clip.frames() / 2}) {
+    PointTracks columns(1, 22);
+    columns.frame(0) = clip.a.joints.frame(t).leftCols<22>();
+    SmplFrame smpl;
+    make_smpl(layout, std::as_const(columns).frame(0), true, smpl);
+    EXPECT_EQ(Eigen::Matrix3Xd(smpl.leftCols<22>()), Eigen::Matrix3Xd(columns.frame(0)));
+    for (const SmplJoint hand : {kLeftHand, kRightHand})
+      EXPECT_LT((smpl.col(hand) - clip.a.joints.at(t, hand)).norm(), 0.05);
+  }
+}
+
+// Joints that fifteen columns lack are where a person has them, to the spread of people.
+TEST(JointLayout, FifteenJointsMakeAPerson) {
+  const InteractionClip clip = synthesize(Task::kHug, {.seed = 4});
+  const JointLayout& layout = joint_layout("kinect-15");
+  const std::array<int, 15> smpl_of = {kHead,     kNeck,          kSpine2,     kLeftShoulder, kLeftElbow,
+                                       kLeftHand, kRightShoulder, kRightElbow, kRightHand,    kLeftHip,
+                                       kLeftKnee, kLeftAnkle,     kRightHip,   kRightKnee,    kRightAnkle};
+  for (int t = 0; t < clip.frames(); t += 50) {
+    PointTracks columns(1, 15);
+    for (int k = 0; k < 15; ++k) columns.at(0, k) = clip.a.joints.at(t, smpl_of[k]);
+    SmplFrame smpl;
+    make_smpl(layout, std::as_const(columns).frame(0), true, smpl);
+    for (int j = 0; j < kSmplJoints; ++j)
+      EXPECT_LT((smpl.col(j) - clip.a.joints.at(t, j)).norm(), 0.12) << t << " " << kSmplNames[j];
+  }
+}
+
+TEST(JointLayout, NamesOfOthersAreMatched) {
+  const std::vector<std::string> sides = {"L_", "R_"};
+  std::vector<std::string> names = {"Head", "Neck"};
+  for (const std::string& side : sides)
+    for (const char* part : {"Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle"}) names.push_back(side + part);
+  const JointLayout layout = layout_of_names("mine", names);
+  EXPECT_EQ(layout.smpl[kLeftKnee].parts[0].column, 6);
+  EXPECT_EQ(layout.smpl[kRightWrist].parts[0].column, 10);
+}
+
+TEST(JointLayout, MissingAndDoubledPartsAreNamed) {
+  const auto refusal = [](const std::vector<std::string>& names) {
+    return thrown_message<InputError>([&] { (void)layout_of_names("mine", names); });
+  };
+  std::vector<std::string> names = joint_layout("coco-17").names;
+  names[13] = "something";
+  EXPECT_THAT(refusal(names), HasSubstr("skeleton 'mine': no column is the left knee"));
+  EXPECT_THAT(refusal({}), HasSubstr("none the head"));
+  names[13] = "left_hip";
+  EXPECT_THAT(refusal(names), HasSubstr("columns 11 ('left_hip') and 13 ('left_hip') are both the left hip"));
+}
+
+TEST(JointLayout, AFileOfNamesIsASkeleton) {
+  const test::ScratchFolder folder;
+  std::string text = "# mine\n";
+  for (const std::string& name : joint_layout("coco-17").names) text += name + "  # a joint\n\n";
+  write_file(folder / "names.txt", text);
+  EXPECT_EQ(read_joint_layout(folder / "names.txt").names, joint_layout("coco-17").names);
+  EXPECT_EQ(read_joint_layout("coco-17").name, "coco-17");
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { (void)read_joint_layout("coco-18"); }),
+              HasSubstr("did you mean 'coco-17'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { (void)joint_layout("kinect-16"); }),
+              HasSubstr("unknown skeleton 'kinect-16'"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,305 @@
+// TorchScript modules that are chains of linear layers and activations, written here as PyTorch writes them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/zip.h"
+#include "duet/nn/load_network.h"
+#include "duet/nn/torch_script.h"
+#include "tests/nn/evaluate.h"
+#include "tests/nn/onnx_writer.h"
+#include "tests/support.h"
+
+namespace duet::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string byte_of(int code) { return std::string(1, static_cast<char>(code)); }
+
+// The opcodes of a pickle of protocol 2.
+std::string number(std::int32_t value) {
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);
+  return bytes;
+}
+std::string text(const std::string& value) { return "X" + number(static_cast<int>(value.size())) + value; }
+std::string numbers(const std::vector<int>& values) {
+  std::string bytes = "(";
+  for (const int value : values) bytes += "J" + number(value);
+  return bytes + "t";
+}
+std::string object(const std::string& module, const std::string& name, const std::string& members) {
+  return "c" + module + "\n" + name + "\n)" + byte_of(0x81) + "}(" + members + "ub";
+}
+struct StoredTensor {
+  int storage = 0;
+  std::vector<int> sizes{}, strides{};
+  int first = 0;
+  std::string kind = "FloatStorage";
+};
+std::string tensor(const StoredTensor& t) {
+  return "ctorch._utils\n_rebuild_tensor_v2\n((" + text("storage") + "ctorch\n" + t.kind + "\n" +
+         text(std::to_string(t.storage)) + text("cpu") + "K" + byte_of(9) + "tQ" + "J" + number(t.first) +
+         numbers(t.sizes) + numbers(t.strides) + byte_of(0x88) + "ccollections\nOrderedDict\n)RtR";
+}
+std::string linear(const StoredTensor& weight, const std::string& bias, const std::string& mangle = "") {
+  return object("__torch__.torch.nn.modules.linear" + mangle, "Linear",
+                text("weight") + tensor(weight) + text("bias") + bias);
+}
+std::string activation(const std::string& name) {
+  return object("__torch__.torch.nn.modules.activation", name, text("training") + byte_of(0x89));
+}
+
+// 3 inputs, 4 hidden, 2 outputs; ELU of alpha 0.5 between them.
+struct Mlp3 {
+  std::vector<Operand> tensors = {operand({4, 3}, 0), operand({4}, 1), operand({2, 4}, 2), operand({2}, 3)};
+  StoredTensor first{.storage = 0, .sizes = {4, 3}, .strides = {3, 1}};
+  StoredTensor second{.storage = 2, .sizes = {2, 4}, .strides = {4, 1}};
+  std::string bias = tensor({.storage = 1, .sizes = {4}, .strides = {1}});
+  std::string last_bias = tensor({.storage = 3, .sizes = {2}, .strides = {1}});
+  std::string between = activation("ELU");
+  std::string forward =
+      "    a_Gemm = getattr(self, \"a/Gemm\")\n"
+      "    a_gemm = (a_Gemm).forward(input_1, )\n"
+      "    b_Elu = getattr(self, \"b/Elu\")\n"
+      "    b_elu = (b_Elu).forward(a_gemm, )\n"
+      "    c_Gemm = getattr(self, \"c/Gemm\")\n"
+      "    c_gemm = (c_Gemm).forward(b_elu, )\n"
+      "    return c_gemm\n";
+  std::string more = {};  // members of the module
+  std::map<std::string, std::string> sources = {
+      {"torch/nn/modules/activation.py", "class ELU(Module):\n  alpha : Final[float] = 0.5\n\nclass Tanh(Module):\n"}};
+
+  [[nodiscard]] std::string module() const {
+    return object("__torch__.torch.fx.graph_module", "GraphModule",
+                  text("_lineno_map") + "ctorch.jit._pickle\nrestore_type_tag\n}(K\x01K\x01u" + text("Dict[int, int]") +
+                      byte_of(0x86) + "R" + text("a/Gemm") + linear(first, bias) + text("b/Elu") + between +
+                      text("c/Gemm") + linear(second, last_bias, ".___torch_mangle_0") + more);
+  }
+  [[nodiscard]] std::string archive(const std::string& pickle) const {
+    std::vector<ZipEntry> entries = {{"policy/data.pkl", byte_of(0x80) + byte_of(2) + pickle + "."},
+                                     {"policy/byteorder", "little"}};
+    std::map<std::string, std::string> code = sources;
+    code.emplace("torch/fx/graph_module.py",
+                 "class GraphModule(Module):\n  training : bool\n"
+                 "  def forward(self: __torch__.torch.fx.graph_module.GraphModule,\n    input_1: Tensor) -> Tensor:\n" +
+                     forward);
+    for (const auto& [path, source] : code) entries.push_back({"policy/code/__torch__/" + path, source});
+    for (std::size_t k = 0; k < tensors.size(); ++k)
+      entries.push_back(
+          {"policy/data/" + std::to_string(k), std::string(reinterpret_cast<const char*>(tensors[k].values.data()),
+                                                           tensors[k].values.size() * sizeof(float))});
+    return zip_bytes(entries);
+  }
+  [[nodiscard]] std::unique_ptr<Network> network(const std::string& pickle) const {
+    return torch_script_network(archive(pickle), "policy.pt");
+  }
+  [[nodiscard]] std::unique_ptr<Network> network() const { return network(module()); }
+  [[nodiscard]] std::string refusal(const std::string& pickle) const {
+    return thrown_message<InputError>([&] { (void)network(pickle); });
+  }
+  [[nodiscard]] std::string refusal() const { return refusal(module()); }
+};
+
+double half_elu(double x) { return x > 0.0 ? x : 0.5 * std::expm1(x); }
+
+// W x + b of the operands from `first` on; `transposed`: W is stored column by column.
+std::vector<double> layer(const std::vector<Operand>& tensors, int first, const std::vector<double>& x,
+                          bool transposed = false) {
+  const std::size_t rows = tensors[first + 1].values.size();
+  std::vector<double> y;
+  for (std::size_t r = 0; r < rows; ++r) {
+    double sum = static_cast<double>(tensors[first + 1].values[r]);
+    for (std::size_t c = 0; c < x.size(); ++c)
+      sum += static_cast<double>(tensors[first].values[transposed ? c * rows + r : r * x.size() + c]) * x[c];
+    y.push_back(sum);
+  }
+  return y;
+}
+
+std::vector<double> expected_of(const Mlp3& file, const std::function<double(double)>& between,
+                                bool transposed = false) {
+  const std::vector<float> x = wave(3);
+  std::vector<double> hidden = layer(file.tensors, 0, {x.begin(), x.end()}, transposed);
+  for (double& value : hidden) value = between(value);
+  return layer(file.tensors, 2, hidden);
+}
+
+void expect_near(const std::vector<float>& found, const std::vector<double>& expected) {
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], expected[k], 1e-5) << k;
+}
+
+TEST(TorchMlp, AGraphModuleIsItsLayersOneAfterAnother) {
+  const Mlp3 file;
+  const auto network = file.network();
+  ASSERT_EQ(network->inputs().size(), 1U);
+  EXPECT_EQ(network->inputs()[0].name, "x");
+  EXPECT_EQ(network->inputs()[0].size, 3);
+  EXPECT_EQ(network->outputs()[0].name, "action");
+  EXPECT_EQ(network->outputs()[0].size, 2);
+  expect_near(evaluate(*network, {wave(3)})[0], expected_of(file, half_elu));
+}
+
+TEST(TorchMlp, EveryActivationIsItsFormula) {
+  const std::tuple<const char*, const char*, std::function<double(double)>> all[] = {
+      {"Tanh", "", [](double x) { return std::tanh(x); }},
+      {"ReLU", "", [](double x) { return std::max(x, 0.0); }},
+      {"Sigmoid", "", [](double x) { return 1.0 / (1.0 + std::exp(-x)); }},
+      {"LeakyReLU", "  negative_slope : Final[float] = 0.2\n", [](double x) { return x > 0.0 ? x : 0.2 * x; }}};
+  for (const auto& [name, line, formula] : all) {
+    Mlp3 file;
+    file.between = activation(name);
+    file.sources["torch/nn/modules/activation.py"] = std::string("class ") + name + "(Module):\n" + line;
+    expect_near(evaluate(*file.network(), {wave(3)})[0], expected_of(file, formula));
+  }
+}
+
+TEST(TorchMlp, ASequentialWithinAModuleIsRead) {
+  Mlp3 file;
+  file.sources["torch/nn/modules/container.py"] =
+      "class Sequential(Module):\n"
+      "  def forward(self: __torch__.torch.nn.modules.container.Sequential,\n    input: Tensor) -> Tensor:\n"
+      "    _0 = getattr(self, \"0\")\n    _1 = getattr(self, \"1\")\n    _2 = getattr(self, \"2\")\n"
+      "    input0 = (_0).forward(input, )\n    input1 = (_1).forward(input0, )\n    return (_2).forward(input1, )\n";
+  file.sources["policy.py"] =
+      "class Policy(Module):\n  actor : __torch__.torch.nn.modules.container.Sequential\n"
+      "  def forward(self: __torch__.policy.Policy,\n    obs: Tensor) -> Tensor:\n"
+      "    actor = self.actor\n    return (actor).forward(obs, )\n";
+  const std::string chain = object("__torch__.torch.nn.modules.container", "Sequential",
+                                   text("0") + linear(file.first, file.bias) + text("1") + file.between + text("2") +
+                                       linear(file.second, file.last_bias));
+  const auto network = file.network(object("__torch__.policy", "Policy", text("actor") + chain));
+  expect_near(evaluate(*network, {wave(3)})[0], expected_of(file, half_elu));
+}
+
+TEST(TorchMlp, AWeightIsReadByItsStridesAndMayHaveNoBias) {
+  Mlp3 file;
+  file.first.strides = {1, 4};  // stored column by column
+  expect_near(evaluate(*file.network(), {wave(3)})[0], expected_of(file, half_elu, true));
+  Mlp3 bare;
+  bare.last_bias = "N";
+  bare.tensors[3].values = {0.0F, 0.0F};
+  expect_near(evaluate(*bare.network(), {wave(3)})[0], expected_of(bare, half_elu));
+}
+
+TEST(TorchMlp, OtherModulesAreRefusedByName) {
+  Mlp3 file;
+  file.between = activation("Softmax");
+  EXPECT_EQ(file.refusal(),
+            "'policy.pt': TorchScript: expected a PolicyExporterLSTM, or linear layers and activations one after "
+            "another, found 'activation.Softmax' as 'b/Elu' (TorchScript of another kind; needs libtorch)");
+  Mlp3 none;
+  none.forward = "    return input_1\n";
+  EXPECT_THAT(none.refusal(), HasSubstr("found none (TorchScript of another kind"));
+  Mlp3 scaled;
+  scaled.sources["torch/nn/modules/activation.py"] = "class ELU(Module):\n  training : bool\n";
+  EXPECT_THAT(scaled.refusal(), HasSubstr("no line 'alpha : Final[float] = NUMBER' in the code of 'b/Elu'"));
+  Mlp3 unknown;
+  unknown.sources.clear();
+  EXPECT_THAT(unknown.refusal(), HasSubstr("no code of '__torch__.torch.nn.modules.activation.ELU'"));
+  Mlp3 number;
+  number.between = "K\x05";
+  EXPECT_THAT(number.refusal(), HasSubstr("'b/Elu', which is no module"));
+}
+
+TEST(TorchMlp, CodeThatDoesMoreThanHandOneTensorOnIsRefused) {
+  const auto line = [](const std::string& code) {
+    Mlp3 file;
+    file.forward = code + "    return input_1\n";
+    return file.refusal();
+  };
+  EXPECT_THAT(line("    x = torch.add(input_1, input_1)\n"),
+              HasSubstr("found the line 'x = torch.add(input_1, input_1)' in the code of 'module'"));
+  EXPECT_THAT(line("    x = (a).forward(input_1, )\n"), HasSubstr("the line 'x = (a).forward(input_1, )'"));
+  EXPECT_THAT(line("    x = (self.gone).forward(input_1, )\n"), HasSubstr("no member 'gone' in 'module'"));
+  EXPECT_THAT(line("    if True:\n"), HasSubstr("the line 'if True:'"));
+  Mlp3 endless;
+  endless.forward = "    a = getattr(self, \"a/Gemm\")\n";
+  EXPECT_THAT(endless.refusal(), HasSubstr("no return in the code of 'module'"));
+  Mlp3 two;
+  two.forward = "";
+  two.sources["torch/fx/graph_module.py"] =
+      "class GraphModule(Module):\n  def forward(self: G,\n    a: Tensor,\n    b: Tensor) -> Tensor:\n    return a\n";
+  EXPECT_THAT(two.refusal(), HasSubstr("no forward of one tensor in 'module'"));
+}
+
+TEST(TorchMlp, AModuleThatHoldsItselfIsRefused) {
+  Mlp3 file;
+  file.forward = "    a = getattr(self, \"me\")\n    return (a).forward(input_1, )\n";
+  // The object is kept in place 1 of the memo before its members are read.
+  const std::string self =
+      "c__torch__.torch.fx.graph_module\nGraphModule\n)" + byte_of(0x81) + "q\x01}(" + text("me") + "h\x01ub";
+  EXPECT_THAT(file.refusal(self), HasSubstr("more than 8 modules within one another"));
+}
+
+TEST(TorchMlp, TensorsThatDoNotFitTheirNumbersAreRefused) {
+  const auto weight = [](const StoredTensor& changed) {
+    Mlp3 file;
+    file.first = changed;
+    return file.refusal();
+  };
+  const std::string fits = "'a/Gemm.weight', whose sizes do not fit the 12 numbers of its storage";
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 4}, .strides = {3, 1}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3, 1}, .first = 1}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3, 1}, .first = -1}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {4, 1}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {0, 0}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {1 << 30, 1 << 30}, .strides = {1, 1}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {0, 3}, .strides = {3, 1}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3}}), HasSubstr(fits));
+  EXPECT_THAT(weight({.storage = 9, .sizes = {4, 3}, .strides = {3, 1}}), HasSubstr("no 'data/9' for 'a/Gemm.weight'"));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3, 1}, .kind = "DoubleStorage"}),
+              HasSubstr("numbers of 'a/Gemm.weight' that are not float"));
+  EXPECT_THAT(weight({.storage = 0, .sizes = {12}, .strides = {1}}), HasSubstr("'a/Gemm' without a matrix 'weight'"));
+  Mlp3 narrow;
+  narrow.second = {.storage = 2, .sizes = {2, 3}, .strides = {4, 1}};
+  EXPECT_THAT(narrow.refusal(), HasSubstr("node 'c/Gemm', operator Gemm: shapes"));
+}
+
+TEST(TorchMlp, PicklesThatDoMoreThanHoldTensorsAreRefused) {
+  const Mlp3 file;
+  EXPECT_THAT(file.refusal("cposix\nsystem\n(" + text("id") + "tR"),
+              HasSubstr("data.pkl: expected a call that rebuilds a tensor or restores a type, found 'posix.system'"));
+  EXPECT_THAT(file.refusal("\x8f"), HasSubstr("expected an opcode of a module of tensors, found 0x8f"));
+  for (const char* broken : {"", "t", "R", "b", "h\x07", "u", "(K\x01u", "Q",
+                             "K\x01K\x02"
+                             "b",
+                             "e"})
+    EXPECT_THAT(file.refusal(broken), HasSubstr("'policy.pt': TorchScript: data.pkl: ")) << broken;
+  const std::string whole = file.module();
+  for (std::size_t size = 0; size < whole.size(); size += 7)
+    EXPECT_THAT(file.refusal(whole.substr(0, size)), HasSubstr("'policy.pt': TorchScript: ")) << size;
+}
+
+TEST(TorchMlp, RlSarsTrackerEqualsItsFormula) {
+  const std::string path = shared_file("models/rl_sar/policy.pt");
+  if (path.empty()) GTEST_SKIP() << "not run: rl_sar/policy.pt absent";
+  std::vector<Operand> tensors(8);
+  read_zip(read_file(path), path, {1 << 20, 1 << 21}, [&](const std::string& entry, const std::string& content) {
+    const std::size_t at = entry.find("/data/");
+    if (at == std::string::npos) return;
+    std::vector<float>& values = tensors[std::stoi(entry.substr(at + 6))].values;
+    values.resize(content.size() / sizeof(float));
+    std::memcpy(values.data(), content.data(), content.size());
+  });
+  const auto network = load_network(path);
+  ASSERT_EQ(network->inputs()[0].size, 154);
+  const std::vector<float> x = wave(154);
+  std::vector<double> value(x.begin(), x.end());
+  for (int first = 0; first < 8; first += 2) {
+    value = layer(tensors, first, value);
+    if (first < 6)
+      for (double& each : value) each = each > 0.0 ? each : std::expm1(each);
+  }
+  expect_near(evaluate(*network, {x})[0], value);
+}
+
+}  // namespace
+}  // namespace duet::test

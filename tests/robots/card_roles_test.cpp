@@ -1,0 +1,133 @@
+#include "duet/robots/card_roles.h"
+
+#include "duet/robots/roles.h"
+#include "tests/robots/fixtures.h"
+
+namespace duet {
+namespace {
+
+using test::g1;
+using test::kSmallCard;
+using test::load_small;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::string error_with(const std::string& keys) { return test::load_error(kSmallCard + keys, test::kSmallUrdf); }
+
+TEST(CardRoles, OfTheG1AreItsParts) {
+  const RobotRoles& roles = g1().roles;
+  EXPECT_THAT(roles.legs[0], ElementsAre(0, 1, 2, 3, 4, 5));
+  EXPECT_THAT(roles.legs[1], ElementsAre(6, 7, 8, 9, 10, 11));
+  EXPECT_THAT(roles.waist, ElementsAre(12, 13, 14));
+  EXPECT_THAT(roles.arms[0], ElementsAre(15, 16, 17, 18, 19, 20, 21));
+  EXPECT_THAT(roles.wrists, ElementsAre(19, 20, 21, 26, 27, 28));
+  EXPECT_EQ(roles.compound.size(), 7u);
+  EXPECT_EQ(roles.bodies.size(), 22u);
+  EXPECT_EQ(g1().frames[roles.push_frame].name, "torso_link");
+  EXPECT_EQ(g1().frames[roles.imu_frame].name, "pelvis");
+  EXPECT_EQ(g1().fall.height, 0.45);
+  EXPECT_EQ(g1().fall.cos_tilt, 0.7);
+  EXPECT_EQ(g1().stance_size().half_width, 0.1185);
+  EXPECT_EQ(g1().stance_size().shift, Eigen::Vector2d(0.02, 0.03));
+  EXPECT_EQ(g1().bounds_of_root().lowest, 0.62);
+  EXPECT_EQ(g1().bounds_of_root().highest, 0.77);
+  EXPECT_EQ(roles.pose_ranges.at(23), (std::pair{-1.1, 0.0}));
+}
+
+TEST(CardRoles, ASilentCardHasNone) {
+  const RobotModel small = load_small();
+  EXPECT_TRUE(small.roles.legs[0].empty());
+  EXPECT_THAT(small.roles.counterpart, ElementsAre(0, 1));
+  EXPECT_THAT(small.roles.bodies, ElementsAre(0, 1, 2));
+  EXPECT_EQ(small.roles.push_frame, 0);
+  EXPECT_DOUBLE_EQ(small.fall.height, 0.57 * small.standing_height);
+  EXPECT_EQ(small.pose("wave"), nullptr);
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { static_cast<void>(small.stance_size()); }),
+            "robot 'small': expected 'stance' in its card, found none");
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([&] { static_cast<void>(small.bounds_of_root()); }),
+            "robot 'small': expected 'root_bounds' in its card, found none");
+}
+
+TEST(CardRoles, APoseIsTheNeutralOneButForItsAngles) {
+  const RobotModel small = load_small(kSmallCard + "poses: {wave: {elbow: 1.5}}\n");
+  ASSERT_NE(small.pose("wave"), nullptr);
+  EXPECT_EQ(*small.pose("wave"), Eigen::Vector2d(0.5, 1.5));
+}
+
+TEST(CardRoles, ALockedJointIsLeftOut) {
+  const std::string card = test::replaced(kSmallCard, "  - {name: elbow, armature: 0.02, kp: 10, kd: 0.5}\n", "") +
+                           "locked: [{name: elbow, position: 0}]\nwaist: [shoulder, elbow]\n"
+                           "pose_ranges: {elbow: [-1, 1], shoulder: [0, 1]}\n";
+  const RobotModel small = load_small(card);
+  EXPECT_THAT(small.roles.waist, ElementsAre(0));
+  EXPECT_EQ(small.roles.pose_ranges.size(), 1u);
+}
+
+TEST(CardRoles, NamesThatAreNoneAreRefusedWithTheirLine) {
+  EXPECT_THAT(error_with("waist: [shouldr]\n"),
+              HasSubstr("small.yaml:17: unknown joint 'shouldr': did you mean 'shoulder'?"));
+  EXPECT_THAT(error_with("push_link: bric\n"), HasSubstr("small.yaml:17: unknown frame 'bric': did you mean 'brick'?"));
+  EXPECT_THAT(error_with("bodies: [base, none]\n"), HasSubstr("unknown frame 'none'"));
+  EXPECT_THAT(error_with("poses: {wave: {elbo: 1}}\n"), HasSubstr("unknown joint 'elbo'"));
+}
+
+TEST(CardRoles, SidesThatDoNotMirrorAreRefused) {
+  EXPECT_THAT(error_with("legs: {left: [shoulder], right: []}\n"),
+              HasSubstr("'legs': expected as many joints left as right, found 1 and 0"));
+  EXPECT_THAT(error_with("legs: {left: [shoulder], right: [elbow]}\n"),
+              HasSubstr("'legs': expected 'shoulder' to mirror 'elbow', found hinges about other axes at zero"));
+  EXPECT_THAT(error_with("arms: {left: [elbow], right: [elbow]}\n"),
+              HasSubstr("'arms': expected each joint once in legs and arms, found 'elbow' or 'elbow' again"));
+  EXPECT_THAT(error_with("arms: {left: [elbow]}\n"), HasSubstr("arms: expected the key 'right', found none"));
+}
+
+TEST(CardRoles, NumbersOutOfRangeAreRefused) {
+  EXPECT_THAT(error_with("fall: {height: 0, cos_tilt: 0.7}\n"),
+              HasSubstr("fall: 'height': expected a number > 0, found 0"));
+  EXPECT_THAT(error_with("pose_ranges: {shoulder: [1, 0]}\n"),
+              HasSubstr("'shoulder': expected lower <= upper, found [1, 0]"));
+  EXPECT_THAT(error_with("pose_ranges: {shoulder: [0, 9]}\n"),
+              HasSubstr("joint 'shoulder': expected angles in [-1, 2], found 9"));
+  EXPECT_THAT(error_with("pose_ranges: {shoulder: 1}\n"), HasSubstr("'shoulder': expected two numbers, found '1'"));
+  EXPECT_THAT(error_with("pose_ranges: {shoulder: [a, 1]}\n"), HasSubstr("expected a finite number, found 'a'"));
+  EXPECT_THAT(error_with("poses: {wave: {shoulder: -7}}\n"), HasSubstr("expected angles in [-1, 2], found -7"));
+  EXPECT_THAT(error_with("poses: {wave: {shoulder: up}}\n"),
+              HasSubstr("'shoulder': expected a finite number, found 'up'"));
+  EXPECT_THAT(error_with("poses: {wave: [1]}\n"), HasSubstr("'wave': expected a mapping, found a list of 1"));
+  EXPECT_THAT(error_with("poses: {wave: {shoulder: 1, shoulder: 1}}\n"),
+              HasSubstr("'wave': expected each joint once, found 'shoulder' again"));
+  EXPECT_THAT(error_with("waist: shoulder\n"), HasSubstr("'waist': expected a list of names, found 'shoulder'"));
+  std::string many = "compound: [";
+  for (int i = 0; i < 65; ++i) many += "[elbow], ";
+  EXPECT_THAT(error_with(many + "]\n"), HasSubstr("'compound': expected at most 64, found 65"));
+}
+
+TEST(Roles, TheG1MirrorsAtItsPlane) {
+  for (int j = 0; j < g1().dof(); ++j) {
+    const std::string& name = g1().joints[j].name;
+    const std::string side = name.starts_with("left_")    ? "right_" + name.substr(5)
+                             : name.starts_with("right_") ? "left_" + name.substr(6)
+                                                          : name;
+    EXPECT_EQ(g1().joints[g1().roles.counterpart[j]].name, side);
+    const bool pitches = name.find("pitch") != std::string::npos || name.find("knee") != std::string::npos ||
+                         name.find("elbow") != std::string::npos;
+    EXPECT_EQ(mirror_sign(g1(), j), pitches ? 1.0 : -1.0) << name;
+  }
+}
+
+TEST(Roles, TheWaistsTiltIsAllButItsYaw) {
+  EXPECT_THAT(tilting_waist(g1()), ElementsAre(13, 14));
+  EXPECT_THAT(leg_joints(g1()), ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
+  EXPECT_TRUE(is_roll(g1(), 5));
+  EXPECT_FALSE(is_roll(g1(), 4));
+}
+
+TEST(Roles, TheG1sBaseIsItsPelvis) {
+  EXPECT_TRUE(base_is_pelvis(g1()));
+  const Pose X = pelvis_in_base(g1(), g1().neutral);
+  EXPECT_EQ(X.p, Eigen::Vector3d::Zero());
+  EXPECT_EQ(X.R.angularDistance(Eigen::Quaterniond::Identity()), 0.0);
+}
+
+}  // namespace
+}  // namespace duet

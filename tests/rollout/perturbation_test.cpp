@@ -1,0 +1,132 @@
+#include "duet/rollout/perturbation.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/core/require.h"
+#include "tests/bench/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* kSuite =
+    "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\nengines: [playback]\n"
+    "controllers: [pd]\npolicies: [replay]\n";
+
+std::vector<Perturbation> read(const std::string& list) {
+  return parse_suite(kSuite + ("perturbations: " + list + "\n"), "p.yaml").perturbations;
+}
+
+std::string refusal(const std::string& list) {
+  return test::thrown_message<InputError>([&] { read(list); });
+}
+
+TEST(Perturbation, ASuiteThatSaysNothingIsClean) {
+  const Suite suite = parse_suite(kSuite, "p.yaml");
+  ASSERT_EQ(suite.perturbations.size(), 1U);
+  EXPECT_EQ(suite.perturbations[0].name, "clean");
+  EXPECT_EQ(resolved_yaml(suite).find("perturbations"), std::string::npos);
+}
+
+TEST(Perturbation, NamesAloneHaveTheDocumentedDefaults) {
+  const std::vector<Perturbation> list =
+      read("[clean, delay, latency, noise, push, friction, mass, plan_latency, kick]");
+  ASSERT_EQ(list.size(), 9U);
+  EXPECT_EQ(list[0].name, "clean");
+  EXPECT_EQ(list[1].delay_ticks, 2);
+  EXPECT_EQ(list[2].latency_ms, 20.0);
+  EXPECT_EQ(list[3].noise->v, 0.5);
+  EXPECT_EQ(list[4].push->force, 60.0);
+  EXPECT_EQ(list[4].push->link, "");
+  EXPECT_EQ(list[5].friction, 0.4);
+  EXPECT_EQ(list[6].mass->add, 3.0);
+  EXPECT_EQ(list[6].name, "mass");
+  EXPECT_EQ(list[7].plan_latency_ms, 100.0);
+  EXPECT_EQ(list[8].kick->speed, 0.5);
+}
+
+TEST(Perturbation, ValuesAndCombinationsAreRead) {
+  const std::vector<Perturbation> list = read(
+      "[{name: push60, push: {force: 50, duration: 0.5, link: pelvis, every: 3}}, {delay: {ticks: 4}}, "
+      "{noise: {q: 0.02}}, {friction: 0.3, mass: {add: -1.5}}]");
+  EXPECT_EQ(list[0].name, "push60");
+  EXPECT_EQ(list[0].push->link, "pelvis");
+  EXPECT_EQ(list[1].name, "delay");
+  EXPECT_EQ(list[2].noise->q, 0.02);
+  EXPECT_EQ(list[2].noise->v, 0.0);  // what is not named has none
+  EXPECT_EQ(list[3].name, "friction+mass");
+  EXPECT_EQ(list[3].mass->add, -1.5);
+}
+
+TEST(Perturbation, WrittenOutItReadsBackToTheSame) {
+  for (const char* text : {"clean", "push",
+                           "{name: all, delay: {ticks: 3}, latency: {ms: 12.5}, noise: {w: 0.1}, "
+                           "push: {force: 7}, friction: 1.2, mass: {link: pelvis, add: 2}, plan_latency: {ms: 60}}",
+                           "{name: k, kick: {speed: 1, first: 0.5, from: 2, to: 2.5}}"}) {
+    const std::string once = to_yaml(read(std::string("[") + text + "]")[0]);
+    EXPECT_EQ(to_yaml(read("[" + once + "]")[0]), once);
+  }
+}
+
+TEST(Perturbation, WhatIsWrongIsNamedWithItsLine) {
+  EXPECT_THAT(refusal("[puhs]"), AllOf(HasSubstr("p.yaml:8"), HasSubstr("did you mean 'push'")));
+  EXPECT_THAT(refusal("[{name: x}]"), HasSubstr("expected at least one of delay, latency"));
+  EXPECT_THAT(refusal("[{name: clean, delay: {ticks: 1}}]"), HasSubstr("'clean' is the arm without"));
+  EXPECT_THAT(refusal("[{name: 'a b', delay: {ticks: 1}}]"), HasSubstr("letters, digits"));
+  EXPECT_THAT(refusal("[push, push]"), HasSubstr("'push' is there twice"));
+  EXPECT_THAT(refusal("[]"), HasSubstr("at least one"));
+  EXPECT_THAT(refusal("push"), HasSubstr("expected a list"));
+  EXPECT_THAT(refusal("[{push: {forec: 3}}]"), HasSubstr("force"));
+  EXPECT_THAT(refusal("[{delay: {ticks: 1.5}}]"), HasSubstr("ticks: expected a whole number, found 1.5"));
+  EXPECT_THAT(refusal("[{delay: {ticks: 0}}]"), HasSubstr("expected a number from 1, at most 50, found 0"));
+  EXPECT_THAT(refusal("[{latency: {ms: 0}}]"), HasSubstr("above 0"));
+  EXPECT_THAT(refusal("[{noise: {q: -1}}]"), HasSubstr("q: expected"));
+  EXPECT_THAT(refusal("[{push: {duration: 3, every: 2}}]"), HasSubstr("every: expected a number from 3"));
+  EXPECT_THAT(refusal("[{kick: {from: 3, to: 2}}]"), HasSubstr("to: expected a number from 3"));
+  EXPECT_THAT(refusal("[{kick: {speed: 0}}]"), HasSubstr("speed: expected a number above 0"));
+  EXPECT_THAT(refusal("[{friction: nan}]"), HasSubstr("finite"));
+  EXPECT_THAT(refusal("[{mass: 3}]"), HasSubstr("mass"));
+}
+
+TEST(Perturbation, LinksAreThoseOfTheRobot) {
+  const auto robot = test::g1();
+  Perturbation perturbation = default_perturbation("push");
+  perturbation.push->link = "torso_lnik";
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); }),
+              AllOf(HasSubstr("perturbation 'push' on robot"), HasSubstr("torso_link")));
+  perturbation.push->link = "base_to_torso";  // a link of another robot
+  const std::string refusal =
+      test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); });
+  EXPECT_THAT(refusal, AllOf(HasSubstr("unknown frame 'base_to_torso'"), HasSubstr("Nearest of")));
+  EXPECT_LT(refusal.size(), 250U);  // not the names of all frames
+  perturbation = default_perturbation("mass");
+  perturbation.mass->add = -90.0;
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { check_perturbation(perturbation, *robot); }),
+              HasSubstr("expected some to be left"));
+}
+
+TEST(Perturbation, ALinkThatIsNotNamedIsTheCards) {
+  const auto g1 = test::g1(), t1 = load_shared_robot("t1");
+  EXPECT_EQ(g1->links[perturbed_link("", *g1)].name, "torso_link");
+  EXPECT_EQ(t1->links[perturbed_link("", *t1)].name, "Trunk");
+  EXPECT_EQ(t1->links[perturbed_link("chest_link", *t1)].name, "Trunk");
+  EXPECT_EQ(with_links(default_perturbation("push"), *g1).push->link, "torso_link");
+  EXPECT_EQ(with_links(default_perturbation("mass"), *t1).mass->link, "Trunk");
+  EXPECT_EQ(to_yaml(with_links(default_perturbation("mass"), *g1)), "{name: mass, mass: {link: torso_link, add: 3}}");
+  EXPECT_NO_THROW(check_perturbation(default_perturbation("push"), *t1));
+}
+
+TEST(Perturbation, AddedMassIsOfItsLinkAlone) {
+  const auto robot = test::g1();
+  const auto heavier = perturbed_robot(default_perturbation("mass"), robot);
+  EXPECT_NEAR(heavier->total_mass() - robot->total_mass(), 3.0, 1e-12);
+  for (size_t i = 0; i < robot->links.size(); ++i)
+    EXPECT_NEAR(heavier->links[i].mass - robot->links[i].mass, robot->links[i].name == "torso_link" ? 3.0 : 0.0, 1e-12);
+  EXPECT_EQ(perturbed_robot(default_perturbation("push"), robot), robot);
+}
+
+}  // namespace
+}  // namespace duet
