@@ -9,6 +9,7 @@
 
 #include "duet/core/clock.h"
 #include "duet/core/require.h"
+#include "duet/training/clipped_objective.h"
 #include "duet/training/threads.h"
 
 namespace duet {
@@ -19,16 +20,6 @@ using Eigen::MatrixXf;
 using Eigen::VectorXf;
 
 double seconds_since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
-
-// Log-probability of z standard deviations, up to a constant.
-float log_probability(const VectorXf& inverse_std, float sum_log_std, const float* action, const float* mean) {
-  float sum = -sum_log_std;
-  for (Eigen::Index k = 0; k < inverse_std.size(); ++k) {
-    const float z = (action[k] - mean[k]) * inverse_std[k];
-    sum -= 0.5F * z * z;
-  }
-  return sum;
-}
 
 void mirror_columns(const Mirror& mirror, const MatrixXf& x, MatrixXf& y) {
   y.resize(x.rows(), x.cols());
@@ -253,17 +244,16 @@ void Ppo::advantages(int thread, Batch& batch) {
   worker.critic_input = worker.critic_raw[0];
   state_.agent.critic_input.apply(worker.critic_input);
   const VectorXf last = worker.critic.forward(worker.critic_input).row(0).transpose();
-  const auto discount = static_cast<float>(options_.discount),
-             decay = static_cast<float>(options_.discount * options_.lambda);
+  std::vector<StepWorth> steps(options_.horizon);
   for (int i = 0; i < each; ++i) {
-    float advantage = 0.0F, next = last[i];
-    for (int h = options_.horizon - 1; h >= 0; --h) {
-      const int c = (h * options_.threads + thread) * each + i;
-      const float goes_on = batch.end[c] == EpisodeEnd::kNone ? 1.0F : 0.0F;
-      advantage = batch.reward[c] + discount * next * goes_on - batch.value[c] + decay * goes_on * advantage;
-      batch.advantage[c] = advantage;
-      batch.target[c] = advantage + batch.value[c];
-      next = batch.value[c];
+    const auto at = [&](int h) { return (h * options_.threads + thread) * each + i; };
+    for (int h = 0; h < options_.horizon; ++h)
+      steps[h] = {
+          .reward = batch.reward[at(h)], .value = batch.value[at(h)], .ends = batch.end[at(h)] != EpisodeEnd::kNone};
+    const std::vector<float> worth = generalised_advantages(steps, last[i], options_.discount, options_.lambda);
+    for (int h = 0; h < options_.horizon; ++h) {
+      batch.advantage[at(h)] = worth[h];
+      batch.target[at(h)] = worth[h] + batch.value[at(h)];
     }
   }
 }
@@ -305,14 +295,6 @@ double Ppo::gradients(int thread, std::span<const int> samples, const std::vecto
   return divergence / n;
 }
 
-// The objective's derivative by a sample's ratio of probabilities; 0 where it is clipped.
-float Ppo::ratio_gradient(float log_ratio, float advantage) const {
-  const float ratio = std::exp(std::clamp(log_ratio, -10.0F, 10.0F));
-  const auto clip = static_cast<float>(options_.clip);
-  const bool clipped = (advantage > 0.0F && ratio > 1.0F + clip) || (advantage < 0.0F && ratio < 1.0F - clip);
-  return clipped ? 0.0F : -advantage * ratio;
-}
-
 double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples,
                                  const std::vector<std::uint8_t>& mirrored, float share, Batch& batch) const {
   const int n = static_cast<int>(samples.size()), actions = action_mirror_.size();
@@ -327,14 +309,14 @@ double Ppo::differentiate_policy(Worker& worker, std::span<const int> samples,
     const auto action = batch.action[m].col(c), old_mean = batch.mean[m].col(c), other_mean = batch.mean[1 - m].col(c);
     const float log_ratio =
         log_probability(inverse_std, sum_log_std, action.data(), mean.col(i).data()) - batch.log_probability[m][c];
-    const float weight = share * ratio_gradient(log_ratio, batch.advantage[c]);
+    const float weight = share * ratio_gradient(log_ratio, batch.advantage[c], static_cast<float>(options_.clip));
     for (int k = 0; k < actions; ++k) {
-      const float z = std::clamp((action[k] - mean(k, i)) * inverse_std[k], -4.0F, 4.0F);
+      const LikelihoodGradient by = likelihood_gradient(action[k], mean(k, i), inverse_std[k]);
       const float moved = (mean(k, i) - old_mean[k]) * inverse_std[k];
       const float apart = mean(k, i) - action_mirror_.sign[k] * other_mean[action_mirror_.from[k]];
       divergence += 0.5 * static_cast<double>(moved) * moved;
-      worker.mean_gradient(k, i) = weight * z * inverse_std[k] + pull * apart * inverse_std[k] * inverse_std[k];
-      if (m == 0) worker.log_std_gradient[k] += weight * (z * z - 1.0F);
+      worker.mean_gradient(k, i) = weight * by.z * inverse_std[k] + pull * apart * inverse_std[k] * inverse_std[k];
+      if (m == 0) worker.log_std_gradient[k] += weight * by.log_std;
     }
   }
   return divergence;

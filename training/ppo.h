@@ -51,7 +51,6 @@ class Ppo {
                    Batch& batch);
   double differentiate_policy(Worker& worker, std::span<const int> samples, const std::vector<std::uint8_t>& mirrored,
                               float share, Batch& batch) const;
-  [[nodiscard]] float ratio_gradient(float log_ratio, float advantage) const;
   void apply_gradients();
   void steer(double divergence);
   [[nodiscard]] bool critic_alone() const { return state_.iteration < state_.critic_alone; }
