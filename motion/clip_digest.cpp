@@ -24,6 +24,7 @@ std::string clip_digest(const PairedMotion& motion) {
   digest.update(std::string_view(reinterpret_cast<const char*>(phases), sizeof phases));
   add(motion.source_partner.joints, digest);
   add(motion.source_reactor.joints, digest);
+  if (!motion.object.empty()) add(keypoint_tracks(motion.object), digest);
   return digest.hex();
 }
 

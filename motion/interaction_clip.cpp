@@ -95,12 +95,14 @@ void validate(const InteractionClip& clip) {
           fmt::format("clip '{}': expected phases with 0 <= act_begin <= act_end <= {} frames, found [{}, {})", clip.id,
                       clip.frames(), clip.phases.act_begin, clip.phases.act_end));
   for (std::size_t i = 0; i < clip.contacts.size(); ++i) check_contact(clip, clip.contacts[i], i);
+  validate(clip.object, clip.frames(), fmt::format("clip '{}', object", clip.id));
 }
 
 InteractionClip read_clip(const Npz& npz) {
   check_schema(npz, kSchema, kSchemaVersion,
                {"id", "task", "reactor", "phases", "rate_hz", "human_joint_names", "a_joints", "a_rotations_wxyz",
-                "b_joints", "b_rotations_wxyz", "contacts", "source_names", "source_values"},
+                "b_joints", "b_rotations_wxyz", "contacts", "source_names", "source_values", "object_position",
+                "object_quat_wxyz", "object_keypoints"},
                {});
   const double rate_hz = get_rate(npz);
   const std::vector<int> columns = get_joint_columns(npz);
@@ -111,7 +113,8 @@ InteractionClip read_clip(const Npz& npz) {
                        .phases = {},
                        .reactor = get_reactor(npz),
                        .contacts = get_contacts(npz, columns),
-                       .source = get_texts(npz, "source")};
+                       .source = get_texts(npz, "source"),
+                       .object = get_object(npz)};
   take_phases(npz, clip);
   check_archive(npz, [&] { validate(clip); });
   return clip;
@@ -128,6 +131,7 @@ std::string clip_bytes(const InteractionClip& clip, ZipMethod method) {
   put_motion(npz, "b", clip.b);
   put_contacts(npz, clip.contacts);
   put_texts(npz, "source", clip.source);
+  put_object(npz, clip.object);
   return npz.bytes(method);
 }
 
@@ -178,6 +182,7 @@ InteractionClip padded(const InteractionClip& clip, double before, double after)
   InteractionClip result = clip;
   result.a = held(clip.a, first, last);
   result.b = held(clip.b, first, last);
+  result.object = held(clip.object, first, last);
   result.phases.act_begin += first;
   result.phases.act_end += first;
   for (ContactWindow& window : result.contacts) {
@@ -191,6 +196,7 @@ InteractionClip mirrored(const InteractionClip& clip) {
   InteractionClip result = clip;
   result.a = mirrored(clip.a);
   result.b = mirrored(clip.b);
+  result.object = mirrored(clip.object);
   for (ContactWindow& window : result.contacts) {
     window.joint_a = kSmplMirror[window.joint_a];
     window.joint_b = kSmplMirror[window.joint_b];

@@ -8,6 +8,7 @@
 
 #include "duet/core/task.h"
 #include "duet/core/zip.h"
+#include "duet/motion/carried_object.h"
 #include "duet/motion/human_motion.h"
 #include "duet/motion/person.h"
 
@@ -33,6 +34,7 @@ struct InteractionClip {
   Person reactor = Person::kB;                // who the robot replaces (H_s); the other stays human (H_p). Decision 1.
   std::vector<ContactWindow> contacts;        // known by construction for synthetic clips, else empty
   std::map<std::string, std::string> source;  // provenance: files, seed, detected units, ...
+  CarriedObject object = {};                  // that the two handle; empty: none
 
   [[nodiscard]] int frames() const { return a.frames(); }
   [[nodiscard]] double rate_hz() const { return a.rate_hz; }
@@ -41,7 +43,7 @@ struct InteractionClip {
 };
 
 // Throws std::invalid_argument: what validate(HumanMotion) says of either, different lengths or rates, phases or
-// contact windows outside the clip.
+// contact windows outside the clip, what validate(CarriedObject) says.
 void validate(const InteractionClip& clip);
 
 // NPZ with the keys of docs/file-formats.md. Loading validates, and proposes the phases where the file has none

@@ -28,6 +28,7 @@ void check_same_time(const PairedMotion& motion) {
               motion.phases.act_end <= motion.frames(),
           fmt::format("phases: expected 0 <= act_begin <= act_end <= {} frames, found [{}, {})", motion.frames(),
                       motion.phases.act_begin, motion.phases.act_end));
+  validate(motion.object, motion.frames(), "object");
 }
 
 void put_robot(Npz& npz, const RobotMotion& robot) {
@@ -64,10 +65,28 @@ RobotMotion get_robot(const Npz& npz, double rate_hz) {
 
 PairedMotion read_paired_motion(const Npz& npz) {
   check_schema(npz, kSchema, kSchemaVersion,
-               {"clip_id", "task", "reactor", "phases", "rate_hz", "robot_joint_names", "robot_root_position",
-                "robot_root_quat_wxyz", "robot_q", "human_joint_names", "partner_joints", "partner_rotations_wxyz",
-                "source_partner_joints", "source_partner_rotations_wxyz", "source_reactor_joints",
-                "source_reactor_rotations_wxyz", "reshaped", "settings_names", "settings_values"},
+               {"clip_id",
+                "task",
+                "reactor",
+                "phases",
+                "rate_hz",
+                "robot_joint_names",
+                "robot_root_position",
+                "robot_root_quat_wxyz",
+                "robot_q",
+                "human_joint_names",
+                "partner_joints",
+                "partner_rotations_wxyz",
+                "source_partner_joints",
+                "source_partner_rotations_wxyz",
+                "source_reactor_joints",
+                "source_reactor_rotations_wxyz",
+                "reshaped",
+                "settings_names",
+                "settings_values",
+                "object_position",
+                "object_quat_wxyz",
+                "object_keypoints"},
                {kLossPrefix});
   const double rate_hz = get_rate(npz);
   const std::vector<int> columns = get_joint_columns(npz);
@@ -81,7 +100,8 @@ PairedMotion read_paired_motion(const Npz& npz) {
                       .source_reactor = get_motion(npz, "source_reactor", rate_hz, columns),
                       .reshaped = {},
                       .loss = {},
-                      .settings = get_texts(npz, "settings")};
+                      .settings = get_texts(npz, "settings"),
+                      .object = get_object(npz)};
   if (npz.contains("reshaped")) motion.reshaped = npz.tracks("reshaped", -1);
   for (const std::string& key : npz.keys())
     if (key.starts_with(kLossPrefix)) motion.loss[key.substr(std::string(kLossPrefix).size())] = npz.numbers(key, {-1});
@@ -112,6 +132,7 @@ std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method) {
   if (!motion.reshaped.empty()) npz.set("reshaped", motion.reshaped);
   for (const auto& [term, values] : motion.loss) npz.set(kLossPrefix + term, values, {values.size()});
   put_texts(npz, "settings", motion.settings);
+  put_object(npz, motion.object);
   return npz.bytes(method);
 }
 

@@ -26,6 +26,7 @@ struct PairedMotion {
   std::map<std::string, std::vector<double>>
       loss;  // per term ("total", "kin", "con", "hum", "temp", "pose"), one per iteration
   std::map<std::string, std::string> settings;  // every option of the solver, kernel and robot, as text
+  CarriedObject object = {};                    // of the clip, where it was there; empty: none
 
   [[nodiscard]] int frames() const { return robot.frames(); }
 };

@@ -67,6 +67,8 @@ void add_people_options(CLI::App& command, PeopleArguments& arguments) {
   command.add_option("--skeleton", options.skeleton,
                      "which joint each column is: `duet list joint-layouts`, or a file with one name a line");
   command.add_option("--body-model", options.body_model, "your SMPL, SMPL-H or SMPL-X file (NPZ or PKL)");
+  command.add_option("--object", options.object,
+                     "shape of the object that they carry: a mesh (.obj) or a box or points (.json), in metres");
   command.add_option("--align", arguments.align,
                      "put two people who were recorded apart into one world: floor or contact (default: refused)");
 }

@@ -74,7 +74,7 @@ SourceClip bvh_clip(const ClipPlace& place, const PeopleOptions& options) {
     throw InputError(fmt::format("'{}': nothing says which task it is; state the task", place.files.at(0)));
   BvhImport imported = import_bvh_pair(place.files.at(0), place.files.at(1), *options.task, bvh_options(options));
   set_reactor(imported.clip, options.reactor.value_or(Person::kB));
-  return {std::move(imported.clip), std::move(imported.verdict), {}};
+  return {std::move(imported.clip), std::move(imported.verdict)};
 }
 
 }  // namespace

@@ -26,6 +26,7 @@ struct PeopleOptions {
   std::optional<bool> drop_t_pose = {};  // an added T pose in frame 0
   std::string skeleton = {};             // name of a joint layout (motion/people/joint_layout.h) or of a file of names
   std::string body_model = {};           // the user's SMPL, SMPL-H or SMPL-X file
+  std::string object = {};               // the user's file of a carried object's shape (motion/people/object_shape.h)
   Alignment align = Alignment::kNone;
   std::optional<Task> task = {};       // empty: from the file's or folder's label, else refused
   std::optional<Person> reactor = {};  // empty: from the data set's annotation, else B

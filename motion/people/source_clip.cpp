@@ -9,7 +9,9 @@
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/motion/people/joint_gaps.h"
+#include "duet/motion/people/object_shape.h"
 #include "duet/motion/people/people_detection.h"
+#include "duet/motion/people/people_files.h"
 #include "duet/motion/phase_proposal.h"
 #include "duet/motion/plausibility.h"
 
@@ -182,16 +184,29 @@ HumanMotion motion_of(const RawPeople& people, std::size_t who, const Plan& plan
   return motion;
 }
 
-std::vector<Pose> object_of(const RawPeople& people, const Plan& plan) {
-  std::vector<Pose> object;
-  if (people.object.empty() || plan.mirrored) return object;
+// Without a shape an object is its origin.
+CarriedObject object_of(const RawPeople& people, const PeopleOptions& options, const Plan& plan,
+                        std::vector<std::string>& evidence) {
+  CarriedObject object;
+  if (people.object.empty() || plan.mirrored) {
+    if (!people.object.empty()) evidence.emplace_back("object: left out, since the world is reflected");
+    if (people.object.empty() && !options.object.empty())
+      evidence.push_back(fmt::format("object: the file has none; '{}' is not used", file_name_of(options.object)));
+    return object;
+  }
+  object.keypoints = options.object.empty() ? Eigen::Matrix3Xd::Zero(3, 1) : read_object_keypoints(options.object);
+  evidence.push_back(
+      options.object.empty()
+          ? "object: its origin is its one keypoint; --object names a file of its shape"
+          : fmt::format("object: {} keypoints of '{}'", object.keypoints.cols(), file_name_of(options.object)));
+  object.poses.reserve(static_cast<std::size_t>(plan.frames));
   const Eigen::Quaterniond R_WF = rotation_of(plan);
   for (int t = 0; t < plan.frames; ++t) {
     const FrameBetween at =
         frame_between(t * (plan.rate_hz / plan.output_rate_hz), people.joints[0].frames() - plan.first);
     const Pose& before = people.object[plan.first + at.frame];
     const Pose X_FO = at.part > 0.0 ? interpolate(before, people.object[plan.first + at.frame + 1], at.part) : before;
-    object.push_back({(R_WF * X_FO.R).normalized(), plan.world.M * X_FO.p + plan.world.p});
+    object.poses.push_back({(R_WF * X_FO.R).normalized(), plan.world.M * X_FO.p + plan.world.p});
   }
   return object;
 }
@@ -265,7 +280,7 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
     result.evidence.push_back(sentence);
     clip.source = provenance(people, plan);
     if (filled) clip.source["interpolated"] = "true";
-    result.object = object_of(people, plan);
+    clip.object = object_of(people, options, plan, result.evidence);
     judge(people, clip, result.evidence);
     set_reactor(clip, options.reactor.value_or(people.reactor.value_or(Person::kB)));
   } catch (const std::invalid_argument& error) {

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/pose.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/people/people_options.h"
 #include "duet/motion/people/raw_people.h"
@@ -14,7 +13,6 @@ namespace duet {
 struct SourceClip {
   InteractionClip clip;               // 50 Hz (or the rate asked for), W: z up, floor at 0, metres
   std::vector<std::string> evidence;  // one line per fact that was found or overridden, for the user to read
-  std::vector<Pose> object = {};      // X_WO, one a frame of the clip; empty: none
 };
 
 // Unit, up axis, levelling, floor, mirror and rate: as the options say, else as the format is known to have them, else

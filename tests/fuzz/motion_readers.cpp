@@ -6,6 +6,7 @@
 #include "duet/motion/bvh.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/paired_motion.h"
+#include "duet/motion/people/object_shape.h"
 #include "duet/motion/people/people_formats.h"
 #include "tests/core/pickle_bytes.h"
 #include "tests/fuzz/archive_edit.h"
@@ -46,6 +47,7 @@ std::string good_clip() {
   InteractionClip clip = test::two_people(3);
   clip.phases = {.act_begin = 1, .act_end = 2};
   clip.contacts = {{.begin = 1, .end = 2, .joint_a = 22, .joint_b = 23}};
+  clip.object = {.poses = std::vector<Pose>(3), .keypoints = Eigen::Matrix3Xd::Zero(3, 2)};
   return clip_bytes(clip);
 }
 
@@ -69,6 +71,7 @@ std::string good_paired_motion() {
   motion.reshaped = PointTracks(3, 16);
   motion.loss = {{"total", {2.0, 1.0}}};
   motion.settings = {{"mode", "paper"}};
+  motion.object = {.poses = std::vector<Pose>(3), .keypoints = Eigen::Matrix3Xd::Zero(3, 2)};
   return paired_motion_bytes(motion);
 }
 
@@ -113,6 +116,13 @@ Reader people_reader(const char* name) {
           }};
 }
 
+std::string shape_sample(unsigned seed) {
+  return seed % 2 == 0 ? "o box\nv 0 0 0\nv 0.1 0.2 -0.3\nv 1e-1 0 0 1\nf 1 2 3\n"
+                       : R"({"box": [0.6, 0.4, 0.2], "centre": [0, 0, 0.1]})";
+}
+void read_shape(std::string_view bytes) { (void)read_object_keypoints(scratch_file("shape.obj", bytes)); }
+void read_shape_json(std::string_view bytes) { (void)read_object_keypoints(scratch_file("shape.json", bytes)); }
+
 std::string names_sample(unsigned /*seed*/) {
   return "nose\nleft_ear\nright_ear # an ear\nl_shoulder\nr_shoulder\nl_elbow\nr_elbow\nl_wrist\nr_wrist\nl_hip\n"
          "r_hip\nl_knee\nr_knee\nl_ankle\nr_ankle\n";
@@ -138,6 +148,8 @@ std::vector<Reader> motion_readers() {
           people_reader<test::kinect_standin, 0>("positions_npz"),
           people_reader<test::npy_standin, 0>("positions_npy"),
           people_reader<test::csv_standin, 0>("positions_csv"),
+          {"object_mesh", [](unsigned) { return shape_sample(0); }, read_shape},
+          {"object_shape", [](unsigned) { return shape_sample(1); }, read_shape_json},
           {"joint_names", names_sample, read_names}};
 }
 

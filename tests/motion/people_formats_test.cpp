@@ -102,8 +102,8 @@ TEST(PeopleFormat, TheDataSetsOwnListsAreUsed) {
 
 TEST(PeopleFormat, Core4dsObjectMovesWithTheWrist) {
   const SourceClip found = read_standin(test::core4d_standin(), options_of(test::core4d_standin()));
-  ASSERT_EQ(static_cast<int>(found.object.size()), found.clip.frames());
-  EXPECT_LT((found.object[3].p - found.clip.a.joints.at(3, kRightWrist)).norm(), kMillimetre);
+  ASSERT_EQ(static_cast<int>(found.clip.object.poses.size()), found.clip.frames());
+  EXPECT_LT((found.clip.object.poses[3].p - found.clip.a.joints.at(3, kRightWrist)).norm(), kMillimetre);
 }
 
 TEST(PeopleFormat, LabelsOfOthersAreTasks) {

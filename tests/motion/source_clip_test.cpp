@@ -218,10 +218,11 @@ TEST(SourceClip, AnObjectMovesWithThePeople) {
   for (int t = 0; t < 24; ++t)
     people.object.push_back({Eigen::Quaterniond(Eigen::Matrix3d(test::y_up().M)), people.joints[0].at(t, kRightHand)});
   const SourceClip found = clip_of(people);
-  ASSERT_EQ(static_cast<int>(found.object.size()), found.clip.frames());
+  ASSERT_EQ(static_cast<int>(found.clip.object.poses.size()), found.clip.frames());
+  EXPECT_EQ(found.clip.object.keypoints, Eigen::Matrix3Xd::Zero(3, 1));
   for (int t = 0; t < found.clip.frames(); ++t) {
-    EXPECT_LT((found.object[t].p - found.clip.a.joints.at(t, kRightHand)).norm(), 1e-9);
-    EXPECT_LT(found.object[t].R.angularDistance(Eigen::Quaterniond::Identity()), 1e-9);
+    EXPECT_LT((found.clip.object.poses[t].p - found.clip.a.joints.at(t, kRightHand)).norm(), 1e-9);
+    EXPECT_LT(found.clip.object.poses[t].R.angularDistance(Eigen::Quaterniond::Identity()), 1e-9);
   }
   people.object.pop_back();
   EXPECT_THAT(refusal(people), HasSubstr("the object has 23 poses and the people 24 frames"));
