@@ -7,6 +7,7 @@
 
 #include "duet/retarget/kernel_frame.h"
 #include "duet/retarget/kernel_ground.h"
+#include "duet/retarget/kernel_object.h"
 
 namespace duet::pair_kernel {
 namespace {
@@ -79,6 +80,7 @@ inline void place_keys(const Place& at, Work& k) {
 }
 
 // Keypoint i against keypoints begin <= j < end, whose original distances lie in the rows from `distance` on.
+template <bool kWeighted>
 inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int distance, V scale) {
   const V x0 = k.key[i][0];
   const V x1 = k.key[i][1];
@@ -93,8 +95,10 @@ inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int dista
     const V d2 = x2 - k.key[j][2];
     const V length = square_root(d0 * d0 + d1 * d1 + d2 * d2 + kGuard);
     const V error = length - at.constant(distance + j - begin);
-    sum += error * error;
-    const V f = error * scale / length;
+    const float own =
+        kWeighted ? at.setup.key_weight[i % at.setup.keys] * at.setup.key_weight[j % at.setup.keys] : 1.0f;
+    sum += kWeighted ? own * (error * error) : error * error;
+    const V f = kWeighted ? error * (own * scale) / length : error * scale / length;
     g0 += f * d0;
     g1 += f * d1;
     g2 += f * d2;
@@ -108,6 +112,7 @@ inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int dista
   return sum;
 }
 
+template <bool kWeighted>
 inline void con_term(const Place& at, Work& k) {
   place_keys(at, k);
   const int keys = at.setup.keys;
@@ -120,14 +125,14 @@ inline void con_term(const Place& at, Work& k) {
   V cross_sum = V{};
   V human_sum = V{};
   for (int i = 0; i < keys; ++i) {
-    if (at.step.con_robot != 0.0f) robot_sum += con_rows(at, k, i, i + 1, keys, row, robot);
+    if (at.step.con_robot != 0.0f) robot_sum += con_rows<kWeighted>(at, k, i, i + 1, keys, row, robot);
     row += keys - 1 - i;
-    cross_sum += con_rows(at, k, i, keys, 2 * keys, row, cross);
+    cross_sum += con_rows<kWeighted>(at, k, i, keys, 2 * keys, row, cross);
     row += keys;
   }
   if (at.setup.adapt_human && at.step.con_human != 0.0f) {
     for (int i = keys; i < 2 * keys; ++i) {
-      human_sum += con_rows(at, k, i, i + 1, 2 * keys, row, human);
+      human_sum += con_rows<kWeighted>(at, k, i, i + 1, 2 * keys, row, human);
       row += 2 * keys - 1 - i;
     }
   }
@@ -241,7 +246,12 @@ inline void sweep_with(const Sweep& sweep) {
       temporal(at, k);
       forward(at, k);
       kin_term<kExtended>(at, k);
-      con_term(at, k);
+      if (kExtended && at.setup.weighted) {
+        con_term<true>(at, k);
+      } else {
+        con_term<false>(at, k);
+      }
+      if (kExtended && at.setup.objects > 0) object_term(at, k);
       hum_term(at, k);
       if (kExtended) ground_terms(at, k);
       pose_term(at, k);

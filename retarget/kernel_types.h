@@ -69,6 +69,11 @@ struct Setup {
   int sphere_point[kMaxSpheres];  // of the robot's
   int sphere_offset[kMaxHumanSpheres];
   SpherePair sphere_pair[kMaxSpherePairs];
+  bool weighted;  // a keypoint's weight is not 1
+  float key_weight[kMaxKeys];
+  int objects;     // keypoints of a carried object
+  int object_row;  // of the constants: the object's keypoints (3 each), then distances of each of 2 K keypoints
+  float key_object[kMaxKeys];
 };
 
 // One iteration: factors of the gradient of T times the objective, and Adam's step.
@@ -85,10 +90,11 @@ struct Step {
   float bone;
   float partner_velocity, partner_acceleration;
   float collision;
+  float object_robot, object_human;
 };
 
 // Rows of a block's constants; then the targets (48), the partner's keypoints (3 K), the original distances, and for
-// the extended kernel the partner's arm bones (18) and his spheres (3 each). Positions
+// the extended kernel the partner's arm bones (18), his spheres (3 each) and a carried object. Positions
 // are relative to the frame's root before optimisation: small numbers, wherever the two stand in the world.
 enum Constant {
   kWeight,  // 1 for a frame of the sequence, 0 for padding
@@ -117,6 +123,8 @@ enum Sum : int {
   kPartnerVelocity,
   kPartnerAcceleration,
   kCollision,
+  kObjectRobot,
+  kObjectHuman,
   kForce,
   kSums = kForce + 3
 };

@@ -32,7 +32,16 @@ void pack_ground(const PairProblem& problem, const PairOptions& options, pair_ke
   setup.robot_spheres = static_cast<int>(spheres.robot_point.size());
   setup.human_spheres = static_cast<int>(spheres.human_offset.size());
   setup.sphere_pairs = static_cast<int>(spheres.pairs.size());
-  setup.extended = setup.upright || setup.bones || setup.sphere_pairs > 0 || options.weights.partner > 0.0;
+  setup.weighted = problem.chain.weighted();
+  setup.objects = problem.object.count();
+  setup.extended = setup.upright || setup.bones || setup.sphere_pairs > 0 || options.weights.partner > 0.0 ||
+                   setup.weighted || setup.objects > 0;
+  for (int k = 0; k < problem.chain.keys(); ++k) {
+    setup.key_weight[k] = static_cast<float>(problem.chain.key_weight[k]);
+    setup.key_object[k] = static_cast<float>(problem.chain.key_object[k]);
+  }
+  setup.object_row = pair_kernel::kHuman + 3 * problem.chain.keys() +
+                     static_cast<int>(problem.distances.rows() + problem.bones.rows()) + 3 * setup.human_spheres;
   std::copy(spheres.robot_point.begin(), spheres.robot_point.end(), setup.sphere_point);
   std::copy(spheres.human_offset.begin(), spheres.human_offset.end(), setup.sphere_offset);
   for (int i = 0; i < setup.sphere_pairs; ++i)
@@ -95,8 +104,7 @@ LaneProblem::LaneProblem(const PairProblem& problem, const PairOptions& options,
       setup_(pack_setup(problem, options)),
       frames_(problem.frames()),
       blocks_((frames_ + kLanes - 1) / kLanes),
-      constant_rows_(pair_kernel::kHuman + 3 * setup_.keys +
-                     static_cast<int>(problem.distances.rows() + problem.bones.rows()) + 3 * setup_.human_spheres),
+      constant_rows_(setup_.object_row + setup_.objects * (3 + 2 * setup_.keys)),
       rows_in_time_(setup_.extended && setup_.adapt_human ? setup_.dof + 3 + kHumanRows : setup_.dof) {
   constants_.resize(static_cast<std::size_t>(blocks_) * constant_rows_);
   for (int block = 0; block < blocks_; ++block) {
@@ -129,9 +137,14 @@ void LaneProblem::pack_frame(const PairProblem& problem, int block, int lane) {
   for (int i = 0; i < problem.distances.rows(); ++i) set(first + i, problem.distances(i, source));
   int row = first + static_cast<int>(problem.distances.rows());
   for (int i = 0; i < problem.bones.rows(); ++i) set(row++, problem.bones(i, source));
-  if (setup_.human_spheres == 0) return;
-  const Eigen::Matrix3Xd spheres = problem.spheres.human.frame(source).colwise() - problem.root.col(source);
-  for (int i = 0; i < 3 * setup_.human_spheres; ++i) set(row++, spheres.data()[i]);
+  if (setup_.human_spheres > 0) {
+    const Eigen::Matrix3Xd spheres = problem.spheres.human.frame(source).colwise() - problem.root.col(source);
+    for (int i = 0; i < 3 * setup_.human_spheres; ++i) set(row++, spheres.data()[i]);
+  }
+  if (setup_.objects == 0) return;
+  const Eigen::Matrix3Xd object = problem.object.points.frame(source).colwise() - problem.root.col(source);
+  for (int i = 0; i < 3 * setup_.objects; ++i) set(row++, object.data()[i]);
+  for (int i = 0; i < problem.object.distances.rows(); ++i) set(row++, problem.object.distances(i, source));
 }
 
 // The kernel's gradient is that of T times the objective: of the size of one frame's, whatever the length.
@@ -149,6 +162,9 @@ pair_kernel::Step LaneProblem::make_step(const PairWeights& w, const Eigen::Arra
   step.acceleration = static_cast<float>(2.0 * w.temp * w.acceleration * frames / (frames - 2.0));
   step.bone = static_cast<float>(2.0 * w.bone);
   step.collision = static_cast<float>(2.0 * w.collision);
+  const ObjectFactors object = object_factors(options_, setup_.keys);
+  step.object_robot = static_cast<float>(4.0 * w.con * w.object * object.robot);
+  step.object_human = static_cast<float>(4.0 * w.con * w.object * object.human);
   step.partner_velocity = static_cast<float>(w.partner * 2.0 * w.temp * frames / (frames - 1.0));
   step.partner_acceleration = static_cast<float>(w.partner * 2.0 * w.temp * w.acceleration * frames / (frames - 2.0));
   for (int r = 0; r < 3; ++r) step.offset[r] = static_cast<float>(offset[r]);
@@ -190,6 +206,9 @@ PairTerms LaneProblem::terms(const Sums& sums, const PairWeights& weights) const
   out.pose = sums[pair_kernel::kPose] / (frames * setup_.dof);
   out.bone = sums[pair_kernel::kBone] / frames;
   out.collision = sums[pair_kernel::kCollision] / frames;
+  const ObjectFactors object = object_factors(options_, setup_.keys);
+  out.object =
+      2.0 / frames * (object.robot * sums[pair_kernel::kObjectRobot] + object.human * sums[pair_kernel::kObjectHuman]);
   out.partner = sums[pair_kernel::kPartnerVelocity] / (frames - 1.0) +
                 weights.acceleration * sums[pair_kernel::kPartnerAcceleration] / (frames - 2.0);
   return out;

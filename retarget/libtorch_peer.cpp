@@ -195,7 +195,8 @@ double libtorch_frames_per_second(const InteractionClip& clip, const RobotModel&
   use_one_thread();
   mallopt(M_MMAP_THRESHOLD, 1 << 30);
   mallopt(M_TRIM_THRESHOLD, 1 << 30);
-  const PairOptions options;
+  PairOptions options;
+  options.weights.object = 0.0;  // the peer knows two people
   InteractionClip resampled = clip;
   resampled.a = resample(clip.a, 50.0);
   resampled.b = resample(clip.b, 50.0);
@@ -209,6 +210,8 @@ double libtorch_frames_per_second(const InteractionClip& clip, const RobotModel&
 }
 
 std::vector<double> libtorch_objective(const PairProblem& problem, int iterations) {
+  require(problem.object.count() == 0 && !problem.chain.weighted(),
+          "libtorch_objective: expected two people without an object or weights of keypoints");
   use_one_thread();
   return Peer(problem).run({}, iterations);
 }

@@ -15,8 +15,9 @@ namespace duet {
 
 namespace {
 
-using Field = std::variant<double*, int*, bool*, std::string*, PairMode*, Optimizer*, KinLoss*, ContactReduction*,
-                           ContactBlocks*, RootTranslation*, ContactKeypoints*, KernelKind*>;
+using Field =
+    std::variant<double*, int*, bool*, std::string*, PairMode*, Optimizer*, KinLoss*, ContactReduction*, ContactBlocks*,
+                 RootTranslation*, ContactKeypoints*, std::vector<ContactKeypoint>*, KernelKind*>;
 
 std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
   return {{"mode", &o.mode},
@@ -29,6 +30,7 @@ std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
           {"w-bone", &o.weights.bone},
           {"w-partner", &o.weights.partner},
           {"w-collision", &o.weights.collision},
+          {"w-object", &o.weights.object},
           {"stage1-iterations", &o.schedule.stage1_iterations},
           {"stage1-rate", &o.schedule.stage1_rate},
           {"stage2-iterations", &o.schedule.stage2_iterations},
@@ -41,6 +43,7 @@ std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
           {"contact-blocks", &o.contact_blocks},
           {"root", &o.root_translation},
           {"keypoints", &o.keypoints},
+          {"keypoint-list", &o.keypoint_list},
           {"filter", &o.filter},
           {"adapt-human", &o.adapt_human},
           {"kernel", &o.kernel},
@@ -100,6 +103,14 @@ void parse(int& out, const std::string& name, const std::string& value) {
 
 void parse(std::string& out, const std::string&, const std::string& value) { out = value; }
 
+void parse(std::vector<ContactKeypoint>& out, const std::string& name, const std::string& value) {
+  try {
+    out = parse_contact_keypoints(value);
+  } catch (const std::invalid_argument& error) {
+    refuse(name, value, error.what());
+  }
+}
+
 template <typename Value>
 std::string format_value(Value value) {
   return texts(value)[static_cast<std::size_t>(value)];
@@ -107,6 +118,7 @@ std::string format_value(Value value) {
 std::string format_value(double value) { return fmt::format("{}", value); }
 std::string format_value(int value) { return fmt::format("{}", value); }
 std::string format_value(const std::string& value) { return value; }
+std::string format_value(const std::vector<ContactKeypoint>& value) { return format_contact_keypoints(value); }
 
 Field find_field(PairOptions& options, const std::string& name) {
   for (const auto& [known, field] : fields(options)) {

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "duet/retarget/contact_keypoints.h"
+
 namespace duet {
 
 struct PairWeights {  // supplement A.1.2, stage 1
@@ -19,6 +21,7 @@ struct PairWeights {  // supplement A.1.2, stage 1
   double bone = 0.0;       // the partner's bones, collars to wrists, keep their lengths
   double partner = 0.0;    // L_temp of the partner's offsets, as a share of `temp`
   double collision = 0.0;  // depth of spheres of the two bodies in each other
+  double object = 1.0;     // of distances from a carried object, as a share of `con`; 0 leaves the object out
 };
 
 struct PairSchedule {
@@ -53,6 +56,7 @@ struct PairOptions {
   ContactBlocks contact_blocks = ContactBlocks::kFull;
   RootTranslation root_translation = RootTranslation::kConstantOffset;
   ContactKeypoints keypoints = ContactKeypoints::kNine;
+  std::vector<ContactKeypoint> keypoint_list = {};  // where not empty, these in the place of `keypoints`
   bool filter = true;       // Gaussian, kernel 5, sigma 0.75, replicate padding, once at the end
   bool adapt_human = true;  // false keeps the partner as it is
   KernelKind kernel = KernelKind::kAuto;

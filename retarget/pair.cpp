@@ -26,6 +26,7 @@ InteractionClip at_50_hz(const InteractionClip& clip) {
   InteractionClip out = clip;
   out.a = resample(clip.a, kTickRate);
   out.b = resample(clip.b, kTickRate);
+  out.object = resample(clip.object, clip.rate_hz(), kTickRate);
   const double ratio = kTickRate / clip.rate_hz();
   out.phases.act_begin = scaled_frame(clip.phases.act_begin, ratio, out.frames());
   out.phases.act_end = scaled_frame(clip.phases.act_end, ratio, out.frames());
@@ -122,7 +123,7 @@ HumanMotion adapted_partner(const HumanMotion& source, int dof, const PairOption
   return adapted;
 }
 
-std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solution, bool extended) {
+std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solution, bool extended, bool object) {
   std::map<std::string, std::vector<double>> curves;
   curves["total"] = solution.total;
   for (const PairTerms& terms : solution.terms) {
@@ -131,6 +132,7 @@ std::map<std::string, std::vector<double>> loss_curves(const PairSolution& solut
     curves["hum"].push_back(terms.hum);
     curves["temp"].push_back(terms.temp);
     curves["pose"].push_back(terms.pose);
+    if (object) curves["object"].push_back(terms.object);
     if (!extended) continue;
     curves["bone"].push_back(terms.bone);
     curves["partner"].push_back(terms.partner);
@@ -169,7 +171,8 @@ PairedMotion retarget(const InteractionClip& clip, const RobotModel& robot, cons
   out.source_reactor = resampled.reactor_motion();
   out.partner = adapted_partner(out.source_partner, problem.chain.dof(), options, solution.x);
   out.reshaped = problem.upright ? problem.reshaped : problem.targets;
-  out.loss = loss_curves(solution, options.mode != PairMode::kPaper);
+  out.loss = loss_curves(solution, options.mode != PairMode::kPaper, problem.object.count() > 0);
+  out.object = resampled.object;
   out.settings = describe(clip, robot, options, solution.kernel);
   return out;
 }

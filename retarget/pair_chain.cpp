@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
@@ -78,6 +79,18 @@ struct FrameAndJoint {
   int smpl = 0;
 };
 
+// Keypoints that the user lists.
+void add_listed_keypoints(const RobotModel& robot, const std::vector<ContactKeypoint>& list,
+                          std::vector<FrameAndJoint>& chosen, PairChain& chain) {
+  const std::vector<int> frames = robot_frames(robot, list);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    chosen.push_back({frames[i], list[i].smpl});
+    chain.key_weight.push_back(list[i].weight);
+  }
+  chain.key_object = object_weights(list);
+}
+
+// A set of keypoints of the paper, each as heavy as the others.
 std::vector<FrameAndJoint> choose_keypoints(const RobotModel& robot, ContactKeypoints choice) {
   std::vector<FrameAndJoint> chosen;
   for (const Keypoint& key : robot.keypoints) {
@@ -103,7 +116,11 @@ std::vector<FrameAndJoint> choose_keypoints(const RobotModel& robot, ContactKeyp
 
 }  // namespace
 
-PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints) {
+bool PairChain::weighted() const {
+  return std::any_of(key_weight.begin(), key_weight.end(), [](double weight) { return weight != 1.0; });
+}
+
+PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints, const std::vector<ContactKeypoint>& list) {
   check_links(robot);
   check_pairs(robot);
   std::vector<Eigen::Matrix3d> turns;
@@ -118,7 +135,17 @@ PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints) {
     return point_of_frame[frame] = static_cast<int>(chain.points.size()) - 1;
   };
   for (const RetargetPair& pair : robot.pairs) chain.pair_points.push_back(point(pair.frame));
-  for (const FrameAndJoint& key : choose_keypoints(robot, keypoints)) {
+  std::vector<FrameAndJoint> chosen;
+  if (list.empty()) {
+    chosen = choose_keypoints(robot, keypoints);
+    std::vector<ContactKeypoint> named(chosen.size());
+    for (std::size_t i = 0; i < chosen.size(); ++i) named[i].smpl = chosen[i].smpl;
+    chain.key_weight.assign(chosen.size(), 1.0);
+    chain.key_object = object_weights(named);
+  } else {
+    add_listed_keypoints(robot, list, chosen, chain);
+  }
+  for (const FrameAndJoint& key : chosen) {
     chain.key_points.push_back(point(key.frame));
     chain.key_smpl.push_back(key.smpl);
   }

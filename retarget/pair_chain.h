@@ -33,12 +33,15 @@ struct ChainPoint {
 struct PairChain {
   std::vector<ChainJoint> joints;
   std::vector<ChainPoint> points;
-  std::vector<int> pair_points;  // index in points per retarget pair, 16
-  std::vector<int> key_points;   // index in points per interaction keypoint, K
-  std::vector<int> key_smpl;     // the SMPL-24 joint of each keypoint, K
+  std::vector<int> pair_points;    // index in points per retarget pair, 16
+  std::vector<int> key_points;     // index in points per interaction keypoint, K
+  std::vector<int> key_smpl;       // the SMPL-24 joint of each keypoint, K
+  std::vector<double> key_weight;  // of its distances from other keypoints, K
+  std::vector<double> key_object;  // of its distances from a carried object's, K
 
   [[nodiscard]] int dof() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] int keys() const { return static_cast<int>(key_points.size()); }
+  [[nodiscard]] bool weighted() const;  // a key_weight is not 1
 };
 
 struct ChainPose {
@@ -48,8 +51,10 @@ struct ChainPose {
 };
 
 // Throws std::invalid_argument: a robot without the 16 pairs (the pelvis first), without keypoints, without hands or
-// hips where `keypoints` asks for them, or with indices out of range.
-PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints);
+// hips where `keypoints` asks for them, or with indices out of range; what robot_frames refuses of `list`, which stands
+// in the place of `keypoints` where it is not empty.
+PairChain make_chain(const RobotModel& robot, ContactKeypoints keypoints,
+                     const std::vector<ContactKeypoint>& list = {});
 
 // Poses of all links and points. `pose` is resized where it must be.
 void forward(const PairChain& chain, const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& p_WB,

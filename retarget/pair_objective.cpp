@@ -32,6 +32,7 @@ struct FrameWork {
 struct Scales {
   PairWeights weights;
   ContactFactors contact;
+  ObjectFactors object;
   KinLoss kin_loss = KinLoss::kSquared;
   double frames = 1.0;
 };
@@ -62,7 +63,11 @@ double con_term(const PairProblem& problem, const Scales& s, int t, FrameWork& w
   work.key_force.setZero(3, 2L * keys);
   for (int i = 0; i < 2 * keys; ++i) {
     for (int j = i + 1; j < 2 * keys; ++j, ++row) {
-      const double factor = (j < keys ? s.contact.robot : i < keys ? s.contact.cross : s.contact.human) * s.contact.all;
+      const double own = problem.chain.key_weight[i % keys] * problem.chain.key_weight[j % keys];
+      const double factor = (j < keys   ? s.contact.robot
+                             : i < keys ? s.contact.cross
+                                        : s.contact.human) *
+                            s.contact.all * own;
       if (factor == 0.0) continue;
       const Eigen::Vector3d d = work.keys.col(i) - work.keys.col(j);
       const double distance = std::sqrt(d.squaredNorm() + kDistanceGuard);
@@ -183,6 +188,9 @@ PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, co
   PairTerms terms;
   terms.kin = kin_term(problem, s, t, work);
   terms.con = con_term(problem, s, t, work);
+  if (problem.object.count() > 0)
+    terms.object = object_term(problem.object, problem.chain, s.object, s.weights.con * s.weights.object, t, work.keys,
+                               work.key_force);
   const auto offsets = column.segment<3 * kHumanOffsets>(dof + 3);
   terms.hum = offsets.squaredNorm() / s.frames;
   terms.pose = column.head(dof).squaredNorm() / (s.frames * dof);
@@ -245,10 +253,17 @@ ContactFactors contact_factors(const PairOptions& options, int keys) {
   return f;
 }
 
+ObjectFactors object_factors(const PairOptions& options, int keys) {
+  const ContactFactors f = contact_factors(options, keys);
+  return {f.cross * f.all, options.adapt_human ? f.human * f.all : 0.0};
+}
+
 PairTerms evaluate(const PairProblem& problem, const PairOptions& options, const PairWeights& weights,
                    const PairVariables& x, PairVariables* gradient) {
-  const Scales scales{weights, contact_factors(options, problem.chain.keys()), options.kin_loss,
-                      static_cast<double>(problem.frames())};
+  const double frames = problem.frames();
+  ObjectFactors object = object_factors(options, problem.chain.keys());
+  object = {object.robot / frames, object.human / frames};
+  const Scales scales{weights, contact_factors(options, problem.chain.keys()), object, options.kin_loss, frames};
   if (gradient != nullptr) *gradient = PairVariables::zero(problem.chain.dof(), problem.frames());
   PairTerms sum;
   FrameWork work;
@@ -260,6 +275,7 @@ PairTerms evaluate(const PairProblem& problem, const PairOptions& options, const
     sum.pose += terms.pose;
     sum.bone += terms.bone;
     sum.collision += terms.collision;
+    sum.object += terms.object;
   }
   const int dof = problem.chain.dof();
   sum.temp = temporal_term(weights, x, 0, dof, 1.0, gradient);

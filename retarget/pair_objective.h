@@ -18,10 +18,11 @@ struct PairTerms {
   double bone = 0.0;       // squared changes of the partner's arm bones, mean over frames
   double partner = 0.0;    // velocity + w_a acceleration of the partner's offsets
   double collision = 0.0;  // squared depths of spheres, mean over frames
+  double object = 0.0;     // changes of distance from a carried object, as `con` counts them
 
   [[nodiscard]] double total(const PairWeights& w) const {
     return w.kin * kin + w.con * con + w.hum * hum + w.temp * temp + w.pose * pose + w.bone * bone +
-           w.temp * w.partner * partner + w.collision * collision;
+           w.temp * w.partner * partner + w.collision * collision + w.con * w.object * object;
   }
 };
 
@@ -33,6 +34,9 @@ struct ContactFactors {
   double all = 1.0;    // 1 (Frobenius) or 1 / N^2
 };
 ContactFactors contact_factors(const PairOptions& options, int keys);
+// The same of the distances from a carried object: its block with the robot counts as robot-human, that with the
+// partner as human-human.
+ObjectFactors object_factors(const PairOptions& options, int keys);
 
 // The objective at x with `weights` (those of a stage) and, where asked for, its gradient by all variables. Variables
 // that the options hold fixed have gradient zero.

@@ -66,7 +66,7 @@ PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& rob
           fmt::format("clip '{}': retargeting needs at least {} frames at 50 Hz, found {}", clip.id, kMinFrames,
                       source.frames()));
   PairProblem problem;
-  problem.chain = make_chain(robot, options.keypoints);
+  problem.chain = make_chain(robot, options.keypoints, options.keypoint_list);
   const PairTree tree = make_pair_tree(robot);
   problem.targets = reshape(source, tree, target_lengths(problem.chain, tree, options),
                             height_scale(robot, problem.chain, tree, source));
@@ -82,6 +82,8 @@ PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& rob
   problem.human = partner.joints.select(problem.chain.key_smpl);
   for (const int smpl : problem.chain.key_smpl) problem.human_offset.push_back(human_offset_of(smpl));
   problem.distances = original_distances(source.joints.select(problem.chain.key_smpl), problem.human);
+  if (options.weights.object > 0.0)
+    problem.object = make_object_keypoints(clip.object, source.joints.select(problem.chain.key_smpl), problem.human);
   if (options.weights.bone > 0.0) problem.bones = arm_bones(partner);
   return problem;
 }

@@ -9,6 +9,7 @@
 #include "duet/motion/interaction_clip.h"
 #include "duet/retarget/body_spheres.h"
 #include "duet/retarget/ground_plan.h"
+#include "duet/retarget/object_term.h"
 #include "duet/retarget/options.h"
 #include "duet/retarget/pair_chain.h"
 #include "duet/retarget/partner_arms.h"
@@ -26,6 +27,7 @@ struct PairProblem {
   std::vector<int> human_offset;  // per keypoint of the partner: which of the 6 offsets moves it, -1 for none
   Eigen::MatrixXd distances;      // (pairs i < j of the 2 K keypoints, robot's first, row by row; T): D_orig [m]
 
+  ObjectKeypoints object;        // that the people carry; without points where there is none
   Eigen::MatrixXd bones;         // (18, T): the partner's arm bones before optimisation; empty where w-bone is 0 [m]
   BodySpheres spheres;           // no pairs where w-collision is 0
   PointTracks reshaped;          // (T, 16, 3): Reshaped(H_s) where the robot stands on the ground, empty otherwise

@@ -53,6 +53,15 @@ struct KeyStiffness {
   double robot = 0.0, human = 0.0;
 };
 
+// Mean over the keypoints of what a carried object adds.
+KeyStiffness object_stiffness(const PairProblem& problem, const PairOptions& options, const PairWeights& weights) {
+  const ObjectFactors f = object_factors(options, problem.chain.keys());
+  double share = 0.0;
+  for (const double own : problem.chain.key_object) share += own / problem.chain.keys();
+  const double all = 4.0 * weights.con * weights.object / 3.0 * share * problem.object.count();
+  return {all * f.robot, all * f.human};
+}
+
 KeyStiffness key_stiffness(const PairOptions& options, const PairWeights& weights, int keys) {
   const ContactFactors f = contact_factors(options, keys);
   const double per_distance = 4.0 * weights.con * f.all / 3.0;
@@ -84,7 +93,9 @@ TemporalFactor temporal_factor(double stiffness, double velocity, double acceler
 Preconditioner make_preconditioner(const PairProblem& problem, const PairOptions& options, const PairWeights& weights) {
   const int dof = problem.chain.dof();
   const double frames = problem.frames();
-  const KeyStiffness key = key_stiffness(options, weights, problem.chain.keys());
+  KeyStiffness key = key_stiffness(options, weights, problem.chain.keys());
+  const KeyStiffness object = object_stiffness(problem, options, weights);
+  key = {key.robot + object.robot, key.human + object.human};
   const double pair = 2.0 * weights.kin / (options.kin_loss == KinLoss::kMeanNorm ? kRetargetPairs : 1.0);
   const double velocity = 2.0 * weights.temp * frames / (frames - 1.0);
   const double acceleration = 2.0 * weights.temp * weights.acceleration * frames / (frames - 2.0);
@@ -106,7 +117,8 @@ Preconditioner make_preconditioner(const PairProblem& problem, const PairOptions
   }
   const double keys = problem.chain.keys();
   const double root = pair * kRetargetPairs +
-                      keys * 4.0 * weights.con * contact_factors(options, problem.chain.keys()).all / 3.0 * keys;
+                      keys * 4.0 * weights.con * contact_factors(options, problem.chain.keys()).all / 3.0 * keys +
+                      keys * object.robot;
   for (int r = 0; r < 3; ++r) out.rows.push_back(temporal_factor(std::max(kLeastStiffness, root), 0.0, 0.0));
   out.offset = frames * std::max(kLeastStiffness, root);
   return out;

@@ -66,6 +66,8 @@ UprightChain make_upright_chain(const RobotModel& robot, const PairChain& whole)
     out.chain.key_points.push_back(point_of[point]);
   }
   out.chain.key_smpl = whole.key_smpl;
+  out.chain.key_weight = whole.key_weight;
+  out.chain.key_object = whole.key_object;
   return out;
 }
 

@@ -110,7 +110,7 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
   const RobotModel robot = load_robot(card, arguments.urdf);
   if (arguments.sweep || !arguments.compare.empty()) return run_comparison(session, arguments, robot);
   require(!arguments.output.empty(), "retarget: expected --output FOLDER, or --compare or --sweep");
-  naming_file(card, [&] { (void)make_chain(robot, options.keypoints); });
+  naming_file(card, [&] { (void)make_chain(robot, options.keypoints, options.keypoint_list); });
   const std::vector<std::string> files = find_motion_files(arguments.inputs);
   std::vector<Retargeted> made(files.size());
   Progress progress(session.progress());

@@ -39,6 +39,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"w-bone", "1"},
                                                                    {"w-partner", "0.7"},
                                                                    {"w-collision", "3"},
+                                                                   {"w-object", "0.5"},
                                                                    {"stage1-iterations", "7"},
                                                                    {"stage1-rate", "0.125"},
                                                                    {"stage2-iterations", "0"},
@@ -51,6 +52,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"contact-blocks", "cross"},
                                                                    {"root", "per-frame"},
                                                                    {"keypoints", "eleven"},
+                                                                   {"keypoint-list", "head,left_hand:2:0.5"},
                                                                    {"filter", "off"},
                                                                    {"adapt-human", "off"},
                                                                    {"kernel", "scalar"},
@@ -90,6 +92,10 @@ TEST(PairOptions, UnknownNameOrValueListsTheKnownOnes) {
                 HasSubstr("a whole number"))
         << bad;
   }
+  EXPECT_EQ(
+      thrown_message<std::invalid_argument>([&] { set_pair_option(options, "keypoint-list", "head:x"); }),
+      "pair option 'keypoint-list' has no value 'head:x': keypoint 'head:x': expected a weight, a finite number of "
+      "zero or more, found 'x'");
   EXPECT_EQ(pair_option(options, "w-kin"), "1");
 }
 
