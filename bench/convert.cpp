@@ -54,6 +54,7 @@ ConvertedMotion convert_paired(const MotionSource& source, const std::string& ou
   }
   const RobotMotionFormat& format = robot_motion_format(options.to);
   evidence.emplace_back("the partner stays behind: robot motions hold no person");
+  if (!motion.object.empty()) evidence.emplace_back("the object stays behind: robot motions hold none");
   return write_resampled(motion.robot, output, robot, format, options.writing, std::move(evidence));
 }
 

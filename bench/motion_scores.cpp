@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <set>
 
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
+#include "duet/metrics/object_metrics.h"
 #include "duet/results/text_table.h"
 #include "duet/robots/kinematics.h"
 #include "duet/rollout/play_back.h"
@@ -41,9 +43,9 @@ double mean_of(const std::vector<const ClipScore*>& scores, const std::string& m
   double sum = 0.0;
   int count = 0;
   for (const ClipScore* score : scores) {
-    const double value = score->metrics.at(metric);
-    if (!std::isfinite(value)) continue;
-    sum += value;
+    const auto found = score->metrics.find(metric);
+    if (found == score->metrics.end() || !std::isfinite(found->second)) continue;
+    sum += found->second;
     ++count;
   }
   return count > 0 ? sum / count : std::nan("");
@@ -51,21 +53,31 @@ double mean_of(const std::vector<const ClipScore*>& scores, const std::string& m
 
 std::map<std::string, double> summarize(const std::vector<const ClipScore*>& scores, const MetricReadings& readings) {
   std::map<std::string, double> row;
-  std::array<ContactCounts, 3> counts{};
+  std::array<ContactCounts, 3> counts{}, object_counts{};
+  bool object = false;
+  std::set<std::string> names;
   for (const ClipScore* score : scores) {
-    for (size_t i = 0; i < counts.size(); ++i) counts[i] += score->contacts[i];
+    object = object || score->metrics.contains("object_distance_error");
+    for (const auto& [name, value] : score->metrics) names.insert(name);
+    for (size_t i = 0; i < counts.size(); ++i) {
+      counts[i] += score->contacts[i];
+      object_counts[i] += score->object_contacts[i];
+    }
     row["source_detected"] += score->source_detected;
     row["robot_detected"] += score->robot_detected;
     row["paper_detected"] += score->paper_detected;
   }
+  for (const std::string& name : names) row[name] = mean_of(scores, name);
   for (const auto& [name, title] : detector_rows()) row[name] /= static_cast<double>(scores.size());
-  for (const auto& [name, value] : scores.front()->metrics) row[name] = mean_of(scores, name);
   for (size_t i = 0; i < counts.size(); ++i) {
     const Classification figures = classification(counts[i], readings.zero_division);
     row[fmt::format("contact_precision_{}", kThresholdNames[i])] = figures.precision;
     row[fmt::format("contact_recall_{}", kThresholdNames[i])] = figures.recall;
     row[fmt::format("contact_f1_{}", kThresholdNames[i])] = figures.f1;
     row[fmt::format("contact_accuracy_{}", kThresholdNames[i])] = figures.accuracy;
+    if (object)
+      row[fmt::format("object_contact_f1_{}", kThresholdNames[i])] =
+          classification(object_counts[i], readings.zero_division).f1;
   }
   row["clips"] = static_cast<double>(scores.size());
   return row;
@@ -77,6 +89,12 @@ std::vector<std::string> columns_of(const std::map<std::string, std::map<std::st
     if (summary.contains(std::string(to_string(task)))) columns.emplace_back(to_string(task));
   if (columns.size() > 1) columns.emplace_back("all");
   return columns;
+}
+
+// Clips of one task may have objects and those of another none.
+double value_of(const std::map<std::string, double>& row, const std::string& name) {
+  const auto found = row.find(name);
+  return found == row.end() ? std::nan("") : found->second;
 }
 
 std::string cell(double value, bool percent) {
@@ -115,6 +133,8 @@ ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const Rob
   score.metrics = retargeting_metrics(motion, *robot, readings.metrics);
   add_other_readings(motion, *robot, score.metrics);
   score.metrics.merge(grounding_metrics(motion, *robot));
+  score.metrics.merge(object_metrics(motion, *robot, readings.metrics.zero_division));
+  score.object_contacts = object_contact_counts(motion, *robot);
   if (options.all_readings) score.all_readings = retargeting_metrics_all_readings(motion, *robot, readings.metrics);
   score.contacts = retargeting_contact_counts(motion, *robot, readings.metrics);
   const std::vector<DetectorView> views = views_of(motion, robot);
@@ -149,15 +169,15 @@ std::string score_table(const std::map<std::string, std::map<std::string, double
   const auto add_row = [&](const std::string& title, std::string_view unit, const std::string& name, bool percent) {
     text += fmt::format("{:<26} {:<8}", title, unit);
     for (const std::string& column : columns)
-      text += fmt::format(" {:>10}", cell(summary.at(column).at(name), percent));
+      text += fmt::format(" {:>10}", cell(value_of(summary.at(column), name), percent));
     text += "\n";
   };
   add_row("clips", "", "clips", false);
   for (const MetricInfo& metric : metric_catalogue()) {
     const std::string name(metric.name);
     const bool of_a_motion = metric.group == MetricGroup::kRetargeting || metric.group == MetricGroup::kOtherReading ||
-                             metric.group == MetricGroup::kGrounding;
-    if (of_a_motion && summary.at(columns.front()).contains(name)) add_row(name, metric.unit, name, false);
+                             metric.group == MetricGroup::kGrounding || metric.group == MetricGroup::kObject;
+    if (of_a_motion && summary.at("all").contains(name)) add_row(name, metric.unit, name, false);
   }
   for (const auto& [name, title] : detector_rows()) add_row(title, "", name, true);
   return text;

@@ -25,11 +25,11 @@ struct ScoreOptions {
 
 struct ClipScore {
   std::string clip, task;
-  std::map<std::string, double>
-      metrics;  // the 18, jpe.pelvis, large_angle_ratio.entry, those of metrics/grounding.h; NaN where undefined
+  std::map<std::string, double> metrics;  // the 18, jpe.pelvis, large_angle_ratio.entry, those of metrics/grounding.h
+                                          // and, with an object, metrics/object_metrics.h; NaN where undefined
   std::map<std::string, double> all_readings;  // of retargeting_metrics_all_readings, where asked for
   std::vector<DetectorScore> detectors;        // likewise
-  std::array<ContactCounts, 3> contacts;
+  std::array<ContactCounts, 3> contacts, object_contacts;
   bool source_detected = false;  // person against person, the reactor as performer
   bool robot_detected = false;   // version `robot`, played back
   bool paper_detected = false;   // version `paper`, played back

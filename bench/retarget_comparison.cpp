@@ -8,6 +8,7 @@
 #include "duet/backends/thread_clock.h"
 #include "duet/core/parallel.h"
 #include "duet/metrics/grounding.h"
+#include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
 #include "duet/results/text_table.h"
 #include "duet/retarget/pair.h"
@@ -37,12 +38,18 @@ constexpr ShownFigure kShown[] = {{"sole_height", "soles over the floor while st
                                   {"awd", "AWD [cm]", 100.0, true},
                                   {"contact_f1_0.2", "contact F1 at 0.2 m", 1.0, false},
                                   {"contact_f1_0.35", "contact F1 at 0.35 m", 1.0, false},
-                                  {"contact_f1_0.5", "contact F1 at 0.5 m", 1.0, false}};
+                                  {"contact_f1_0.5", "contact F1 at 0.5 m", 1.0, false},
+                                  {"object_distance_error", "hand to object, distance changes by [cm]", 100.0, true},
+                                  {"object_distance_error.partner", "the same of the partner [cm]", 100.0, true},
+                                  {"object_contact_f1_0.2", "hand on object F1 at 0.2 m", 1.0, false},
+                                  {"object_contact_f1_0.35", "hand on object F1 at 0.35 m", 1.0, false},
+                                  {"object_contact_f1_0.5", "hand on object F1 at 0.5 m", 1.0, false}};
 constexpr const char* kF1[] = {"contact_f1_0.2", "contact_f1_0.35", "contact_f1_0.5"};
 
 struct ClipFigures {
   std::map<std::string, double> figures;
-  std::array<ContactCounts, 3> contacts;
+  std::array<ContactCounts, 3> contacts, object_contacts;
+  bool object = false;
   double seconds = 0.0;
   int frames = 0;
 };
@@ -58,6 +65,10 @@ ClipFigures figures_of(const InteractionClip& clip, const RetargetVariant& varia
   for (const char* name : {"jpe", "awd"}) out.figures[name] = metrics.at(name);
   out.figures["large_angle_ratio.entry"] = large_angle_ratio(hinge_magnitudes(motion.robot.q), LargeAngle::kEntry);
   out.contacts = retargeting_contact_counts(motion, robot);
+  out.object = !motion.object.empty();
+  if (!out.object) return out;
+  out.figures.merge(object_metrics(motion, robot));
+  out.object_contacts = object_contact_counts(motion, robot);
   return out;
 }
 
@@ -66,12 +77,15 @@ ComparedVariant summary_of(const std::string& name, const std::vector<ClipFigure
   out.name = name;
   out.clips = static_cast<int>(clips.size());
   double seconds = 0.0, frames = 0.0;
-  std::array<ContactCounts, 3> contacts{};
+  std::array<ContactCounts, 3> contacts{}, object_contacts{};
+  bool object = false;
   std::map<std::string, int> counts;
   for (const ClipFigures& clip : clips) {
     seconds += clip.seconds;
     frames += clip.frames;
     for (std::size_t i = 0; i < contacts.size(); ++i) contacts[i] += clip.contacts[i];
+    for (std::size_t i = 0; i < contacts.size(); ++i) object_contacts[i] += clip.object_contacts[i];
+    object = object || clip.object;
     for (const auto& [figure, value] : clip.figures) {
       if (!std::isfinite(value)) continue;
       ComparedFigure& sum = out.figures[figure];
@@ -83,6 +97,8 @@ ComparedVariant summary_of(const std::string& name, const std::vector<ClipFigure
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     const double f1 = classification(contacts[i]).f1;
     out.figures[kF1[i]] = {f1, f1};
+    const double object_f1 = classification(object_contacts[i]).f1;
+    if (object) out.figures[fmt::format("object_{}", kF1[i])] = {object_f1, object_f1};
   }
   out.frames_per_second = frames / seconds;
   return out;
@@ -144,7 +160,14 @@ std::string comparison_table(const std::vector<ComparedVariant>& compared) {
   TextTable table;
   table.header = {"Mean over clips (worst clip)"};
   for (const ComparedVariant& variant : compared) table.header.push_back(variant.name);
+  const auto is_of_an_object = [](const ShownFigure& figure) {
+    return std::string_view(figure.name).starts_with("object_");
+  };
+  const bool object = std::any_of(compared.begin(), compared.end(), [](const ComparedVariant& variant) {
+    return variant.figures.contains("object_distance_error");
+  });
   for (const ShownFigure& figure : kShown) {
+    if (is_of_an_object(figure) && !object) continue;
     table.rows.push_back({figure.title});
     for (const ComparedVariant& variant : compared) table.rows.back().push_back(figure_text(variant, figure));
   }

@@ -19,6 +19,7 @@
 #include "duet/datasets/people_clip.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
+#include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
 #include "duet/motion/people/people_formats.h"
 #include "duet/results/json_fields.h"
@@ -44,6 +45,7 @@ json settings_of(const DatasetPlan& plan, const PeopleFormat& format) {
                         {"drop_t_pose", or_null(people.drop_t_pose)},
                         {"skeleton", people.skeleton},
                         {"body_model", people.body_model.empty() ? "" : sha256_file(people.body_model)},
+                        {"object", people.object.empty() ? "" : sha256_file(people.object)},
                         {"align", static_cast<int>(people.align)},
                         {"task", people.task ? json(to_string(*people.task)) : json()},
                         {"reactor", people.reactor ? json(*people.reactor == Person::kA ? "A" : "B") : json()}};
@@ -132,10 +134,11 @@ std::string key_of(const std::string& settings, const std::vector<NamedDigest>& 
   return digest.hex();
 }
 
-// The 18 metrics, how it stands, and whether the task's detector sees it.
+// The 18 metrics, how it stands, what it does with an object that is carried, and whether the task's detector sees it.
 std::map<std::string, double> figures_of(const PairedMotion& paired, const RobotModel& robot) {
   std::map<std::string, double> figures = retargeting_metrics(paired, robot);
   figures.merge(grounding_metrics(paired, robot));
+  figures.merge(object_metrics(paired, robot));
   figures["robot_detected"] =
       detect(paired.task, human_agent(paired.partner.joints), robot_agent(robot, paired.robot), DetectorVersion::kRobot)
           .success;

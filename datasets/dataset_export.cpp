@@ -80,14 +80,15 @@ class Export {
     read_log();
   }
 
-  // Whether it was there before.
-  bool make(const Item& item) {
+  // Whether it was there before. `has_object` is told of what is written now.
+  bool make(const Item& item, bool& has_object) {
     if (is_there(item)) return true;
     const std::string bytes = read_file(dataset_ + "/" + item.source.file);
     if (sha256_hex(bytes) != item.source.sha256)
       throw InputError(fmt::format("'{}/{}' was changed since the data set was made (its digest differs)", dataset_,
                                    item.source.file));
     const PairedMotion paired = parse_paired_motion(bytes, item.source.file);
+    has_object = !paired.object.empty();
     const std::string stem = item.robot->name + "/" + item.entry->clip;
     RobotMotionWriting writing = writing_;
     writing.name = item.entry->clip;
@@ -169,10 +170,12 @@ DatasetExport export_dataset(const std::string& dataset, const std::string& outp
       if (result.stopped) return;
     }
     const Item& item = items[static_cast<std::size_t>(i)];
-    const bool from_before = work.make(item);
+    bool has_object = false;
+    const bool from_before = work.make(item, has_object);
     const std::lock_guard hold(mutex);
     ++result.motions;
     result.from_before += from_before;
+    result.objects_left_out += has_object;
     if (events.finished) events.finished(*item.entry, from_before);
   });
   work.write_manifest();

@@ -12,7 +12,8 @@ namespace duet {
 
 struct DatasetExport {
   int motions = 0;
-  int from_before = 0;  // of these, written by an earlier command
+  int from_before = 0;       // of these, written by an earlier command
+  int objects_left_out = 0;  // of those written now, whose carried object the format has no place for
   bool stopped = false;
 };
 

@@ -16,11 +16,13 @@ constexpr auto kPlain = Direction::kNone;
 constexpr auto kRetarget = MetricGroup::kRetargeting;
 constexpr auto kOther = MetricGroup::kOtherReading;
 constexpr auto kStanding = MetricGroup::kGrounding;
+constexpr auto kThing = MetricGroup::kObject;
 constexpr auto kControl = MetricGroup::kController;
 constexpr auto kEpisode = MetricGroup::kEpisode;
 constexpr std::string_view kC21 = "supplement C.2.1";
 constexpr std::string_view kS4 = "supplement A.4.6, Table S4";
 constexpr std::string_view kGround = "duet: how a retargeted motion stands (metrics/grounding.h)";
+constexpr std::string_view kCarried = "duet: hands and a carried object (metrics/object_metrics.h)";
 constexpr std::string_view kDetectors = "supplement C.3.1, Algorithms 1-6";
 constexpr std::string_view kWalking = "duet: walking by command (metrics/locomotion.h)";
 constexpr std::string_view kSafety = "duet: contact safety";
@@ -63,6 +65,12 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"limit_violations", "1", kDown, kStanding, "Joint limits violated", kGround},
     {"root_roll_max", "rad", kDown, kStanding, "Roll of the base, peak", kGround},
     {"root_tilt_max", "rad", kDown, kStanding, "Tilt of the base, peak", kGround},
+
+    {"object_distance_error", "m", kDown, kThing, "Hand to object, change of distance", kCarried},
+    {"object_distance_error.partner", "m", kDown, kThing, "Partner's hand to object, change of distance", kCarried},
+    {"object_contact_f1_0.2", "1", kUp, kThing, "Hand on object F1 at 0.2 m", kCarried},
+    {"object_contact_f1_0.35", "1", kUp, kThing, "Hand on object F1 at 0.35 m", kCarried},
+    {"object_contact_f1_0.5", "1", kUp, kThing, "Hand on object F1 at 0.5 m", kCarried},
 
     {"hf_ratio", "1", kDown, kControl, "Joint-velocity energy above 5 Hz", kS4},
     {"dof_jerk", "rad/s^3", kDown, kControl, "Joint jerk", kS4},

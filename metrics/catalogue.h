@@ -11,7 +11,8 @@ namespace duet {
 enum class Direction { kLower, kHigher, kNone };
 // kOtherReading: of retargeting, under another reading than the default, printed beside it.
 // kGrounding: how a retargeted motion stands (metrics/grounding.h).
-enum class MetricGroup { kRetargeting, kOtherReading, kGrounding, kController, kEpisode };
+// kObject: what the hands do with a carried object (metrics/object_metrics.h), of motions that have one.
+enum class MetricGroup { kRetargeting, kOtherReading, kGrounding, kObject, kController, kEpisode };
 
 struct MetricInfo {
   std::string_view name;  // "jpe", "contact_f1_0.35", "hf_ratio", ...

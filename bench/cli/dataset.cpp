@@ -223,6 +223,8 @@ void run_export(Session& session, const ExportArguments& arguments) {
   const DatasetExport made = export_dataset(arguments.dataset, arguments.output, robots_of(arguments),
                                             robot_motion_format(arguments.to), writing, arguments.threads, events);
   progress.finish();
+  if (made.objects_left_out > 0)
+    note(session, fmt::format("the objects of {} motions stay behind: robot motions hold none", made.objects_left_out));
   print(session,
         fmt::format("{}: {} motions in format '{}'{}\n", arguments.output, made.motions, arguments.to,
                     made.from_before > 0 ? fmt::format(", {} from before", made.from_before) : ""),
@@ -230,6 +232,7 @@ void run_export(Session& session, const ExportArguments& arguments) {
          {"format", arguments.to},
          {"motions", made.motions},
          {"from_before", made.from_before},
+         {"objects_left_out", made.objects_left_out},
          {"stopped", made.stopped}});
   if (made.stopped) session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
 }
