@@ -33,7 +33,7 @@ std::string_view next_word(std::string_view& line) {
 }
 
 void check_point(const Eigen::Vector3d& point, const std::string& where) {
-  if (!(point.cwiseAbs().maxCoeff() <= kFarthestPoint))
+  if (!point.allFinite() || point.cwiseAbs().maxCoeff() > kFarthestPoint)
     throw InputError(fmt::format("{}: expected metres, at most {:g} from the origin, found ({:g}, {:g}, {:g})", where,
                                  kFarthestPoint, point.x(), point.y(), point.z()));
 }

@@ -26,6 +26,13 @@ CarriedObject turning_box(int frames) {
   return object;
 }
 
+InteractionClip five_frames() {
+  InteractionClip clip = test::two_people(5);
+  clip.phases = {.act_begin = 1, .act_end = 2};
+  clip.contacts.clear();
+  return clip;
+}
+
 PairedMotion paired(int frames) {
   PairedMotion motion;
   motion.clip_id = "carry";
@@ -47,7 +54,7 @@ void expect_same(const CarriedObject& a, const CarriedObject& b) {
 }
 
 TEST(CarriedObject, ClipsAndPairedMotionsGiveBackEveryBit) {
-  InteractionClip clip = test::two_people(5);
+  InteractionClip clip = five_frames();
   clip.object = turning_box(5);
   expect_same(parse_clip(clip_bytes(clip), "clip.npz").object, clip.object);
   PairedMotion motion = paired(5);
@@ -56,14 +63,14 @@ TEST(CarriedObject, ClipsAndPairedMotionsGiveBackEveryBit) {
 }
 
 TEST(CarriedObject, FilesWithoutOneHaveNoneOfItsKeys) {
-  for (const std::string& bytes : {clip_bytes(test::two_people(5)), paired_motion_bytes(paired(5))})
+  for (const std::string& bytes : {clip_bytes(five_frames()), paired_motion_bytes(paired(5))})
     for (const std::string& key : Npz::parse(bytes, "file").keys())
       EXPECT_THAT(key, testing::Not(testing::StartsWith("object")));
-  EXPECT_TRUE(parse_clip(clip_bytes(test::two_people(5)), "clip.npz").object.empty());
+  EXPECT_TRUE(parse_clip(clip_bytes(five_frames()), "clip.npz").object.empty());
 }
 
 TEST(CarriedObject, HalfAnObjectIsRefusedByItsKey) {
-  InteractionClip clip = test::two_people(5);
+  InteractionClip clip = five_frames();
   clip.object = turning_box(5);
   for (const char* key : {"object_position", "object_quat_wxyz", "object_keypoints"})
     EXPECT_THAT(thrown_message<InputError>([&] { parse_clip(test::without_key(clip_bytes(clip), key), "x.npz"); }),
@@ -119,7 +126,7 @@ TEST(CarriedObject, ResamplesAsThePeopleDo) {
 }
 
 TEST(CarriedObject, PaddedAndMirroredClipsTakeItAlong) {
-  InteractionClip clip = test::two_people(5);
+  InteractionClip clip = five_frames();
   clip.object = turning_box(5);
   const InteractionClip longer = padded(clip, 0.04, 0.06);
   ASSERT_EQ(longer.object.poses.size(), 10U);
