@@ -48,12 +48,12 @@ void add_task(TextTable& table, const Row& scores) {
     add_row(table, scores, "  " + name, "", "",
             [&, &name = name](const DetectorResult& r) { return shown_entry(r.parts, name, yes_no); });
   for (const auto& [name, value] : first.result.values)
-    add_row(table, scores, "  " + name, std::string(detector_figure(first.task, name).unit), "",
+    add_row(table, scores, "  " + name, std::string(detector_figure(first.task, name, first.thresholds).unit), "",
             [&, &name = name](const DetectorResult& r) { return shown_entry(r.values, name, number); });
   const Thresholds tau = thresholds(first.task, first.thresholds);
   for (const auto& [name, value] : tau)
-    add_row(table, scores, "  margin of " + name, std::string(threshold_info(first.task, name).unit), number(value),
-            [&, &name = name](const DetectorResult& r) { return shown_entry(r.margins, name, margin); });
+    add_row(table, scores, "  margin of " + name, std::string(threshold_unit(first.task, name, first.thresholds)),
+            number(value), [&, &name = name](const DetectorResult& r) { return shown_entry(r.margins, name, margin); });
   add_row(table, scores, "  evidence_frames", "frames", "",
           [](const DetectorResult& r) { return std::to_string(std::count(r.frames.begin(), r.frames.end(), true)); });
 }

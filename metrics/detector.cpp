@@ -24,9 +24,9 @@ void check_tracks(Task task, const Tracks& tracks) {
   }
 }
 
-// The task's thresholds with those given in the place of the printed ones.
-Thresholds completed(Task task, const Thresholds& given) {
-  Thresholds complete = thresholds(task);
+// The task's thresholds with those given in the place of the set's.
+Thresholds completed(Task task, const Thresholds& given, ThresholdSet set = ThresholdSet::kPaper) {
+  Thresholds complete = thresholds(task, set);
   for (const auto& [name, value] : given) {
     const auto known = complete.find(name);
     if (known == complete.end()) {
@@ -43,12 +43,27 @@ Thresholds completed(Task task, const Thresholds& given) {
 }  // namespace
 
 std::string_view to_string(DetectorVersion version) { return version == DetectorVersion::kPaper ? "paper" : "robot"; }
-std::string_view to_string(ThresholdSet set) { return set == ThresholdSet::kPaper ? "paper" : "strict"; }
+std::string_view to_string(ThresholdSet set) {
+  return set == ThresholdSet::kPaper ? "paper" : set == ThresholdSet::kStrict ? "strict" : "act";
+}
+
+ThresholdSet parse_threshold_set(std::string_view name) {
+  std::vector<std::string> known;
+  for (const ThresholdSet set : kThresholdSets) {
+    if (name == to_string(set)) return set;
+    known.emplace_back(to_string(set));
+  }
+  throw std::invalid_argument(unknown_name_message("set of thresholds", name, known));
+}
 
 Thresholds thresholds(Task task, ThresholdSet set) {
   Thresholds tau;
+  if (const ActRule* rule = definition_of(task).rule; set == ThresholdSet::kAct && rule != nullptr) {
+    for (const RuleThreshold& threshold : rule->thresholds) tau[std::string(threshold.name)] = threshold.value;
+    return tau;
+  }
   for (const ThresholdInfo& info : definition_of(task).detector.thresholds)
-    tau[std::string(info.name)] = set == ThresholdSet::kStrict ? info.strict : info.paper;
+    tau[std::string(info.name)] = set == ThresholdSet::kPaper ? info.paper : info.strict;
   return tau;
 }
 
@@ -59,11 +74,22 @@ DetectorResult detect_performer(Task task, const Agent& performer, const Agent& 
   return detector.detect(performer, partner, completed(task, thresholds), readings);
 }
 
+DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds) {
+  const ActRule* rule = definition_of(task).rule;
+  require(rule != nullptr, fmt::format("{} detector: the set act has no rule of its own for it", to_string(task)));
+  check_tracks(task, rule->tracks(performer, partner));
+  return rule->detect(performer, partner, completed(task, thresholds, ThresholdSet::kAct));
+}
+
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version, ThresholdSet set,
                       DetectorReadings readings) {
-  if (set == ThresholdSet::kStrict) readings = strict_readings(readings);
+  if (set != ThresholdSet::kPaper) readings = strict_readings(readings);
   const bool paper = version == DetectorVersion::kPaper;
-  return detect_performer(task, paper ? human : robot, paper ? robot : human, thresholds(task, set), readings);
+  const Agent& performer = paper ? human : robot;
+  const Agent& partner = paper ? robot : human;
+  if (set == ThresholdSet::kAct && definition_of(task).rule != nullptr)
+    return detect_by_rule(task, performer, partner, {});
+  return detect_performer(task, performer, partner, thresholds(task, set), readings);
 }
 
 }  // namespace duet

@@ -3,6 +3,7 @@
 // the robot the performer (docs/architecture.md, 6).
 #pragma once
 
+#include <array>
 #include <string_view>
 #include <vector>
 
@@ -22,12 +23,15 @@ namespace duet {
 inline constexpr std::string_view kDetectorsVersion = "1";
 
 enum class DetectorVersion { kPaper, kRobot };
-enum class ThresholdSet {
-  kPaper,
-  kStrict
-};  // Table S11 | the stricter set, which also sets readings (docs/detectors.md)
+// Table S11 | the stricter set, which also sets readings | the set of rules that know the act, where a task has one,
+// else the strict one (docs/detectors.md).
+enum class ThresholdSet { kPaper, kStrict, kAct };
+inline constexpr std::array kThresholdSets = {ThresholdSet::kPaper, ThresholdSet::kStrict, ThresholdSet::kAct};
 std::string_view to_string(DetectorVersion version);  // "paper", "robot"
-std::string_view to_string(ThresholdSet set);         // "paper", "strict"
+std::string_view to_string(ThresholdSet set);         // "paper", "strict", "act"
+
+// Throws std::invalid_argument for another name, and lists these.
+ThresholdSet parse_threshold_set(std::string_view name);
 
 Thresholds thresholds(Task task, ThresholdSet set = ThresholdSet::kPaper);
 
@@ -35,6 +39,9 @@ Thresholds thresholds(Task task, ThresholdSet set = ThresholdSet::kPaper);
 // finite, an unknown threshold.
 DetectorResult detect_performer(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds,
                                 const DetectorReadings& readings = {});
+
+// By the task's rule of the set `act`. Throws std::invalid_argument as above, and for a task that has none.
+DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds);
 
 // Roles from the version: detect(t, human, robot, kRobot, ...) equals detect(t, robot, human, kPaper, ...).
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version,

@@ -230,7 +230,8 @@ const TaskDefinition& fist_bump() {
       .detector = {.thresholds = kFistBumpThresholds,
                    .figures = kFistBumpFigures,
                    .tracks = fist_bump_tracks,
-                   .detect = detect_fist_bump}};
+                   .detect = detect_fist_bump},
+      .rule = &rules::kFistBump};
   return kDefinition;
 }
 

@@ -258,7 +258,8 @@ const TaskDefinition& handshake() {
       .detector = {.thresholds = kHandshakeThresholds,
                    .figures = kHandshakeFigures,
                    .tracks = handshake_tracks,
-                   .detect = detect_handshake}};
+                   .detect = detect_handshake},
+      .rule = &rules::kHandshake};
   return kDefinition;
 }
 

@@ -224,7 +224,8 @@ const TaskDefinition& high_five() {
       .detector = {.thresholds = kHighFiveThresholds,
                    .figures = kHighFiveFigures,
                    .tracks = high_five_tracks,
-                   .detect = detect_high_five}};
+                   .detect = detect_high_five},
+      .rule = &rules::kHighFive};
   return kDefinition;
 }
 

@@ -345,7 +345,8 @@ const TaskDefinition& hug() {
               .close = true,
               .layout = synthesis::hug_layout,
               .perform = synthesis::perform_hug},
-      .detector = {.thresholds = kHugThresholds, .figures = kHugFigures, .tracks = hug_tracks, .detect = detect_hug}};
+      .detector = {.thresholds = kHugThresholds, .figures = kHugFigures, .tracks = hug_tracks, .detect = detect_hug},
+      .rule = &rules::kHug};
   return kDefinition;
 }
 

@@ -4,15 +4,14 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "duet/core/task.h"
 #include "duet/tasks/agent.h"
 #include "duet/tasks/detector_readings.h"
+#include "duet/tasks/detector_result.h"
+#include "duet/tasks/rules/act_rule.h"
 #include "duet/tasks/synthesis/act.h"
 
 namespace duet {
@@ -46,25 +45,6 @@ struct ThresholdInfo {
   std::string_view meaning;
 };
 
-struct DetectorFigure {
-  std::string_view name;  // in DetectorResult::values
-  std::string_view unit;
-  std::string_view meaning;
-};
-
-using Thresholds = std::map<std::string, double>;  // "contact", "min_frames", ...
-
-struct DetectorResult {
-  bool success = false;
-  std::vector<bool> frames;              // evidence mask, T entries
-  std::map<std::string, bool> parts;     // the printed sub-conditions by name
-  std::map<std::string, double> values;  // what was measured: each of the detector's figures that the readings have
-  // Per threshold, signed: by how much it could be tightened (positive) or must be loosened (negative) with the others
-  // as they are; at exactly 0 the printed comparison decides. -infinity with fewer frames than are asked for. The
-  // smallest has the sign of the verdict, for a hug "overall" (the best of its three modes) has.
-  std::map<std::string, double> margins;
-};
-
 struct TaskDetector {
   std::span<const ThresholdInfo> thresholds;
   std::span<const DetectorFigure> figures;
@@ -85,6 +65,7 @@ struct TaskDefinition {
   PhaseSignal phases;
   synthesis::Act act;
   TaskDetector detector;
+  const ActRule* rule = nullptr;  // of the set `act`; null: the strict thresholds stand for it
 };
 
 const TaskDefinition& definition_of(Task task);

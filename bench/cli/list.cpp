@@ -67,6 +67,16 @@ std::vector<Listed> list_detectors() {
       entry.more["thresholds"][std::string(info.name)] = {
           {"paper", info.paper}, {"strict", info.strict}, {"unit", info.unit}, {"meaning", info.meaning}};
     }
+    for (const RuleThreshold& threshold : rule_thresholds(task)) {
+      entry.options.push_back(
+          fmt::format("act {} {:g}{}: {}", threshold.name, threshold.value, threshold.unit, threshold.meaning));
+      entry.more["act"][std::string(threshold.name)] = {
+          {"value", threshold.value}, {"unit", threshold.unit}, {"meaning", threshold.meaning}};
+    }
+    for (const DetectorFigure& figure : rule_figures(task)) {
+      entry.options.push_back(fmt::format("act prints {} [{}]: {}", figure.name, figure.unit, figure.meaning));
+      entry.more["act_figures"][std::string(figure.name)] = {{"unit", figure.unit}, {"meaning", figure.meaning}};
+    }
     for (const auto& [option, value] : strict_choices(task)) {
       entry.options.push_back(fmt::format("strict reads {}={}", option, value));
       entry.more["strict_readings"][option] = value;

@@ -40,7 +40,7 @@ ScoreOptions options_of(const ScoreArguments& arguments) {
     const auto [option, value] = split_assignment(choice);
     set_reading(options.readings, option, value);
   }
-  options.thresholds = arguments.thresholds == "strict" ? ThresholdSet::kStrict : ThresholdSet::kPaper;
+  options.thresholds = parse_threshold_set(arguments.thresholds);
   options.all_detectors = arguments.all_detectors;
   options.all_readings = arguments.all_readings;
   return options;
@@ -147,7 +147,7 @@ void add_score(CLI::App& app, Session& session) {
   command->add_option("--reading", arguments->readings,
                       "family.option=reading; `duet list readings` shows all (repeatable)");
   command->add_option("--thresholds", arguments->thresholds, "of the detectors; `duet list detectors` shows them")
-      ->check(CLI::IsMember({"paper", "strict"}))
+      ->check(CLI::IsMember({"paper", "strict", "act"}))
       ->capture_default_str();
   command->add_flag("--all-detectors", arguments->all_detectors,
                     "every task's detector with values, thresholds and margins, for people and robot");

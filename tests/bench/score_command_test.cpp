@@ -263,7 +263,8 @@ TEST(ScoreCommand, ListDetectorsPrintsTableS11AndTheStrictSet) {
   const Answer answer = duet_program("list detectors");
   ASSERT_EQ(answer.code, 0) << answer.err;
   for (const char* text : {"min_frames 3 frames (strict 25): one way to embrace lasts so many frames on end",
-                           "strict reads bend.direction=forward", "prints shoulder_distance_both_min [m]"})
+                           "strict reads bend.direction=forward", "prints shoulder_distance_both_min [m]",
+                           "act trunks 0.45m: the trunks are at most so far apart, level"})
     EXPECT_THAT(answer.out, HasSubstr(text));
   const nlohmann::json json = nlohmann::json::parse(duet_program("list detectors --json").out);
   EXPECT_EQ(json.size(), all_tasks().size());

@@ -28,6 +28,25 @@ TEST(DetectorCatalogue, EveryFigureAndThresholdIsInTheCatalogue) {
               HasSubstr("did you mean 'hands_distance_min'"));
 }
 
+TEST(DetectorCatalogue, RulesOfTheSetActHaveUnitsAndMeanings) {
+  for (const Task task : all_tasks()) {
+    Agent agent;
+    for (Eigen::Matrix3Xd* track :
+         {&agent.lhand, &agent.rhand, &agent.head, &agent.root, &agent.torso, &agent.lshoulder, &agent.rshoulder})
+      *track = Eigen::Matrix3Xd::Random(3, 40);
+    const DetectorResult result = detect(task, agent, agent, DetectorVersion::kRobot, ThresholdSet::kAct);
+    const std::size_t figures = rule_figures(task).empty() ? detector_figures(task).size() : rule_figures(task).size();
+    EXPECT_EQ(result.values.size(), figures) << to_string(task);
+    for (const auto& [name, value] : result.values)
+      EXPECT_EQ(detector_figure(task, name, ThresholdSet::kAct).name, name);
+    for (const auto& [name, value] : thresholds(task, ThresholdSet::kAct))
+      EXPECT_FALSE(threshold_unit(task, name, ThresholdSet::kAct).empty()) << to_string(task) << " " << name;
+  }
+  EXPECT_TRUE(rule_thresholds(Task::kBend).empty());
+  EXPECT_EQ(threshold_unit(Task::kHug, "hold", ThresholdSet::kAct), "s");
+  EXPECT_EQ(threshold_unit(Task::kBend, "min_frames", ThresholdSet::kAct), "frames");
+}
+
 TEST(DetectorCatalogue, StrictChoicesAreTheReadingsThatTheSetBrings) {
   using Choices = std::vector<std::pair<std::string, std::string>>;
   EXPECT_EQ(strict_choices(Task::kBend), (Choices{{"bend.direction", "forward"}}));
@@ -46,6 +65,11 @@ TEST(DetectorCatalogue, TheDocsHaveEveryThresholdAndFigure) {
       EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {} | {} |", figure.name, figure.unit, figure.meaning)));
     for (const auto& [option, value] : strict_choices(task))
       EXPECT_THAT(docs, HasSubstr(fmt::format("`{}={}`", option, value)));
+    for (const RuleThreshold& threshold : rule_thresholds(task))
+      EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {:g} | {} | {} |", threshold.name, threshold.value,
+                                              threshold.unit, threshold.meaning)));
+    for (const DetectorFigure& figure : rule_figures(task))
+      EXPECT_THAT(docs, HasSubstr(fmt::format("| `{}` | {} | {} |", figure.name, figure.unit, figure.meaning)));
   }
 }
 

@@ -91,6 +91,8 @@ TEST(Detector, NamesOfVersionsAndSets) {
   EXPECT_EQ(to_string(DetectorVersion::kRobot), "robot");
   EXPECT_EQ(to_string(ThresholdSet::kPaper), "paper");
   EXPECT_EQ(to_string(ThresholdSet::kStrict), "strict");
+  EXPECT_EQ(to_string(ThresholdSet::kAct), "act");
+  for (const ThresholdSet set : kThresholdSets) EXPECT_EQ(parse_threshold_set(to_string(set)), set);
 }
 
 // The scenes are of use only if both verdicts occur.
@@ -108,7 +110,7 @@ TEST(Detector, TestScenesSucceedAndFail) {
 
 TEST(Detector, VersionRobotExchangesTheAgents) {
   for_each_scene([](Task task, int seed, const Scene& s) {
-    for (const ThresholdSet set : {ThresholdSet::kPaper, ThresholdSet::kStrict}) {
+    for (const ThresholdSet set : kThresholdSets) {
       const DetectorResult robot = detect(task, s.partner, s.performer, DetectorVersion::kRobot, set);
       const DetectorResult paper = detect(task, s.performer, s.partner, DetectorVersion::kPaper, set);
       expect_same(robot, paper, 0.0, label(task, seed));

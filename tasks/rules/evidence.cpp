@@ -1,0 +1,124 @@
+#include "duet/tasks/rules/evidence.h"
+
+#include <algorithm>
+
+namespace duet::rules {
+namespace {
+
+constexpr int kBefore = 10;    // frames in which hands close in on one another
+constexpr int kComeAndGo = 2;  // frames at either end of a meeting in which hands still come and already go
+
+double range_of(const Eigen::Matrix3Xd& hand, const FrameSpan& span) {
+  const auto z = hand.row(2).segment(span.begin, span.frames());
+  return z.maxCoeff() - z.minCoeff();
+}
+
+double height_over_shoulders(const Eigen::Matrix3Xd& hand, const Agent& agent, const FrameSpan& span) {
+  const Eigen::ArrayXd height = hand.row(2).transpose().array() - shoulder_heights(agent);
+  return height.segment(span.begin, span.frames()).mean();
+}
+
+double closing_speed(const Eigen::ArrayXd& distance, int begin) {
+  double fastest = 0.0;
+  for (int t = std::max(kBefore, begin - kBefore); t <= begin; ++t)
+    fastest = std::max(fastest, (distance[t - kBefore] - distance[t]) * kRateHz / kBefore);
+  return fastest;
+}
+
+double farthest_after(const Eigen::ArrayXd& distance, int end) {
+  const Eigen::Index left = distance.size() - end;
+  return left > 0 ? distance.tail(left).maxCoeff() : distance[end - 1];
+}
+
+double limit_of(const Eigen::ArrayXd& distance, const Nearness& near) {
+  return std::min(near.farthest, std::max(near.contact, distance.minCoeff() + near.steady));
+}
+
+}  // namespace
+
+Eigen::Matrix3Xd smoothed(const Eigen::Matrix3Xd& track, int window) {
+  const Eigen::Index frames = track.cols(), half = window / 2;
+  Eigen::Matrix3Xd mean(3, frames);
+  for (Eigen::Index t = 0; t < frames; ++t) {
+    const Eigen::Index side = std::min({half, t, frames - 1 - t});
+    mean.col(t) = track.middleCols(t - side, 2 * side + 1).rowwise().mean();
+  }
+  return mean;
+}
+
+Agent smoothed(const Agent& agent) {
+  return {.lhand = smoothed(agent.lhand),
+          .rhand = smoothed(agent.rhand),
+          .head = smoothed(agent.head),
+          .root = smoothed(agent.root),
+          .torso = smoothed(agent.torso),
+          .lshoulder = smoothed(agent.lshoulder),
+          .rshoulder = smoothed(agent.rshoulder)};
+}
+
+std::vector<FrameSpan> spans_of(const FrameMask& mask) {
+  std::vector<FrameSpan> spans;
+  const int frames = static_cast<int>(mask.size());
+  for (int t = 0; t < frames; ++t) {
+    if (!mask[t]) continue;
+    if (spans.empty() || spans.back().end != t) spans.push_back({t, t});
+    spans.back().end = t + 1;
+  }
+  return spans;
+}
+
+FrameMask mask_of(const FrameSpan& span, Eigen::Index frames) {
+  FrameMask mask(frames);
+  std::fill(mask.begin() + span.begin, mask.begin() + span.end, true);
+  return mask;
+}
+
+Eigen::ArrayXd shoulder_heights(const Agent& agent) {
+  return 0.5 * (agent.lshoulder.row(2) + agent.rshoulder.row(2)).transpose().array();
+}
+
+Eigen::ArrayXd trunk_distances(const Agent& performer, const Agent& partner) {
+  return (partner.torso - performer.torso).topRows<2>().colwise().norm().transpose().array();
+}
+
+Tracks meeting_tracks(const Agent& performer, const Agent& partner) {
+  Tracks tracks = hands_of("performer", performer);
+  append(tracks, hands_of("partner", partner));
+  append(tracks, {{"performer.torso", &performer.torso},
+                  {"performer.lshoulder", &performer.lshoulder},
+                  {"performer.rshoulder", &performer.rshoulder},
+                  {"partner.torso", &partner.torso},
+                  {"partner.lshoulder", &partner.lshoulder},
+                  {"partner.rshoulder", &partner.rshoulder}});
+  return tracks;
+}
+
+std::vector<HandMeeting> hand_meetings(const Agent& performer, const Agent& partner, const Nearness& near) {
+  std::vector<HandMeeting> meetings;
+  const Eigen::ArrayXd trunks = trunk_distances(performer, partner);
+  for (const bool own_right : {false, true}) {
+    for (const bool other_right : {false, true}) {
+      const Eigen::Matrix3Xd& own = own_right ? performer.rhand : performer.lhand;
+      const Eigen::Matrix3Xd& other = other_right ? partner.rhand : partner.lhand;
+      const Eigen::ArrayXd distance = distances(own, other);
+      for (const FrameSpan& span : spans_of(below(distance, limit_of(distance, near)))) {
+        const int edge = std::min(kComeAndGo, (span.frames() - 1) / 2);
+        const FrameSpan inside{span.begin + edge, span.end - edge};
+        meetings.push_back({.span = span,
+                            .performer_right = own_right,
+                            .partner_right = other_right,
+                            .nearest = distance.segment(span.begin, span.frames()).minCoeff(),
+                            .shake = std::min(range_of(own, inside), range_of(other, inside)),
+                            .travel = std::max(range_of(own, span), range_of(other, span)),
+                            .own_height = height_over_shoulders(own, performer, span),
+                            .other_height = height_over_shoulders(other, partner, span),
+                            .trunks = trunks.segment(span.begin, span.frames()).mean(),
+                            .closing = closing_speed(distance, span.begin),
+                            .parted = farthest_after(distance, span.end)});
+      }
+    }
+  }
+  return meetings;
+}
+
+}  // namespace duet::rules

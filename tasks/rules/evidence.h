@@ -1,0 +1,60 @@
+// What the rules of acts look at: smoothed tracks, spans of frames, and the times at which a hand of one stays with a
+// hand of the other. 50 Hz. Thread-safe.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "duet/tasks/agent.h"
+#include "duet/tasks/frame_windows.h"
+
+namespace duet::rules {
+
+inline constexpr double kRateHz = 50.0;
+inline constexpr int kSmoothing = 7;  // frames: about the 0.13 s that a lost frame of 15 Hz spoils
+
+// Centred moving mean over `window` frames (odd), fewer at either end.
+Eigen::Matrix3Xd smoothed(const Eigen::Matrix3Xd& track, int window = kSmoothing);
+Agent smoothed(const Agent& agent);  // each track that is there
+
+// Frames [begin, end).
+struct FrameSpan {
+  int begin = 0, end = 0;
+  [[nodiscard]] int frames() const { return end - begin; }
+  [[nodiscard]] double seconds() const { return frames() / kRateHz; }
+};
+std::vector<FrameSpan> spans_of(const FrameMask& mask);
+FrameMask mask_of(const FrameSpan& span, Eigen::Index frames);
+
+// Mean height of both shoulders, (T). [m]
+Eigen::ArrayXd shoulder_heights(const Agent& agent);
+
+// How near hands are while they are together: nearer than `contact`, or, where they never come so near (short hands of
+// a skeleton), within `steady` of their least distance, which is below `farthest`. [m]
+struct Nearness {
+  double contact = 0.2, steady = 0.06, farthest = 0.3;
+};
+
+// A time at which one hand of the performer and one of the partner are together.
+struct HandMeeting {
+  FrameSpan span;
+  bool performer_right = false, partner_right = false;
+  double nearest = 0.0;  // least distance of the two [m]
+  double shake = 0.0;    // range of heights that both hands go through, the lesser, but for 0.04 s at either end [m]
+  double travel = 0.0;   // the larger [m]
+  double own_height = 0.0, other_height = 0.0;  // of each hand over its own shoulders, mean [m]
+  double trunks = 0.0;                          // horizontal distance of the two trunks, mean [m]
+  double closing = 0.0;                         // by which the hands came nearer in the 0.2 s before, at most [m/s]
+  double parted = 0.0;  // farthest that the two are apart afterwards; where nothing follows: at its end [m]
+};
+
+// Of smoothed tracks (hands, torso, shoulders of both), in the order LL, LR, RL, RR and of time.
+std::vector<HandMeeting> hand_meetings(const Agent& performer, const Agent& partner, const Nearness& near);
+
+// Hands, torso and shoulders of both.
+Tracks meeting_tracks(const Agent& performer, const Agent& partner);
+
+// Horizontal distance of the two trunks, (T). [m]
+Eigen::ArrayXd trunk_distances(const Agent& performer, const Agent& partner);
+
+}  // namespace duet::rules
