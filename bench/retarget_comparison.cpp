@@ -22,28 +22,29 @@ struct ShownFigure {
   double factor;
   bool worst;  // whether the worst clip is of interest
 };
-constexpr ShownFigure kShown[] = {{"sole_height", "soles over the floor while standing, median [cm]", 100.0, true},
-                                  {"sole_height_max", "the same, highest frame [cm]", 100.0, true},
-                                  {"foot_skate", "skate in stance [cm/s]", 100.0, true},
-                                  {"penetration", "robot in partner, mean depth [cm]", 100.0, true},
-                                  {"penetration_max", "robot in partner, deepest [cm]", 100.0, true},
-                                  {"self_penetration_max", "robot in itself, deepest [cm]", 100.0, true},
-                                  {"bone_change_max", "partner's bones change by [cm]", 100.0, true},
-                                  {"joint_speed_max", "joint speed, peak [rad/s]", 1.0, true},
-                                  {"joint_acceleration_max", "joint acceleration, peak [rad/s^2]", 1.0, true},
-                                  {"limit_violations", "limit violations", 1.0, true},
-                                  {"root_roll_max", "roll of the base, peak [deg]", 57.29577951308232, true},
-                                  {"root_tilt_max", "tilt of the base, peak [deg]", 57.29577951308232, true},
-                                  {"jpe", "JPE [cm]", 100.0, true},
-                                  {"awd", "AWD [cm]", 100.0, true},
-                                  {"contact_f1_0.2", "contact F1 at 0.2 m", 1.0, false},
-                                  {"contact_f1_0.35", "contact F1 at 0.35 m", 1.0, false},
-                                  {"contact_f1_0.5", "contact F1 at 0.5 m", 1.0, false},
-                                  {"object_distance_error", "hand to object, distance changes by [cm]", 100.0, true},
-                                  {"object_distance_error.partner", "the same of the partner [cm]", 100.0, true},
-                                  {"object_contact_f1_0.2", "hand on object F1 at 0.2 m", 1.0, false},
-                                  {"object_contact_f1_0.35", "hand on object F1 at 0.35 m", 1.0, false},
-                                  {"object_contact_f1_0.5", "hand on object F1 at 0.5 m", 1.0, false}};
+constexpr ShownFigure kShownMetrics[] = {
+    {"sole_height", "soles over the floor while standing, median [cm]", 100.0, true},
+    {"sole_height_max", "the same, highest frame [cm]", 100.0, true},
+    {"foot_skate", "skate in stance [cm/s]", 100.0, true},
+    {"penetration", "robot in partner, mean depth [cm]", 100.0, true},
+    {"penetration_max", "robot in partner, deepest [cm]", 100.0, true},
+    {"self_penetration_max", "robot in itself, deepest [cm]", 100.0, true},
+    {"bone_change_max", "partner's bones change by [cm]", 100.0, true},
+    {"joint_speed_max", "joint speed, peak [rad/s]", 1.0, true},
+    {"joint_acceleration_max", "joint acceleration, peak [rad/s^2]", 1.0, true},
+    {"limit_violations", "limit violations", 1.0, true},
+    {"root_roll_max", "roll of the base, peak [deg]", 57.29577951308232, true},
+    {"root_tilt_max", "tilt of the base, peak [deg]", 57.29577951308232, true},
+    {"jpe", "JPE [cm]", 100.0, true},
+    {"awd", "AWD [cm]", 100.0, true},
+    {"contact_f1_0.2", "contact F1 at 0.2 m", 1.0, false},
+    {"contact_f1_0.35", "contact F1 at 0.35 m", 1.0, false},
+    {"contact_f1_0.5", "contact F1 at 0.5 m", 1.0, false},
+    {"object_distance_error", "hand to object, distance changes by [cm]", 100.0, true},
+    {"object_distance_error.partner", "the same of the partner [cm]", 100.0, true},
+    {"object_contact_f1_0.2", "hand on object F1 at 0.2 m", 1.0, false},
+    {"object_contact_f1_0.35", "hand on object F1 at 0.35 m", 1.0, false},
+    {"object_contact_f1_0.5", "hand on object F1 at 0.5 m", 1.0, false}};
 constexpr const char* kF1[] = {"contact_f1_0.2", "contact_f1_0.35", "contact_f1_0.5"};
 
 struct ClipFigures {
@@ -166,7 +167,7 @@ std::string comparison_table(const std::vector<ComparedVariant>& compared) {
   const bool object = std::any_of(compared.begin(), compared.end(), [](const ComparedVariant& variant) {
     return variant.figures.contains("object_distance_error");
   });
-  for (const ShownFigure& figure : kShown) {
+  for (const ShownFigure& figure : kShownMetrics) {
     if (is_of_an_object(figure) && !object) continue;
     table.rows.push_back({figure.title});
     for (const ComparedVariant& variant : compared) table.rows.back().push_back(figure_text(variant, figure));

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "duet/metrics/detector.h"
+
 namespace duet {
 
 struct Figure {
@@ -31,13 +33,12 @@ struct Benchmark {
 // In the order in which they are printed.
 const std::vector<Benchmark>& benchmarks();
 
-// A table that is printed instead of figures: `duet bench detectors` (6 x 6 confusion of the detectors on synthetic
-// clips).
+// A table that is printed instead of figures: `duet bench detectors` (confusion of the detectors on synthetic clips).
 struct ConfusionTable {
   std::vector<std::string> tasks;
   std::vector<std::vector<double>> rate;  // [clips of task][detector], fraction accepted
   int clips = 0;
 };
-ConfusionTable detector_confusion(int clips_per_task, int threads, bool strict);
+ConfusionTable detector_confusion(int clips_per_task, int threads, ThresholdSet set);
 
 }  // namespace duet

@@ -5,10 +5,9 @@
 
 namespace duet {
 
-ConfusionTable detector_confusion(int clips_per_task, int threads, bool strict) {
+ConfusionTable detector_confusion(int clips_per_task, int threads, ThresholdSet set) {
   const std::span<const Task> tasks = all_tasks();
   const int count = static_cast<int>(tasks.size());
-  const ThresholdSet set = strict ? ThresholdSet::kStrict : ThresholdSet::kPaper;
   std::vector<std::vector<char>> accepted(tasks.size() * static_cast<size_t>(clips_per_task),
                                           std::vector<char>(tasks.size()));
   parallel_for_each(static_cast<int>(accepted.size()), threads, [&](int i) {

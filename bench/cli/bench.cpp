@@ -4,6 +4,7 @@
 #include <ctime>
 
 #include "duet/bench/benchmarks/benchmark.h"
+#include "duet/bench/cli/bench_detectors.h"
 #include "duet/bench/cli/command.h"
 #include "duet/bench/version.h"
 #include "duet/core/names.h"
@@ -18,8 +19,7 @@ namespace {
 struct BenchArguments {
   std::vector<std::string> names;
   BenchmarkOptions options;
-  int clips = 200;
-  bool strict = false;
+  DetectorArguments detectors;
   bool gate = false;
 };
 
@@ -56,28 +56,10 @@ std::string line(const Figure& figure) {
   return fmt::format("{:<44} {:>12.5g} {:<10} {}\n", figure.name, figure.value, figure.unit, target);
 }
 
-void print_confusion(const Session& session, const BenchArguments& arguments) {
-  const ConfusionTable table = detector_confusion(arguments.clips, arguments.options.threads, arguments.strict);
-  std::string text =
-      fmt::format("{} synthetic clips a task, person against person, {} thresholds; fraction accepted\n{:<16}",
-                  table.clips, arguments.strict ? "strict" : "paper", "clips \\ detector");
-  nlohmann::json json = {{"clips_per_task", table.clips}, {"rate", nlohmann::json::object()}};
-  for (const std::string& task : table.tasks) text += fmt::format(" {:>10}", task);
-  text += "\n";
-  for (size_t i = 0; i < table.tasks.size(); ++i) {
-    text += fmt::format("{:<16}", table.tasks[i]);
-    for (size_t j = 0; j < table.tasks.size(); ++j) {
-      text += fmt::format(" {:>9.1f}%", 100.0 * table.rate[i][j]);
-      json["rate"][table.tasks[i]][table.tasks[j]] = table.rate[i][j];
-    }
-    text += "\n";
-  }
-  print(session, text, json);
-}
-
 void run_bench(Session& session, const BenchArguments& arguments) {
   check_names(arguments.names);
-  if (arguments.names == std::vector<std::string>{"detectors"}) return print_confusion(session, arguments);
+  if (arguments.names == std::vector<std::string>{"detectors"})
+    return run_bench_detectors(session, arguments.detectors, arguments.options.threads);
   nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
   json["context"]["duet_version"] = duet_version();
   json["context"]["machine"] = describe_machine();
@@ -97,9 +79,12 @@ void run_bench(Session& session, const BenchArguments& arguments) {
 }  // namespace
 
 void add_bench(CLI::App& app, Session& session) {
-  CLI::App* command = add_command(app, session, "bench",
-                                  "measure this code on this machine; `bench detectors` prints the confusion table",
-                                  "duet bench pair/paper backend --json\n  duet bench detectors --clips 200");
+  CLI::App* command =
+      add_command(app, session, "bench",
+                  "measure this code on this machine; `bench detectors` prints how well detectors tell acts apart",
+                  "duet bench pair/paper backend --json\n"
+                  "  duet bench detectors --clips 200 --thresholds act\n"
+                  "  duet bench detectors --clips recordings --labels labels.csv --list");
   auto arguments = std::make_shared<BenchArguments>();
   arguments->options.threads = default_threads();
   command->add_option("names", arguments->names, "which, by path; `duet list benchmarks` shows all (default: all)");
@@ -107,11 +92,8 @@ void add_bench(CLI::App& app, Session& session) {
       ->capture_default_str()
       ->check(CLI::Range(0.001, 3600.0));
   add_threads(command, arguments->options.threads, "threads of the scaling figures");
-  command->add_option("--clips", arguments->clips, "synthetic clips a task for `detectors`")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
   command->add_flag("--gate", arguments->gate, "exit code 1 where a figure does not reach its target");
-  command->add_flag("--strict", arguments->strict, "the strict thresholds for `detectors`");
+  add_detector_options(*command, arguments->detectors);
   command->callback([&session, arguments] { run_bench(session, *arguments); });
 }
 

@@ -1,5 +1,6 @@
 // What a person edits of a data set, and what it keeps of each clip.
 #include "duet/datasets/annotations.h"
+#include "duet/datasets/clip_labels.h"
 #include "duet/datasets/entry.h"
 #include "duet/motion/synthesis.h"
 #include "tests/fuzz/reader.h"
@@ -35,11 +36,20 @@ std::string entry_sample(unsigned /*seed*/) {
 
 void read_entry_bytes(std::string_view bytes) { (void)entry_line(parse_entry(bytes, "entries.jsonl")); }
 
+std::string labels_sample(unsigned seed) {
+  return seed % 2 == 0 ? "clip,label\na-001,Shake hands\nb, hug\nc,\n"
+                       : "\xef\xbb\xbf"
+                         "clip,label\r\nd,kicking\r\n";
+}
+
+void read_label_bytes(std::string_view bytes) { (void)parse_clip_labels(bytes, "labels.csv"); }
+
 }  // namespace
 
 std::vector<Reader> dataset_readers() {
   return {{"dataset_annotations", annotations_sample, read_annotation_bytes},
-          {"dataset_entry", entry_sample, read_entry_bytes}};
+          {"dataset_entry", entry_sample, read_entry_bytes},
+          {"clip_labels", labels_sample, read_label_bytes}};
 }
 
 }  // namespace duet::fuzz
