@@ -11,7 +11,7 @@ namespace duet {
 namespace {
 
 // In this order: on recorded people the strict hug takes few handshakes and the handshake many hugs, the high-five most
-// handshakes, the wave some fly-kisses (rates of strict detectors on people: docs/detectors.md).
+// handshakes, the wave some fly-kisses (rates of detectors on people: docs/detectors.md).
 constexpr std::array kSearch = {Task::kHug,     Task::kHandshake, Task::kHighFive,
                                 Task::kFlyKiss, Task::kWave,      Task::kBend};
 
@@ -21,11 +21,11 @@ bool is_seen(const InteractionClip& clip, ThresholdSet set) {
   return detect(clip.task, a, b, version, set).success || detect(clip.task, b, a, version, set).success;
 }
 
-// The first task that is seen, with strict thresholds before the printed ones. `clip(task)` is the recording as a clip
-// of that task.
+// The first task that is seen, by the rules of acts before strict thresholds before the printed ones. `clip(task)` is
+// the recording as a clip of that task.
 template <typename ClipOfTask>
 SourceClip recognised(const std::string& name, ClipOfTask&& clip) {
-  for (const ThresholdSet set : {ThresholdSet::kStrict, ThresholdSet::kPaper}) {
+  for (const ThresholdSet set : {ThresholdSet::kAct, ThresholdSet::kStrict, ThresholdSet::kPaper}) {
     for (const Task task : kSearch) {
       SourceClip found = clip(task);
       if (!is_seen(found.clip, set)) continue;
