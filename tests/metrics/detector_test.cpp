@@ -86,6 +86,34 @@ TEST(Detector, StrictNeverAcceptsWhatPaperRefuses) {
   });
 }
 
+TEST(Detector, TasksWithoutARuleAreJudgedByTheStrictSet) {
+  EXPECT_EQ(thresholds(Task::kBend, ThresholdSet::kAct), thresholds(Task::kBend, ThresholdSet::kStrict));
+  for (const Task task : {Task::kBend, Task::kFlyKiss})
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      const Scene s = acting(task, seed);
+      EXPECT_EQ(detect(task, s.performer, s.partner, DetectorVersion::kPaper, ThresholdSet::kAct).success,
+                detect(task, s.performer, s.partner, DetectorVersion::kPaper, ThresholdSet::kStrict).success);
+    }
+  const Scene s = acting(Task::kBend, 1);
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
+                  [&] { (void)detect_by_rule(Task::kBend, s.performer, s.partner, {}); }),
+              HasSubstr("bend detector: the set act has no rule of its own for it"));
+}
+
+TEST(Detector, ARuleRefusesWhatNoDetectorTakes) {
+  Scene s = acting(Task::kHug, 1);
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] {
+                (void)detect_by_rule(Task::kHug, s.performer, s.partner, {{"trunk", 0.4}});
+              }),
+              HasSubstr("did you mean 'trunks'"));
+  s.partner.torso.resize(3, 0);
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
+                  [&] { (void)detect_by_rule(Task::kHug, s.performer, s.partner, {}); }),
+              HasSubstr("the track partner.torso is needed and empty"));
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)parse_threshold_set("acts"); }),
+              HasSubstr("did you mean 'act'"));
+}
+
 TEST(Detector, NamesOfVersionsAndSets) {
   EXPECT_EQ(to_string(DetectorVersion::kPaper), "paper");
   EXPECT_EQ(to_string(DetectorVersion::kRobot), "robot");

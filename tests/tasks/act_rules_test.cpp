@@ -1,18 +1,16 @@
 // The rules of the set act, one by one: what each asks for, on both sides of its threshold, on tracks made by hand.
-#include <fmt/format.h>
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "duet/metrics/detector.h"
 #include "tests/metrics/acting.h"
-#include "tests/support.h"
 
 namespace duet {
 namespace {
-
-using ::testing::HasSubstr;
 
 using Scene = test::Scene;
 
@@ -364,34 +362,6 @@ TEST(ActRule, CentimetresOfNoiseDecideNothing) {
     }
     EXPECT_GE(accepted, 19) << to_string(task);
   }
-}
-
-TEST(ActRule, TasksWithoutARuleAreJudgedByTheStrictSet) {
-  EXPECT_EQ(thresholds(Task::kBend, ThresholdSet::kAct), thresholds(Task::kBend, ThresholdSet::kStrict));
-  for (const Task task : {Task::kBend, Task::kFlyKiss})
-    for (std::uint64_t seed = 0; seed < 20; ++seed) {
-      const Scene s = test::acting(task, seed);
-      EXPECT_EQ(detect(task, s.performer, s.partner, DetectorVersion::kPaper, ThresholdSet::kAct).success,
-                detect(task, s.performer, s.partner, DetectorVersion::kPaper, ThresholdSet::kStrict).success);
-    }
-  const Scene s = facing(1.0, 20);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { (void)detect_by_rule(Task::kBend, s.performer, s.partner, {}); }),
-              HasSubstr("bend detector: the set act has no rule of its own for it"));
-}
-
-TEST(ActRule, RefusesWhatNoDetectorTakes) {
-  Scene s = facing(1.0, 20);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] {
-                (void)detect_by_rule(Task::kHug, s.performer, s.partner, {{"trunk", 0.4}});
-              }),
-              HasSubstr("did you mean 'trunks'"));
-  s.partner.torso.resize(3, 0);
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
-                  [&] { (void)detect_by_rule(Task::kHug, s.performer, s.partner, {}); }),
-              HasSubstr("the track partner.torso is needed and empty"));
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { (void)parse_threshold_set("acts"); }),
-              HasSubstr("did you mean 'act'"));
 }
 
 // Clips of one frame have no meeting, no swing and no hug.
