@@ -9,6 +9,7 @@
 
 #include "duet/bench/clips.h"
 #include "duet/core/names.h"
+#include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -72,8 +73,10 @@ std::vector<LabelledSource> sources_of(const LabelledClips& clips) {
   if (clips.format.empty() && is_clip_of_duet(clips.paths.front())) {
     for (const std::string& file : find_motion_files(clips.paths))
       sources.push_back({stem_of(file), [file] {
-                           const InteractionClip clip = load_clip(file);
-                           return people_of(clip, std::string(to_string(clip.task)));
+                           return naming_file(file, [&] {
+                             const InteractionClip clip = load_clip(file);
+                             return people_of(clip, std::string(to_string(clip.task)));
+                           });
                          }});
     return sources;
   }

@@ -118,6 +118,15 @@ TEST(DetectorConfusion, AFileOfLabelsGoesFirst) {
               HasSubstr("did you mean 'hug'"));
 }
 
+TEST(DetectorConfusion, AClipThatCannotBeReadIsNamedAndCountsNowhere) {
+  const ClipFolder folder;
+  std::ofstream(folder.path() + "broken.npz") << "no archive";
+  const std::vector<LabelledVerdicts> verdicts = judge_labelled({.paths = {folder.path() + "hug.npz", folder.path()}});
+  ASSERT_EQ(verdicts.size(), 4u);
+  EXPECT_THAT(verdicts[1].message, HasSubstr("broken.npz"));
+  EXPECT_EQ(detector_rates(verdicts, {ThresholdSet::kAct})[0].acts, 4);
+}
+
 TEST(DetectorConfusion, SameVerdictsWhateverTheNumberOfThreads) {
   const ClipFolder folder;
   const auto text = [&](int threads) {
