@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/results/leaderboard.h"
+#include "duet/results/resolution.h"
 #include "duet/results/row_groups.h"
 #include "duet/results/text_table.h"
 
@@ -29,7 +30,7 @@ Comparison evaluate(const std::string& name, const PairedRows& gathered, const L
 // Sets p_holm of all by Holm's step-down adjustment over them.
 void correct_for_family(std::vector<Comparison>& comparisons);
 
-// One line per comparison: pairs, success of both, difference with its intervals, tests.
-TextTable comparison_table(const std::vector<Comparison>& comparisons);
+// One line per comparison: pairs, success of both, difference with its intervals, tests, verdict.
+TextTable comparison_table(const std::vector<Comparison>& comparisons, double margin = kFivePoints);
 
 }  // namespace duet

@@ -4,6 +4,7 @@
 #include "duet/results/comparison_parts.h"
 #include "duet/results/json_fields.h"
 #include "duet/results/leaderboard_rows.h"
+#include "duet/results/resolution.h"
 #include "duet/results/text_table.h"
 
 namespace duet {
@@ -15,7 +16,7 @@ std::string interval_text(const Interval& interval) {
   return fmt::format("[{:.1f}, {:.1f}]", 100.0 * interval.low, 100.0 * interval.high);
 }
 
-std::vector<std::string> cells_of(const Comparison& comparison) {
+std::vector<std::string> cells_of(const Comparison& comparison, double margin) {
   const double pairs = static_cast<double>(comparison.pairs);
   return {comparison.group,
           fmt::format("{}", comparison.pairs),
@@ -27,7 +28,8 @@ std::vector<std::string> cells_of(const Comparison& comparison) {
           fmt::format("{}", comparison.only_b),
           p_value(comparison.p),
           p_value(comparison.p_holm),
-          fmt::format("{:.1f}", 100.0 * comparison.minimum_detectable)};
+          fmt::format("{:.1f}", 100.0 * comparison.minimum_detectable),
+          std::string(to_string(verdict_of(comparison, margin)))};
 }
 
 long largest(const std::vector<Comparison>& comparisons, long Comparison::*field) {
@@ -36,13 +38,15 @@ long largest(const std::vector<Comparison>& comparisons, long Comparison::*field
   return value;
 }
 
-std::string notes(const std::vector<Comparison>& comparisons) {
+std::string notes(const std::vector<Comparison>& comparisons, double margin) {
   const double level = 100.0 * comparisons.front().level;
   std::string text = fmt::format(
       "Same episodes in both runs. A, B: success in %. A - B: points with Newcombe's paired {:g} % interval; by clip: "
       "bootstrap over clips. p: exact McNemar, p (Holm): corrected for the {} comparisons here. MDE: the smallest "
-      "difference, in points, that so many pairs with so much disagreement show in 80 % of runs.\n",
-      level, comparisons.size());
+      "difference, in points, that so many pairs with so much disagreement show in 80 % of runs. Verdict: of A; the "
+      "same within the margin where the paired "
+      "interval lies within {:g} points, else better or worse where p (Holm) is at most {:.2g}.\n",
+      level, comparisons.size(), 100.0 * margin, 1.0 - comparisons.front().level);
   std::string small;
   for (const Comparison& comparison : comparisons) {
     if (comparison.pairs < 30) small.append(small.empty() ? "" : "; ").append(comparison.group);
@@ -61,19 +65,30 @@ std::string notes(const std::vector<Comparison>& comparisons) {
 
 }  // namespace
 
-TextTable comparison_table(const std::vector<Comparison>& comparisons) {
+TextTable comparison_table(const std::vector<Comparison>& comparisons, double margin) {
   TextTable table;
-  table.header = {"Comparison", "Pairs", "A", "B", "A - B", "by clip", "only A", "only B", "p", "p (Holm)", "MDE"};
-  for (const Comparison& comparison : comparisons) table.rows.push_back(cells_of(comparison));
+  table.header = {"Comparison", "Pairs",  "A", "B",        "A - B", "by clip",
+                  "only A",     "only B", "p", "p (Holm)", "MDE",   "Verdict"};
+  for (const Comparison& comparison : comparisons) table.rows.push_back(cells_of(comparison, margin));
   return table;
 }
 
 std::string comparison_markdown(const std::vector<Comparison>& comparisons) {
+  return comparison_markdown(comparisons, kFivePoints);
+}
+
+std::string comparison_markdown(const std::vector<Comparison>& comparisons, double margin) {
   if (comparisons.empty()) return "Nothing to compare.\n";
-  return markdown_table(comparison_table(comparisons)) + "\n" + notes(comparisons);
+  std::string text = markdown_table(comparison_table(comparisons, margin)) + "\n" + notes(comparisons, margin);
+  for (const std::string& note : resolution_notes(comparisons, margin)) text += fmt::format("Caution: {}.\n", note);
+  return text;
 }
 
 nlohmann::json comparison_json(const std::vector<Comparison>& comparisons) {
+  return comparison_json(comparisons, kFivePoints);
+}
+
+nlohmann::json comparison_json(const std::vector<Comparison>& comparisons, double margin) {
   nlohmann::json list = nlohmann::json::array();
   const auto interval = [](const Interval& limits) {
     return nlohmann::json::array({number_or_null(limits.low), number_or_null(limits.high)});
@@ -93,9 +108,10 @@ nlohmann::json comparison_json(const std::vector<Comparison>& comparisons) {
                     {"p_holm", number_or_null(comparison.p_holm)},
                     {"minimum_detectable", number_or_null(comparison.minimum_detectable)},
                     {"unpaired_a", comparison.unpaired_a},
-                    {"unpaired_b", comparison.unpaired_b}});
+                    {"unpaired_b", comparison.unpaired_b},
+                    {"verdict", std::string(to_string(verdict_of(comparison, margin)))}});
   }
-  return {{"schema", "duet.comparison/1"}, {"comparisons", std::move(list)}};
+  return {{"schema", "duet.comparison/1"}, {"margin", margin}, {"comparisons", std::move(list)}};
 }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include "duet/results/distinct_episodes.h"
 #include "duet/results/leaderboard.h"
 #include "duet/results/name_digests.h"
+#include "duet/results/resolution.h"
 #include "duet/results/run_directory.h"
 
 namespace duet::cli {
@@ -14,6 +15,7 @@ namespace {
 
 struct CompareArguments {
   std::string a, b;
+  double min_effect = 100.0 * kFivePoints;  // [points]
   LeaderboardOptions options;
 };
 
@@ -49,10 +51,14 @@ void run_compare(const Session& session, const CompareArguments& arguments) {
   const std::vector<Comparison> comparisons = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
     return compare_runs(a.rows, b.rows, arguments.options);
   });
+  const double margin = arguments.min_effect / 100.0;
   const std::string text =
-      fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, comparison_markdown(comparisons));
+      fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, comparison_markdown(comparisons, margin));
   print(session, with_notes("md", text, notes),
-        {{"a", arguments.a}, {"b", arguments.b}, {"comparisons", comparison_json(comparisons)}, {"notes", notes}});
+        {{"a", arguments.a},
+         {"b", arguments.b},
+         {"comparisons", comparison_json(comparisons, margin)},
+         {"notes", notes}});
 }
 
 }  // namespace
@@ -68,6 +74,9 @@ void add_compare(CLI::App& app, Session& session) {
   command->add_option("--level", arguments->options.level, "of intervals")
       ->capture_default_str()
       ->check(CLI::Range(0.5, 0.9999));
+  command->add_option("--min-effect", arguments->min_effect, "margin [points] within which two runs are the same")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 99.0));
   command->add_option("--resamples", arguments->options.resamples, "of the cluster bootstrap")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000000));

@@ -18,6 +18,7 @@
 #include "duet/results/interval_plot.h"
 #include "duet/results/leaderboard.h"
 #include "duet/results/policy_report.h"
+#include "duet/results/resolution.h"
 #include "duet/results/run_union.h"
 
 namespace duet::cli {
@@ -27,6 +28,7 @@ struct ReportArguments {
   std::vector<std::string> runs, formats = {"md", "html"}, curves;
   std::string output;
   bool no_clips = false;
+  double min_effect = 0.0;  // [points]; 0: none is claimed
   int threads = default_threads();
 };
 
@@ -106,7 +108,10 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   const Tables tables = make_tables(run.rows, run.info.certificate);
   const PolicyReport policies = tables.has_walking() ? PolicyReport{} : policy_report(run.rows);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
-  const std::vector<std::string> notes = notes_of(arguments.runs, runs, run.rows);
+  std::vector<std::string> notes = notes_of(arguments.runs, runs, run.rows);
+  if (arguments.min_effect > 0.0)
+    for (std::string& caution : resolution_notes(tables.leaderboard, arguments.min_effect / 100.0))
+      notes.push_back(std::move(caution));
   Progress progress(session.progress());
   nlohmann::json json = {{"files", nlohmann::json::array()}, {"notes", notes}};
   const auto wrote = [&](const std::string& path) {
@@ -145,6 +150,10 @@ void add_report(CLI::App& app, Session& session) {
   command->add_option("-o,--output", arguments->output, "folder (default: the first run directory)");
   command->add_option("--curves", arguments->curves,
                       "training curves to show in the HTML (CSV; the first column is the axis)");
+  command
+      ->add_option("--min-effect", arguments->min_effect,
+                   "a difference that is claimed [points]: says which arms are too small for it, and what they need")
+      ->check(CLI::Range(0.1, 99.0));
   command->add_flag("--no-clips", arguments->no_clips, "HTML without the clips' key frames and loss curves");
   add_threads(command, arguments->threads);
   command->callback([&session, arguments] { run_report(session, *arguments); });
