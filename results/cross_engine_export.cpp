@@ -72,7 +72,18 @@ void add_ranks(const RankStability& ranks, TextTable& table) {
   }
   Figure all{.table = "ranks", .name = ranks.of, .figure = "mean_tau_b", .n = ranks.defined};
   all.value = ranks.mean_tau_b;
+  all.interval = ranks.tau_interval;
   add(table, all);
+  all.figure = "rank_violation";
+  all.n = static_cast<long>(ranks.engines.size());
+  all.value = ranks.rank_violation;
+  all.interval = ranks.violation_interval;
+  add(table, all);
+  all.figure = "winner_changes";
+  all.value = ranks.winner_changes;
+  all.interval = ranks.winner_interval;
+  add(table, all);
+  all.interval.reset();
   all.figure = "swapped";
   all.n = ranks.item_pairs;
   all.value = static_cast<double>(ranks.swapped);
@@ -226,6 +237,11 @@ Json json_of(const RankStability& ranks) {
           {"items", ranks.items},
           {"engines", list_of(ranks.engines)},
           {"mean_tau_b", number_or_null(ranks.mean_tau_b)},
+          {"tau_interval", json_of(ranks.tau_interval)},
+          {"rank_violation", number_or_null(ranks.rank_violation)},
+          {"violation_interval", json_of(ranks.violation_interval)},
+          {"winner_changes", number_or_null(ranks.winner_changes)},
+          {"winner_interval", json_of(ranks.winner_interval)},
           {"defined", ranks.defined},
           {"item_pairs", ranks.item_pairs},
           {"swapped", ranks.swapped}};

@@ -4,6 +4,7 @@
 #include <compare>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -53,6 +54,13 @@ class ClipNumbers {
 
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options);
 std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success);
+// Sets what rank_stability leaves: violation, change of the winner, all intervals.
+void add_rank_reliability(const EngineRows& rows, const CrossEngineOptions& options, std::vector<RankStability>& ranks);
+// For each item the largest difference of its rate in the reference to that of an item that `other` puts on another
+// side of it; the mean over items. Rates of the same items, one or more. Source: SIMPLER, arXiv 2405.05941, section IV.
+double mean_maximum_rank_violation(std::span<const double> reference, std::span<const double> other);
+// Probability that the best item in `a` is not that in `b`; of items tied for the best one is drawn in each.
+double winner_change(std::span<const double> a, std::span<const double> b);
 std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
                                       const CrossEngineOptions& options);
 std::vector<EngineParting> engine_parting(const EngineRows& rows, double distance);

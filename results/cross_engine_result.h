@@ -64,6 +64,13 @@ struct RankStability {
   long defined = 0;         // those pairs of engines
   long item_pairs = 0;      // pairs of items that some two engines both ran
   long swapped = 0;         // of them, those that some two engines put in opposite order
+  // Over the pairs of engines that both ran two items or more, with intervals that draw clips again within their task;
+  // NaN where there are none.
+  Interval tau_interval = {};   // of mean_tau_b, over the draws in which it is defined
+  double rank_violation = 0.0;  // mean_maximum_rank_violation, each engine of a pair as the reference in turn
+  Interval violation_interval = {};
+  double winner_changes = 0.0;  // probability that the best item in one engine is not that in the other
+  Interval winner_interval = {};
 };
 
 // An engine's value of a metric minus that of playback in the same episode, whatever playback's controller.

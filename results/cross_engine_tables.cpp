@@ -94,6 +94,19 @@ std::string rank_sentence(const RankStability& ranks) {
                      ranks.swapped, ranks.item_pairs);
 }
 
+std::string reliability_sentence(const RankStability& ranks) {
+  const auto limits = [](const Interval& interval, double scale, int digits) {
+    if (!std::isfinite(interval.low)) return std::string("no interval");
+    return fmt::format("[{:.{}f}, {:.{}f}]", scale * interval.low + 0.0, digits, scale * interval.high + 0.0, digits);
+  };
+  return fmt::format(
+      "Of {}, with intervals that draw clips again: mean tau-b {} {}; mean maximum rank violation {:.1f} points {}; "
+      "the "
+      "winner changes between two engines with probability {:.2f} {}.",
+      ranks.of, tau_cell(ranks.mean_tau_b), limits(ranks.tau_interval, 1.0, 2), 100.0 * ranks.rank_violation,
+      limits(ranks.violation_interval, 100.0, 1), ranks.winner_changes, limits(ranks.winner_interval, 1.0, 2));
+}
+
 TitledTable rank_table(const CrossEngine& result) {
   TitledTable titled{.title = "Stability of ranks",
                      .caption = "",
@@ -103,6 +116,7 @@ TitledTable rank_table(const CrossEngine& result) {
   for (const RankStability& ranks : result.ranks) {
     titled.notes.push_back(rank_sentence(ranks));
     if (ranks.items < 2) continue;
+    if (std::isfinite(ranks.rank_violation)) titled.notes.push_back(reliability_sentence(ranks));
     shown.push_back(&ranks);
     titled.table.header.push_back("tau-b of " + ranks.of);
     titled.table.header.emplace_back("Swapped");

@@ -79,6 +79,7 @@ In points: SD, the sample standard deviation of the engines' rates; range, the h
 | mujoco, ode    |                 -1.00 |  1 of 1 |
 
 Ranks of combinations: mean tau-b -0.33 over 3 pairs of engines; 1 of 1 pairs swap their order between some two engines.
+Of combinations, with intervals that draw clips again: mean tau-b -0.33 [-0.33, 1.00]; mean maximum rank violation 16.7 points [5.6, 16.7]; the winner changes between two engines with probability 0.67 [0.33, 0.67].
 By success; combinations are of controller and policy. tau-b (Kendall): 1 the same order in both engines, 0 none in common, -1 the reverse; not defined where all are tied. Swapped: pairs in opposite order in the two engines.
 
 ### Drift of metrics from playback

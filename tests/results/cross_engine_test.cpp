@@ -238,6 +238,56 @@ TEST(RankStability, IsNotDefinedForOneCombinationOrTiesThroughout) {
   EXPECT_EQ(tied.swapped, 0);
 }
 
+TEST(RankStability, MeanMaximumRankViolationIsThatOfSimpler) {
+  const std::vector<double> reference = {0.9, 0.6, 0.5};
+  EXPECT_EQ(mean_maximum_rank_violation(reference, std::vector<double>{0.3, 0.2, 0.1}), 0.0);
+  // The last two are the other way round: each is .1 off.
+  EXPECT_NEAR(mean_maximum_rank_violation(reference, std::vector<double>{0.3, 0.1, 0.2}), 0.2 / 3.0, 1e-12);
+  // All reversed: .4, .3 and .4.
+  EXPECT_NEAR(mean_maximum_rank_violation(reference, std::vector<double>{0.1, 0.2, 0.3}), 1.1 / 3.0, 1e-12);
+  // Tied in the other engine: an item is violated by those above it in the reference alone.
+  EXPECT_NEAR(mean_maximum_rank_violation(reference, std::vector<double>{0.1, 0.1, 0.1}), 0.7 / 3.0, 1e-12);
+  EXPECT_EQ(mean_maximum_rank_violation(std::vector<double>{0.5, 0.5}, std::vector<double>{0.2, 0.7}), 0.0);
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
+                  [&] { mean_maximum_rank_violation(reference, std::vector<double>{0.1}); }),
+              testing::HasSubstr("expected as many rates in both engines"));
+}
+
+TEST(RankStability, TheWinnerChangesWhereTheBestAreNotTheSame) {
+  const std::vector<double> first = {0.9, 0.6};
+  EXPECT_EQ(winner_change(first, std::vector<double>{0.5, 0.4}), 0.0);
+  EXPECT_EQ(winner_change(first, std::vector<double>{0.4, 0.5}), 1.0);
+  EXPECT_EQ(winner_change(first, std::vector<double>{0.5, 0.5}), 0.5);
+  EXPECT_EQ(winner_change(std::vector<double>{0.5, 0.5}, std::vector<double>{0.5, 0.5}), 0.5);
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { winner_change(first, std::vector<double>{}); }),
+              testing::HasSubstr("winner: expected as many rates"));
+}
+
+TEST(RankStability, FiguresHaveIntervalsThatDrawClipsAgain) {
+  Rows rows;
+  for (const auto& [engine, a, b] : {std::tuple("mujoco", 9, 3), {"ode", 4, 8}}) {
+    add_rate(rows, engine, "a", a, 12);
+    add_rate(rows, engine, "b", b, 12);
+  }
+  const RankStability ranks = compared(rows).ranks.at(0);
+  EXPECT_NEAR(ranks.rank_violation, 0.5 * (6.0 / 12.0 + 4.0 / 12.0), 1e-12);
+  EXPECT_EQ(ranks.winner_changes, 1.0);
+  EXPECT_EQ(ranks.mean_tau_b, -1.0);
+  EXPECT_LE(ranks.violation_interval.low, ranks.rank_violation);
+  EXPECT_GE(ranks.violation_interval.high, ranks.rank_violation);
+  EXPECT_LT(ranks.violation_interval.low, ranks.violation_interval.high);
+  EXPECT_GE(ranks.tau_interval.low, -1.0);
+  EXPECT_LE(ranks.winner_interval.high, 1.0);
+  EXPECT_EQ(compared(rows).ranks.at(0).violation_interval.low, ranks.violation_interval.low);
+  std::reverse(rows.begin(), rows.end());
+  EXPECT_EQ(compared(rows).ranks.at(0).violation_interval.low, ranks.violation_interval.low);
+  rows.clear();
+  add_rate(rows, "mujoco", "a", 1, 4);
+  add_rate(rows, "ode", "a", 2, 4);
+  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).rank_violation));
+  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).violation_interval.low));
+}
+
 TEST(MetricDrift, IsEngineMinusPlaybackInTheSameEpisode) {
   Rows rows;
   for (int i = 0; i < 6; ++i) {
