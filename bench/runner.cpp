@@ -22,7 +22,8 @@ bool chosen(const std::vector<std::string>& filter, const std::string& name) {
 }
 
 RunPart part_of(const RunOptions& options) {
-  return {options.engines, options.controllers, options.policies, options.tasks, options.perturbations};
+  const std::vector<std::string>& policies = options.decide.asked() ? options.decide.policies : options.policies;
+  return {options.engines, options.controllers, policies, options.tasks, options.perturbations};
 }
 
 // The part of a filter that the suite does not have is a mistake of the user, not an empty run.
@@ -38,8 +39,18 @@ void check_filters(const RunOptions& options, const Suite& suite) {
   check_filter(options.engines, suite.engines, "engine");
   check_filter(options.controllers, controller_names_of(suite), "controller");
   check_filter(options.policies, policy_names_of(suite), "policy");
+  check_filter(options.decide.policies, policy_names_of(suite), "policy");
   check_filter(options.tasks, tasks, "task");
   check_filter(options.perturbations, perturbation_names_of(suite), "perturbation");
+}
+
+// Throws for what no decision can be of.
+void check_decision_of(const RunOptions& options, const Suite& suite) {
+  if (!options.decide.asked()) return;
+  check_decision(options.decide);
+  require(options.policies.empty(), "--until-decided names the policies that run: leave --policies out");
+  if (!suite.references.empty())
+    throw InputError("--until-decided: expected a suite of clips, found one of walking commands");
 }
 
 bool plays_back(const Suite& suite, const RunOptions& options) {
@@ -73,7 +84,8 @@ std::vector<std::string> left_out(const std::vector<std::string>& filter, const 
 
 // Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
 void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
-  const std::size_t policies = suite.policies.size() - left_out(options.policies, policy_names_of(suite)).size();
+  const std::size_t policies =
+      suite.policies.size() - left_out(part_of(options).policies, policy_names_of(suite)).size();
   if (!bodies.absent_policies().empty() && bodies.absent_policies().size() == policies)
     throw MissingError(bodies.absent_policies().begin()->second);
   const std::size_t wanted =
@@ -163,26 +175,77 @@ void ask_for(const Suite& suite, const std::vector<Task>& clips, const RunOption
   run.ask_for(part_of(options), count({RunPart()}), count);
 }
 
+// What the episodes of a plan need, and where their rows go.
+struct Rollouts {
+  const Suite& suite;
+  const RunIdentity& identity;
+  const Bodies& bodies;
+  const EpisodePlan& plan;
+  const StopSign& stop;
+  int threads = 1;
+
+  [[nodiscard]] std::string key_of(const EpisodeSpec& spec) const {
+    return row_for(spec, suite, identity, *bodies.robot(spec.controller)).key;
+  }
+
+  // Those at these places of the plan.
+  void run(const std::vector<std::uint32_t>& places, RunDirectory& folder, Progress& progress,
+           RunSummary& summary) const {
+    const std::string trajectories =
+        suite.record == RecordTrajectories::kNone ? "" : inside(folder.path(), "trajectories");
+    SharedWork work(folder, stop);
+    const auto key_at = [&](int i) { return key_of(plan.at(places[i])); };
+    const auto run_at = [&](int i) {
+      return run_or_refuse(plan.at(places[i]), suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+    };
+    work.run(static_cast<int>(places.size()), threads, key_at, run_at, progress);
+    summary.run += work.done();
+    for (const auto& [outcome, count] : work.outcomes()) summary.outcomes[outcome] += count;
+    summary.already_there += work.done_by_others();
+  }
+};
+
+// Look by look, until the policies are told apart or all clips are done. Nothing of it depends on the rows that were
+// there before but the work that they save.
+void run_until_decided(const Rollouts& rollouts, const RunOptions& options, const std::vector<std::uint32_t>& missing,
+                       Progress& progress, RunDirectory& run, RunSummary& summary) {
+  const RunPart part = part_of(options);
+  const DecisionSchedule schedule =
+      decision_schedule(rollouts.plan, part, rollouts.suite.seed, options.episodes_per_look);
+  DecidedRun decided{.decision = decide({}, schedule.rounds, {}, options.decide), .planned = summary.planned};
+  progress.start("rolling out until decided", static_cast<int>(missing.size()), "episodes at most");
+  for (std::size_t look = 0; look < schedule.looks.size() && !decided.decision.is_decided(); ++look) {
+    std::vector<std::uint32_t> places;
+    for (const std::uint32_t place : schedule.episodes[look]) {
+      if (!is_needed(rollouts.plan.at(place), decided.decision)) continue;
+      ++decided.used;
+      if (std::ranges::binary_search(missing, place)) places.push_back(place);
+    }
+    rollouts.run(places, run, progress, summary);
+    if (rollouts.stop.asked()) break;
+    decided.decision =
+        decide(rows_of_part(load_run(run.path()).rows, part), schedule.rounds,
+               {schedule.looks.begin(), schedule.looks.begin() + static_cast<long>(look) + 1}, options.decide);
+    write_file(inside(run.path(), "decision.json"), decided_run_json(decided).dump(2) + "\n");
+    summary.decided = decided;
+  }
+  progress.finish();
+}
+
 // Plans and runs what is missing.
 void run_missing(const Suite& suite, const RunIdentity& identity, const Bodies& bodies, const RunOptions& options,
                  const StopSign& stop, Progress& progress, RunDirectory& run, RunSummary& summary) {
   const EpisodePlan plan(suite, bodies);
-  const auto key_of = [&](const EpisodeSpec& spec) {
-    return row_for(spec, suite, identity, *bodies.robot(spec.controller)).key;
-  };
+  const Rollouts rollouts{suite, identity, bodies, plan, stop, options.threads};
+  const auto key_of = [&](const EpisodeSpec& spec) { return rollouts.key_of(spec); };
   const std::vector<std::uint32_t> missing = missing_episodes(plan, part_of(options), run, key_of, stop, summary);
-  const std::string trajectories = suite.record == RecordTrajectories::kNone ? "" : inside(run.path(), "trajectories");
-  SharedWork work(run, stop);
+  if (options.decide.asked()) {
+    run_until_decided(rollouts, options, missing, progress, run, summary);
+    return;
+  }
   progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
-  const auto key_at = [&](int i) { return key_of(plan.at(missing[i])); };
-  const auto run_at = [&](int i) {
-    return run_or_refuse(plan.at(missing[i]), suite, identity, bodies, trajectories, [&] { return stop.asked(); });
-  };
-  work.run(static_cast<int>(missing.size()), options.threads, key_at, run_at, progress);
+  rollouts.run(missing, run, progress, summary);
   progress.finish();
-  summary.run = work.done();
-  summary.outcomes = work.outcomes();
-  summary.already_there += work.done_by_others();
 }
 
 }  // namespace
@@ -211,11 +274,12 @@ void require_names_of(const std::string& directory, const Suite& suite) {
 
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
   check_filters(options, suite);
+  check_decision_of(options, suite);
   RunSummary summary;
   summary.absent_engines = absent_engines(suite, options);
   const RunIdentity identity = identity_of(suite);
   Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
-                left_out(options.policies, policy_names_of(suite)));
+                left_out(part_of(options).policies, policy_names_of(suite)));
   check_actors(bodies, suite, options);
   summary.absent_controllers = bodies.absent();
   summary.absent_policies = bodies.absent_policies();

@@ -5,9 +5,11 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "duet/bench/decided_run.h"
 #include "duet/bench/episode.h"
 #include "duet/bench/progress.h"
 #include "duet/bench/run_episode.h"
@@ -26,7 +28,9 @@ struct RunOptions {
   std::vector<std::string> engines, controllers, policies;     // where not empty: only these
   std::vector<std::string> tasks, perturbations;
   std::vector<std::string> argv;
-  nlohmann::json certificate;  // parity certificate that the run keeps; null: none
+  DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart
+  std::size_t episodes_per_look = kEpisodesPerLook;  // of a decision
+  nlohmann::json certificate;                        // parity certificate that the run keeps; null: none
 };
 
 struct RunSummary {
@@ -36,12 +40,13 @@ struct RunSummary {
   // Name -> reason; their episodes are rows with `unsupported`.
   std::map<std::string, std::string> absent_engines, absent_controllers, absent_policies;
   std::vector<std::string> warnings;  // sentences
+  std::optional<DecidedRun> decided;  // of the last look; none where no decision was asked for or no look reached
   RunEnd end = RunEnd::kComplete;
 };
 
 // Several processes may run one suite into one folder at once: each episode is run by one of them. Throws InputError
-// (suite, clips, run directory, a full disk), MissingError (none of its engines, of its policies or, but for playback,
-// of its controllers is there), std::invalid_argument.
+// (suite, clips, run directory, a full disk; a decision for a suite of walking commands), MissingError (none of its
+// engines, of its policies or, but for playback, of its controllers is there), std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 }  // namespace duet

@@ -31,6 +31,7 @@ struct RunArguments {
   std::string suite, output, start, partner, profile, certificate;
   std::vector<std::string> overrides, clips, networks;
   bool dry_run = false, allow_programs = false;
+  double min_effect = 5.0;  // [points]
   RunOptions options;
 };
 
@@ -95,6 +96,7 @@ std::string describe(const RunSummary& summary, const Suite& suite, const std::s
   for (const auto* absent : {&summary.absent_engines, &summary.absent_controllers, &summary.absent_policies})
     for (const auto& [name, reason] : *absent)
       text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
+  if (summary.decided.has_value()) text += decided_run_text(*summary.decided);
   if (summary.end != RunEnd::kComplete) text += "stopped early; the same command goes on where it stopped\n";
   return text;
 }
@@ -153,6 +155,7 @@ void run_run(Session& session, RunArguments arguments) {
   require(!arguments.output.empty(), "--output is needed: the run directory");
   arguments.options.argv = session.argv;
   arguments.options.begin = session.begin;
+  arguments.options.decide.min_effect = arguments.min_effect / 100.0;
   if (!arguments.certificate.empty())
     arguments.options.certificate = certificate_json(load_certificate(arguments.certificate));
   Progress progress(session.progress());
@@ -175,8 +178,29 @@ void run_run(Session& session, RunArguments arguments) {
                          {"policy_faults", policy_fault_notes(tables.leaderboard)},
                          {"complete", summary.end == RunEnd::kComplete},
                          {"notes", notes}};
+  if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
   add_tables(tables, json);
   print_result(session, summary.end, with_notes("md", tables_text(tables), notes), json);
+}
+
+// Three options of one question.
+void add_until_decided(CLI::App& command, RunArguments& arguments) {
+  DecisionOptions& decide = arguments.options.decide;
+  CLI::Option* policies =
+      command
+          .add_option(
+              "--until-decided", decide.policies,
+              "A,B,...: run these policies, clip by clip, until A is better or worse than each of the others or "
+              "the same within the margin; a test that may be looked at at any time")
+          ->delimiter(',');
+  command.add_option("--alpha", decide.alpha, "error of the decision, over all of its pairs")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0e-6, 0.5))
+      ->needs(policies);
+  command.add_option("--min-effect", arguments.min_effect, "margin [points] within which two policies are the same")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 99.0))
+      ->needs(policies);
 }
 
 // CLI::Range lets NaN through.
@@ -221,6 +245,7 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("--tasks", options.tasks, "only these")->delimiter(',');
   command->add_option("--perturbations", options.perturbations, "only these (playback is always clean)")
       ->delimiter(',');
+  add_until_decided(*command, *arguments);
   add_threads(command, options.threads);
   command
       ->add_option("--time-limit", options.time_limit, "of the command [s], 0 for none; stops resumable (exit code 75)")

@@ -67,6 +67,74 @@ TEST(Runner, ThreadsDoNotChangeResults) {
   for (const EpisodeRow& row : load_run(folder / "two").rows) EXPECT_EQ(hashes.at(row.key), row.state_hash) << row.clip;
 }
 
+// Handshakes in playback, which replay fulfils and a robot that stands still does not: told apart after a few clips.
+Suite decidable_suite() {
+  return parse_suite(
+      "schema: duet.suite/1\nname: test\nversion: 1.0.0\nclips: {synth: {per_task: 8}}\ntasks: [handshake]\n"
+      "engines: [playback]\ncontrollers: [pd]\npolicies: [replay, {name: still, use: 'null'}]\nstart: clip\n",
+      "test.yaml");
+}
+
+RunOptions until_decided(int threads) {
+  RunOptions options;
+  options.threads = threads;
+  options.decide = {.policies = {"replay", "still"}, .alpha = 0.4};
+  options.episodes_per_look = 3;  // one clip: two policies and the null arm
+  return options;
+}
+
+TEST(Runner, StopsWhenDecidedAtTheSameEpisodeWhateverTheThreadsAndGoesOnToTheFullRun) {
+  const test::ScratchFolder folder;
+  const RunSummary one = run(decidable_suite(), folder / "one", until_decided(1));
+  ASSERT_TRUE(one.decided.has_value());
+  EXPECT_EQ(one.decided->decision.pairs.at(0).verdict, PairVerdict::kBetter);
+  EXPECT_EQ(one.end, RunEnd::kComplete);
+  EXPECT_EQ(one.planned, 24);
+  EXPECT_LT(one.run, 24);
+  EXPECT_EQ(one.run, one.decided->used);
+  EXPECT_EQ(one.decided->saved(), 24 - one.run);
+  run(decidable_suite(), folder / "two", until_decided(2));
+  EXPECT_EQ(read_file(folder / "one/decision.json"), read_file(folder / "two/decision.json"));
+  std::map<std::string, std::string> hashes;
+  for (const EpisodeRow& row : load_run(folder / "one").rows) hashes[row.key] = row.state_hash;
+  EXPECT_EQ(load_run(folder / "two").rows.size(), hashes.size());
+  for (const EpisodeRow& row : load_run(folder / "two").rows) EXPECT_EQ(hashes.at(row.key), row.state_hash);
+  // A stopped run is a part of the full one, whose later rows change no decision.
+  EXPECT_EQ(run(decidable_suite(), folder / "two").run, 24 - one.run);
+  const std::string before = read_file(folder / "two/decision.json");
+  const RunSummary again = run(decidable_suite(), folder / "two", until_decided(2));
+  EXPECT_EQ(again.run, 0);
+  EXPECT_EQ(again.decided->used, one.decided->used);
+  EXPECT_EQ(read_file(folder / "two/decision.json"), before);
+}
+
+TEST(Runner, ADecisionThatWasKilledComesToTheSameEnd) {
+  const test::ScratchFolder folder;
+  run(decidable_suite(), folder / "run", until_decided(1));
+  const std::string decision = read_file(folder / "run/decision.json");
+  const std::string path = folder / "run/episodes.jsonl";
+  const std::string whole = read_file(path);
+  std::ofstream(path, std::ios::trunc) << whole.substr(0, whole.find('\n') + 40);  // one row and a torn one
+  std::filesystem::remove(folder / "run/decision.json");
+  EXPECT_EQ(run(decidable_suite(), folder / "run", until_decided(2)).already_there, 1);
+  EXPECT_EQ(read_file(folder / "run/decision.json"), decision);
+}
+
+TEST(Runner, RefusesADecisionOfPoliciesThatTheSuiteDoesNotHave) {
+  const test::ScratchFolder folder;
+  RunOptions options = until_decided(1);
+  options.decide.policies = {"replay", "dp"};
+  const auto refusal = [&] {
+    return test::thrown_message<std::invalid_argument>([&] { run(decidable_suite(), folder / "run", options); });
+  };
+  EXPECT_THAT(refusal(), HasSubstr("the suite has no policy 'dp'"));
+  options.decide.policies = {"replay"};
+  EXPECT_THAT(refusal(), HasSubstr("expected two policies or more, found 1"));
+  options.decide.policies = {"replay", "still"};
+  options.policies = {"replay"};
+  EXPECT_THAT(refusal(), HasSubstr("leave --policies out"));
+}
+
 TEST(Runner, DirectoryOfAnotherSuiteIsRefused) {
   const test::ScratchFolder folder;
   run(test::playback_suite(), folder / "run");
