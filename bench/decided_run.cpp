@@ -57,8 +57,7 @@ bool is_needed(const EpisodeSpec& spec, const Decision& so_far) {
 
 std::string decided_run_text(const DecidedRun& run) {
   return fmt::format("{}{}: {} of {} episodes were used, {} runs saved\n", decision_text(run.decision),
-                     run.decision.is_decided() ? "decided" : "undecided so far", run.used, run.planned,
-                     run.saved());
+                     run.decision.is_decided() ? "decided" : "undecided so far", run.used, run.planned, run.saved());
 }
 
 nlohmann::json decided_run_json(const DecidedRun& run) {

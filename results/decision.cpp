@@ -99,16 +99,26 @@ PairDecision decide_pair(PairDecision pair, const CellsOfClip& cells, const std:
   return pair;
 }
 
+std::string judgement(const PairDecision& pair) {
+  switch (pair.verdict) {
+    case PairVerdict::kUndecided:
+      break;
+    case PairVerdict::kBetter:
+    case PairVerdict::kWorse:
+      return fmt::format("{} is {} than {}", pair.a, to_string(pair.verdict), pair.b);
+    case PairVerdict::kSame:
+      return fmt::format("{} and {} are the {}", pair.a, pair.b, to_string(pair.verdict));
+  }
+  return fmt::format("{} against {} is undecided", pair.a, pair.b);
+}
+
 std::string sentence(const PairDecision& pair, double alpha) {
-  const char* words = pair.verdict == PairVerdict::kBetter  ? "is better than"
-                      : pair.verdict == PairVerdict::kWorse ? "is worse than"
-                      : pair.verdict == PairVerdict::kSame  ? "is the same within the margin as"
-                                                            : "and (undecided)";
-  if (pair.clips == 0) return fmt::format("{} {} {}: no clip has an episode of both\n", pair.a, words, pair.b);
+  if (pair.clips == 0) return fmt::format("{}: no clip has an episode of both\n", judgement(pair));
   return fmt::format(
-      "{} {} {}: {:+.1f} points [{:.1f}, {:.1f}] ({:g} %, valid at every look), e-value {:.3g}, anytime p {:.3g}, "
-      "{} clips, of which {} favour {} and {} {}\n",
-      pair.a, words, pair.b, 100.0 * pair.difference + 0.0, 100.0 * pair.interval.low, 100.0 * pair.interval.high,
+      "{}: {:+.1f} points [{:.1f}, {:.1f}] ({:g} %, valid at every look), e-value {:.3g}, anytime p {:.3g}, {} clips, "
+      "of "
+      "which {} favour {} and {} {}\n",
+      judgement(pair), 100.0 * pair.difference + 0.0, 100.0 * pair.interval.low, 100.0 * pair.interval.high,
       100.0 * (1.0 - alpha), pair.e_value, pair.p, pair.clips, pair.better, pair.a, pair.worse, pair.b);
 }
 

@@ -92,6 +92,15 @@ TEST(Decision, SaysWorseAndTheSame) {
   EXPECT_EQ(decide(two_policies(20, 1), one_by_one(20), every_ten(20), kTwo).pairs[0].verdict, PairVerdict::kUndecided);
 }
 
+TEST(Decision, IsSaidInASentence) {
+  const auto text = [](const std::vector<EpisodeRow>& rows, int clips) {
+    return decision_text(decide(rows, one_by_one(clips), every_ten(clips), kTwo));
+  };
+  EXPECT_THAT(text(two_policies(100, 2), 100), HasSubstr("dstar is better than dp: +50.0 points ["));
+  EXPECT_THAT(text(two_policies(400, 1), 400), HasSubstr("dstar and dp are the same within the margin: +0.0 points ["));
+  EXPECT_THAT(text(two_policies(20, 1), 20), HasSubstr("dstar against dp is undecided: +0.0 points ["));
+}
+
 TEST(Decision, OneClipIsOneObservationHoweverManyEnginesRunIt) {
   std::vector<EpisodeRow> rows;
   for (const char* engine : {"mujoco", "ode", "bullet"}) {
