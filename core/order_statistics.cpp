@@ -30,8 +30,13 @@ double quantile_of_sorted(std::span<const double> sorted, double p) {
 }
 
 double quantile(std::vector<double> values, double p) {
-  std::sort(values.begin(), values.end());
-  return quantile_of_sorted(values, p);
+  require(p >= 0.0 && p <= 1.0, fmt::format("quantile: expected p in [0, 1], found {}", p));
+  if (values.empty()) return kUndefined;
+  const double place = p * static_cast<double>(values.size() - 1);
+  const auto below = values.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(values.begin(), below, values.end());
+  const double above = below + 1 == values.end() ? *below : *std::min_element(below + 1, values.end());
+  return *below + (place - std::floor(place)) * (above - *below);
 }
 
 RankAgreement kendall(std::span<const double> a, std::span<const double> b) {

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <optional>
+#include <utility>
 
 #include "duet/core/require.h"
 #include "duet/metrics/detector.h"
@@ -25,10 +27,13 @@ bool is_seen(const InteractionClip& clip, ThresholdSet set) {
 // the recording as a clip of that task.
 template <typename ClipOfTask>
 SourceClip recognised(const std::string& name, ClipOfTask&& clip) {
+  std::array<std::optional<SourceClip>, kSearch.size()> clips;  // each converted once
   for (const ThresholdSet set : {ThresholdSet::kAct, ThresholdSet::kStrict, ThresholdSet::kPaper}) {
-    for (const Task task : kSearch) {
-      SourceClip found = clip(task);
-      if (!is_seen(found.clip, set)) continue;
+    for (std::size_t i = 0; i < kSearch.size(); ++i) {
+      const Task task = kSearch[i];
+      if (!clips[i]) clips[i] = clip(task);
+      if (!is_seen(clips[i]->clip, set)) continue;
+      SourceClip found = std::move(*clips[i]);
       found.evidence.push_back(fmt::format("task: {} (its detector sees it on the people, {} thresholds; no label)",
                                            to_string(task), to_string(set)));
       found.clip.source["task"] = "detected";

@@ -44,13 +44,19 @@ double distance(const Segment& a, const Segment& b) {
 
 bool is_arm(const std::string& region) { return region == "hand" || region == "forearm"; }
 
-// Makes `deepest` the depth of two segments in each other, each with its radius, where that is deeper. Most are told
+struct Rod {
+  explicit Rod(const Segment& s) : ends(s), middle(0.5 * (s[0] + s[1])), half(0.5 * (s[1] - s[0]).norm()) {}
+  Segment ends;
+  Eigen::Vector3d middle;
+  double half;
+};
+
+// Makes `deepest` the depth of two rods in each other, each with its radius, where that is deeper. Most are told
 // apart by their middles alone.
-void deepen(const Segment& a, const Segment& b, double radii, double& deepest) {
-  const double middles = 0.5 * (a[0] + a[1] - b[0] - b[1]).norm();
-  const double halves = 0.5 * ((a[1] - a[0]).norm() + (b[1] - b[0]).norm());
-  if (middles - halves > radii - deepest) return;
-  deepest = std::max(deepest, radii - distance(a, b));
+void deepen(const Rod& a, const Rod& b, double radii, double& deepest) {
+  const double near = radii - deepest + a.half + b.half;
+  if (near < 0.0 || (a.middle - b.middle).squaredNorm() > near * near) return;
+  deepest = std::max(deepest, radii - distance(a.ends, b.ends));
 }
 
 struct Samples {
@@ -109,13 +115,13 @@ class Sampler {
   }
 
   void touch(int t, Samples& out) {
-    std::vector<Segment> segments;
+    std::vector<Rod> segments;
     segments.reserve(robot_.shapes.size());
-    for (int i = 0; i < static_cast<int>(robot_.shapes.size()); ++i) segments.push_back(segment(i));
+    for (int i = 0; i < static_cast<int>(robot_.shapes.size()); ++i) segments.emplace_back(segment(i));
     double deepest = 0.0;
     for (std::size_t c = 0; c < body_.capsules.size(); ++c) {
       const HumanCapsule& capsule = body_.capsules[c];
-      const Segment bone = capsule.ends(motion_.partner.joints.frame(t));
+      const Rod bone(capsule.ends(motion_.partner.joints.frame(t)));
       for (std::size_t i = 0; i < segments.size(); ++i)
         if (!human_arms_[c] || !robot_arms_[i])
           deepen(segments[i], bone, capsule.radius + robot_.shapes[i].radius, deepest);
