@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kRate = 50.0;
 constexpr double kReach = 0.975;         // of a straight leg: short of where a knee has no slope
+constexpr double kReachSlack = 1e-4;     // [m]
 constexpr double kMostCrouch = 0.08;     // that a long step may take from the base's height [m]
 constexpr double kStandingBand = 0.05;   // a person's pelvis this little below its standing height stands [m]
 constexpr double kStepHeight = 0.03;     // a swinging sole clears the floor by this at least [m]
@@ -139,6 +140,25 @@ void place(const GroundPlan& plan, int side, Standing& standing) {
   standing.p.z() = 0.0;
 }
 
+// Moves a place by no more than it takes for the leg to reach it in every frame of the stance, where that can be: a
+// step that is long on one side of the hip only needs no shorter stance.
+void draw_within_reach(const GroundPlan& plan, const LegPose& legs, int side, Standing& standing) {
+  constexpr int kRounds = 20;
+  for (int round = 0; round < kRounds; ++round) {
+    double worst = 0.0;
+    Eigen::Vector2d back = Eigen::Vector2d::Zero();
+    for (int t = standing.begin; t < standing.end; ++t) {
+      const Eigen::Vector2d step = step_of(plan, legs, side, t, standing.p, standing.turn);
+      const double excess = step.norm() - longest_step(legs, side, plan.base(2, t));
+      if (excess <= worst) continue;
+      worst = excess;
+      back = step * (excess / step.norm());
+    }
+    if (worst < kReachSlack) return;
+    standing.p.head<2>() -= back;
+  }
+}
+
 // Stances of a foot, each shortened to the frames in which the leg reaches it.
 std::vector<Standing> find_standing(const GroundPlan& plan, const LegPose& legs, int side,
                                     const std::vector<char>& stands) {
@@ -152,9 +172,10 @@ std::vector<Standing> find_standing(const GroundPlan& plan, const LegPose& legs,
   for (Standing& standing : all) {
     for (int trial = 0; trial < 4; ++trial) {
       place(plan, side, standing);
+      draw_within_reach(plan, legs, side, standing);
       const auto reached = [&](int t) {
         return step_of(plan, legs, side, t, standing.p, standing.turn).norm() <=
-               longest_step(legs, side, plan.base(2, t));
+               longest_step(legs, side, plan.base(2, t)) + kReachSlack;
       };
       const int before = standing.end - standing.begin;
       while (standing.end - standing.begin > 3 && !reached(standing.end - 1)) --standing.end;
