@@ -6,6 +6,7 @@
 #include "duet/core/skeleton.h"
 #include "duet/retarget/partner_arms.h"
 #include "duet/robots/human_body.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -13,12 +14,12 @@ namespace {
 struct RobotSphere {
   int shape = 0;
   double radius = 0.0;
-  bool arm = false, trunk = false;  // forearm or hand; torso, head or pelvis
+  bool arm = false, trunk = false;  // forearm or hand; torso, head or pelvis; else a thigh
 };
 
 struct HumanSphere {
   double radius = 0.0;
-  bool arm = false;
+  bool arm = false, hip = false;  // hip: lowest part of the trunk, hips and thighs
 };
 
 // Links of `robot` as links of the chain; -1 for those of the legs.
@@ -45,10 +46,17 @@ Eigen::Matrix3d turn_of(const RobotModel& robot, const UprightChain& upright, in
 std::vector<RobotSphere> add_robot_spheres(const RobotModel& robot, UprightChain& upright, BodySpheres& out) {
   const std::vector<int> links = chain_links(robot, upright);
   std::vector<RobotSphere> spheres;
+  Kinematics standing(robot);
+  standing.update(Pose{}, robot.neutral);
   for (std::size_t i = 0; i < robot.shapes.size(); ++i) {
     const RobotShape& shape = robot.shapes[i];
     const bool arm = shape.region == "hand" || shape.region == "forearm";
     const bool trunk = shape.region == "torso" || shape.region == "head" || shape.region == "pelvis";
+    if (shape.region == "thigh") {  // legs are solved later: as they hang from the planned base in the neutral pose
+      out.robot_point.push_back(static_cast<int>(upright.chain.points.size()));
+      upright.chain.points.push_back({0, standing.shape_position(static_cast<int>(i))});
+      spheres.push_back({static_cast<int>(i), shape.radius, false, false});
+    }
     if (links[shape.link] < 0 || (!arm && !trunk)) continue;
     const bool two = trunk && shape.half_length > shape.radius;
     for (const double along : two ? std::vector<double>{-0.6, 0.6} : std::vector<double>{0.0}) {
@@ -62,18 +70,22 @@ std::vector<RobotSphere> add_robot_spheres(const RobotModel& robot, UprightChain
 }
 
 std::vector<HumanSphere> add_human_spheres(const HumanMotion& partner, BodySpheres& out) {
-  constexpr std::array<const char*, 5> kTrunk = {"head", "upper_chest", "lower_chest", "abdomen", "lower_trunk"};
+  constexpr std::array<const char*, 6> kTrunk = {"head",    "upper_chest",     "lower_chest",
+                                                 "abdomen", "left_side_chest", "right_side_chest"};
+  constexpr std::array<const char*, 5> kHips = {"lower_trunk", "left_pelvis", "right_pelvis", "left_thigh",
+                                                "right_thigh"};
   constexpr std::array<const char*, 4> kArms = {"left_forearm", "right_forearm", "left_hand", "right_hand"};
   const HumanBody body = make_human_body(bone_lengths(partner));
   std::vector<HumanSphere> spheres;
   std::vector<const HumanCapsule*> capsules;
   for (const HumanCapsule& capsule : body.capsules) {
-    bool trunk = false, arm = false;
+    bool trunk = false, arm = false, hip = false;
     for (const char* name : kTrunk) trunk = trunk || capsule.name == name;
     for (const char* name : kArms) arm = arm || capsule.name == name;
-    if (!trunk && !arm) continue;
+    for (const char* name : kHips) hip = hip || capsule.name == name;
+    if (!trunk && !arm && !hip) continue;
     capsules.push_back(&capsule);
-    spheres.push_back({capsule.radius, arm});
+    spheres.push_back({capsule.radius, arm, hip});
     // A forearm's sphere sits at its elbow and a hand's beyond its wrist: each moves with one offset.
     out.human_offset.push_back(arm ? human_offset_of(capsule.joint_a) : -1);
   }
@@ -102,11 +114,13 @@ BodySpheres make_body_spheres(const RobotModel& robot, UprightChain& chain, cons
   const std::vector<HumanSphere> humans = add_human_spheres(partner, out);
   const int first = static_cast<int>(robots.size());
   for (int a = 0; a < first; ++a) {
+    const auto is_thigh = [&](int i) { return !robots[i].arm && !robots[i].trunk; };
     for (int b = a + 1; b < first; ++b)
-      if (may_touch(robot, robots[a].shape, robots[b].shape))
+      if (may_touch(robot, robots[a].shape, robots[b].shape) && !(is_thigh(a) && is_thigh(b)))
         out.pairs.push_back({a, b, robots[a].radius + robots[b].radius});
     for (int h = 0; h < static_cast<int>(humans.size()); ++h)
-      if (robots[a].trunk || !humans[h].arm) out.pairs.push_back({a, first + h, robots[a].radius + humans[h].radius});
+      if (is_thigh(a) ? humans[h].hip : robots[a].trunk || !humans[h].arm)
+        out.pairs.push_back({a, first + h, robots[a].radius + humans[h].radius});
   }
   return out;
 }

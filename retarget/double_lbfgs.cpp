@@ -12,7 +12,7 @@ namespace {
 constexpr double kSmallDecrease = 2e-5;  // as in lanes
 constexpr int kMostHalvings = 6;
 
-constexpr double kLongestJointTurn = 0.4;  // as in lanes [rad]
+constexpr double kLongestJointStep = 1.0, kLongestJointTurn = 0.4;  // as in lanes [rad]
 
 class DoubleLbfgs {
  public:
@@ -33,6 +33,9 @@ class DoubleLbfgs {
   [[nodiscard]] PairVariables from_filtered(PairVariables direction) const;
   [[nodiscard]] PairVariables moved(const PairVariables& direction, double rate) const;
   void multiply(int slot);
+  [[nodiscard]] PairVariables choose_direction() const;
+  bool go(const PairVariables& direction);
+  void descend(const PairWeights& weights, int iterations, PairSolution& solution);
 
   const PairProblem& problem_;
   const PairOptions& options_;
@@ -41,6 +44,7 @@ class DoubleLbfgs {
   PairVariables x_;
   std::array<PairVariables, LbfgsMemory::kGradient + 1> vectors_;  // in the preconditioner's space
   LbfgsMemory memory_;
+  PairTerms terms_;  // at x_
 };
 
 // D^(-1/2) L^-1 of T times the gradient, without what would leave the joints' limits.
@@ -95,8 +99,11 @@ PairVariables DoubleLbfgs::from_filtered(PairVariables direction) const {
 }
 
 PairVariables DoubleLbfgs::moved(const PairVariables& direction, double rate) const {
-  PairVariables x{x_.frames + rate * direction.frames, x_.offset + rate * direction.offset};
-  for (int j = 0; j < problem_.chain.dof(); ++j) {
+  PairVariables x{rate * direction.frames, x_.offset + rate * direction.offset};
+  const int dof = problem_.chain.dof();
+  x.frames.topRows(dof) = x.frames.topRows(dof).cwiseMax(-kLongestJointTurn).cwiseMin(kLongestJointTurn);
+  x.frames += x_.frames;
+  for (int j = 0; j < dof; ++j) {
     const ChainJoint& joint = problem_.chain.joints[j];
     x.frames.row(j) = x.frames.row(j).cwiseMax(joint.lower).cwiseMin(joint.upper);
   }
@@ -111,49 +118,66 @@ void DoubleLbfgs::multiply(int slot) {
   }
 }
 
-PairSolution DoubleLbfgs::solve() {
+PairVariables DoubleLbfgs::choose_direction() const {
+  const Eigen::VectorXd factor = memory_.direction();
+  PairVariables direction = PairVariables::zero(problem_.chain.dof(), problem_.frames());
+  for (int k = 0; k <= LbfgsMemory::kGradient; ++k) {
+    direction.frames += factor[k] * vectors_[k].frames;
+    direction.offset += factor[k] * vectors_[k].offset;
+  }
+  return from_filtered(direction);
+}
+
+// To where the objective is lower along `direction`, remembering the step; false where there is no such place.
+bool DoubleLbfgs::go(const PairVariables& direction) {
   PairVariables& gradient = vectors_[LbfgsMemory::kGradient];
-  PairSolution solution;
-  PairTerms terms = filtered_gradient(x_, gradient);
-  multiply(0);
-  int small = 0;
-  for (int i = 0; i < options_.lbfgs_iterations && small < 3; ++i) {
-    solution.terms.push_back(terms);
-    solution.total.push_back(terms.total(weights_));
-    const Eigen::VectorXd factor = memory_.direction();
-    PairVariables direction = PairVariables::zero(problem_.chain.dof(), problem_.frames());
-    for (int k = 0; k <= LbfgsMemory::kGradient; ++k) {
-      direction.frames += factor[k] * vectors_[k].frames;
-      direction.offset += factor[k] * vectors_[k].offset;
-    }
-    direction = from_filtered(direction);
-    const double longest = direction.frames.topRows(problem_.chain.dof()).cwiseAbs().maxCoeff();
-    double rate = std::min(1.0, kLongestJointTurn / std::max(longest, 1e-6));
-    PairVariables next, there;
-    PairTerms terms_there;
-    bool descends = false;
-    for (int halving = 0; halving <= kMostHalvings && !descends; ++halving, rate *= 0.5) {
-      next = moved(direction, rate);
-      terms_there = filtered_gradient(next, there);
-      descends = terms_there.total(weights_) < solution.total.back();
-    }
-    if (!descends && memory_.pairs() == 0) break;
-    if (!descends) {
-      memory_.forget();
-      continue;
-    }
+  const double longest = direction.frames.topRows(problem_.chain.dof()).cwiseAbs().maxCoeff();
+  double rate = std::min(1.0, kLongestJointStep / std::max(longest, 1e-6));
+  for (int halving = 0; halving <= kMostHalvings; ++halving, rate *= 0.5) {
+    const PairVariables next = moved(direction, rate);
+    PairVariables there;
+    const PairTerms terms = filtered_gradient(next, there);
+    if (!(terms.total(weights_) < terms_.total(weights_))) continue;
     const int slot = memory_.next_slot();
     vectors_[slot] = to_filtered({next.frames - x_.frames, next.offset - x_.offset});
     vectors_[slot + 1] = {there.frames - gradient.frames, there.offset - gradient.offset};
     gradient = there;
     x_ = next;
+    terms_ = terms;
     multiply(slot);
     if (!memory_.keep()) memory_.forget();
-    terms = terms_there;
-    small = solution.total.back() - terms.total(weights_) < kSmallDecrease * solution.total.back() ? small + 1 : 0;
+    return true;
   }
-  solution.terms.push_back(terms);
-  solution.total.push_back(terms.total(weights_));
+  return false;
+}
+
+void DoubleLbfgs::descend(const PairWeights& weights, int iterations, PairSolution& solution) {
+  weights_ = weights;
+  memory_.forget();
+  terms_ = filtered_gradient(x_, vectors_[LbfgsMemory::kGradient]);
+  multiply(0);
+  int small = 0;
+  for (int i = 0; i < iterations && small < 3; ++i) {
+    const double before = terms_.total(weights_);
+    solution.terms.push_back(terms_);
+    solution.total.push_back(before);
+    if (!go(choose_direction())) {
+      if (memory_.pairs() == 0) break;
+      memory_.forget();
+      continue;
+    }
+    small = before - terms_.total(weights_) < kSmallDecrease * before ? small + 1 : 0;
+  }
+}
+
+PairSolution DoubleLbfgs::solve() {
+  PairSolution solution;
+  const PairWeights last = weights_;
+  const int imitation = imitation_iterations(options_);
+  if (imitation > 0) descend(pair_iteration(options_, 0).weights, imitation, solution);
+  descend(last, options_.lbfgs_iterations - imitation, solution);
+  solution.terms.push_back(terms_);
+  solution.total.push_back(terms_.total(weights_));
   solution.x = x_;
   return solution;
 }

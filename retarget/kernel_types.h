@@ -17,8 +17,8 @@ inline constexpr int kHumanRows = 18;
 inline constexpr int kBones = 6;  // of the partner's arms; bone k ends at his offset k
 inline constexpr int kMaxHumanSpheres = 16;
 inline constexpr int kMaxSpheres = 32;  // of both bodies
-inline constexpr int kMaxSpherePairs = 256;
-inline constexpr int kMemory = 5;  // steps that L-BFGS remembers
+inline constexpr int kMaxSpherePairs = 384;
+inline constexpr int kMemory = 3;  // steps that L-BFGS remembers: more save fewer evaluations than they cost
 inline constexpr int kHalo = 2;    // blocks before the first and after the last, for neighbours in time
 inline constexpr int kMaxRows = kMaxJoints + 6 + kHumanRows;
 
@@ -182,10 +182,10 @@ void combine_v2(const VectorSweep&, const Row* const* vectors, const float* fact
 void combine_v3(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
 void combine_v4(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
 
-// next = x + rate * direction, inside the bounds.
-void move_v2(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
-void move_v3(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
-void move_v4(const VectorSweep&, const Row* x, const Row* direction, float rate, Row* next);
+// next = x + rate * direction, no joint by more than `turn`, inside the bounds.
+void move_v2(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
+void move_v3(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
+void move_v4(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
 
 // One Adam iteration over the blocks. v2 needs nothing beyond x86-64-v2, v3 AVX2 and FMA, v4 AVX-512.
 void sweep_v2(const Sweep& sweep);

@@ -35,8 +35,8 @@ void dots_v2(const VectorSweep& at, const Row* const* vectors, int count, int ne
 void combine_v2(const VectorSweep& at, const Row* const* vectors, const float* factors, int count, Row* out) {
   combine(at, vectors, factors, count, out);
 }
-void move_v2(const VectorSweep& at, const Row* x, const Row* direction, float rate, Row* next) {
-  move(at, x, direction, rate, next);
+void move_v2(const VectorSweep& at, const Row* x, const Row* direction, float rate, float turn, Row* next) {
+  move(at, x, direction, rate, turn, next);
 }
 
 }  // namespace duet::pair_kernel

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "duet/retarget/lbfgs_memory.h"
 #include "duet/retarget/temporal_filter.h"
@@ -18,7 +19,9 @@ constexpr double kEnough = 2e-5;  // relative decrease; three steps in a row bel
 constexpr int kHalvings = 6;      // of a step that does not descend
 constexpr double kFaded = 1e-9;   // of a state that a lane hands on to the next
 
-constexpr double kLongestTurn = 0.4;  // of a joint in one step [rad]: longer ones jump into poor minima
+constexpr double kFarthestTurn = 1.0;  // of a joint along the direction in one step [rad]
+constexpr double kLongestTurn = 0.4;   // of it what is taken: longer turns jump into poor minima, and a few joints that
+                                       // would turn far do not hold up the others
 
 // What a state of two values at a lane's beginning adds to the frames after it: the answers of the filter to 1.
 struct Answer {
@@ -83,6 +86,14 @@ class LaneLbfgs {
   void multiply(int slot);
   // The direction, in `direction` and as the offset's; its slope.
   double choose_direction(Rows& direction, Eigen::Vector3d& offset);
+  struct Step {
+    Eigen::Array3d offset;
+    Eigen::Vector3d offset_gradient = Eigen::Vector3d::Zero();
+    Value value = {};
+  };
+  std::optional<Step> search(const Rows& direction, const Eigen::Vector3d& offset_direction);
+  bool take(const Step& step);
+  void descend(const PairWeights& weights, int iterations, PairSolution& solution);
 
   const PairOptions& options_;
   PairWeights weights_;
@@ -96,6 +107,7 @@ class LaneLbfgs {
   std::array<Eigen::Vector3d, LbfgsMemory::kGradient + 1> offsets_;
   Eigen::Array3d offset_ = Eigen::Array3d::Zero();
   double offset_scale_ = 1.0;
+  Value value_;  // at x_
 };
 
 // A lane's segment was filtered from zero: adds what the segment before it (after it, backwards) leaves over.
@@ -200,54 +212,67 @@ double LaneLbfgs::choose_direction(Rows& direction, Eigen::Vector3d& offset) {
   return slope;
 }
 
-PairSolution LaneLbfgs::solve() {
-  PairSolution solution;
-  Eigen::Vector3d slope_there;
-  Value value = evaluate_at(x_, offset_, here_, offsets_[LbfgsMemory::kGradient]);
+// Goes along `direction` until the objective is lower there: then next_ and there_ hold the place and its gradient.
+std::optional<LaneLbfgs::Step> LaneLbfgs::search(const Rows& direction, const Eigen::Vector3d& offset_direction) {
+  double rate = std::min(1.0, kFarthestTurn / longest_turn(direction));
+  for (int halving = 0; halving <= kHalvings; ++halving, rate *= 0.5) {
+    lanes_.kernel().move(whole(), x_.data() + lanes_.halo(), direction.data(), static_cast<float>(rate),
+                         static_cast<float>(kLongestTurn), next_.data() + lanes_.halo());
+    lanes_.fill_halo(next_);
+    Step step{.offset = offset_ + rate * offset_direction.array()};
+    step.value = evaluate_at(next_, step.offset, there_, step.offset_gradient);
+    if (step.value.objective < value_.objective) return step;
+  }
+  return std::nullopt;
+}
+
+// To next_, remembering the step; false where its curvature is of no use.
+bool LaneLbfgs::take(const Step& step) {
+  const int slot = memory_.next_slot();
+  lanes_.kernel().step(whole(), x_.data() + lanes_.halo(), next_.data() + lanes_.halo(), here_.data(), there_.data(),
+                       vectors_[slot].data(), vectors_[slot + 1].data());
+  offsets_[slot] = offset_scale_ * (step.offset - offset_).matrix();
+  offsets_[slot + 1] = step.offset_gradient - offsets_[LbfgsMemory::kGradient];
+  offsets_[LbfgsMemory::kGradient] = step.offset_gradient;
+  std::swap(here_, there_);
+  std::swap(x_, next_);
+  offset_ = step.offset;
+  value_ = step.value;
+  multiply(slot);
+  return memory_.keep();
+}
+
+void LaneLbfgs::descend(const PairWeights& weights, int iterations, PairSolution& solution) {
+  weights_ = weights;
+  memory_.forget();
+  value_ = evaluate_at(x_, offset_, here_, offsets_[LbfgsMemory::kGradient]);
+  multiply(0);  // of the gradient with itself
   Rows direction = lanes_.make_rows();
-  multiply(0);  // of zero vectors, and of the gradient with itself
   int small = 0;
-  for (int i = 0; i < options_.lbfgs_iterations && small < 3; ++i) {
-    solution.terms.push_back(value.terms);
-    solution.total.push_back(value.objective);
+  for (int i = 0; i < iterations && small < 3; ++i) {
+    solution.terms.push_back(value_.terms);
+    solution.total.push_back(value_.objective);
     Eigen::Vector3d offset_direction;
     if (choose_direction(direction, offset_direction) >= 0.0) {
       memory_.forget();
       choose_direction(direction, offset_direction);
     }
-    double rate = std::min(1.0, kLongestTurn / longest_turn(direction));
-    Value there;
-    Eigen::Array3d offset;
-    bool descends = false;
-    for (int halving = 0; halving <= kHalvings && !descends; ++halving, rate *= 0.5) {
-      lanes_.kernel().move(whole(), x_.data() + lanes_.halo(), direction.data(), static_cast<float>(rate),
-                           next_.data() + lanes_.halo());
-      lanes_.fill_halo(next_);
-      offset = offset_ + rate * offset_direction.array();
-      there = evaluate_at(next_, offset, there_, slope_there);
-      descends = there.objective < value.objective;
-    }
-    if (!descends && memory_.pairs() == 0) break;
-    if (!descends) {
-      memory_.forget();
-      continue;
-    }
-    const int slot = memory_.next_slot();
-    lanes_.kernel().step(whole(), x_.data() + lanes_.halo(), next_.data() + lanes_.halo(), here_.data(), there_.data(),
-                         vectors_[slot].data(), vectors_[slot + 1].data());
-    offsets_[slot] = offset_scale_ * (offset - offset_).matrix();
-    offsets_[slot + 1] = slope_there - offsets_[LbfgsMemory::kGradient];
-    offsets_[LbfgsMemory::kGradient] = slope_there;
-    std::swap(here_, there_);
-    std::swap(x_, next_);
-    offset_ = offset;
-    multiply(slot);
-    if (!memory_.keep()) memory_.forget();
-    small = value.objective - there.objective < kEnough * value.objective ? small + 1 : 0;
-    value = there;
+    const std::optional<Step> step = search(direction, offset_direction);
+    if (!step && memory_.pairs() == 0) break;
+    const double before = value_.objective;
+    if (!step || !take(*step)) memory_.forget();
+    if (step) small = before - value_.objective < kEnough * before ? small + 1 : 0;
   }
-  solution.terms.push_back(value.terms);
-  solution.total.push_back(value.objective);
+}
+
+PairSolution LaneLbfgs::solve() {
+  PairSolution solution;
+  const PairWeights last = weights_;
+  const int imitation = imitation_iterations(options_);
+  if (imitation > 0) descend(pair_iteration(options_, 0).weights, imitation, solution);
+  descend(last, options_.lbfgs_iterations - imitation, solution);
+  solution.terms.push_back(value_.terms);
+  solution.total.push_back(value_.objective);
   solution.x = lanes_.variables(x_, offset_);
   return solution;
 }

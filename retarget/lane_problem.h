@@ -20,7 +20,7 @@ struct LaneKernel {
                pair_kernel::Row*);
   void (*combine)(const pair_kernel::VectorSweep&, const pair_kernel::Row* const*, const float*, int,
                   pair_kernel::Row*);
-  void (*move)(const pair_kernel::VectorSweep&, const pair_kernel::Row*, const pair_kernel::Row*, float,
+  void (*move)(const pair_kernel::VectorSweep&, const pair_kernel::Row*, const pair_kernel::Row*, float, float,
                pair_kernel::Row*);
 };
 LaneKernel lane_kernel(KernelKind kind);  // kV2, kV3 or kV4

@@ -45,24 +45,50 @@ inline void step(const VectorSweep& at, const Row* x0, const Row* x1, const Row*
   }
 }
 
-inline void dots(const VectorSweep& at, const Row* const* vectors, int count, int newest, const Row* g, Row* sums) {
-  const std::size_t begin = static_cast<std::size_t>(at.begin) * at.rows,
-                    end = static_cast<std::size_t>(at.end) * at.rows;
+constexpr std::size_t kChunk = 32;  // rows of three vectors that stay in the first cache
+
+// Products of two vectors at once: what is multiplied with them is loaded once, and six sums fit in registers.
+inline void dots_of_two(const Row* const* two, const Row* s, const Row* y, const Row* g, std::size_t begin,
+                        std::size_t end, Row* sums) {
   for (int lane = 0; lane < kLanes; lane += kWidth) {
-    V sum[3 * (2 * kMemory + 1)] = {};
+    V sum[6];
+    for (int k = 0; k < 6; ++k) sum[k] = load(sums[k], lane);
     for (std::size_t i = begin; i < end; ++i) {
-      const V s = load(vectors[newest][i], lane), y = load(vectors[newest + 1][i], lane), here = load(g[i], lane);
-      for (int k = 0; k < count; ++k) {
-        const V v = load(vectors[k][i], lane);
-        sum[3 * k] += v * s;
-        sum[3 * k + 1] += v * y;
-        sum[3 * k + 2] += v * here;
-      }
-      sum[3 * count] += here * s;
-      sum[3 * count + 1] += here * y;
-      sum[3 * count + 2] += here * here;
+      const V first = load(two[0][i], lane), second = load(two[1][i], lane);
+      const V with_s = load(s[i], lane), with_y = load(y[i], lane), with_g = load(g[i], lane);
+      sum[0] += first * with_s;
+      sum[1] += first * with_y;
+      sum[2] += first * with_g;
+      sum[3] += second * with_s;
+      sum[4] += second * with_y;
+      sum[5] += second * with_g;
     }
-    for (int k = 0; k < 3 * (count + 1); ++k) store(sums[k], lane, sum[k]);
+    for (int k = 0; k < 6; ++k) store(sums[k], lane, sum[k]);
+  }
+}
+
+inline void dots_of_gradient(const Row* s, const Row* y, const Row* g, std::size_t begin, std::size_t end, Row* sums) {
+  for (int lane = 0; lane < kLanes; lane += kWidth) {
+    V sum[3];
+    for (int k = 0; k < 3; ++k) sum[k] = load(sums[k], lane);
+    for (std::size_t i = begin; i < end; ++i) {
+      const V here = load(g[i], lane);
+      sum[0] += here * load(s[i], lane);
+      sum[1] += here * load(y[i], lane);
+      sum[2] += here * here;
+    }
+    for (int k = 0; k < 3; ++k) store(sums[k], lane, sum[k]);
+  }
+}
+
+// `count` is even; `sums` are added to.
+inline void dots(const VectorSweep& at, const Row* const* vectors, int count, int newest, const Row* g, Row* sums) {
+  const std::size_t last = static_cast<std::size_t>(at.end) * at.rows;
+  const Row *s = vectors[newest], *y = vectors[newest + 1];
+  for (std::size_t begin = static_cast<std::size_t>(at.begin) * at.rows; begin < last; begin += kChunk) {
+    const std::size_t end = begin + kChunk < last ? begin + kChunk : last;
+    for (int k = 0; k < count; k += 2) dots_of_two(vectors + k, s, y, g, begin, end, sums + 3 * k);
+    dots_of_gradient(s, y, g, begin, end, sums + 3 * count);
   }
 }
 
@@ -83,12 +109,17 @@ inline void combine(const VectorSweep& at, const Row* const* vectors, const floa
   }
 }
 
-inline void move(const VectorSweep& at, const Row* x, const Row* direction, float rate, Row* next) {
+inline void move(const VectorSweep& at, const Row* x, const Row* direction, float rate, float turn, Row* next) {
   for (int block = 0; block < at.blocks; ++block) {
     const std::size_t first = static_cast<std::size_t>(block) * at.rows;
     for (std::size_t i = 0; i < at.rows; ++i) {
       for (int lane = 0; lane < kLanes; lane += kWidth) {
-        V v = load(x[first + i], lane) + rate * load(direction[first + i], lane);
+        V d = rate * load(direction[first + i], lane);
+        if (static_cast<int>(i) < at.setup->dof) {
+          d = d < -turn ? V{} - turn : d;
+          d = d > turn ? V{} + turn : d;
+        }
+        V v = load(x[first + i], lane) + d;
         if (static_cast<int>(i) < at.setup->dof) {
           v = v < at.setup->lower[i] ? V{} + at.setup->lower[i] : v;
           v = v > at.setup->upper[i] ? V{} + at.setup->upper[i] : v;

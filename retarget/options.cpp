@@ -147,7 +147,7 @@ PairOptions pair_options_of(PairMode mode) {
   options.weights.collision = 10.0;
   if (mode != PairMode::kBest) return options;
   options.optimizer = Optimizer::kLbfgs;
-  options.lbfgs_iterations = 80;
+  options.lbfgs_iterations = 60;
   return options;
 }
 

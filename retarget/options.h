@@ -61,7 +61,7 @@ struct PairOptions {
   bool adapt_human = true;  // false keeps the partner as it is
   KernelKind kernel = KernelKind::kAuto;
   Optimizer optimizer = Optimizer::kAdam;
-  int lbfgs_iterations = 50;  // all with the weights of stage 2
+  int lbfgs_iterations = 50;  // the first eight with the weights of stage 1, the others with those of stage 2
   // The robot stands: soles where the person's feet do, a base that follows slowly and upright
   // (retarget/ground_plan.h).
   bool ground = false;

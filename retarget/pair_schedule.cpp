@@ -1,5 +1,7 @@
 #include "duet/retarget/pair_schedule.h"
 
+#include <algorithm>
+
 namespace duet {
 
 PairIteration pair_iteration(const PairOptions& options, int iteration) {
@@ -15,5 +17,7 @@ PairIteration pair_iteration(const PairOptions& options, int iteration) {
   out.reset = restarted && iteration == schedule.stage1_iterations;
   return out;
 }
+
+int imitation_iterations(const PairOptions& options) { return std::min(8, options.lbfgs_iterations / 6); }
 
 }  // namespace duet

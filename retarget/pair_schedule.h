@@ -21,6 +21,9 @@ inline int pair_iterations(const PairOptions& options) {
   return options.schedule.stage1_iterations + options.schedule.stage2_iterations;
 }
 
+// L-BFGS's first iterations have the weights of stage 1, as Adam's have: they choose the minimum that the others reach.
+int imitation_iterations(const PairOptions& options);
+
 struct PairSolution {
   PairVariables x;               // after the last iteration, before the Gaussian filter
   std::vector<PairTerms> terms;  // one per iteration, at its start (before its update)

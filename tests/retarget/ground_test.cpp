@@ -1,6 +1,10 @@
 // PAIR on the ground: the modes `grounded` and `best`, their terms, plan, legs and the partner's arms.
 #include <gmock/gmock.h>
 
+#include <array>
+#include <thread>
+#include <vector>
+
 #include "duet/motion/foot_contact.h"
 #include "duet/retarget/leg_pose.h"
 #include "duet/retarget/pair.h"
@@ -115,7 +119,44 @@ TEST(PairLbfgs, ReachesWhatAdamReachesInAQuarterOfTheEvaluations) {
       const PairSolution solution = solve_pair(problem, options);
       EXPECT_LE(solution.total.size(), static_cast<std::size_t>(options.lbfgs_iterations) + 1);
       EXPECT_LT(solution.total.back(), 1.02 * adam) << to_string(kernel);
-      for (std::size_t i = 1; i < solution.total.size(); ++i) EXPECT_LE(solution.total[i], solution.total[i - 1]);
+      const auto imitation = static_cast<std::size_t>(imitation_iterations(options));
+      EXPECT_EQ(imitation, 8);
+      for (std::size_t i = 1; i < solution.total.size(); ++i)  // the weights change once
+        if (i != imitation) {
+          EXPECT_LE(solution.total[i], solution.total[i - 1]);
+        }
+    }
+  }
+}
+
+TEST(PairLbfgs, TheFirstIterationsAreImitationButOfAShortSearch) {
+  PairOptions options;
+  for (const auto& [iterations, imitation] : {std::pair{5, 0}, {6, 1}, {48, 8}, {80, 8}}) {
+    options.lbfgs_iterations = iterations;
+    EXPECT_EQ(imitation_iterations(options), imitation);
+  }
+  options.optimizer = Optimizer::kLbfgs;
+  options.lbfgs_iterations = 5;
+  const PairProblem problem = make_pair_problem(test::random_clip(40, 3), test::g1(), options);
+  const PairSolution solution = solve_pair(problem, options);
+  PairWeights last = options.weights;
+  last.con *= options.schedule.stage2_contact_scale;
+  EXPECT_NEAR(solution.total.front(), solution.terms.front().total(last), 1e-9 * solution.total.front());
+}
+
+TEST(PairOnGround, ThreadsDoNotChangeTheBits) {
+  const InteractionClip clip = test::random_clip(90, 12);
+  for (const PairMode name : {PairMode::kGrounded, PairMode::kBest}) {
+    const PairedMotion expected = retarget(clip, test::g1(), mode(name));
+    std::array<PairedMotion, 4> found;
+    std::vector<std::jthread> threads;
+    threads.reserve(found.size());
+    for (PairedMotion& motion : found) threads.emplace_back([&] { motion = retarget(clip, test::g1(), mode(name)); });
+    threads.clear();
+    for (const PairedMotion& motion : found) {
+      EXPECT_EQ(motion.robot.q, expected.robot.q);
+      EXPECT_EQ(motion.partner.joints, expected.partner.joints);
+      EXPECT_EQ(motion.loss, expected.loss);
     }
   }
 }
