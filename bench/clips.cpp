@@ -49,6 +49,10 @@ std::vector<ClipSource> list_sources(const Suite& suite) {
   return sources;
 }
 
+InteractionClip with_padding(InteractionClip clip, const ClipPadding& pad) {
+  return pad.any() ? padded(clip, pad.before, pad.after) : std::move(clip);
+}
+
 InteractionClip synthesize(const SyntheticClip& source) {
   SynthesisOptions options;
   options.seed = source.seed;
@@ -76,6 +80,7 @@ std::string maker_of(const Suite& suite, const RobotModel& robot) {
   std::string text =
       fmt::format("duet.prepared/1 {} {} {}", program_identity(), robot.digest, to_string(available_kernels().front()));
   for (const auto& [name, value] : suite.retarget) text += fmt::format("\n{}={}", name, value);
+  if (suite.clips.pad.any()) text += fmt::format("\npad {} {}", suite.clips.pad.before, suite.clips.pad.after);
   return text;
 }
 
@@ -90,15 +95,15 @@ LoadedMotion find_or_make(const PreparedClips& prepared, const std::string& labe
 
 // A file that is only read is not kept.
 LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const PairOptions& options,
-                       const PreparedClips& prepared) {
+                       const ClipPadding& pad, const PreparedClips& prepared) {
   if (const auto* file = std::get_if<std::string>(&source)) {
     const Npz npz = Npz::load(*file);
-    const auto read = [&] { return load_or_retarget(npz, robot, options); };
+    const auto read = [&] { return load_or_retarget(npz, robot, options, Implausible::kRefused, pad); };
     const bool keep = prepared.keeps() && kind_of(npz) == MotionFile::kClip;
     return keep ? find_or_make(prepared, sha256_file(*file), read) : read();
   }
   const auto& clip = std::get<SyntheticClip>(source);
-  const auto make = [&] { return LoadedMotion{retarget(synthesize(clip), robot, options), {}}; };
+  const auto make = [&] { return LoadedMotion{retarget(with_padding(synthesize(clip), pad), robot, options), {}}; };
   return prepared.keeps() ? find_or_make(prepared, label_of(clip), make) : make();
 }
 
@@ -114,12 +119,13 @@ void note_all(const std::vector<LoadedMotion>& made, Progress& progress) {
 
 std::vector<LoadedMotion> make_clips(const std::vector<ClipSource>& sources, const RobotModel& robot,
                                      const PairOptions& options, int threads, Progress& progress,
-                                     const PreparedClips& prepared = {"", ""}, const StopSign* stop = nullptr) {
+                                     const ClipPadding& pad = {}, const PreparedClips& prepared = {"", ""},
+                                     const StopSign* stop = nullptr) {
   std::vector<LoadedMotion> made(sources.size());
   progress.start("preparing clips", static_cast<int>(sources.size()), "clips");
   parallel_for_each(static_cast<int>(sources.size()), threads, [&](int i) {
     if (stop != nullptr && stop->asked()) throw Stopped();
-    made[i] = make_clip(sources[i], robot, options, prepared);
+    made[i] = make_clip(sources[i], robot, options, pad, prepared);
     progress.advance();
   });
   progress.finish();
@@ -175,14 +181,16 @@ MotionFile kind_of(const Npz& npz) {
 }
 
 LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
-                              Implausible implausible) {
+                              Implausible implausible, const ClipPadding& pad) {
   return naming_file(npz.name(), [&]() -> LoadedMotion {
     switch (kind_of(npz)) {
       case MotionFile::kClip: {
         ForeignClip read = read_foreign_clip(npz, implausible);
-        return {retarget(read.clip, robot, options), std::move(read.notes)};
+        return {retarget(with_padding(std::move(read.clip), pad), robot, options), std::move(read.notes)};
       }
       case MotionFile::kPaired:
+        if (pad.any())
+          throw InputError("expected a clip of two people, as only these can be padded, found a paired motion");
         return {read_paired_motion(npz), {}};
       case MotionFile::kRecording:
         break;
@@ -212,9 +220,9 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
                                         const PrepareOptions& prepare) {
   if (!suite.references.empty()) return empty_clips(suite.references);
   const PreparedClips prepared(prepare.keep_in, maker_of(suite, robot));
-  std::vector<PairedMotion> clips =
-      by_task(make_clips(list_sources(suite), robot, pair_options(suite), threads, progress, prepared, prepare.stop),
-              suite.tasks);
+  std::vector<PairedMotion> clips = by_task(make_clips(list_sources(suite), robot, pair_options(suite), threads,
+                                                       progress, suite.clips.pad, prepared, prepare.stop),
+                                            suite.tasks);
   if (clips.empty()) throw InputError(fmt::format("{}: no clip is left for the tasks of the suite", suite.file));
   for (const PairedMotion& clip : clips) check_robot(clip, robot);
   check_ids(clips);

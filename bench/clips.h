@@ -31,9 +31,10 @@ struct LoadedMotion {
   std::vector<std::string> notes;  // what a clip's reader should know (motion/plausibility.h)
 };
 
-// A clip, retargeted, or a paired motion. Throws InputError; for a recording with what is needed instead.
+// A clip, padded and retargeted, or a paired motion. Throws InputError; for a recording with what is needed instead,
+// and for a paired motion that is to be padded.
 LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
-                              Implausible implausible = Implausible::kRefused);
+                              Implausible implausible = Implausible::kRefused, const ClipPadding& pad = {});
 
 // Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads; what
 // there is to know of them is noted on `progress`. Throws InputError where none remains, Stopped (bench/stop_sign.h)

@@ -152,6 +152,7 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
   setup.seed = spec.seed;
   setup.foot_trace = spec.engine != kPlaybackEngine && spec.arm == "main" && controller_info(controller.use).walks;
   setup.fuse_ticks = suite.fuse_ticks;
+  setup.max_root_speed = suite.max_root_speed;
   if (suite.partner == PartnerMode::kSolid)
     setup.limits =
         load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);

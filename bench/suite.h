@@ -19,6 +19,7 @@
 #include "duet/motion/synthesis.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
+#include "duet/policies/scheduler.h"
 #include "duet/rollout/perturbation.h"
 
 namespace duet {
@@ -30,11 +31,19 @@ struct ClipVariant {
   std::optional<double> target_height{};  // [m]
 };
 
+// How long both people stand as in the first and the last frame of each clip around it.
+struct ClipPadding {
+  double before = 0.0, after = 0.0;  // [s]
+
+  [[nodiscard]] bool any() const { return before > 0.0 || after > 0.0; }
+};
+
 struct SuiteClips {
   int synth_per_task = 0;  // synthesised clips of each task, or
   std::uint64_t synth_seed = 42;
   std::vector<std::string> files;       // clips or paired motions (NPZ)
   std::vector<ClipVariant> variants{};  // of synthesised clips; none: each as it is drawn
+  ClipPadding pad{};
 };
 
 // A controller as a suite names it: one of duet's, or an IO descriptor, with options, under a name of its own.
@@ -68,8 +77,9 @@ struct Suite {
   SuiteStart start = SuiteStart::kAuto;
   double start_radius = 1.0;  // of `approach` [m]
   PartnerMode partner = PartnerMode::kGhost;
-  int fuse_ticks = kTicksPerPlan;  // SchedulerOptions
-  Profile profile;                 // step and solver settings of the suite's engines
+  int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions
+  double max_root_speed = SchedulerOptions{}.max_root_speed;  // [m/s]
+  Profile profile;                                            // step and solver settings of the suite's engines
   DetectorVersion detector = DetectorVersion::kRobot;
   ThresholdSet thresholds = ThresholdSet::kPaper;
   std::string contact_limits;                   // table; empty: the one that ships with duet

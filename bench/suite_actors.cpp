@@ -1,12 +1,14 @@
 #include "duet/bench/suite_actors.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <functional>
 
 #include "duet/bench/suite_names.h"
+#include "duet/bench/suite_section.h"
 #include "duet/controllers/registry.h"
 #include "duet/core/names.h"
 #include "duet/core/plain_name.h"
@@ -125,6 +127,37 @@ void read_list(const YamlSection& top, const char* key, const char* kind,
              fmt::format("{}: expected at least one {}, found none", key, kind));
 }
 
+std::string options_yaml(const std::map<std::string, std::string>& options) {
+  std::vector<std::string> texts;
+  texts.reserve(options.size());
+  for (const auto& [name, value] : options) texts.push_back(fmt::format("{}: {}", name, yaml_quoted(value)));
+  return fmt::format(", options: {{{}}}", fmt::join(texts, ", "));
+}
+
+// A plain controller or policy is its name.
+std::string to_yaml(const SuiteController& controller) {
+  if (controller.use == controller.name && controller.options.empty()) return controller.name;
+  return fmt::format("{{name: {}, use: {}{}}}", controller.name, yaml_quoted(controller.use),
+                     controller.options.empty() ? "" : options_yaml(controller.options));
+}
+
+std::string to_yaml(const SuitePolicy& policy) {
+  const bool plain = policy.options.empty() && policy.prompt.empty() && !policy.shuffled_partner;
+  if (policy.use == policy.name && plain) return policy.name;
+  return fmt::format("{{name: {}, use: {}{}{}{}}}", policy.name, yaml_quoted(policy.use),
+                     policy.options.empty() ? "" : options_yaml(policy.options),
+                     policy.prompt.empty() ? "" : ", prompt: " + yaml_quoted(policy.prompt),
+                     policy.shuffled_partner ? ", partner: shuffled" : "");
+}
+
+template <typename Item>
+std::string list_yaml(const char* key, const std::vector<Item>& items) {
+  std::vector<std::string> texts;
+  texts.reserve(items.size());
+  for (const Item& item : items) texts.push_back(to_yaml(item));
+  return fmt::format("{}: [{}]\n", key, fmt::join(texts, ", "));
+}
+
 }  // namespace
 
 void check_options_of(const SuiteController& controller) {
@@ -163,6 +196,9 @@ std::string from_folder_of(const Suite& suite, const std::string& file) {
   const bool here = !std::filesystem::exists(beside) && std::filesystem::exists(file);
   return std::filesystem::absolute(here ? std::filesystem::path(file) : beside).lexically_normal().string();
 }
+
+std::string controllers_yaml(const Suite& suite) { return list_yaml("controllers", suite.controllers); }
+std::string policies_yaml(const Suite& suite) { return list_yaml("policies", suite.policies); }
 
 void read_controllers(const YamlSection& top, Suite& suite) {
   read_list(top, "controllers", "controller", [&](const YAML::Node& node) {

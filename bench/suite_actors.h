@@ -12,6 +12,10 @@ namespace duet {
 void read_controllers(const YamlSection& top, Suite& suite);
 void read_policies(const YamlSection& top, Suite& suite);
 
+// Their lines of the resolved form; a plain controller or policy is its name.
+std::string controllers_yaml(const Suite& suite);
+std::string policies_yaml(const Suite& suite);
+
 // Throw std::invalid_argument for an unknown controller or policy, or an option that it does not have.
 void check_options_of(const SuiteController& controller);
 void check_options_of(const SuitePolicy& policy);

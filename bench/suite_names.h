@@ -33,6 +33,14 @@ const NameTable<ThresholdSet>& threshold_names();
 std::string_view to_string(SuiteStart start);
 std::string_view to_string(PartnerMode partner);
 
+// Its names in the order of the enumerators, which count from 0: the choices of a field (core/field.h).
+template <typename E>
+std::vector<std::string> choices_of(const NameTable<E>& table) {
+  std::vector<std::string> names(table.size());
+  for (const auto& [name, value] : table) names.at(static_cast<std::size_t>(value)) = name;
+  return names;
+}
+
 template <typename E>
 std::string_view name_of(const NameTable<E>& table, E value) {
   for (const auto& [name, known] : table)

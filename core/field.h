@@ -155,6 +155,19 @@ Field<Owner> field(FieldWords words, Member member, double Owner::*least) {
   return made;
 }
 
+// A field of a type of its own: what it may be, its text, and what sets it from one (what was expected, "" where it is
+// set).
+template <typename Owner>
+Field<Owner> field(FieldWords words, std::string values, std::function<std::string(const Owner&)> text,
+                   const std::function<std::string(Owner&, const std::string&)>& assign) {
+  Field<Owner> made;
+  static_cast<FieldWords&>(made) = std::move(words);
+  made.values = std::move(values);
+  made.text = std::move(text);
+  made.assign = [assign](Owner& owner, const std::string& said, const FieldRange&) { return assign(owner, said); };
+  return made;
+}
+
 template <typename Owner>
 FieldRange range_of(const Field<Owner>& known, const Owner& owner) {
   FieldRange range = known.range;

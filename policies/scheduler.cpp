@@ -14,7 +14,6 @@ namespace duet {
 namespace {
 
 constexpr double kUnitTolerance = 1e-6;
-constexpr int kMaxTicks = 90;  // inside the 100 ticks of a plan, with room for a plan that comes late
 
 double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
 
@@ -36,8 +35,8 @@ void check(const Reference& reference, const char* what) {
 
 Scheduler::Scheduler(const SchedulerOptions& options) : options_(options) {
   const auto check_ticks = [](const char* name, int ticks) {
-    require(1 <= ticks && ticks <= kMaxTicks,
-            fmt::format("scheduler: expected {} in 1..{}, found {}", name, kMaxTicks, ticks));
+    require(1 <= ticks && ticks <= kMostFuseTicks,
+            fmt::format("scheduler: expected {} in 1..{}, found {}", name, kMostFuseTicks, ticks));
   };
   check_ticks("fuse_ticks", options.fuse_ticks);
   check_ticks("late_after_ticks", options.late_after_ticks);

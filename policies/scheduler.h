@@ -7,6 +7,8 @@
 
 namespace duet {
 
+inline constexpr int kMostFuseTicks = 90;  // inside the 100 ticks of a plan, with room for a plan that comes late
+
 struct SchedulerOptions {
   int fuse_ticks = kTicksPerPlan;  // over which a new plan takes over from the old one, weight growing linearly
   double max_root_speed = 1.5;     // bound on the reference's root [m/s]

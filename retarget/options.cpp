@@ -1,12 +1,8 @@
 #include "duet/retarget/options.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <charconv>
-#include <cmath>
 #include <utility>
-#include <variant>
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -15,126 +11,131 @@ namespace duet {
 
 namespace {
 
-using Field =
-    std::variant<double*, int*, bool*, std::string*, PairMode*, Optimizer*, KinLoss*, ContactReduction*, ContactBlocks*,
-                 RootTranslation*, ContactKeypoints*, std::vector<ContactKeypoint>*, KernelKind*>;
+using Options = PairOptions;
 
-std::vector<std::pair<std::string, Field>> fields(PairOptions& o) {
-  return {{"mode", &o.mode},
-          {"w-kin", &o.weights.kin},
-          {"w-con", &o.weights.con},
-          {"w-hum", &o.weights.hum},
-          {"w-temp", &o.weights.temp},
-          {"w-acceleration", &o.weights.acceleration},
-          {"w-pose", &o.weights.pose},
-          {"w-bone", &o.weights.bone},
-          {"w-partner", &o.weights.partner},
-          {"w-collision", &o.weights.collision},
-          {"w-object", &o.weights.object},
-          {"stage1-iterations", &o.schedule.stage1_iterations},
-          {"stage1-rate", &o.schedule.stage1_rate},
-          {"stage2-iterations", &o.schedule.stage2_iterations},
-          {"stage2-rate", &o.schedule.stage2_rate},
-          {"stage2-contact-scale", &o.schedule.stage2_contact_scale},
-          {"keep-moments", &o.schedule.keep_moments},
-          {"adam-epsilon", &o.schedule.epsilon},
-          {"kin-loss", &o.kin_loss},
-          {"contact-reduction", &o.contact_reduction},
-          {"contact-blocks", &o.contact_blocks},
-          {"root", &o.root_translation},
-          {"keypoints", &o.keypoints},
-          {"keypoint-list", &o.keypoint_list},
-          {"filter", &o.filter},
-          {"adapt-human", &o.adapt_human},
-          {"kernel", &o.kernel},
-          {"optimizer", &o.optimizer},
-          {"lbfgs-iterations", &o.lbfgs_iterations},
-          {"ground", &o.ground},
-          {"root-smoothing", &o.root_smoothing},
-          {"smpl", &o.smpl_path}};
+FieldWords words(const char* name, const char* meaning, FieldRange range = {}, const char* unit = "") {
+  return {.name = name, .meaning = meaning, .unit = unit, .range = range};
 }
 
-// The texts of an enumeration's values, in the order of its enumerators.
-std::vector<std::string> texts(PairMode) { return {"paper", "grounded", "best"}; }
-std::vector<std::string> texts(Optimizer) { return {"adam", "lbfgs"}; }
-std::vector<std::string> texts(KinLoss) { return {"squared", "mean-norm"}; }
-std::vector<std::string> texts(ContactReduction) { return {"frobenius", "mean"}; }
-std::vector<std::string> texts(ContactBlocks) { return {"full", "cross-and-human", "cross"}; }
-std::vector<std::string> texts(RootTranslation) { return {"constant-offset", "per-frame", "fixed"}; }
-std::vector<std::string> texts(ContactKeypoints) { return {"nine", "eleven", "seven"}; }
-std::vector<std::string> texts(KernelKind) { return {"auto", "scalar", "v2", "v3", "v4"}; }
-std::vector<std::string> texts(bool) { return {"off", "on"}; }
-
-[[noreturn]] void refuse(const std::string& name, const std::string& value, const std::string& expected) {
-  throw std::invalid_argument(fmt::format("pair option '{}' has no value '{}': {}", name, value, expected));
+// A number, zero or more, or one of the names of an enumeration.
+template <typename Member>
+Field<Options> amount(const char* name, const char* meaning, Member member, const char* unit = "") {
+  return field<Options>(words(name, meaning, {.low = 0.0}, unit), member);
+}
+template <typename Member>
+Field<Options> choice(const char* name, std::vector<std::string> names, const char* meaning, Member member) {
+  return field<Options>({.name = name, .meaning = meaning, .choices = std::move(names)}, member);
+}
+Field<Options> flag(const char* name, const char* meaning, bool Options::*member) {
+  return choice(name, {"off", "on"}, meaning, member);
 }
 
-template <typename Value>
-void parse(Value& out, const std::string& name, const std::string& value) {
-  const std::vector<std::string> known = texts(out);
-  for (std::size_t i = 0; i < known.size(); ++i) {
-    if (known[i] != value) continue;
-    out = static_cast<Value>(i);
-    return;
-  }
-  refuse(name, value, fmt::format("{}", fmt::join(known, ", ")));
+// It sets all others.
+Field<Options> mode_field() {
+  Field<Options> mode =
+      choice("mode", {"paper", "grounded", "best"},
+             "as printed, standing on the ground, or that with L-BFGS; sets the options below", &Options::mode);
+  mode.assign = [set = mode.assign](Options& options, const std::string& text, const FieldRange& range) {
+    Options asked;
+    std::string expected = set(asked, text, range);
+    if (expected.empty()) options = pair_options_of(asked.mode);
+    return expected;
+  };
+  return mode;
 }
 
-template <typename Number>
-bool parse_number(Number& out, const std::string& value) {
-  const char* end = value.data() + value.size();
-  const auto [stop, error] = std::from_chars(value.data(), end, out);
-  return error == std::errc() && stop == end;
+Field<Options> keypoint_list() {
+  return field<Options>(
+      words("keypoint-list", "in the place of keypoints"), "joint[@frame][:weight[:object]], by commas",
+      [](const Options& o) { return format_contact_keypoints(o.keypoint_list); },
+      [](Options& o, const std::string& text) -> std::string {
+        try {
+          o.keypoint_list = parse_contact_keypoints(text);
+        } catch (const std::invalid_argument& error) {
+          return error.what();
+        }
+        return "";
+      });
 }
 
-void parse(double& out, const std::string& name, const std::string& value) {
-  double number = 0.0;
-  if (!parse_number(number, value) || !std::isfinite(number) || number < 0.0) {
-    refuse(name, value, "a finite number, zero or more");
-  }
-  out = number;
+void add_weights(FieldTable<Options>& table) {
+  const auto weight = [&](const char* name, const char* meaning, double PairWeights::*member) {
+    table.push_back(amount(
+        name, meaning, [member](auto& o) -> auto& { return o.weights.*member; }));
+  };
+  weight("w-kin", "of L_kin, the pose", &PairWeights::kin);
+  weight("w-con", "of L_con, the distances between the two", &PairWeights::con);
+  weight("w-hum", "of L_hum, the partner's own pose", &PairWeights::hum);
+  weight("w-temp", "of L_temp, smoothness", &PairWeights::temp);
+  weight("w-acceleration", "of the accelerations in L_temp", &PairWeights::acceleration);
+  weight("w-pose", "of L_pose, the robot's neutral pose", &PairWeights::pose);
+  weight("w-bone", "of the lengths of the partner's bones, collars to wrists; 0 as printed", &PairWeights::bone);
+  weight("w-partner", "of L_temp of the partner's offsets, as a share of w-temp; 0 as printed", &PairWeights::partner);
+  weight("w-collision", "of the depth of spheres of the two bodies in each other; 0 as printed",
+         &PairWeights::collision);
+  weight("w-object", "of the distances to a carried object, as a share of w-con; 0: no object", &PairWeights::object);
 }
 
-void parse(int& out, const std::string& name, const std::string& value) {
-  int number = 0;
-  if (!parse_number(number, value) || number < 0) refuse(name, value, "a whole number, zero or more");
-  out = number;
+void add_schedule(FieldTable<Options>& table) {
+  const auto add = [&](const char* name, const char* meaning, auto member) {
+    table.push_back(amount(
+        name, meaning, [member](auto& o) -> auto& { return o.schedule.*member; }));
+  };
+  add("stage1-iterations", "of stage 1", &PairSchedule::stage1_iterations);
+  add("stage1-rate", "Adam's learning rate in stage 1", &PairSchedule::stage1_rate);
+  add("stage2-iterations", "of stage 2", &PairSchedule::stage2_iterations);
+  add("stage2-rate", "Adam's learning rate in stage 2", &PairSchedule::stage2_rate);
+  add("stage2-contact-scale", "of w-con in stage 2", &PairSchedule::stage2_contact_scale);
+  table.push_back(choice(
+      "keep-moments", {"off", "on"}, "Adam's moments, across the stages",
+      [](auto& o) -> auto& { return o.schedule.keep_moments; }));
+  add("adam-epsilon", "Adam's epsilon", &PairSchedule::epsilon);
 }
 
-void parse(std::string& out, const std::string&, const std::string& value) { out = value; }
-
-void parse(std::vector<ContactKeypoint>& out, const std::string& name, const std::string& value) {
-  try {
-    out = parse_contact_keypoints(value);
-  } catch (const std::invalid_argument& error) {
-    refuse(name, value, error.what());
-  }
+FieldTable<Options> make_table() {
+  FieldTable<Options> table = {mode_field()};
+  table.reserve(32);
+  add_weights(table);
+  add_schedule(table);
+  for (Field<Options>& more : FieldTable<Options>{
+           choice("kin-loss", {"squared", "mean-norm"}, "sum of squares over pairs, 1/T, or PHC's mean norm",
+                  &Options::kin_loss),
+           choice("contact-reduction", {"frobenius", "mean"}, "as printed, 1/T, or 1/(T N^2)",
+                  &Options::contact_reduction),
+           choice("contact-blocks", {"full", "cross-and-human", "cross"},
+                  "distances: all, without robot to robot, or robot to human only", &Options::contact_blocks),
+           choice("root", {"constant-offset", "per-frame", "fixed"}, "how the root may move",
+                  &Options::root_translation),
+           choice("keypoints", {"nine", "eleven", "seven"},
+                  "head, shoulders, elbows, wrists, hands; with hips; without hands", &Options::keypoints),
+           flag("filter", "Gaussian over time, kernel 5, sigma 0.75, once at the end", &Options::filter),
+           flag("adapt-human", "whether the partner is moved", &Options::adapt_human),
+           choice("kernel", {"auto", "scalar", "v2", "v3", "v4"},
+                  "double reference (scalar) or float lanes: x86-64-v2, AVX2, AVX-512", &Options::kernel),
+           choice("optimizer", {"adam", "lbfgs"}, "Adam in two stages, or L-BFGS", &Options::optimizer),
+           amount("lbfgs-iterations", "of L-BFGS, all with the weights of stage 2", &Options::lbfgs_iterations),
+           flag("ground", "the robot stands: soles where the person's feet do", &Options::ground),
+           amount("root-smoothing", "standard deviation of the base's smoothing, where ground is on",
+                  &Options::root_smoothing, "s"),
+           field<Options>(words("smpl", "SMPL shape basis (NPZ); where there is none bone lengths are scaled"),
+                          &Options::smpl_path)})
+    table.push_back(std::move(more));
+  return table;
 }
 
-template <typename Value>
-std::string format_value(Value value) {
-  return texts(value)[static_cast<std::size_t>(value)];
-}
-std::string format_value(double value) { return fmt::format("{}", value); }
-std::string format_value(int value) { return fmt::format("{}", value); }
-std::string format_value(const std::string& value) { return value; }
-std::string format_value(const std::vector<ContactKeypoint>& value) { return format_contact_keypoints(value); }
-
-Field find_field(PairOptions& options, const std::string& name) {
-  for (const auto& [known, field] : fields(options)) {
-    if (known == name) return field;
-  }
+const Field<Options>& known_option(const std::string& name) {
+  if (const Field<Options>* known = find_field(pair_option_table(), name)) return *known;
   throw std::invalid_argument(unknown_name_message("pair option", name, pair_option_names()));
 }
 
 }  // namespace
 
-std::vector<std::string> pair_option_names() {
-  PairOptions options;
-  std::vector<std::string> names;
-  for (const auto& [name, field] : fields(options)) names.push_back(name);
-  return names;
+const FieldTable<PairOptions>& pair_option_table() {
+  static const FieldTable<PairOptions> table = make_table();
+  return table;
 }
+
+std::vector<std::string> pair_option_names() { return field_names(pair_option_table()); }
 
 PairOptions pair_options_of(PairMode mode) {
   PairOptions options;
@@ -161,18 +162,12 @@ PairOptions make_pair_options(const std::vector<std::pair<std::string, std::stri
 }
 
 void set_pair_option(PairOptions& options, const std::string& name, const std::string& value) {
-  if (name == "mode") {
-    PairMode mode = PairMode::kPaper;
-    parse(mode, name, value);
-    options = pair_options_of(mode);
-    return;
-  }
-  std::visit([&](auto* field) { parse(*field, name, value); }, find_field(options, name));
+  const std::string expected = set_field(known_option(name), options, value);
+  require(expected.empty(), fmt::format("pair option '{}' has no value '{}': {}", name, value, expected));
 }
 
 std::string pair_option(const PairOptions& options, const std::string& name) {
-  PairOptions copy = options;
-  return std::visit([](const auto* field) { return format_value(*field); }, find_field(copy, name));
+  return known_option(name).text(options);
 }
 
 void validate(const PairOptions& options) {

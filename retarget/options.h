@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "duet/core/field.h"
 #include "duet/retarget/contact_keypoints.h"
 
 namespace duet {
@@ -68,6 +69,9 @@ struct PairOptions {
   double root_smoothing = 0.2;  // standard deviation of the base's smoothing, where `ground` is on [s]
   std::string smpl_path;        // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
 };
+
+// One table of them, for `duet list`, suites and the reference page.
+const FieldTable<PairOptions>& pair_option_table();
 
 // Text forms for the command line and for PairedMotion::settings. The setter throws std::invalid_argument for an
 // unknown name or value and lists the known ones ("pair option 'root' has no value 'free': constant-offset, per-frame,

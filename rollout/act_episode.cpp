@@ -19,7 +19,8 @@ PolicyReference reference_of(const RolloutSetup& setup, Policy& policy) {
            .perception = setup.perturbation.perception,
            .perception_seed = setup.perturbation_seed,
            .plan_latency_ms = setup.perturbation.plan_latency_ms,
-           .fuse_ticks = setup.fuse_ticks}};
+           .fuse_ticks = setup.fuse_ticks,
+           .max_root_speed = setup.max_root_speed}};
 }
 
 Rollout finished(Rollout rollout, const RolloutSetup& setup, const PolicyReference& reference) {

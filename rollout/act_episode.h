@@ -8,6 +8,7 @@
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
+#include "duet/policies/scheduler.h"
 #include "duet/rollout/rollout.h"
 
 namespace duet {
@@ -20,8 +21,9 @@ struct RolloutSetup : EpisodeConditions {
   // none.
   PointTracks seen_partner;
   std::uint64_t seed = 0;
-  bool foot_trace = false;         // whether the row is to have one
-  int fuse_ticks = kTicksPerPlan;  // SchedulerOptions
+  bool foot_trace = false;                                    // whether the row is to have one
+  int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions
+  double max_root_speed = SchedulerOptions{}.max_root_speed;  // [m/s]
 };
 
 // Runs until the reference ends (and the partner with it, where it is varied: episode_ticks), or as roll_out of an

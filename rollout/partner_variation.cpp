@@ -1,12 +1,9 @@
 #include "duet/rollout/partner_variation.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "duet/core/clock.h"
-#include "duet/robots/yaml_range.h"
 
 namespace duet {
 namespace {
@@ -65,21 +62,6 @@ void scale_bodies(double scale, PointTracks& joints) {
 }
 
 }  // namespace
-
-PartnerVariation read_partner_variation(const YamlSection& section) {
-  PartnerVariation variation;
-  variation.scale = in_range(section, "scale", variation.scale, {0.5, 1.5, true});
-  variation.speed = in_range(section, "speed", variation.speed, {0.25, 4.0, true});
-  variation.shift_s = in_range(section, "shift_s", variation.shift_s, {-30.0, 30.0, true});
-  variation.hesitate_s = in_range(section, "hesitate_s", variation.hesitate_s, {0.0, 30.0, true});
-  variation.abort = section.flag_or("abort", variation.abort);
-  return variation;
-}
-
-std::string to_yaml(const PartnerVariation& variation) {
-  return fmt::format("{{scale: {}, speed: {}, shift_s: {}, hesitate_s: {}, abort: {}}}", variation.scale,
-                     variation.speed, variation.shift_s, variation.hesitate_s, variation.abort);
-}
 
 int episode_ticks(const PartnerVariation& variation, int reference_ticks) {
   const double slower = std::max(0.0, 1.0 / variation.speed - 1.0);

@@ -3,12 +3,9 @@
 #pragma once
 
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "duet/core/task.h"
 #include "duet/motion/human_motion.h"
-#include "duet/robots/yaml_section.h"
 
 namespace duet {
 
@@ -20,11 +17,6 @@ struct PartnerVariation {
   double hesitate_s = 0.0;  // stands still so long at half of its preparation [s]
   bool abort = false;       // at the middle of the act it goes back the way it came, as fast, and stays where it began
 };
-
-// Throws InputError: file, line, expected, found.
-PartnerVariation read_partner_variation(const YamlSection& section);
-// "{scale: 1, ...}" with every value.
-std::string to_yaml(const PartnerVariation& variation);
 
 // Ticks of an episode whose reference has so many (50 Hz): as many more as the partner needs to do at least what it
 // does in the clip by then (shift, hesitation, a speed below 1).

@@ -3,14 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "duet/core/random.h"
 #include "duet/policies/policy.h"
-#include "duet/robots/yaml_section.h"
 
 namespace duet {
 
@@ -32,17 +29,6 @@ struct PerceptionPlan {
   std::optional<PerceptionFreeze> freeze;
   std::optional<PerceptionJump> jump;
 };
-
-// One kind of it: a key of a perturbation, the keys of its mapping, what it means, and how it is read and written (""
-// where the plan has none of it). Reading throws InputError: file, line, expected, found.
-struct PerceptionKind {
-  std::string name;
-  std::vector<const char*> keys;
-  std::string meaning;
-  std::function<void(const YamlSection& mapping, PerceptionPlan& plan)> read;
-  std::function<std::string(const PerceptionPlan& plan)> write;
-};
-const std::vector<PerceptionKind>& perception_kinds();
 
 // A plan at work in one episode. Nothing allocates after construction; not thread-safe.
 class Perception {

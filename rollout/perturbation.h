@@ -61,10 +61,8 @@ struct Perturbation {
   std::optional<PartnerVariation> partner;
 };
 
-// The kinds that may be named alone, with their defaults: one table in perturbation.cpp, from which they are read,
-// written, listed and checked.
+// The kinds that may be named alone, with their defaults: one table (rollout/perturbation_kinds.h).
 const std::vector<std::string>& perturbation_kinds();
-std::string meaning_of_perturbation(const std::string& kind);  // throws std::invalid_argument for another name
 
 // Throws std::invalid_argument for another name, with the nearest; "clean" is one.
 Perturbation default_perturbation(const std::string& kind);

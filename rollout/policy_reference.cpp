@@ -13,7 +13,7 @@ PolicyReference::PolicyReference(Policy& policy, PolicyReferenceOptions options)
       options_(std::move(options)),
       latency_ticks_(ticks_of(options_.plan_latency_ms / 1000.0)),
       perception_(options_.perception, options_.perception_seed),
-      scheduler_({.fuse_ticks = options_.fuse_ticks}) {}
+      scheduler_({.fuse_ticks = options_.fuse_ticks, .max_root_speed = options_.max_root_speed}) {}
 
 void PolicyReference::begin(const RobotState& start) {
   options_.context.start = start;

@@ -21,6 +21,7 @@ struct PolicyReferenceOptions {
   std::uint64_t perception_seed = 0;
   double plan_latency_ms = 0.0;  // from what a policy saw to its plan in the scheduler, to the nearest tick
   int fuse_ticks = kTicksPerPlan;
+  double max_root_speed = SchedulerOptions{}.max_root_speed;  // [m/s]
 };
 
 class PolicyReference final : public ReferenceSource {

@@ -9,7 +9,9 @@
 #include "duet/bench/benchmarks/benchmark.h"
 #include "duet/bench/cli/command.h"
 #include "duet/bench/profile.h"
+#include "duet/bench/reference_pages.h"
 #include "duet/bench/shipped_suites.h"
+#include "duet/bench/suite_keys.h"
 #include "duet/controllers/controller.h"
 #include "duet/controllers/registry.h"
 #include "duet/core/names.h"
@@ -30,6 +32,7 @@
 #include "duet/robots/robot_cards.h"
 #include "duet/robots/robot_model.h"
 #include "duet/rollout/perturbation.h"
+#include "duet/rollout/perturbation_kinds.h"
 
 namespace duet::cli {
 namespace {
@@ -159,10 +162,32 @@ std::vector<Listed> list_joint_layouts() {
   return list;
 }
 
+// "force (60): a number above 0, at most 5000 N; at the centre of mass", and the same for machines.
+std::string field_line(const FieldRow& row) {
+  return fmt::format("{}{}: {}{}{}", row.name, row.fallback.empty() ? "" : fmt::format(" ({})", row.fallback),
+                     row.values, row.meaning.empty() ? "" : "; ", row.meaning);
+}
+nlohmann::json field_json(const FieldRow& row) {
+  return {{"name", row.name}, {"default", row.fallback}, {"values", row.values}, {"meaning", row.meaning}};
+}
+
 std::vector<Listed> list_pair_options() {
   std::vector<Listed> list;
-  for (const std::string& name : pair_option_names())
-    list.push_back({name, "default " + pair_option(PairOptions(), name)});
+  for (const FieldRow& row : field_rows(pair_option_table(), PairOptions()))
+    list.push_back(
+        {row.name, fmt::format("default {} ({}): {}", row.fallback, row.values, row.meaning), {}, field_json(row)});
+  return list;
+}
+
+std::vector<Listed> list_suite_keys() {
+  std::vector<Listed> list;
+  for (const SuiteKey& key : suite_keys())
+    for (const FieldRow& row : key.rows)
+      list.push_back({row.name,
+                      fmt::format("{} ({}): {}", row.fallback.empty() ? "no default" : "default " + row.fallback,
+                                  row.values, row.meaning),
+                      {},
+                      field_json(row)});
   return list;
 }
 
@@ -202,9 +227,14 @@ std::vector<Listed> list_controllers() {
 
 std::vector<Listed> list_perturbations() {
   std::vector<Listed> list = {{kCleanName, "nothing is disturbed"}};
-  for (const std::string& kind : perturbation_kinds())
-    list.push_back(
-        {kind, fmt::format("{}; default {}", meaning_of_perturbation(kind), to_yaml(default_perturbation(kind)))});
+  for (const PerturbationKind& kind : perturbation_kind_table()) {
+    Listed entry{kind.name, fmt::format("{}; default {}", kind.meaning, to_yaml(default_perturbation(kind.name)))};
+    for (const FieldRow& row : kind.rows) {
+      entry.options.push_back(row.name.empty() ? row.values : field_line(row));
+      entry.more["fields"].push_back(field_json(row));
+    }
+    list.push_back(std::move(entry));
+  }
   return list;
 }
 
@@ -264,6 +294,7 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
       {"profiles", list_profiles},
       {"controllers", list_controllers},
       {"suites", list_suites},
+      {"suite-keys", list_suite_keys},
       {"perturbations", list_perturbations},
       {"policies", list_policies},
       {"metrics", list_metrics},
@@ -308,13 +339,14 @@ std::vector<std::string> listing_names() {
 void add_list(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "list", "everything that can be named", "duet list readings");
   auto what = std::make_shared<std::string>();
-  command
-      ->add_option("what", *what,
-                   "tasks, detectors, engines, engine-options, profiles, controllers, suites, perturbations, policies, "
-                   "metrics, readings, pair-options, people-formats, joint-layouts, curation-criteria, robots, "
-                   "robot-formats, benchmarks")
-      ->required();
-  command->callback([&session, what] { run_list(session, *what); });
+  command->add_option("what", *what, fmt::format("{}", fmt::join(listing_names(), ", ")))->required();
+  auto markdown = std::make_shared<bool>(false);
+  command->add_flag("--markdown", *markdown,
+                    fmt::format("as a page of docs/reference: {}", fmt::join(reference_page_names(), ", ")));
+  command->callback([&session, what, markdown] {
+    if (*markdown) return print(session, reference_page(*what), {{"markdown", reference_page(*what)}});
+    run_list(session, *what);
+  });
 }
 
 }  // namespace duet::cli

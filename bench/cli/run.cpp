@@ -39,7 +39,7 @@ struct RunArguments {
 void use_clips(const std::vector<std::string>& paths, Suite& suite) {
   if (paths.empty()) return;
   require(suite.references.empty(), "--clips: the suite has a `reference` and no clips");
-  suite.clips = {};
+  suite.clips = {.files = {}, .pad = suite.clips.pad};
   for (const std::string& file : find_motion_files(paths))
     suite.clips.files.push_back(std::filesystem::absolute(file).string());
 }

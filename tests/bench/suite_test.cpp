@@ -110,9 +110,10 @@ TEST(Suite, ValuesOutOfRangeAreRefused) {
   EXPECT_THAT(refusal("dt: -1\n"), HasSubstr("divides 0.02"));
   EXPECT_THAT(refusal("episodes_per_clip: 0\n"), HasSubstr("expected a whole number, 1 to 2147483647, found 0"));
   EXPECT_THAT(refusal("episodes_per_clip: 1.5\n"), HasSubstr("whole number"));
-  EXPECT_THAT(refusal("start_radius: 9\n"), HasSubstr("0 to 5 m"));
-  EXPECT_THAT(refusal("fuse_ticks: 91\n"), HasSubstr("expected fuse_ticks in 1..90, found 91"));
-  EXPECT_THAT(refusal("limits: {wall_s_per_episode: 0}\n"), HasSubstr("more than 0 s"));
+  EXPECT_THAT(refusal("start_radius: 9\n"), HasSubstr("start_radius: expected a number from 0, at most 5 m, found 9"));
+  EXPECT_THAT(refusal("fuse_ticks: 91\n"), HasSubstr("fuse_ticks: expected a whole number, 1 to 90, found 91"));
+  EXPECT_THAT(refusal("limits: {wall_s_per_episode: 0}\n"),
+              HasSubstr("wall_s_per_episode: expected a number above 0, at most 1e+06 s, found 0"));
   EXPECT_THAT(refusal("seed: -4\n"), HasSubstr("expected a whole number, 0 to 9000000000000000, found -4"));
 }
 

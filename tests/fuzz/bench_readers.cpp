@@ -17,13 +17,14 @@ constexpr const char* kSuite = R"(schema: duet.suite/1
 name: sample
 version: 1.0.0
 seed: 7
-clips: {synth: {per_task: 2, seed: 42}}
+clips: {synth: {per_task: 2, seed: 42}, pad: {before: 1, after: 0.5}}
 tasks: [hug, handshake]
 engines: [playback]
 controllers: [pd]
 policies: [replay]
 episodes_per_clip: 2
 start: act
+max_root_speed: 0.6
 detector: {version: robot, thresholds: paper}
 limits: {wall_s_per_episode: 60}
 )";

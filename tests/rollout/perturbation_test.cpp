@@ -80,15 +80,48 @@ TEST(Perturbation, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(refusal("[]"), HasSubstr("at least one"));
   EXPECT_THAT(refusal("push"), HasSubstr("expected a list"));
   EXPECT_THAT(refusal("[{push: {forec: 3}}]"), HasSubstr("force"));
-  EXPECT_THAT(refusal("[{delay: {ticks: 1.5}}]"), HasSubstr("ticks: expected a whole number, found 1.5"));
-  EXPECT_THAT(refusal("[{delay: {ticks: 0}}]"), HasSubstr("expected a number from 1, at most 50, found 0"));
+  EXPECT_THAT(refusal("[{delay: {ticks: 1.5}}]"), HasSubstr("ticks: expected a whole number, 1 to 50, found 1.5"));
+  EXPECT_THAT(refusal("[{delay: {ticks: 0}}]"), HasSubstr("ticks: expected a whole number, 1 to 50, found 0"));
   EXPECT_THAT(refusal("[{latency: {ms: 0}}]"), HasSubstr("above 0"));
   EXPECT_THAT(refusal("[{noise: {q: -1}}]"), HasSubstr("q: expected"));
   EXPECT_THAT(refusal("[{push: {duration: 3, every: 2}}]"), HasSubstr("every: expected a number from 3"));
   EXPECT_THAT(refusal("[{kick: {from: 3, to: 2}}]"), HasSubstr("to: expected a number from 3"));
   EXPECT_THAT(refusal("[{kick: {speed: 0}}]"), HasSubstr("speed: expected a number above 0"));
-  EXPECT_THAT(refusal("[{friction: nan}]"), HasSubstr("finite"));
+  EXPECT_THAT(refusal("[{friction: nan}]"), HasSubstr("friction: expected a number from 0, at most 10, found 'nan'"));
   EXPECT_THAT(refusal("[{mass: 3}]"), HasSubstr("mass"));
+}
+
+// What a suite's hash is made of: no row of the table may change a letter of it.
+TEST(Perturbation, EveryKindIsWrittenAsItAlwaysWas) {
+  const std::vector<std::pair<std::string, std::string>> written = {
+      {"delay", "{ticks: 2}"},
+      {"latency", "{ms: 20}"},
+      {"noise", "{q: 0.01, v: 0.5, w: 0.2, gravity: 0.05}"},
+      {"push", "{force: 60, duration: 1, every: 4}"},
+      {"kick", "{speed: 0.5, first: 2, from: 3, to: 6}"},
+      {"friction", "0.4"},
+      {"mass", "{add: 3}"},
+      {"jitter", "{sigma: 0.02}"},
+      {"dropout", "{p: 0.1}"},
+      {"perception_latency", "{ms: 200}"},
+      {"vanish", "{at: 2}"},
+      {"freeze", "{at: 2, for: 1}"},
+      {"jump", "{at: 2, metres: 0.3}"},
+      {"plan_latency", "{ms: 100}"},
+      {"partner", "{scale: 1, speed: 1, shift_s: 0, hesitate_s: 0, abort: false}"}};
+  ASSERT_EQ(perturbation_kinds().size(), written.size());
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    const auto& [kind, values] = written[i];
+    EXPECT_EQ(perturbation_kinds()[i], kind);
+    EXPECT_EQ(to_yaml(default_perturbation(kind)), "{name: " + kind + ", " + kind + ": " + values + "}");
+    EXPECT_EQ(to_yaml(read("[{" + kind + ": " + values + "}]")[0]), to_yaml(default_perturbation(kind)));
+  }
+}
+
+TEST(Perturbation, ADefaultRisesToTheValueThatBoundsIt) {
+  EXPECT_EQ(read("[{push: {duration: 5}}]")[0].push->every, 5.0);
+  EXPECT_EQ(read("[{kick: {from: 8}}]")[0].kick->to, 8.0);
+  EXPECT_EQ(read("[{kick: {from: 2}}]")[0].kick->to, 6.0);
 }
 
 TEST(Perturbation, LinksAreThoseOfTheRobot) {

@@ -1,0 +1,89 @@
+#include "duet/bench/reference_pages.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "duet/bench/suite_keys.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/retarget/options.h"
+#include "duet/rollout/perturbation_kinds.h"
+
+namespace duet {
+namespace {
+
+constexpr const char* kMadeBy = "Made by `duet list {} --markdown` from the table that the program reads with.\n\n";
+
+struct PageMaker {
+  const char* name;
+  std::string (*make)();
+};
+
+// A cell of a Markdown table: as code, or "-" where there is nothing.
+std::string code(const std::string& text) { return text.empty() ? "-" : '`' + text + '`'; }
+
+std::string head(const std::string& title, const std::string& name, const std::string& about) {
+  return fmt::format("# {}\n\n{}\n\n{}", title, about, fmt::format(fmt::runtime(kMadeBy), name));
+}
+
+std::string suite_page() {
+  std::string text =
+      head(
+          "Keys of a suite", "suite-keys",
+          "A suite is a YAML file ([file-formats.md](../file-formats.md#suite)). Beside `reference` the keys of clips, "
+          "policies and people are refused.") +
+      "| key | default | value | meaning |\n|---|---|---|---|\n";
+  for (const SuiteKey& key : suite_keys())
+    for (const FieldRow& row : key.rows)
+      text += fmt::format("| `{}` | {} | {} | {} |\n", row.name, row.fallback.empty() ? "-" : row.fallback, row.values,
+                          row.meaning);
+  return text;
+}
+
+std::string perturbation_page() {
+  std::string text = head("Perturbations", "perturbations",
+                          "Kinds of perturbation of a suite ([file-formats.md](../file-formats.md#perturbations)).");
+  for (const PerturbationKind& kind : perturbation_kind_table()) {
+    text +=
+        fmt::format("## {}\n\n{}. By its name alone: `{}`.\n\n| key | default | value | meaning |\n|---|---|---|---|\n",
+                    kind.name, kind.meaning, to_yaml(default_perturbation(kind.name)));
+    for (const FieldRow& row : kind.rows)
+      text += fmt::format("| {} | {} | {} | {} |\n", code(row.name), code(row.fallback), row.values,
+                          row.meaning.empty() ? "-" : row.meaning);
+    text += '\n';
+  }
+  text.pop_back();
+  return text;
+}
+
+std::string pair_page() {
+  std::string text =
+      head("Options of PAIR", "pair-options",
+           "For `duet retarget --option NAME=VALUE` and the key `retarget` of a suite. Defaults are those "
+           "of the mode `paper`; [retargeting.md](../retargeting.md) tells the modes apart.") +
+      "| option | default | value | meaning |\n|---|---|---|---|\n";
+  for (const FieldRow& row : field_rows(pair_option_table(), PairOptions()))
+    text += fmt::format("| `{}` | {} | {} | {} |\n", row.name, code(row.fallback), row.values, row.meaning);
+  return text;
+}
+
+constexpr PageMaker kPages[] = {
+    {"suite-keys", suite_page}, {"perturbations", perturbation_page}, {"pair-options", pair_page}};
+
+}  // namespace
+
+std::vector<std::string> reference_page_names() {
+  std::vector<std::string> names;
+  names.reserve(std::size(kPages));
+  for (const PageMaker& page : kPages) names.emplace_back(page.name);
+  return names;
+}
+
+std::string reference_page(const std::string& name) {
+  for (const PageMaker& page : kPages)
+    if (name == page.name) return page.make();
+  throw std::invalid_argument(unknown_name_message("reference page", name, reference_page_names()));
+}
+
+}  // namespace duet

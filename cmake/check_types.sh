@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# One definition for each name: no two headers define a type of the same name in the same namespace, which a linker would
+# not notice. Prints each name with the places that define it; exit 1.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench)
+[ $# -eq 0 ] || rooms=("$@")
+
+# "NAMESPACE::NAME FILE:LINE" for each type that a header defines at the level of a namespace: clang-format leaves these
+# at the start of a line. Declarations ahead end with ';', specialisations have '<' after the name.
+definitions() {
+  find "${rooms[@]}" -name '*.h' | sort | while read -r file; do
+    awk -v file="$file" '
+      /^namespace [A-Za-z_:]+ \{$/ { space[++depth] = $2; next }
+      /^namespace \{$/ { space[++depth] = file; next }
+      /^\}  \/\/ namespace/ { depth--; next }
+      /^(struct|class|enum class|enum) [A-Za-z_]/ {
+        line = $0
+        if (line ~ /^[^{]*;/) next
+        sub(/^(struct|class|enum class|enum) /, "", line)
+        match(line, /^[A-Za-z_0-9]+/)
+        name = substr(line, 1, RLENGTH)
+        if (substr(line, RLENGTH + 1, 1) == "<") next
+        full = name
+        for (i = depth; i > 0; i--) full = space[i] "::" full
+        print full, file ":" FNR
+      }' "$file"
+  done
+}
+twice=$(definitions | sort | awk '
+  { if ($1 in places) { many[$1] = 1; places[$1] = places[$1] ", " $2 } else places[$1] = $2 }
+  END { for (name in many) print name ": defined in " places[name] }' | sort)
+if [ -n "$twice" ]; then
+  echo "$twice"
+  exit 1
+fi
+echo "types: no two headers define a type of the same name"

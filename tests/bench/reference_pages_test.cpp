@@ -1,0 +1,23 @@
+#include "duet/bench/reference_pages.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/core/file.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+TEST(ReferencePages, TheFilesAreWhatTheTablesSay) {
+  for (const std::string& name : reference_page_names())
+    EXPECT_EQ(read_file(std::string(DUET_SOURCE_DIR) + "/docs/reference/" + name + ".md"), reference_page(name))
+        << "`./run reference` writes docs/reference/" << name << ".md anew";
+}
+
+TEST(ReferencePages, AnUnknownOneIsRefusedWithTheNearest) {
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { reference_page("suite-key"); }),
+              testing::HasSubstr("did you mean 'suite-keys'"));
+}
+
+}  // namespace
+}  // namespace duet
