@@ -17,7 +17,7 @@ done <<<"$documents"
 
 # Paths as comments write them: from the root of the tree, or a bare ALL-CAPS or reference/ document.
 while IFS=: read -r file cited; do
-  [ -e "$cited" ] || missing "$file" "$cited"
+  [ -e "$cited" ] || [ -e "docs/$cited" ] || missing "$file" "$cited"
 done < <(grep -roE '\b(docs|reference|design|shared)/[A-Za-z0-9_/-]+\.md|\b[a-z_/0-9]+/README\.md|\b[A-Z]{4,}\.md' "${folders[@]}" run \
   --include='*.h' --include='*.cpp' --include='*.yaml' --include='*.txt' --include='*.cmake' --include='*.md' --include=run |
   grep -vE '/(README|CONTRIBUTING)\.md:|:(README|CONTRIBUTING)\.md$' | sort -u)
