@@ -15,6 +15,7 @@
 #include "duet/core/names.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
+#include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/motion/synthesis.h"
@@ -29,6 +30,7 @@ struct SyntheticClip {
   Task task;
   int index;
   std::uint64_t seed;
+  Likeness like;
   const ClipVariant* variant;  // of the suite; null: as drawn
 };
 using ClipSource = std::variant<std::string, SyntheticClip>;  // a file, or what is synthesised
@@ -36,9 +38,10 @@ using ClipSource = std::variant<std::string, SyntheticClip>;  // a file, or what
 void add_synthetic(const std::vector<Task>& tasks, const SuiteClips& clips, std::vector<ClipSource>& sources) {
   for (const Task task : tasks) {
     for (int index = 0; index < clips.synth_per_task; ++index) {
-      if (clips.variants.empty()) sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, nullptr});
+      if (clips.variants.empty())
+        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, clips.synth_like, nullptr});
       for (const ClipVariant& variant : clips.variants)
-        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, &variant});
+        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, clips.synth_like, &variant});
     }
   }
 }
@@ -53,10 +56,23 @@ InteractionClip with_padding(InteractionClip clip, const ClipPadding& pad) {
   return pad.any() ? padded(clip, pad.before, pad.after) : std::move(clip);
 }
 
+// A robot needs time to come and to go, and an act that is broken off is none to succeed in: who is like people stands
+// before and after, and goes through with it.
+void like_people(const SyntheticClip& source, SynthesisOptions& options) {
+  constexpr double kBefore = 4.0, kAfter = 2.0;  // [s]; as recordings are padded
+  constexpr double kHesitant = 0.1;
+  Random random(source.seed, stream_key({"hesitates", to_string(source.task), std::to_string(source.index)}));
+  options.like = Likeness::kPeople;
+  options.before = kBefore;
+  options.after = kAfter;
+  options.outcome = random.chance(kHesitant) ? ActOutcome::kHesitant : ActOutcome::kComplete;
+}
+
 InteractionClip synthesize(const SyntheticClip& source) {
   SynthesisOptions options;
   options.seed = source.seed;
   options.index = source.index;
+  if (source.like == Likeness::kPeople) like_people(source, options);
   if (source.variant == nullptr) return synthesize(source.task, options);
   options.side = source.variant->side;
   options.target_height = source.variant->target_height;
@@ -68,6 +84,7 @@ InteractionClip synthesize(const SyntheticClip& source) {
 // What tells a clip that is made from others.
 std::string label_of(const SyntheticClip& clip) {
   std::string label = fmt::format("{} {} {}", to_string(clip.task), clip.seed, clip.index);
+  if (clip.like != Likeness::kRehearsed) label += fmt::format(" like={}", name_of(likeness_names(), clip.like));
   if (clip.variant == nullptr) return label;
   label += " " + clip.variant->name;
   if (clip.variant->side) label += fmt::format(" {}", name_of(side_names(), *clip.variant->side));
@@ -230,8 +247,9 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
 }
 
 std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
-                                          std::uint64_t seed, int threads, Progress& progress) {
+                                          std::uint64_t seed, int threads, Progress& progress, Likeness like) {
   SuiteClips clips;
+  clips.synth_like = like;
   clips.synth_per_task = per_task;
   clips.synth_seed = seed;
   std::vector<ClipSource> sources;

@@ -44,7 +44,8 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
 
 // Clips that are no suite's: `per_task` of each task, for training.
 std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
-                                          std::uint64_t seed, int threads, Progress& progress);
+                                          std::uint64_t seed, int threads, Progress& progress,
+                                          Likeness like = Likeness::kRehearsed);
 
 PairOptions pair_options(const Suite& suite);
 

@@ -85,7 +85,8 @@ void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
 
 std::string origin_of(const DemonstrationOptions& options) {
   const std::string clips =
-      fmt::format("{} clips of each task (seed {}), {} start{} of each{}", options.per_task, options.seed,
+      fmt::format("{} clips of each task{} (seed {}), {} start{} of each{}", options.per_task,
+                  options.like == Likeness::kPeople ? " like people" : "", options.seed,
                   options.starts, options.starts == 1 ? "" : "s",
                   options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
@@ -105,7 +106,7 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
   set.origin = origin_of(options);
   for (const Task task : kPaperTasks) {  // one at a time: hours of clips and takes are gigabytes
     const std::vector<PairedMotion> clips =
-        synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress);
+        synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress, options.like);
     std::vector<std::optional<Take>> made(clips.size() * starts);
     progress.start(fmt::format("demonstrating {}", to_string(task)), static_cast<int>(made.size()), "takes");
     parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {

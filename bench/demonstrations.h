@@ -19,6 +19,7 @@ namespace duet {
 struct DemonstrationOptions {
   int per_task = 300;  // clips of each task
   std::uint64_t seed = 880001;
+  Likeness like = Likeness::kRehearsed;
   int starts = 2;                          // of each clip, drawn as A.4.4 has it
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
   int followed = 120;                      // clips of each task whose first start is also followed in the engine

@@ -41,6 +41,7 @@ struct ClipPadding {
 struct SuiteClips {
   int synth_per_task = 0;  // synthesised clips of each task, or
   std::uint64_t synth_seed = 42;
+  Likeness synth_like = Likeness::kRehearsed;
   std::vector<std::string> files;       // clips or paired motions (NPZ)
   std::vector<ClipVariant> variants{};  // of synthesised clips; none: each as it is drawn
   ClipPadding pad{};

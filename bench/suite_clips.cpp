@@ -77,7 +77,11 @@ const FieldTable<SuiteClips>& synth_fields() {
   static const FieldTable<SuiteClips> table = {
       field<SuiteClips>({.name = "per_task", .meaning = "clips to synthesise for each task", .range = {.low = 1}},
                         &SuiteClips::synth_per_task),
-      field<SuiteClips>({.name = "seed", .meaning = "of what is synthesised"}, &SuiteClips::synth_seed)};
+      field<SuiteClips>({.name = "seed", .meaning = "of what is synthesised"}, &SuiteClips::synth_seed),
+      field<SuiteClips>({.name = "like",
+                         .meaning = "which generator: acts rehearsed on a stage, or people as they were recorded",
+                         .choices = choices_of(likeness_names())},
+                        &SuiteClips::synth_like)};
   return table;
 }
 
@@ -97,7 +101,7 @@ const FieldTable<ClipPadding>& padding_fields() {
 
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = section_below(top, suite.file, "clips", {"synth", "files", "pad"});
-  const YamlSection synth = section_below(clips, suite.file, "synth", {"per_task", "seed", "variants"});
+  const YamlSection synth = section_below(clips, suite.file, "synth", {"per_task", "seed", "like", "variants"});
   read_fields(synth, synth_fields(), suite.clips);
   read_variants(synth, suite);
   if (clips.has("files")) suite.clips.files = names_in(clips, "files");
@@ -128,9 +132,13 @@ void check_variants(const YamlSection& top, const Suite& suite) {
 // A padding that is none is not written: suites of before there was one keep their hash.
 std::string clips_yaml(const SuiteClips& clips) {
   const std::string pad = clips.pad.any() ? flow_mapping(padding_fields(), clips.pad) : "";
-  if (clips.files.empty())
-    return fmt::format("clips: {{synth: {{per_task: {}, seed: {}{}}}{}}}\n", clips.synth_per_task, clips.synth_seed,
-                       variants_yaml(clips.variants), pad.empty() ? "" : ", pad: " + pad);
+  if (clips.files.empty()) {
+    // The first generator goes without saying, as in every suite before there was another.
+    const bool first = clips.synth_like == Likeness::kRehearsed;
+    const std::string like = first ? "" : fmt::format(", like: {}", name_of(likeness_names(), clips.synth_like));
+    return fmt::format("clips: {{synth: {{per_task: {}, seed: {}{}{}}}{}}}\n", clips.synth_per_task, clips.synth_seed,
+                       like, variants_yaml(clips.variants), pad.empty() ? "" : ", pad: " + pad);
+  }
   std::string text = "clips:\n  files:\n";
   for (const std::string& file : clips.files) text += fmt::format("    - \"{}\"\n", file);
   return pad.empty() ? text : fmt::format("{}  pad: {}\n", text, pad);

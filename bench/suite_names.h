@@ -25,6 +25,9 @@ bool is_path_option(std::string_view option);
 
 const NameTable<SuiteStart>& start_names();
 const NameTable<Side>& side_names();
+const NameTable<Likeness>& likeness_names();  // "rehearsed", "people"
+// Throws std::invalid_argument that begins with `option` and lists the names.
+Likeness likeness_of(std::string_view option, const std::string& name);
 const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();

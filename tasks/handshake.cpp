@@ -19,13 +19,27 @@ constexpr double kReach = 1.0;  // from the first movement to the clasp [s]
 // Clasped hands pass each other: each hand joint is this far beyond the middle and to its own side. [m]
 constexpr double kOverlap = 0.010, kAside = 0.012;
 
-std::vector<Burst> shake_bouts(double begin, double end, Draws& draws) {
-  const double rate = draws.uniform("shake.rate_hz", 1.6, 2.4);
+// Found on the 18 handshakes of SBU (docs/synthesis.md).
+constexpr RecordedManner kRecordedHandshake = {.tempo = {0.9, 1.15, 1.45},
+                                               .touch = {0.85, 1.3, 1.7},
+                                               .until_touch = kReach,
+                                               .distance = {0.98, 1.08, 1.26},
+                                               .way = {0.0, 0.04, 0.4},
+                                               .speed = {0.5, 0.75, 1.0},
+                                               .stands = 0.15,
+                                               .overlap = {0.5, 0.75, 1.0},
+                                               .reaction = {0.0, 0.25, 0.45},
+                                               .left = 0.03,
+                                               .before = {0.3, 0.65, 1.1},
+                                               .after = {0.33, 0.58, 0.7}};
+
+std::vector<Burst> shake_bouts(double begin, double end, const Manner& manner, Draws& draws) {
+  const double rate = draws.uniform("shake.rate_hz", 1.6, 2.4) / std::max(1.0, 0.75 * manner.tempo);
   Random random = draws.stream("shake.bouts");
   std::vector<Burst> bouts;
   double t = begin + random.uniform(0.1, 0.3);
   while (t < end) {
-    const double length = (3 + random.below(3)) / rate;
+    const double length = (manner.rehearsed ? 3 + random.below(3) : 1 + random.below(2)) / rate;
     if (t + length > end) break;
     bouts.push_back({t, t + length, rate, 0.35 / rate});
     t += length + random.uniform(0.6, 1.6);
@@ -42,6 +56,10 @@ Layout handshake_layout(const Cast& cast, Draws& draws) {
   Lean lean;
   lean.forward = draws.styled("lean", cast.style, 0.03, 0.12);
   lean.twist = -side_sign(cast.side) * draws.uniform("twist", 0.10, 0.22);
+  if (cast.manner.distance) {
+    lean.shift = draws.uniform("shift", 0.06, 0.14);  // onto the front foot; found by the speed of the roots
+    return meeting_at_distance(cast, z, *cast.manner.distance + 2.0 * lean.shift, lean);
+  }
   // At least 0.45 m: closer, a hand is at the own belly.
   return meeting_layout(cast, z, share, 0.45, 0.62, lean);
 }
@@ -49,7 +67,7 @@ Layout handshake_layout(const Cast& cast, Draws& draws) {
 void perform_handshake(Scene& scene, Draws& draws) {
   const double clasp = scene.act_begin + kReach;
   const double amplitude = draws.styled("shake.amplitude", scene.cast.style, 0.018, 0.045);
-  const std::vector<Burst> bouts = shake_bouts(clasp, scene.act_end - 0.2, draws);
+  const std::vector<Burst> bouts = shake_bouts(clasp, scene.act_end - 0.2, scene.cast.manner, draws);
   const int side = scene.cast.side;
   const Eigen::Vector3d middle = in_world(scene.people[0].act, scene.layout.meet);
   for (const int k : {0, 1}) {
@@ -254,7 +272,8 @@ const TaskDefinition& handshake() {
               .touch_distance = 0.05,
               .close = false,
               .layout = synthesis::handshake_layout,
-              .perform = synthesis::perform_handshake},
+              .perform = synthesis::perform_handshake,
+              .recorded = synthesis::kRecordedHandshake},
       .detector = {.thresholds = kHandshakeThresholds,
                    .figures = kHandshakeFigures,
                    .tracks = handshake_tracks,

@@ -23,6 +23,20 @@ constexpr double kSkin = 0.025;       // hand joint above the surface of the tor
 constexpr double kStatureGap = 0.13;  // from here on the taller one's arms both go over [m]
 constexpr std::array<SmplJoint, 3> kBackJoints = {kSpine1, kSpine2, kSpine3};
 
+// Found on the 21 hugs of SBU (docs/synthesis.md).
+constexpr RecordedManner kRecordedHug = {.tempo = {1.1, 1.36, 1.7},
+                                         .touch = {0.05, 0.05, 0.5},
+                                         .until_touch = kWrap,
+                                         .distance = {0.2, 0.24, 0.42},
+                                         .way = {0.5, 0.8, 1.05},
+                                         .speed = {1.6, 2.0, 2.4},
+                                         .stands = 0.03,
+                                         .overlap = {0.15, 0.26, 0.4},
+                                         .reaction = {0.1, 0.38, 0.5},
+                                         .left = 0.1,
+                                         .before = {0.62, 0.92, 1.6},
+                                         .after = {0.3, 0.56, 1.0}};
+
 // Where a hand lies on the partner's back, relative to a joint of the partner's spine (that joint's axes).
 struct Spot {
   SmplJoint joint = kSpine3;
@@ -48,10 +62,12 @@ Spot spot_for(const Cast& cast, const Layout& layout, int person, int arm, Draws
   Spot spot;
   spot.over = goes_over(cast, person, arm);
   const std::string name = fmt::format("{}{}.spot", kWho[person], arm == 0 ? "left" : "right");
-  const double below = draws.uniform(name + ".below", spot.over ? 0.10 : 0.12, spot.over ? 0.16 : 0.2);
+  double below = draws.uniform(name + ".below", spot.over ? 0.10 : 0.12, spot.over ? 0.16 : 0.2);
+  if (!cast.manner.rehearsed) below += draws.uniform(name + ".lower", 0.05, 0.3);  // height of the hands in SBU's hugs
   const double wanted = cast.target_height ? *cast.target_height + (spot.over ? 0.03 : -0.03)
                                            : own.p(2, sided(kLeftShoulder, arm)) - below;
-  const double z = std::clamp(wanted, partner.p(2, kSpine1) - 0.03, partner.p(2, kSpine3) + 0.09);
+  const double z =
+      std::clamp(wanted, partner.p(2, kSpine1) - (cast.manner.rehearsed ? 0.03 : 0.08), partner.p(2, kSpine3) + 0.09);
   for (const SmplJoint joint : kBackJoints)
     if (std::abs(z - partner.p(2, joint)) < std::abs(z - partner.p(2, spot.joint))) spot.joint = joint;
   // My left arm comes round the partner's right side.
@@ -84,6 +100,21 @@ std::vector<Burst> plan_pats(const std::string& who, double begin, double end, D
   return {{start, std::min(start + 1.8, end), 0.9, 0.4}};
 }
 
+constexpr double kMostHugLean = 0.45;  // of a trunk [rad]
+
+// They stand at `distance` (not so near that their trunks would be in each other) and lean into the embrace.
+void stand_off(const Cast& cast, double distance, Layout& layout) {
+  if (distance <= layout.distance) return;
+  const auto between = [&] {
+    double gap = distance;
+    for (const int k : {0, 1}) gap -= cast.body[k].torso_radius + embracing(cast, layout, k).p(0, kSpine3);
+    return gap;
+  };
+  while (between() > 0.03 && layout.lean[0].forward < kMostHugLean)
+    for (Lean& lean : layout.lean) lean.forward += 0.01;
+  layout.distance = distance;
+}
+
 Layout hug_layout(const Cast& cast, Draws& draws) {
   Layout layout;
   const double lean = draws.styled("lean", cast.style, 0.08, 0.17);
@@ -95,8 +126,11 @@ Layout hug_layout(const Cast& cast, Draws& draws) {
   for (const int k : {0, 1}) {
     layout.lean[k].forward = lean;
     layout.lean[k].side = -side_sign(cast.side) * 0.05;
+    if (!cast.manner.rehearsed) layout.lean[k].shift = draws.uniform(k == 0 ? "a.shift" : "b.shift", 0.07, 0.14);
     layout.distance += cast.body[k].torso_radius + embracing(cast, layout, k).p(0, kSpine3);
   }
+  if (cast.manner.distance)
+    stand_off(cast, *cast.manner.distance + layout.lean[0].shift + layout.lean[1].shift, layout);
   return layout;
 }
 
@@ -344,7 +378,8 @@ const TaskDefinition& hug() {
               .touch_distance = 0.25,
               .close = true,
               .layout = synthesis::hug_layout,
-              .perform = synthesis::perform_hug},
+              .perform = synthesis::perform_hug,
+              .recorded = synthesis::kRecordedHug},
       .detector = {.thresholds = kHugThresholds, .figures = kHugFigures, .tracks = hug_tracks, .detect = detect_hug},
       .rule = &rules::kHug};
   return kDefinition;

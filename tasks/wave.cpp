@@ -313,26 +313,28 @@ constexpr auto kWaveParaphrases = std::to_array<std::string_view>({
 namespace tasks {
 
 const TaskDefinition& wave() {
-  static constexpr TaskDefinition kDefinition = {.name = "wave",
-                                                 .prompt = "wave to the person",
-                                                 .paraphrases = kWaveParaphrases,
-                                                 .phrases = kWavePhrases,
-                                                 .phases = {.act = ActSignal::kHandsUp},
-                                                 .act = {.mean_seconds = 18.6,
-                                                         .shortest = 4.5,
-                                                         .longest = 9.0,
-                                                         .release = 1.0,
-                                                         .lowest = 1.45,
-                                                         .highest = 1.7,
-                                                         .touch_distance = 0.0,
-                                                         .close = false,
-                                                         .layout = synthesis::wave_layout,
-                                                         .perform = synthesis::perform_wave},
-                                                 .detector = {.thresholds = kWaveThresholds,
-                                                              .figures = kWaveFigures,
-                                                              .tracks = wave_tracks,
-                                                              .detect = detect_wave},
-                                                 .rule = &rules::kWave};
+  static constexpr TaskDefinition kDefinition = {
+      .name = "wave",
+      .prompt = "wave to the person",
+      .paraphrases = kWaveParaphrases,
+      .phrases = kWavePhrases,
+      .phases = {.act = ActSignal::kHandsUp},
+      .act = {.mean_seconds = 18.6,
+              .shortest = 4.5,
+              .longest = 9.0,
+              .release = 1.0,
+              .lowest = 1.45,
+              .highest = 1.7,
+              .touch_distance = 0.0,
+              .close = false,
+              .layout = synthesis::wave_layout,
+              .perform = synthesis::perform_wave,
+              .recorded = {.tempo = {1.0, 1.2, 1.5}, .way = {0.0, 0.1, 0.4}}},
+      .detector = {.thresholds = kWaveThresholds,
+                   .figures = kWaveFigures,
+                   .tracks = wave_tracks,
+                   .detect = detect_wave},
+      .rule = &rules::kWave};
   return kDefinition;
 }
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/dataset_stats.h"
 #include "duet/bench/cli/people_arguments.h"
 #include "duet/bench/interrupt.h"
 #include "duet/core/parallel.h"
@@ -173,21 +174,6 @@ void run_inspect(const Session& session, const DatasetArguments& arguments, int 
   print(session, text, json);
 }
 
-void run_stats(const Session& session, const std::string& folder) {
-  const std::vector<DatasetEntry> entries = read_dataset(folder);
-  std::string text;
-  nlohmann::json json = nlohmann::json::object();
-  for (const auto& [name, table] : {std::pair{"tasks", task_table(entries)},
-                                    {"outcomes", outcome_table(entries)},
-                                    {"curation", curation_table(entries)},
-                                    {"retargeting", retargeting_table(entries)}}) {
-    if (table.rows.empty()) continue;
-    text += markdown_table(table) + "\n";
-    json[name] = {{"header", table.header}, {"rows", table.rows}};
-  }
-  print(session, text, json);
-}
-
 struct ExportArguments {
   std::string dataset, output, to;
   std::vector<std::string> robots;
@@ -328,13 +314,6 @@ void add_phases(CLI::App& dataset, Session& session) {
   command->callback([&session, count, seed, threads] { run_phases(session, *count, *seed, *threads); });
 }
 
-void add_stats(CLI::App& dataset, Session& session) {
-  CLI::App* command = add_command(dataset, session, "stats", "the tables of a data set", "duet dataset stats data");
-  auto folder = std::make_shared<std::string>();
-  command->add_option("folder", *folder, "a data set")->required();
-  command->callback([&session, folder] { run_stats(session, *folder); });
-}
-
 }  // namespace
 
 void add_dataset(CLI::App& app, Session& session) {
@@ -344,7 +323,7 @@ void add_dataset(CLI::App& app, Session& session) {
   add_curate(*dataset, session);
   add_dataset_retarget(*dataset, session);
   add_dataset_convert(*dataset, session);
-  add_stats(*dataset, session);
+  add_dataset_stats(*dataset, session);
   add_phases(*dataset, session);
 }
 

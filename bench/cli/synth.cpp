@@ -5,10 +5,12 @@
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/suite_names.h"
 #include "duet/core/digest.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/motion/synthesis.h"
+#include "duet/motion/tracked_clip.h"
 
 namespace duet::cli {
 namespace {
@@ -17,7 +19,8 @@ struct SynthArguments {
   std::string task;
   int count = 1;
   std::string output;
-  std::string side;
+  std::string side, like = "rehearsed", outcome;
+  bool as_tracked = false;
   int threads = default_threads();
   SynthesisOptions options;
 };
@@ -27,12 +30,21 @@ std::vector<Task> chosen_tasks(const std::string& name) {
   return {parse_task(name)};
 }
 
+ActOutcome parse_outcome(const std::string& name) {
+  if (name == "complete") return ActOutcome::kComplete;
+  if (name == "hesitant") return ActOutcome::kHesitant;
+  require(name == "aborted", fmt::format("--outcome: expected complete, hesitant or aborted, found '{}'", name));
+  return ActOutcome::kAborted;
+}
+
 void run_synth(const Session& session, SynthArguments arguments) {
   if (!arguments.side.empty()) {
     require(arguments.side == "left" || arguments.side == "right",
             fmt::format("--side: expected left or right, found '{}'", arguments.side));
     arguments.options.side = arguments.side == "left" ? Side::kLeft : Side::kRight;
   }
+  arguments.options.like = likeness_of("--like", arguments.like);
+  if (!arguments.outcome.empty()) arguments.options.outcome = parse_outcome(arguments.outcome);
   constexpr int kMost = 100000;
   require(arguments.count >= 1 && arguments.count <= kMost,
           fmt::format("--count: expected 1 to {} clips of each task, found {}", kMost, arguments.count));
@@ -44,7 +56,8 @@ void run_synth(const Session& session, SynthArguments arguments) {
   parallel_for_each(total, arguments.threads, [&](int i) {
     SynthesisOptions options = arguments.options;
     options.index = arguments.options.index + i % arguments.count;
-    const InteractionClip clip = synthesize(tasks[i / arguments.count], options);
+    InteractionClip clip = synthesize(tasks[i / arguments.count], options);
+    if (arguments.as_tracked) clip = tracked(clip, {}, options.seed);
     const std::string path = (std::filesystem::path(arguments.output) / (clip.id + ".npz")).string();
     save_clip(clip, path);
     written[i] = {{"file", path},
@@ -62,7 +75,8 @@ void run_synth(const Session& session, SynthArguments arguments) {
 
 void add_synth(CLI::App& app, Session& session) {
   CLI::App* command = add_command(app, session, "synth", "synthesise two-person clips of a task",
-                                  "duet synth handshake --count 20 --seed 7 --output clips");
+                                  "duet synth handshake --count 20 --seed 7 --output clips\n"
+                                  "  duet synth hug --like people --tracked --count 20 --output clips");
   auto arguments = std::make_shared<SynthArguments>();
   command
       ->add_option("task", arguments->task,
@@ -85,6 +99,17 @@ void add_synth(CLI::App& app, Session& session) {
   fixed("--speed", arguments->options.speed, "walking speed [m/s]");
   fixed("--style", arguments->options.style, "0 restrained to 1 expansive");
   fixed("--duration", arguments->options.duration, "of the whole clip [s]");
+  command
+      ->add_option("--like", arguments->like,
+                   "rehearsed: long acts of two who come from three metres; people: short acts of two who stand "
+                   "close, cropped as recordings are")
+      ->capture_default_str();
+  fixed("--before", arguments->options.before, "like people: standing before anything moves [s]");
+  fixed("--after", arguments->options.after, "like people: standing after everything [s]");
+  command->add_option("--outcome", arguments->outcome,
+                      "like people: complete, hesitant or aborted (default: drawn)");
+  command->add_flag("--tracked", arguments->as_tracked,
+                    "as a depth camera would have it: 15 Hz, centimetres of noise, arms lost");
   command->add_option("--side", arguments->side, "hand of the act: left or right (default: drawn)");
   command->callback([&session, arguments] { run_synth(session, *arguments); });
 }

@@ -5,6 +5,7 @@
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/demonstrations.h"
+#include "duet/bench/suite_names.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/shipped_suites.h"
 #include "duet/core/file.h"
@@ -199,6 +200,11 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
   command->add_option("-o,--output", run.folder, "folder: demonstrations in data/, one subfolder per policy")
       ->capture_default_str();
   command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
+  command
+      ->add_option_function<std::string>(
+          "--like", [arguments](const std::string& name) { arguments->data.like = likeness_of("--like", name); },
+          "whose way the people of the clips have: rehearsed or people (docs/synthesis.md)")
+      ->default_str("rehearsed");
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
   command
       ->add_option("--start", arguments->start,

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "duet/tasks/synthesis/solid.h"
+
 namespace duet::synthesis {
 namespace {
 
@@ -89,21 +91,23 @@ std::vector<double> smooth_below(const std::vector<double>& limit, int half) {
   return smooth;
 }
 
-std::vector<TorsoPose> pose_torsos(const Performer& person, const Performer& partner, int frames, double rate_hz) {
+std::vector<TorsoPose> pose_torsos(const Performer& person, const Performer& partner, int frames, double rate_hz,
+                                   const Showing& showing) {
   std::vector<TorsoPose> torsos(frames);
   std::vector<double> limit(frames);
   for (int i = 0; i < frames; ++i) {
-    torsos[i] = torso_at(person, partner, i / rate_hz);
-    limit[i] = highest_pelvis(person, torsos[i], i / rate_hz);
+    const double t = showing.first + showing.tempo * (i / rate_hz);
+    torsos[i] = torso_at(person, partner, t);
+    limit[i] = highest_pelvis(person, torsos[i], t);
   }
-  const int half = std::max(1, static_cast<int>(std::lround(kHeightWindow * rate_hz)));
+  const int half = std::max(1, static_cast<int>(std::lround(kHeightWindow / showing.tempo * rate_hz)));
   const std::vector<double> heights = smooth_below(limit, half);
   for (int i = 0; i < frames; ++i) torsos[i].pelvis.z() = heights[i];
   return torsos;
 }
 
 // Reads no more of the partner than the torso.
-void pose_limbs(const Performer& person, const Figure& partner, double t, Figure& own) {
+void pose_limbs(const Performer& person, const Body& partner_body, const Figure& partner, double t, Figure& own) {
   // Arms swing against the legs: the left one goes forward with the right foot.
   const double ahead = left_ahead(person, t, own.yaw);
   const double stride = person.arm_swing * std::atan(ahead / (2.0 * person.body.leg()));
@@ -113,7 +117,10 @@ void pose_limbs(const Performer& person, const Figure& partner, double t, Figure
     const Moment moment{t, side, person.body, own, partner, -side_sign(side) * stride, sway};
     const ArmPose arm = person.arms[side].at(moment);
     pose_leg(person.body, person.gait.foot(side, t), side, own);
-    pose_arm(person.body, arm, side, own);
+    if (person.meets_skin)
+      pose_arm_outside(person.body, arm, side, solid_parts(partner_body, partner), own);
+    else
+      pose_arm(person.body, arm, side, own);
   }
 }
 
@@ -125,20 +132,22 @@ void store(const Figure& figure, int frame, HumanMotion& motion) {
 
 }  // namespace
 
-std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz) {
+std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz,
+                                  const Showing& showing) {
   std::array<HumanMotion, 2> motions;
   std::array<std::vector<TorsoPose>, 2> torsos;
   for (const int k : {0, 1}) {
     motions[k].rate_hz = rate_hz;
     motions[k].joints = PointTracks(frames, kSmplJoints);
     motions[k].rotations.reserve(static_cast<size_t>(frames) * kSmplJoints);
-    torsos[k] = pose_torsos(people[k], people[1 - k], frames, rate_hz);
+    torsos[k] = pose_torsos(people[k], people[1 - k], frames, rate_hz, showing);
   }
   for (int i = 0; i < frames; ++i) {
     std::array<Figure, 2> figures;
     for (const int k : {0, 1}) pose_torso(people[k].body, torsos[k][i], figures[k]);
     for (const int k : {0, 1}) {
-      pose_limbs(people[k], figures[1 - k], i / rate_hz, figures[k]);
+      pose_limbs(people[k], people[1 - k].body, figures[1 - k], showing.first + showing.tempo * (i / rate_hz),
+                 figures[k]);
       store(figures[k], i, motions[k]);
     }
   }

@@ -9,6 +9,13 @@
 
 namespace duet::synthesis {
 
-std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz);
+// What of the scene's time a clip shows: from `first` on, `tempo` seconds of it in each second of the clip.
+struct Showing {
+  double first = 0.0;  // [s]
+  double tempo = 1.0;
+};
+
+std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz,
+                                  const Showing& showing = {});
 
 }  // namespace duet::synthesis

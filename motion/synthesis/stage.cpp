@@ -18,25 +18,27 @@ constexpr double kLead = 0.4, kSettle = 0.3,
                  kTail = 0.4;         // least time standing: before, before the act, at the end [s]
 constexpr double kShortestWay = 0.6;  // both ways together [m]
 
-Body draw_body(const std::string& who, std::optional<double> height, Draws& draws) {
+}  // namespace
+
+Body draw_body(const std::string& who, std::optional<double> height, Draws& draws, double shortest_arms,
+               double longest_arms) {
   Random stature = draws.stream(who + "height");
   const double usual = std::clamp(1.71 + 0.10 * stature.normal(), 1.5, 1.95);
   const double h = height.value_or(usual);
   draws.record(who + "height", h);
   Proportions proportions;
   proportions.legs = draws.uniform(who + "legs", 0.975, 1.025);
-  proportions.arms = draws.uniform(who + "arms", 0.97, 1.03);
+  proportions.arms = draws.uniform(who + "arms", shortest_arms, longest_arms);
   proportions.shoulders = draws.uniform(who + "shoulders", 0.94, 1.06);
   proportions.hips = draws.uniform(who + "hips", 0.94, 1.06);
   return make_body(h, proportions);
 }
 
-// The four ends of the two ways. The middle between the two in the act is the origin, A sets out along +x.
-struct Ways {
-  std::array<Placement, 2> start, act;
-};
+namespace {
 
 Eigen::Vector2d towards(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }
+
+}  // namespace
 
 Ways plan_ways(const Layout& layout, double distance, double angle, double share) {
   Ways ways;
@@ -56,16 +58,22 @@ Ways plan_ways(const Layout& layout, double distance, double angle, double share
   return ways;
 }
 
+Walk step_back(const Body& body, const Placement& from, double speed, double by) {
+  Placement to = from;
+  to.position -= by * towards(from.yaw);
+  return plan_walk(body, from, to, 0.6 * speed, 0.0);
+}
+
+namespace {
+
 Walk later(Walk walk, double by) {
   walk.begin += by;
   walk.end += by;
   return walk;
 }
 
-Walk step_back(const Body& body, const Placement& from, double speed, const std::string& who, Draws& draws) {
-  Placement to = from;
-  to.position -= draws.uniform(who + "back", 0.5, 0.9) * towards(from.yaw);
-  Walk walk = plan_walk(body, from, to, 0.6 * speed, 0.0);
+Walk draw_step_back(const Body& body, const Placement& from, double speed, const std::string& who, Draws& draws) {
+  Walk walk = step_back(body, from, speed, draws.uniform(who + "back", 0.5, 0.9));
   walk.first_foot = draws.chance(who + "back.left_first", 0.5) ? 0 : 1;
   return walk;
 }
@@ -96,7 +104,7 @@ std::vector<Walk> plan_leave(const Body& body, const Placement& from, double spe
   draws.record(who + "leaves.turning", turns ? "yes" : "no");
   draws.record(who + "leaves.backwards", backs ? "yes" : "no");
   std::vector<Walk> walks;
-  if (backs) walks.push_back(step_back(body, from, speed, who, draws));
+  if (backs) walks.push_back(draw_step_back(body, from, speed, who, draws));
   if (turns) {
     const Placement here = backs ? walks.back().to : from;
     const double begin = backs ? walks.back().end + 0.15 : 0.0;
@@ -157,6 +165,8 @@ double draw_seconds(const Act& act, const SynthesisOptions& options, Draws& draw
   return draws.uniform("duration", 0.8 * act.mean_seconds, 1.2 * act.mean_seconds, options.duration);
 }
 
+}  // namespace
+
 Performer make_performer(const Body& body, const Ways& ways, int k, double style, Draws& draws) {
   const std::string who(kWho[k]);
   const double outward = draws.uniform(who + "arms.outward", 0.10, 0.17);
@@ -168,6 +178,8 @@ Performer make_performer(const Body& body, const Ways& ways, int k, double style
     person.sway[i] = Sway(draws.stream(who + "sway." + std::to_string(i)));
   return person;
 }
+
+namespace {
 
 void give_ways(Performer& person, const Timing& timing, int k, const Clock& clock) {
   person.reaction = timing.reaction[k];
@@ -218,11 +230,12 @@ Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
   scene.act_end = clock.act_end;
   scene.release_end = clock.release_end;
   for (const int k : {0, 1}) give_ways(scene.people[k], timing, k, clock);
-  return {std::move(scene), frames};
+  return {.scene = std::move(scene), .frames = frames};
 }
 
 void look_away(Scene& scene) {
   for (Performer& person : scene.people) {
+    if (person.gait.walks().empty()) continue;
     const Walk& last = person.gait.walks().back();
     if (last.turned_by < 1.0) person.look.to(last.begin, last.begin + 0.8, 0.0);
   }

@@ -38,4 +38,14 @@ Layout meeting_layout(const Cast& cast, double z, double share, double nearest, 
   return layout;
 }
 
+Layout meeting_at_distance(const Cast& cast, double z, double distance, const Lean& lean) {
+  const double arms = cast.body[0].arm() + cast.body[1].arm();
+  Layout layout;
+  layout.distance = distance;
+  layout.meet = {distance * cast.body[0].arm() / arms, 0.0, z};
+  for (const int k : {0, 1})
+    layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.96);
+  return layout;
+}
+
 }  // namespace duet::synthesis

@@ -10,6 +10,30 @@
 
 namespace duet::synthesis {
 
+// How people go about an act. `rehearsed`: the way of the first generator, to the bit.
+struct Manner {
+  bool rehearsed = true;
+  double tempo = 1.0;                      // how many times as fast the scene is played as it is planned
+  std::optional<double> distance = {};     // of the roots in the act [m]; else the layout's own
+};
+
+// What recorded people do in an act. docs/synthesis.md says where each figure is from.
+struct RecordedManner {
+  Deciles tempo = {1.4, 1.7, 2.0};  // of the planned motion
+  Deciles act = {};                 // from its begin to its end, at tempo 1 [s]; zeros: as the rehearsed act has it
+  Deciles touch = {};               // of an act with a touch that lasts, its length as played [s]
+  double until_touch = 0.0;         // from the act's begin to that touch, at tempo 1 [s]
+  Deciles distance = {};            // of the roots in the act [m]; zeros: the layout's own
+  Deciles way = {0.0, 0.2, 0.5};    // that both together walk up to each other [m]
+  Deciles speed = {0.45, 0.7, 1.0};  // in the middle of such a way [m/s]
+  double stands = 0.35;              // share of people who leave it to the other
+  Deciles overlap = {0.1, 0.3, 0.5};   // by which the act begins before the two stand, as played [s]
+  Deciles reaction = {0.05, 0.2, 0.5};  // of B to A, as played [s]
+  double left = 0.106;                  // share of acts with the left hand
+  Deciles before = {0.5, 0.9, 1.4};     // what a recording has before the touch (a gesture's begin) [s]
+  Deciles after = {0.2, 0.5, 1.0};      // and after it [s]
+};
+
 // Who takes part, before anybody is placed.
 struct Cast {
   std::array<Body, 2> body;  // A, B
@@ -17,6 +41,7 @@ struct Cast {
   double style = 0.5;
   std::optional<double> target_height;  // above the ground [m]
   double farthest = 2.0;                // largest root distance that leaves both a way to walk [m]
+  Manner manner = {};
 };
 
 // How they stand to each other: A at the origin facing +x, B at (distance, lateral) facing -x. [m]
@@ -52,6 +77,7 @@ struct Act {
   bool close;                // they stand so close that they must step back before they may turn
   Layout (*layout)(const Cast&, Draws&);
   void (*perform)(Scene&, Draws&);
+  RecordedManner recorded = {};
 };
 
 // Point of a person's frame (origin on the floor below the root, x forward) in W.
@@ -59,6 +85,8 @@ Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& poin
 // The same point seen by A and by B of a layout.
 Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a);
 
+// Distance and leans where the distance is given and the hands meet at height `z` between them.
+Layout meeting_at_distance(const Cast& cast, double z, double distance, const Lean& lean);
 // Distance and leans for hands that meet at height `z`: each reaches with `share` of the arm, but neither less than
 // `nearest` nor more than `farthest` in front of the own root.
 Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean);

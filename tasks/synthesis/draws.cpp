@@ -28,6 +28,14 @@ double Draws::styled(const std::string& quantity, double style, double low, doub
   return value;
 }
 
+double Draws::spread(const std::string& quantity, const Deciles& deciles) {
+  const double u = stream(quantity).uniform();
+  const double value = u < 0.5 ? deciles.middle + (u - 0.5) / 0.4 * (deciles.middle - deciles.low)
+                               : deciles.middle + (u - 0.5) / 0.4 * (deciles.high - deciles.middle);
+  record(quantity, value);
+  return value;
+}
+
 bool Draws::chance(const std::string& quantity, double probability, std::optional<bool> given) {
   const bool value = given ? *given : stream(quantity).chance(probability);
   recorded_[quantity] = value ? "yes" : "no";

@@ -17,6 +17,11 @@ namespace duet::synthesis {
 // Names of one person's quantities begin with this.
 inline constexpr std::array<std::string_view, 2> kWho = {"a.", "b."};
 
+// 10, 50 and 90 % of a quantity over clips.
+struct Deciles {
+  double low = 0.0, middle = 0.0, high = 0.0;
+};
+
 class Draws {
  public:
   Draws(std::uint64_t seed, Task task, int index);
@@ -26,6 +31,8 @@ class Draws {
   // A quantity that follows the style (0 ... 1): low + (high - low) * style, give or take a fifth of the range, kept
   // inside it.
   double styled(const std::string& quantity, double style, double low, double high);
+  // Through the 10, 50 and 90 % of a distribution, straight in between and a quarter of the last stretch beyond.
+  double spread(const std::string& quantity, const Deciles& deciles);
   bool chance(const std::string& quantity, double probability, std::optional<bool> given = {});
   [[nodiscard]] Random stream(std::string_view quantity) const;
 

@@ -30,6 +30,7 @@ struct Performer {
   Placement act;          // where the feet stand during the act
   double reaction = 0.0;  // how much later than A this person begins things [s]
   double arm_swing = 0.7;
+  bool meets_skin = false;  // hands stop at the partner's trunk and head
   Channel forward, side, twist, crouch, shift;
   Channel look{1.0};  // 1: at the partner, 0: straight ahead
   Channel nod;        // of the head, forward [rad]

@@ -1,0 +1,140 @@
+#include "duet/metrics/interaction_statistics.h"
+
+#include <cmath>
+
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+// Two who stand 1 m apart, hands down; the right hands meet in the middle in frames [begin, end).
+HumanMotion standing(double x, int frames, double rate_hz) {
+  HumanMotion person{.rate_hz = rate_hz, .joints = PointTracks(frames, kSmplJoints), .rotations = {}};
+  for (int t = 0; t < frames; ++t)
+    for (int j = 0; j < kSmplJoints; ++j) person.joints.at(t, j) = Eigen::Vector3d(x, 0.05 * j, 0.9);
+  for (int t = 0; t < frames; ++t) {
+    person.joints.at(t, kHead).z() = 1.6;
+    person.joints.at(t, kNeck).z() = 1.5;
+    person.joints.at(t, kLeftToe).z() = 0.0;
+    for (const int hand : {kLeftHand, kRightHand}) person.joints.at(t, hand).z() = 0.8;
+  }
+  return person;
+}
+
+InteractionClip meeting(int begin, int end, int frames = 100, double rate_hz = 50.0) {
+  InteractionClip clip;
+  clip.id = "meeting";
+  clip.task = Task::kHandshake;
+  clip.a = standing(0.0, frames, rate_hz);
+  clip.b = standing(1.0, frames, rate_hz);
+  clip.phases = {.act_begin = begin, .act_end = end};
+  for (int t = begin; t < end; ++t) {
+    clip.a.joints.at(t, kRightHand) = Eigen::Vector3d(0.45, 0.0, 1.1);
+    clip.b.joints.at(t, kRightHand) = Eigen::Vector3d(0.55, 0.0, 1.1);
+  }
+  return clip;
+}
+
+TEST(InteractionStatistics, TouchIsTimedAndPlaced) {
+  const InteractionStatistics found = interaction_statistics(meeting(20, 70));
+  EXPECT_DOUBLE_EQ(found.seconds, 2.0);
+  EXPECT_DOUBLE_EQ(found.touches, 1.0);
+  EXPECT_DOUBLE_EQ(found.touch_s, 1.0);
+  EXPECT_DOUBLE_EQ(found.before_s, 0.4);
+  EXPECT_DOUBLE_EQ(found.after_s, 0.6);
+  EXPECT_DOUBLE_EQ(found.touch_distance, 1.0);
+  EXPECT_NEAR(found.touch_height, 1.1, 1e-12);
+  EXPECT_DOUBLE_EQ(found.right_hands, 1.0);
+  EXPECT_DOUBLE_EQ(found.standing, 1.0);
+  EXPECT_DOUBLE_EQ(found.reaction_s, 0.0);
+}
+
+TEST(InteractionStatistics, HandsTouchBelowTheirThresholdOnly) {
+  InteractionClip clip = meeting(20, 70);
+  for (int t = 20; t < 70; ++t) clip.b.joints.at(t, kRightHand).x() = 0.45 + kHandsTouch;
+  const InteractionStatistics apart = interaction_statistics(clip);
+  EXPECT_EQ(apart.touches, 0.0);
+  EXPECT_TRUE(std::isnan(apart.touch_s));
+  EXPECT_TRUE(std::isnan(apart.touch_distance));
+  for (int t = 20; t < 70; ++t) clip.b.joints.at(t, kRightHand).x() -= 1e-6;
+  EXPECT_EQ(interaction_statistics(clip).touches, 1.0);
+}
+
+TEST(InteractionStatistics, AHugTouchesWithAHandAtTheTrunk) {
+  InteractionClip clip = meeting(0, 0);
+  clip.phases = {.act_begin = 0, .act_end = 100};
+  clip.task = Task::kHug;
+  EXPECT_EQ(interaction_statistics(clip).touches, 0.0);
+  for (int t = 10; t < 30; ++t) clip.a.joints.at(t, kLeftHand) = Eigen::Vector3d(0.8, 0.0, 1.2);
+  const InteractionStatistics found = interaction_statistics(clip);
+  EXPECT_DOUBLE_EQ(found.touch_s, 0.4);
+  EXPECT_DOUBLE_EQ(found.right_hands, 0.0);
+}
+
+TEST(InteractionStatistics, AGestureLastsAsLongAsItsAct) {
+  InteractionClip clip = meeting(20, 70);
+  clip.task = Task::kWave;
+  const InteractionStatistics found = interaction_statistics(clip);
+  EXPECT_DOUBLE_EQ(found.touch_s, 1.0);
+  EXPECT_TRUE(std::isnan(found.touch_height));
+}
+
+TEST(InteractionStatistics, WhoWalksUpDoesNotStandAndCloses) {
+  InteractionClip clip = meeting(60, 90);
+  for (int t = 0; t < 100; ++t) {
+    const double late = std::max(0.0, 50.0 - t) / 50.0;  // 1 m in 1 s
+    clip.b.joints.frame(t).row(0).array() += late;
+  }
+  const InteractionStatistics found = interaction_statistics(clip);
+  EXPECT_NEAR(found.approach_speed, 1.0, 1e-9);
+  EXPECT_DOUBLE_EQ(found.standing, 0.5);
+  EXPECT_DOUBLE_EQ(found.largest_distance, 2.0);
+  EXPECT_DOUBLE_EQ(found.touch_distance, 1.0);
+}
+
+TEST(InteractionStatistics, ReactionIsBetweenTheTwoSettingOut) {
+  InteractionClip clip = meeting(50, 70);
+  for (int t = 30; t < 50; ++t) clip.a.joints.at(t, kRightHand).x() += kSetOut + 1e-6;
+  EXPECT_DOUBLE_EQ(interaction_statistics(clip).reaction_s, 0.4);
+  for (int t = 30; t < 50; ++t) clip.a.joints.at(t, kRightHand).x() -= 2e-6;
+  EXPECT_DOUBLE_EQ(interaction_statistics(clip).reaction_s, 0.0);
+}
+
+TEST(InteractionStatistics, RateIsThatOfTheRecording) {
+  InteractionClip clip = meeting(20, 70);
+  EXPECT_DOUBLE_EQ(interaction_statistics(clip).source_rate_hz, 50.0);
+  clip.source["source_rate_hz"] = "15";
+  EXPECT_DOUBLE_EQ(interaction_statistics(clip).source_rate_hz, 15.0);
+  clip.source["source_rate_hz"] = "no number";
+  EXPECT_DOUBLE_EQ(interaction_statistics(clip).source_rate_hz, 50.0);
+}
+
+TEST(InteractionStatistics, TooShortAClipIsRefused) {
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { (void)interaction_statistics(meeting(0, 1, 2)); }),
+            "interaction statistics of clip 'meeting': expected at least 3 frames, found 2");
+}
+
+TEST(InteractionStatistics, SpreadsAgreeWithinAFifth) {
+  const InteractionStatisticInfo time = {"t", "T", "s", &InteractionStatistics::touch_s, false};
+  const InteractionStatisticInfo share = {"s", "S", "1", &InteractionStatistics::touches, true};
+  std::vector<InteractionStatistics> clips(11);
+  for (int i = 0; i < 11; ++i) clips[i].touch_s = i;
+  clips[0].touches = 1.0;
+  clips.push_back({});  // has none
+  const StatisticSpread spread = spread_of(clips, time);
+  EXPECT_EQ(spread.clips, 11);
+  EXPECT_DOUBLE_EQ(spread.low, 1.0);
+  EXPECT_DOUBLE_EQ(spread.middle, 5.0);
+  EXPECT_DOUBLE_EQ(spread.high, 9.0);
+  EXPECT_NEAR(spread_of(clips, share).middle, 1.0 / 12.0, 1e-12);
+  EXPECT_EQ(spread_of({}, time).clips, 0);
+  const auto middle = [](double value) { return StatisticSpread{1, value, value, value}; };
+  EXPECT_TRUE(agree(middle(4.0), middle(5.0), time));
+  EXPECT_FALSE(agree(middle(3.99), middle(5.0), time));
+  EXPECT_FALSE(agree(middle(6.01), middle(5.0), time));
+  EXPECT_TRUE(agree(middle(0.19), middle(0.0), share));
+  EXPECT_FALSE(agree(middle(0.21), middle(0.0), share));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,173 @@
+// Clips like people: what was drawn, what is shown, and what a tracker makes of it.
+#include <set>
+
+#include "duet/motion/synthesis.h"
+#include "duet/motion/tracked_clip.h"
+#include "duet/tasks/task_definition.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+InteractionClip people(Task task, SynthesisOptions options = {}) {
+  options.like = Likeness::kPeople;
+  return synthesize(task, options);
+}
+
+bool same(const InteractionClip& one, const InteractionClip& other) {
+  return one.a.joints == other.a.joints && one.b.joints == other.b.joints && one.source == other.source &&
+         one.phases == other.phases && one.contacts == other.contacts;
+}
+
+std::string refused(Task task, const SynthesisOptions& options) {
+  return test::thrown_message<std::invalid_argument>([&] { (void)synthesize(task, options); });
+}
+
+TEST(PeopleSynthesis, SeedAndIndexDecide) {
+  for (const Task task : all_tasks()) {
+    EXPECT_TRUE(same(people(task, {.seed = 3, .index = 2}), people(task, {.seed = 3, .index = 2}))) << to_string(task);
+    EXPECT_FALSE(same(people(task, {.seed = 3, .index = 2}), people(task, {.seed = 4, .index = 2})));
+    EXPECT_FALSE(same(people(task, {.seed = 3, .index = 2}), people(task, {.seed = 3, .index = 3})));
+  }
+}
+
+TEST(PeopleSynthesis, ClipsAreNamedAndLabelled) {
+  const InteractionClip clip = people(Task::kHug, {.seed = 9, .index = 1, .outcome = ActOutcome::kHesitant});
+  EXPECT_EQ(clip.id, "people-hug-s9-0001");
+  EXPECT_EQ(clip.source.at("like"), "people");
+  EXPECT_EQ(clip.source.at("outcome"), "hesitant");
+  for (const char* key : {"tempo", "act.apart", "touch", "way", "overlap", "b.reaction", "before", "after", "a.height"})
+    EXPECT_TRUE(clip.source.contains(key)) << key;
+}
+
+TEST(PeopleSynthesis, AllTasksAreValidAndTheirContactsHold) {
+  for (const Task task : all_tasks()) {
+    const double within = definition_of(task).act.touch_distance;
+    for (int index = 0; index < 12; ++index) {
+      const InteractionClip clip = people(task, {.seed = 5, .index = index});
+      ASSERT_NO_THROW(validate(clip)) << clip.id;
+      EXPECT_LT(clip.frames() / clip.rate_hz(), 12.0) << clip.id;
+      if (task == Task::kHug) continue;  // hands that the body stops may stay farther from the spine
+      for (const ContactWindow& window : clip.contacts)
+        for (int t = window.begin; t < window.end; ++t)
+          ASSERT_LT((clip.a.joints.at(t, window.joint_a) - clip.b.joints.at(t, window.joint_b)).norm(), within + 0.03)
+              << clip.id << " frame " << t;
+    }
+  }
+}
+
+TEST(PeopleSynthesis, OutcomesAreDrawnAndCanBeAskedFor) {
+  std::set<std::string> drawn;
+  for (int index = 0; index < 60; ++index)
+    drawn.insert(people(Task::kHandshake, {.index = index, .rate_hz = 20.0}).source.at("outcome"));
+  EXPECT_EQ(drawn, (std::set<std::string>{"aborted", "complete", "hesitant"}));
+  const InteractionClip aborted = people(Task::kHandshake, {.outcome = ActOutcome::kAborted});
+  EXPECT_TRUE(aborted.contacts.empty());
+  double nearest = 1.0;
+  for (int t = 0; t < aborted.frames(); ++t)
+    nearest = std::min(nearest, (aborted.a.joints.at(t, kRightHand) - aborted.b.joints.at(t, kRightHand)).norm());
+  EXPECT_GT(nearest, 0.05);
+  EXPECT_FALSE(people(Task::kHandshake, {.outcome = ActOutcome::kComplete}).contacts.empty());
+}
+
+TEST(PeopleSynthesis, BeforeAndAfterShowPeopleWhoStand) {
+  const SynthesisOptions shown{.before = 4.0, .after = 2.0, .outcome = ActOutcome::kComplete};
+  for (const Task task : {Task::kHandshake, Task::kHug, Task::kWave}) {
+    const InteractionClip clip = people(task, shown), cropped = people(task, {.outcome = ActOutcome::kComplete});
+    EXPECT_GT(clip.frames(), cropped.frames() + 200) << to_string(task);
+    for (const HumanMotion* person : {&clip.a, &clip.b}) {
+      const Eigen::Vector3d begin = person->joints.at(0, kPelvis), later = person->joints.at(150, kPelvis);
+      EXPECT_LT((begin - later).head<2>().norm(), 0.03) << to_string(task);
+      const int n = clip.frames();
+      const Eigen::Vector3d before = person->joints.at(n - 80, kPelvis), end = person->joints.at(n - 1, kPelvis);
+      EXPECT_LT((before - end).head<2>().norm(), 0.03) << to_string(task);
+    }
+  }
+}
+
+TEST(PeopleSynthesis, OptionsChangeTheirQuantity) {
+  EXPECT_EQ(people(Task::kHandshake, {.side = Side::kLeft}).source.at("side"), "left");
+  EXPECT_EQ(people(Task::kHandshake, {.height_a = 1.9}).source.at("a.height"), "1.9");
+  EXPECT_EQ(people(Task::kHandshake, {.angle = 0.1}).source.at("angle"), "0.1");
+  const auto farthest = [](double distance) {
+    const InteractionClip clip =
+        people(Task::kHandshake, {.distance = distance, .before = 0.0, .outcome = ActOutcome::kComplete});
+    return (clip.a.joints.at(0, kPelvis) - clip.b.joints.at(0, kPelvis)).head<2>().norm();
+  };
+  EXPECT_NEAR(farthest(2.5), 2.5, 0.1);
+  EXPECT_NEAR(farthest(3.5), 3.5, 0.1);
+}
+
+TEST(PeopleSynthesis, OptionsOfTheOtherGeneratorAreRefused) {
+  EXPECT_EQ(refused(Task::kHug, {.duration = 12.0, .like = Likeness::kPeople}),
+            "synthesize: clips like people have no duration; expected before and after, which say what is shown");
+  const std::string message = "synthesize: before, after and outcome are of clips like people; expected like=people";
+  EXPECT_EQ(refused(Task::kHug, {.before = 1.0}), message);
+  EXPECT_EQ(refused(Task::kHug, {.after = 1.0}), message);
+  EXPECT_EQ(refused(Task::kHug, {.outcome = ActOutcome::kComplete}), message);
+  EXPECT_EQ(refused(Task::kHug, {.like = Likeness::kPeople, .before = 31.0}),
+            "synthesize: before 31 s is out of range; expected [0, 30] s");
+}
+
+double largest_difference(const PointTracks& one, const PointTracks& other, int joint) {
+  double largest = 0.0;
+  for (int t = 0; t < std::min(one.frames(), other.frames()); ++t)
+    largest = std::max(largest, (one.at(t, joint) - other.at(t, joint)).norm());
+  return largest;
+}
+
+TEST(TrackedClip, HidesTheMotionByCentimetresAndKeepsWhatIsKnown) {
+  const InteractionClip clip = people(Task::kHandshake, {.seed = 6, .outcome = ActOutcome::kComplete});
+  const InteractionClip seen = tracked(clip, {}, 1);
+  EXPECT_EQ(seen.id, clip.id + "-tracked");
+  EXPECT_EQ(seen.task, clip.task);
+  EXPECT_EQ(seen.reactor, clip.reactor);
+  EXPECT_EQ(seen.phases.act_begin, clip.phases.act_begin);
+  EXPECT_EQ(seen.contacts.size(), clip.contacts.size());
+  EXPECT_EQ(seen.source.at("source_rate_hz"), "15");
+  EXPECT_EQ(seen.source.at("tracked"), "1");
+  EXPECT_EQ(seen.source.at("outcome"), "complete");
+  EXPECT_GT(largest_difference(clip.a.joints, seen.a.joints, kLeftShoulder), 0.002);
+  EXPECT_LT(largest_difference(clip.a.joints, seen.a.joints, kLeftShoulder), 0.08);
+}
+
+TEST(TrackedClip, SeedDecides) {
+  const InteractionClip clip = people(Task::kHug, {.seed = 6});
+  EXPECT_EQ(tracked(clip, {}, 1).a.joints, tracked(clip, {}, 1).a.joints);
+  EXPECT_NE(tracked(clip, {}, 1).a.joints, tracked(clip, {}, 2).a.joints);
+}
+
+TEST(TrackedClip, EachFigureHasItsEffect) {
+  const InteractionClip clip = people(Task::kHandshake, {.seed = 8, .outcome = ActOutcome::kComplete});
+  const Tracker none{
+      .rate_hz = 50.0, .noise = 0.0, .drift = 0.0, .limb_noise = 0.0, .hidden_within = 0.0, .lost_noise = 0.0};
+  const auto change = [&](const Tracker& tracker, int joint) {
+    return largest_difference(tracked(clip, none, 1).a.joints, tracked(clip, tracker, 1).a.joints, joint);
+  };
+  Tracker noisy = none, drifting = none, limbs = none, lost = none, slow = none;
+  noisy.noise = 0.02;
+  drifting.drift = 0.02;
+  limbs.limb_noise = 0.02;
+  lost.hidden_within = 10.0, lost.lost_share = 1.0, lost.lost_noise = 0.05;
+  slow.rate_hz = 10.0;
+  EXPECT_GT(change(noisy, kLeftHip), 0.01);
+  EXPECT_GT(change(drifting, kLeftHip), 0.01);
+  EXPECT_GT(change(limbs, kRightElbow), 0.01);
+  EXPECT_EQ(change(limbs, kLeftHip), 0.0);
+  EXPECT_GT(change(lost, kRightElbow), 0.05);
+  EXPECT_EQ(change(lost, kLeftHip), 0.0);
+  EXPECT_GT(change(slow, kRightElbow), 0.002);
+}
+
+TEST(TrackedClip, ImpossibleTrackersAreRefused) {
+  const InteractionClip clip = people(Task::kWave);
+  const auto message = [&](const Tracker& tracker) {
+    return test::thrown_message<std::invalid_argument>([&] { (void)tracked(clip, tracker, 1); });
+  };
+  EXPECT_EQ(message({.rate_hz = 4.0}), "tracked clip: expected a rate of 5 to 120 Hz, found 4");
+  EXPECT_EQ(message({.noise = -1.0}), "tracked clip: expected figures of 0 or more, found -1");
+  EXPECT_EQ(message({.drift_time = 0.0}), "tracked clip: expected a positive drift_time, found 0");
+}
+
+}  // namespace
+}  // namespace duet
