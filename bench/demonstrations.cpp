@@ -86,8 +86,8 @@ void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
 std::string origin_of(const DemonstrationOptions& options) {
   const std::string clips =
       fmt::format("{} clips of each task{} (seed {}), {} start{} of each{}", options.per_task,
-                  options.like == Likeness::kPeople ? " like people" : "", options.seed,
-                  options.starts, options.starts == 1 ? "" : "s",
+                  options.like == Likeness::kPeople ? " like people" : "", options.seed, options.starts,
+                  options.starts == 1 ? "" : "s",
                   options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
   return fmt::format("{}, {} followed in {} under {} by {}", clips, options.followed, options.engine,

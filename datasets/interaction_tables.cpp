@@ -33,8 +33,7 @@ TextTable interaction_table(const InteractionSet& set, Task task) {
   TextTable table{.header = {std::string(to_string(task)), "unit", set.name}, .rows = {}, .label_columns = 2};
   table.rows.push_back({"Clips", "", clips_cell(set, task)});
   for (const InteractionStatisticInfo& info : interaction_statistic_catalogue())
-    table.rows.push_back(
-        {std::string(info.title), std::string(info.unit), spread_cell(spread_of(clips, info), info)});
+    table.rows.push_back({std::string(info.title), std::string(info.unit), spread_cell(spread_of(clips, info), info)});
   return table;
 }
 

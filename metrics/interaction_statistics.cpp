@@ -20,8 +20,7 @@ namespace {
 using People = std::array<const HumanMotion*, 2>;
 
 constexpr std::array<SmplJoint, 2> kHands = {kLeftHand, kRightHand};
-constexpr std::array<SmplJoint, 7> kTrunk = {kPelvis,       kNeck,          kHead,    kLeftShoulder,
-                                             kRightShoulder, kLeftHip,       kRightHip};
+constexpr std::array<SmplJoint, 7> kTrunk = {kPelvis, kNeck, kHead, kLeftShoulder, kRightShoulder, kLeftHip, kRightHip};
 
 Eigen::Vector3d joint(const HumanMotion& person, int t, int j) { return person.joints.at(t, j); }
 
@@ -107,8 +106,8 @@ void add_approach(const InteractionClip& clip, const People& people, Interaction
   for (int t = 0; t < frames; ++t) {
     result.largest_distance = std::max(result.largest_distance, root_distance(people, t));
     if (t < window) continue;
-    result.approach_speed = std::max(
-        result.approach_speed, (root_distance(people, t - window) - root_distance(people, t)) / seconds);
+    result.approach_speed =
+        std::max(result.approach_speed, (root_distance(people, t - window) - root_distance(people, t)) / seconds);
     for (const int k : {0, 1}) {
       const Eigen::Vector3d way = joint(*people[k], t, kPelvis) - joint(*people[k], t - window, kPelvis);
       speeds[k].push_back(way.head<2>().norm() / seconds);

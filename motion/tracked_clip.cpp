@@ -14,9 +14,9 @@ namespace duet {
 namespace {
 
 // The columns of "kinect-15" and the joints that stand for them.
-constexpr std::array<SmplJoint, 15> kColumns = {kHead,          kNeck,       kSpine2,   kLeftShoulder, kLeftElbow,
-                                                kLeftHand,      kRightShoulder, kRightElbow, kRightHand, kLeftHip,
-                                                kLeftKnee,      kLeftAnkle,  kRightHip, kRightKnee,    kRightAnkle};
+constexpr std::array<SmplJoint, 15> kColumns = {kHead,     kNeck,          kSpine2,     kLeftShoulder, kLeftElbow,
+                                                kLeftHand, kRightShoulder, kRightElbow, kRightHand,    kLeftHip,
+                                                kLeftKnee, kLeftAnkle,     kRightHip,   kRightKnee,    kRightAnkle};
 
 constexpr bool is_arm(SmplJoint joint) {
   return joint == kLeftElbow || joint == kRightElbow || joint == kLeftHand || joint == kRightHand;

@@ -198,27 +198,28 @@ constexpr auto kBendParaphrases = std::to_array<std::string_view>({
 namespace tasks {
 
 const TaskDefinition& bend() {
-  static constexpr TaskDefinition kDefinition = {.name = "bend",
-                                                 .prompt = "bend down to the person",
-                                                 .paraphrases = kBendParaphrases,
-                                                 .phrases = kBendPhrases,
-                                                 .phases = {.act = ActSignal::kTrunksLean},
-                                                 .act = {.mean_seconds = 17.6,
-                                                         .shortest = 4.5,
-                                                         .longest = 9.5,
-                                                         .release = 0.6,
-                                                         .lowest = 0.0,
-                                                         .highest = 0.0,
-                                                         .touch_distance = 0.0,
-                                                         .close = false,
-                                                         .layout = synthesis::bend_layout,
-                                                         .perform = synthesis::perform_bend,
-                                                         .recorded = {.tempo = {1.0, 1.25, 1.6}, .way = {0.0, 0.1, 0.4}}},
-                                                 .detector = {.thresholds = kBendThresholds,
-                                                              .figures = kBendFigures,
-                                                              .tracks = bend_tracks,
-                                                              .detect = detect_bend,
-                                                              .read_strictly = read_bend_strictly}};
+  static constexpr TaskDefinition kDefinition = {
+      .name = "bend",
+      .prompt = "bend down to the person",
+      .paraphrases = kBendParaphrases,
+      .phrases = kBendPhrases,
+      .phases = {.act = ActSignal::kTrunksLean},
+      .act = {.mean_seconds = 17.6,
+              .shortest = 4.5,
+              .longest = 9.5,
+              .release = 0.6,
+              .lowest = 0.0,
+              .highest = 0.0,
+              .touch_distance = 0.0,
+              .close = false,
+              .layout = synthesis::bend_layout,
+              .perform = synthesis::perform_bend,
+              .recorded = {.tempo = {1.0, 1.25, 1.6}, .way = {0.0, 0.1, 0.4}}},
+      .detector = {.thresholds = kBendThresholds,
+                   .figures = kBendFigures,
+                   .tracks = bend_tracks,
+                   .detect = detect_bend,
+                   .read_strictly = read_bend_strictly}};
   return kDefinition;
 }
 

@@ -211,27 +211,28 @@ constexpr auto kFlyKissParaphrases = std::to_array<std::string_view>({
 namespace tasks {
 
 const TaskDefinition& fly_kiss() {
-  static constexpr TaskDefinition kDefinition = {.name = "fly_kiss",
-                                                 .prompt = "blow a kiss to the person",
-                                                 .paraphrases = kFlyKissParaphrases,
-                                                 .phrases = kFlyKissPhrases,
-                                                 .phases = {.act = ActSignal::kHandsUp},
-                                                 .act = {.mean_seconds = 17.9,
-                                                         .shortest = 5.5,
-                                                         .longest = 10.0,
-                                                         .release = 1.1,
-                                                         .lowest = 1.1,
-                                                         .highest = 1.5,
-                                                         .touch_distance = 0.0,
-                                                         .close = false,
-                                                         .layout = synthesis::fly_kiss_layout,
-                                                         .perform = synthesis::perform_fly_kiss,
-                                                         .recorded = {.tempo = {1.3, 1.6, 2.0}, .way = {0.0, 0.1, 0.4}}},
-                                                 .detector = {.thresholds = kFlyKissThresholds,
-                                                              .figures = kFlyKissFigures,
-                                                              .tracks = fly_kiss_tracks,
-                                                              .detect = detect_fly_kiss,
-                                                              .read_strictly = read_fly_kiss_strictly}};
+  static constexpr TaskDefinition kDefinition = {
+      .name = "fly_kiss",
+      .prompt = "blow a kiss to the person",
+      .paraphrases = kFlyKissParaphrases,
+      .phrases = kFlyKissPhrases,
+      .phases = {.act = ActSignal::kHandsUp},
+      .act = {.mean_seconds = 17.9,
+              .shortest = 5.5,
+              .longest = 10.0,
+              .release = 1.1,
+              .lowest = 1.1,
+              .highest = 1.5,
+              .touch_distance = 0.0,
+              .close = false,
+              .layout = synthesis::fly_kiss_layout,
+              .perform = synthesis::perform_fly_kiss,
+              .recorded = {.tempo = {1.3, 1.6, 2.0}, .way = {0.0, 0.1, 0.4}}},
+      .detector = {.thresholds = kFlyKissThresholds,
+                   .figures = kFlyKissFigures,
+                   .tracks = fly_kiss_tracks,
+                   .detect = detect_fly_kiss,
+                   .read_strictly = read_fly_kiss_strictly}};
   return kDefinition;
 }
 

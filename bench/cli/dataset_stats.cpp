@@ -22,7 +22,7 @@ bool is_dataset(const std::string& folder) { return std::filesystem::exists(fold
 InteractionSet interactions_of(const std::string& folder) {
   const std::vector<std::string> files = find_motion_files({is_dataset(folder) ? folder + "/people" : folder});
   InteractionSet set{.name = std::filesystem::path(folder).lexically_normal().filename().string(),
-                     .tasks = std::vector<Task>(files.size()),
+                     .tasks = std::vector<Task>(files.size(), Task::kHug),
                      .clips = std::vector<InteractionStatistics>(files.size())};
   parallel_for_each(static_cast<int>(files.size()), default_threads(), [&](int i) {
     const InteractionClip clip = load_clip(files[i]);
@@ -38,8 +38,7 @@ void add_interactions(const std::string& folder, const std::string& against, std
   const InteractionSet other = against.empty() ? InteractionSet{} : interactions_of(against);
   for (const Task task : all_tasks()) {
     if (set.of(task).empty() || (!against.empty() && other.of(task).empty())) continue;
-    const TextTable table =
-        against.empty() ? interaction_table(set, task) : interaction_table(set, other, task);
+    const TextTable table = against.empty() ? interaction_table(set, task) : interaction_table(set, other, task);
     text += markdown_table(table) + "\n";
     nlohmann::json& entry = json["interactions"][std::string(to_string(task))];
     entry = {{"header", table.header}, {"rows", table.rows}};

@@ -106,8 +106,7 @@ void add_synth(CLI::App& app, Session& session) {
       ->capture_default_str();
   fixed("--before", arguments->options.before, "like people: standing before anything moves [s]");
   fixed("--after", arguments->options.after, "like people: standing after everything [s]");
-  command->add_option("--outcome", arguments->outcome,
-                      "like people: complete, hesitant or aborted (default: drawn)");
+  command->add_option("--outcome", arguments->outcome, "like people: complete, hesitant or aborted (default: drawn)");
   command->add_flag("--tracked", arguments->as_tracked,
                     "as a depth camera would have it: 15 Hz, centimetres of noise, arms lost");
   command->add_option("--side", arguments->side, "hand of the act: left or right (default: drawn)");

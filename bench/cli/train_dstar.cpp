@@ -5,9 +5,9 @@
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/demonstrations.h"
-#include "duet/bench/suite_names.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/shipped_suites.h"
+#include "duet/bench/suite_names.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"

@@ -12,10 +12,10 @@ namespace {
 // Chosen, not measured: SBU's recordings are of acts that were asked for and done. The three of its 18 handshakes in
 // which no hands meet are what there is to say of acts that come to nothing.
 constexpr double kHesitantShare = 0.10, kAbortedShare = 0.08;
-constexpr double kMostReaction = 0.6;                // of the planned motion: the acts leave no more [s]
-constexpr double kQuickestWalk = 0.55;               // two steps, however short [s]
-constexpr double kShortestStep = 0.05;               // less is no walk [m]
-constexpr double kBegin = 30.0;                      // of the scene's time, so that nothing lies before 0 [s]
+constexpr double kMostReaction = 0.6;   // of the planned motion: the acts leave no more [s]
+constexpr double kQuickestWalk = 0.55;  // two steps, however short [s]
+constexpr double kShortestStep = 0.05;  // less is no walk [m]
+constexpr double kBegin = 30.0;         // of the scene's time, so that nothing lies before 0 [s]
 // Kinect's arms end before SMPL's; its people are students (docs/synthesis.md).
 constexpr double kShortestArms = 0.90, kLongestArms = 1.02;
 
@@ -146,7 +146,8 @@ Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
     person.meets_skin = true;
-    person.reaction = k == 0 ? 0.0 : std::clamp(draws.spread("b.reaction", act.recorded.reaction) * tempo, 0.0, kMostReaction);
+    person.reaction =
+        k == 0 ? 0.0 : std::clamp(draws.spread("b.reaction", act.recorded.reaction) * tempo, 0.0, kMostReaction);
     give_walk(person, ways.act[k], speed, tempo, kBegin + k * later);
     arrive = std::max(arrive, walked_until(person));
   }
@@ -157,8 +158,8 @@ Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws
   double last = scene.release_end;
   for (const int k : {0, 1}) {
     Performer& person = scene.people[k];
-    give_leave(person, std::max(scene.act_end + 0.1 * tempo, walked_until(person)), speed, tempo,
-               std::string(kWho[k]), draws);
+    give_leave(person, std::max(scene.act_end + 0.1 * tempo, walked_until(person)), speed, tempo, std::string(kWho[k]),
+               draws);
     last = std::max(last, walked_until(person));
   }
   outcome = draw_outcome(options, draws);

@@ -70,6 +70,8 @@ TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
   options.starts = 1;
   options.engine = "";
   EXPECT_EQ(origin_of(options), "3 clips of each task (seed 880001), 1 start of each, none followed");
+  options.like = Likeness::kPeople;
+  EXPECT_EQ(origin_of(options), "3 clips of each task like people (seed 880001), 1 start of each, none followed");
 }
 
 TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {

@@ -183,6 +183,17 @@ TEST(Suite, VariantsOfClipsAreReadAndCount) {
   EXPECT_EQ(resolved_yaml(parse_suite(kMinimal, "s.yaml")).find("variants"), std::string::npos);
 }
 
+TEST(Suite, ClipsMayBeLikePeople) {
+  const Suite suite = parse_suite(with_synth("{per_task: 2, like: people}"), "s.yaml");
+  EXPECT_EQ(suite.clips.synth_like, Likeness::kPeople);
+  EXPECT_EQ(suite_hash(parse_suite(resolved_yaml(suite), "again.yaml")), suite_hash(suite));
+  EXPECT_NE(suite_hash(suite), suite_hash(parse_suite(with_synth("{per_task: 2}"), "s.yaml")));
+  EXPECT_EQ(resolved_yaml(parse_suite(kMinimal, "s.yaml")).find("like:"), std::string::npos);
+  EXPECT_EQ(suite_hash(parse_suite(with_synth("{per_task: 2, like: rehearsed}"), "s.yaml")),
+            suite_hash(parse_suite(with_synth("{per_task: 2}"), "s.yaml")));
+  EXPECT_THAT(refusal("", with_synth("{per_task: 2, like: robots}")), HasSubstr("'robots'"));
+}
+
 TEST(Suite, VariantsThatCannotBeAreRefused) {
   const auto with = [](const std::string& list) {
     return refusal("", with_synth("{per_task: 1, variants: " + list + "}"));

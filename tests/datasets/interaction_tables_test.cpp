@@ -35,8 +35,7 @@ TEST(InteractionTables, MarkWhatIsApart) {
 }
 
 TEST(InteractionTables, CountWhatAgrees) {
-  const InteractionAgreement found =
-      interaction_agreement(set_of("made", 1.5), set_of("recorded", 1.0), Task::kHug);
+  const InteractionAgreement found = interaction_agreement(set_of("made", 1.5), set_of("recorded", 1.0), Task::kHug);
   EXPECT_EQ(found.compared, 3);  // length, touches, time in touch
   EXPECT_EQ(found.agreeing, 2);
 }

@@ -1,10 +1,9 @@
-#include "duet/tasks/synthesis/solid.h"
-
 #include <gtest/gtest.h>
 
 #include "duet/motion/synthesis.h"
 #include "duet/robots/human_body.h"
 #include "duet/tasks/synthesis/performer.h"
+#include "duet/tasks/synthesis/solid.h"
 
 namespace duet::synthesis {
 namespace {
