@@ -1,5 +1,5 @@
-// How two people interact in a clip: when and where they touch, how they come to it, how fast, with which hand, and what
-// their tracker did to them. Compares synthetic clips with recorded ones (docs/synthesis.md). Pure functions.
+// How two people interact in a clip: when and where they touch, how they come to it, how fast, with which hand, and
+// what their tracker did to them. Compares synthetic clips with recorded ones (docs/synthesis.md). Pure functions.
 #pragma once
 
 #include <limits>
@@ -17,34 +17,34 @@ inline constexpr double kUnknownStatistic = std::numeric_limits<double>::quiet_N
 // kEmbrace to the other's line from pelvis to neck. A gesture without touch lasts as long as the clip's act does. NaN
 // where a clip says nothing of it: no touch, no onset.
 struct InteractionStatistics {
-  double seconds = 0.0;                          // of the clip
-  double touches = 0.0;                          // 1: there is a touch (or a gesture), 0: there is none
-  double touch_s = kUnknownStatistic;            // time in touch, all touches together [s]
-  double before_s = kUnknownStatistic;           // from the first frame to the first touch [s]
-  double after_s = kUnknownStatistic;            // from the last touch to the end of the clip [s]
-  double touch_distance = kUnknownStatistic;     // of the roots, level, at the first touch [m]
-  double largest_distance = kUnknownStatistic;   // of the roots, level, in the clip [m]
-  double touch_height = kUnknownStatistic;       // of the touching hands over the lowest foot, mean in touch [m]
-  double approach_speed = kUnknownStatistic;     // fastest closing of the roots over kApproachWindow [m/s]
-  double root_speed_p95 = kUnknownStatistic;     // of either root over kApproachWindow, over frames, mean of both [m/s]
-  double hand_speed_p95 = kUnknownStatistic;     // of the faster hand, over frames, mean of both people [m/s]
-  double joint_speed_p95 = kUnknownStatistic;    // as in Table S5 (metrics/clip_statistics.h) [m/s]
-  double reaction_s = kUnknownStatistic;         // from the first hand that sets out to the other person's [s]
-  double right_hands = kUnknownStatistic;        // share of the hands in act that are right ones: 0, 0.5 or 1
-  double standing = kUnknownStatistic;           // share of the two whose root stays within kStanding: 0, 0.5 or 1
-  double source_rate_hz = kUnknownStatistic;     // of the recording, before it was resampled [Hz]
-  double noise = kUnknownStatistic;              // median residual of trunk joints, see kNoiseStep [m]
-  double arm_change_p95 = kUnknownStatistic;     // of the arms' bones against their median, over frames [1]
-  double arm_occluded = kUnknownStatistic;       // share of frames and arms with a bone changed by over kOccluded [1]
-  double stature = kUnknownStatistic;            // of the head joint over the lowest joint, median, mean of both [m]
-  double arm_length = kUnknownStatistic;         // shoulder to wrist, median, mean of both [m]
+  double seconds = 0.0;                         // of the clip
+  double touches = 0.0;                         // 1: there is a touch (or a gesture), 0: there is none
+  double touch_s = kUnknownStatistic;           // time in touch, all touches together [s]
+  double before_s = kUnknownStatistic;          // from the first frame to the first touch [s]
+  double after_s = kUnknownStatistic;           // from the last touch to the end of the clip [s]
+  double touch_distance = kUnknownStatistic;    // of the roots, level, at the first touch [m]
+  double largest_distance = kUnknownStatistic;  // of the roots, level, in the clip [m]
+  double touch_height = kUnknownStatistic;      // of the touching hands over the lowest foot, mean in touch [m]
+  double approach_speed = kUnknownStatistic;    // fastest closing of the roots over kApproachWindow [m/s]
+  double root_speed_p95 = kUnknownStatistic;    // of either root over kApproachWindow, over frames, mean of both [m/s]
+  double hand_speed_p95 = kUnknownStatistic;    // of the faster hand, over frames, mean of both people [m/s]
+  double joint_speed_p95 = kUnknownStatistic;   // as in Table S5 (metrics/clip_statistics.h) [m/s]
+  double reaction_s = kUnknownStatistic;        // from the first hand that sets out to the other person's [s]
+  double right_hands = kUnknownStatistic;       // share of the hands in act that are right ones: 0, 0.5 or 1
+  double standing = kUnknownStatistic;          // share of the two whose root stays within kStanding: 0, 0.5 or 1
+  double source_rate_hz = kUnknownStatistic;    // of the recording, before it was resampled [Hz]
+  double noise = kUnknownStatistic;             // median residual of trunk joints, see kNoiseStep [m]
+  double arm_change_p95 = kUnknownStatistic;    // of the arms' bones against their median, over frames [1]
+  double arm_occluded = kUnknownStatistic;      // share of frames and arms with a bone changed by over kOccluded [1]
+  double stature = kUnknownStatistic;           // of the head joint over the lowest joint, median, mean of both [m]
+  double arm_length = kUnknownStatistic;        // shoulder to wrist, median, mean of both [m]
 };
 
-inline constexpr double kHandsTouch = 0.15;      // [m]
-inline constexpr double kEmbrace = 0.25;         // [m]
-inline constexpr double kApproachWindow = 0.5;   // [s]
-inline constexpr double kStanding = 0.15;        // [m]
-inline constexpr double kSetOut = 0.12;          // a hand has set out so far from where it was, seen from the root [m]
+inline constexpr double kHandsTouch = 0.15;     // [m]
+inline constexpr double kEmbrace = 0.25;        // [m]
+inline constexpr double kApproachWindow = 0.5;  // [s]
+inline constexpr double kStanding = 0.15;       // [m]
+inline constexpr double kSetOut = 0.12;         // a hand has set out so far from where it was, seen from the root [m]
 // A joint against the middle of where it was and will be after such a time: 0 for steady motion, and for white noise of
 // a standard deviation s an axis 1.9 s. [s]
 inline constexpr double kNoiseStep = 1.0 / 15.0;

@@ -1,6 +1,6 @@
-// Two people as a depth camera would have recorded them: 15 joints at a low rate with noise, arms that are lost where the
-// bodies hide them, read back by the importer of such files (motion/people/). The motion itself stays what it was: a
-// policy is scored on that; noise on what a policy sees is a suite's perturbation (`duet list perturbations`).
+// Two people as a depth camera would have recorded them: 15 joints at a low rate with noise, arms that are lost where
+// the bodies hide them, read back by the importer of such files (motion/people/). The motion itself stays what it was:
+// a policy is scored on that; noise on what a policy sees is a suite's perturbation (`duet list perturbations`).
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@ namespace duet {
 // Defaults as found on SBU (docs/synthesis.md).
 struct Tracker {
   double rate_hz = 15.0;
-  double noise = 0.0015;     // standard deviation of a joint, each axis and frame for itself [m]
-  double crowded = 2.5;      // times as much where the two are nearer than kCrowded
-  double drift = 0.004;      // and of a slow error of each joint [m]
-  double drift_time = 0.8;   // over which it changes [s]
+  double noise = 0.0015;      // standard deviation of a joint, each axis and frame for itself [m]
+  double crowded = 2.5;       // times as much where the two are nearer than kCrowded
+  double drift = 0.004;       // and of a slow error of each joint [m]
+  double drift_time = 0.8;    // over which it changes [s]
   double limb_noise = 0.011;  // of elbows, hands, knees and feet besides [m]
   // A hand within this of the other person is lost at times, and jumps. [m]
   double hidden_within = 0.30;
-  double lost_share = 0.16; // of such frames
+  double lost_share = 0.16;  // of such frames
   double lost_noise = 0.06;  // standard deviation of elbow and hand then [m]
 };
 

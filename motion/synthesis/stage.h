@@ -2,8 +2,8 @@
 #pragma once
 
 #include "duet/core/task.h"
-#include "duet/motion/synthesis_options.h"
 #include "duet/motion/synthesis/render.h"
+#include "duet/motion/synthesis_options.h"
 #include "duet/tasks/synthesis/act.h"
 
 namespace duet::synthesis {

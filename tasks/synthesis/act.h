@@ -13,21 +13,21 @@ namespace duet::synthesis {
 // How people go about an act. `rehearsed`: the way of the first generator, to the bit.
 struct Manner {
   bool rehearsed = true;
-  double tempo = 1.0;                      // how many times as fast the scene is played as it is planned
-  std::optional<double> distance = {};     // of the roots in the act [m]; else the layout's own
+  double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
+  std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
 };
 
 // What recorded people do in an act. docs/synthesis.md says where each figure is from.
 struct RecordedManner {
-  Deciles tempo = {1.4, 1.7, 2.0};  // of the planned motion
-  Deciles act = {};                 // from its begin to its end, at tempo 1 [s]; zeros: as the rehearsed act has it
-  Deciles touch = {};               // of an act with a touch that lasts, its length as played [s]
-  double until_touch = 0.0;         // from the act's begin to that touch, at tempo 1 [s]
-  Deciles distance = {};            // of the roots in the act [m]; zeros: the layout's own
-  Deciles way = {0.0, 0.2, 0.5};    // that both together walk up to each other [m]
-  Deciles speed = {0.45, 0.7, 1.0};  // in the middle of such a way [m/s]
-  double stands = 0.35;              // share of people who leave it to the other
-  Deciles overlap = {0.1, 0.3, 0.5};   // by which the act begins before the two stand, as played [s]
+  Deciles tempo = {1.4, 1.7, 2.0};      // of the planned motion
+  Deciles act = {};                     // from its begin to its end, at tempo 1 [s]; zeros: as the rehearsed act has it
+  Deciles touch = {};                   // of an act with a touch that lasts, its length as played [s]
+  double until_touch = 0.0;             // from the act's begin to that touch, at tempo 1 [s]
+  Deciles distance = {};                // of the roots in the act [m]; zeros: the layout's own
+  Deciles way = {0.0, 0.2, 0.5};        // that both together walk up to each other [m]
+  Deciles speed = {0.45, 0.7, 1.0};     // in the middle of such a way [m/s]
+  double stands = 0.35;                 // share of people who leave it to the other
+  Deciles overlap = {0.1, 0.3, 0.5};    // by which the act begins before the two stand, as played [s]
   Deciles reaction = {0.05, 0.2, 0.5};  // of B to A, as played [s]
   double left = 0.106;                  // share of acts with the left hand
   Deciles before = {0.5, 0.9, 1.4};     // what a recording has before the touch (a gesture's begin) [s]

@@ -51,7 +51,7 @@ TEST(InteractionStatistics, TouchIsTimedAndPlaced) {
 
 TEST(InteractionStatistics, HandsTouchBelowTheirThresholdOnly) {
   InteractionClip clip = meeting(20, 70);
-  for (int t = 20; t < 70; ++t) clip.b.joints.at(t, kRightHand).x() = 0.45 + kHandsTouch;
+  for (int t = 20; t < 70; ++t) clip.b.joints.at(t, kRightHand).x() = 0.45 + kHandsTouch + 1e-9;
   const InteractionStatistics apart = interaction_statistics(clip);
   EXPECT_EQ(apart.touches, 0.0);
   EXPECT_TRUE(std::isnan(apart.touch_s));
@@ -65,7 +65,7 @@ TEST(InteractionStatistics, AHugTouchesWithAHandAtTheTrunk) {
   clip.phases = {.act_begin = 0, .act_end = 100};
   clip.task = Task::kHug;
   EXPECT_EQ(interaction_statistics(clip).touches, 0.0);
-  for (int t = 10; t < 30; ++t) clip.a.joints.at(t, kLeftHand) = Eigen::Vector3d(0.8, 0.0, 1.2);
+  for (int t = 10; t < 30; ++t) clip.a.joints.at(t, kLeftHand) = Eigen::Vector3d(0.8, 0.3, 1.2);
   const InteractionStatistics found = interaction_statistics(clip);
   EXPECT_DOUBLE_EQ(found.touch_s, 0.4);
   EXPECT_DOUBLE_EQ(found.right_hands, 0.0);

@@ -26,7 +26,8 @@ TEST(SolidParts, AreThoseOfTheSolidPartner) {
   for (const SolidPart& part : solid_parts(body, figure)) {
     for (const HumanCapsule& capsule : solid.capsules) {
       const auto ends = capsule.ends(figure.p);
-      if ((ends[0] - part.from).norm() > 1e-9 || (ends[1] - part.to).norm() > 1e-9) continue;
+      const bool same = (ends[0] - part.from).norm() < 1e-9 && (ends[1] - part.to).norm() < 1e-9;
+      if (!same) continue;
       EXPECT_NEAR(capsule.radius, part.radius, 1e-9) << capsule.name;
       ++found;
     }
