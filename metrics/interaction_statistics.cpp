@@ -19,7 +19,7 @@ namespace {
 
 using People = std::array<const HumanMotion*, 2>;
 
-constexpr std::array<SmplJoint, 2> kHands = {kLeftHand, kRightHand};
+constexpr std::array<SmplJoint, 2> kHandJoints = {kLeftHand, kRightHand};
 constexpr std::array<SmplJoint, 7> kTrunk = {kPelvis, kNeck, kHead, kLeftShoulder, kRightShoulder, kLeftHip, kRightHip};
 
 Eigen::Vector3d joint(const HumanMotion& person, int t, int j) { return person.joints.at(t, j); }
@@ -45,7 +45,7 @@ Nearest nearest_hands(const People& people, int t) {
   Nearest nearest;
   for (const int a : {0, 1}) {
     for (const int b : {0, 1}) {
-      const Eigen::Vector3d p = joint(*people[0], t, kHands[a]), q = joint(*people[1], t, kHands[b]);
+      const Eigen::Vector3d p = joint(*people[0], t, kHandJoints[a]), q = joint(*people[1], t, kHandJoints[b]);
       if ((p - q).norm() < nearest.distance) nearest = {(p - q).norm(), {a, b}, 0.5 * (p.z() + q.z())};
     }
   }
@@ -57,7 +57,7 @@ Nearest nearest_embrace(const People& people, int t) {
   for (const int k : {0, 1}) {
     const HumanMotion& other = *people[1 - k];
     for (const int side : {0, 1}) {
-      const Eigen::Vector3d hand = joint(*people[k], t, kHands[side]);
+      const Eigen::Vector3d hand = joint(*people[k], t, kHandJoints[side]);
       const double distance = to_segment(hand, joint(other, t, kPelvis), joint(other, t, kNeck));
       if (distance < nearest.distance) nearest = {distance, {side, side}, hand.z()};
     }
@@ -128,7 +128,7 @@ double hand_speed(const HumanMotion& person) {
   std::vector<double> faster;
   for (int t = 1; t < person.frames(); ++t) {
     double speed = 0.0;
-    for (const int hand : kHands)
+    for (const int hand : kHandJoints)
       speed = std::max(speed, person.rate_hz * (joint(person, t, hand) - joint(person, t - 1, hand)).norm());
     faster.push_back(speed);
   }
@@ -138,7 +138,7 @@ double hand_speed(const HumanMotion& person) {
 // When a hand first is kSetOut from where it was in the first frame, seen from the root; none where it never is. [s]
 std::optional<double> set_out(const HumanMotion& person) {
   for (int t = 1; t < person.frames(); ++t)
-    for (const int hand : kHands) {
+    for (const int hand : kHandJoints) {
       const Eigen::Vector3d now = joint(person, t, hand) - joint(person, t, kPelvis);
       const Eigen::Vector3d before = joint(person, 0, hand) - joint(person, 0, kPelvis);
       if ((now - before).norm() > kSetOut) return t / person.rate_hz;

@@ -108,6 +108,7 @@ FieldTable<Options> make_table() {
                   &Options::root_translation),
            choice("keypoints", {"nine", "eleven", "seven"},
                   "head, shoulders, elbows, wrists, hands; with hips; without hands", &Options::keypoints),
+            keypoint_list(),
            flag("filter", "Gaussian over time, kernel 5, sigma 0.75, once at the end", &Options::filter),
            flag("adapt-human", "whether the partner is moved", &Options::adapt_human),
            choice("kernel", {"auto", "scalar", "v2", "v3", "v4"},
