@@ -211,7 +211,9 @@ void score_recording(const Recording& recording, const ActSource& source, const 
   if (rules.feet) row.feet = foot_trace(recording, robot);
   row.success = false;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {
-    for (const ThresholdSet set : {ThresholdSet::kPaper, ThresholdSet::kStrict}) {
+    for (const ThresholdSet set : kThresholdSets) {
+      // Rows of suites that do not ask for it stay as they were before there was such a set.
+      if (set == ThresholdSet::kAct && rules.thresholds != ThresholdSet::kAct) continue;
       const DetectorResult result = detect(task, human, machine, version, set, rules.readings.detectors);
       row.verdicts.push_back(to_verdict(result, version, set));
       if (version == rules.detector && set == rules.thresholds)

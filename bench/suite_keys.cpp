@@ -269,7 +269,7 @@ void add_verdict_and_record(Keys& keys) {
                                           .choices = choices_of(version_names())},
                                          &Suite::detector),
                             field<Suite>({.name = "thresholds",
-                                          .meaning = "`paper`: Table S11; `strict`: the stricter set",
+                                          .meaning = "`paper`: Table S11; `strict`: the stricter set; `act`: the rules that know the act",
                                           .choices = choices_of(threshold_names())},
                                          &Suite::thresholds)},
                            With::kClips));

@@ -55,7 +55,8 @@ const NameTable<DetectorVersion>& version_names() {
 }
 
 const NameTable<ThresholdSet>& threshold_names() {
-  static const NameTable<ThresholdSet> names = {{"paper", ThresholdSet::kPaper}, {"strict", ThresholdSet::kStrict}};
+  static const NameTable<ThresholdSet> names = {
+      {"paper", ThresholdSet::kPaper}, {"strict", ThresholdSet::kStrict}, {"act", ThresholdSet::kAct}};
   return names;
 }
 

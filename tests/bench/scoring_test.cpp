@@ -53,7 +53,7 @@ TEST_F(WaveThatSucceeds, IsNoneWhereTheRobotFellOrTheEpisodeEndedInAnyOtherWay) 
 
 TEST_F(WaveThatSucceeds, SuccessIsTheVerdictOfTheSuitesDetectorAndThresholdsAlone) {
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper})
-    for (const ThresholdSet set : {ThresholdSet::kPaper, ThresholdSet::kStrict}) {
+    for (const ThresholdSet set : kThresholdSets) {
       suite_.detector = version;
       suite_.thresholds = set;
       const EpisodeRow row = scored();
@@ -63,6 +63,11 @@ TEST_F(WaveThatSucceeds, SuccessIsTheVerdictOfTheSuitesDetectorAndThresholdsAlon
       ASSERT_NE(own, row.verdicts.end());
       EXPECT_EQ(row.success, own->success) << own->version << " " << own->thresholds;
     }
+}
+
+TEST_F(WaveThatSucceeds, TheRulesOfTheActAreAskedWhereTheSuiteAsksForThem) {
+  suite_.thresholds = ThresholdSet::kAct;
+  EXPECT_EQ(scored().verdicts.size(), 6U);
 }
 
 TEST_F(WaveThatSucceeds, ANullPolicyIsNoSuccess) {
