@@ -242,4 +242,13 @@ Verification verify_run(const Run& run, const VerifyOptions& options, Progress& 
   return Verifier(run, options, progress).verify();
 }
 
+std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here) {
+  const std::string there = environment.value("machine", "");
+  if (there.empty() || there == here) return "";
+  return fmt::format(
+      "the rows were made on another machine ({}; this one: {}): networks sum in the order of its vector instructions, "
+      "and a contact amplifies the last bits",
+      there, here);
+}
+
 }  // namespace duet

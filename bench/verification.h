@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,10 @@ struct Verification {
   int repeatable = 0, not_repeatable = 0;  // rows; timed out, or of an engine that this machine lacks
   [[nodiscard]] int different() const;
 };
+
+// A sentence for rows that differ: that they were made on another machine than `here` (describe_machine()); "" where it
+// is the same, or where the run does not say.
+std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here);
 
 // Throws InputError where the run's inputs, suite, detectors, policies or controllers are not what run.json says or not
 // what this machine has (which, expected, found), MissingError for a network that is not there.

@@ -6,6 +6,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/verification.h"
 #include "duet/core/parallel.h"
+#include "duet/results/environment.h"
 
 namespace duet::cli {
 namespace {
@@ -36,7 +37,7 @@ nlohmann::json json_of(const RepeatedEpisode& repeat) {
           {"differences", fields}};
 }
 
-std::string text_of(const Verification& found, const VerifyArguments& arguments) {
+std::string text_of(const Verification& found, const VerifyArguments& arguments, const std::string& other_machine) {
   std::string text;
   for (const std::string& fault : found.faults) text += fmt::format("WRONG     {}\n", fault);
   for (const std::string& missing : found.missing) text += fmt::format("MISSING   {}\n", missing);
@@ -47,6 +48,7 @@ std::string text_of(const Verification& found, const VerifyArguments& arguments)
     text += fmt::format(" (drawn from {} by --seed {}; --all runs them all)", found.repeatable, arguments.options.seed);
   if (found.not_repeatable > 0)
     text += fmt::format("; {} timed out or need what this machine lacks and were not run", found.not_repeatable);
+  if (found.different() > 0 && !other_machine.empty()) text += '\n' + other_machine;
   return text;
 }
 
@@ -58,7 +60,8 @@ void run_verify(Session& session, VerifyArguments arguments) {
   const Verification found = verify_run(run, arguments.options, progress);
   nlohmann::json episodes = nlohmann::json::array();
   for (const RepeatedEpisode& repeat : found.repeats) episodes.push_back(json_of(repeat));
-  print(session, text_of(found, arguments),
+  const std::string other_machine = other_machine_sentence(run.info.environment, describe_machine());
+  print(session, text_of(found, arguments, other_machine),
         {{"episodes", episodes},
          {"different", found.different()},
          {"faults", found.faults},

@@ -235,5 +235,13 @@ TEST(Verification, APartOfASuiteIsWholeInItself) {
   EXPECT_EQ(objection(folder / "run"), "");
 }
 
+TEST(OtherMachineSentence, NamesBothAndIsEmptyWhereTheyAreTheSame) {
+  const nlohmann::json environment = {{"machine", "EPYC, AVX-512"}};
+  EXPECT_THAT(other_machine_sentence(environment, "EPYC, AVX2"),
+              AllOf(HasSubstr("(EPYC, AVX-512; this one: EPYC, AVX2)")));
+  EXPECT_THAT(other_machine_sentence(environment, "EPYC, AVX-512"), IsEmpty());
+  EXPECT_THAT(other_machine_sentence(nlohmann::json::object(), "EPYC, AVX2"), IsEmpty());
+}
+
 }  // namespace
 }  // namespace duet
