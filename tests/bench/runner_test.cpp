@@ -198,7 +198,8 @@ TEST(Runner, PairedClipsOfTheSameIdAreRefused) {
   save_paired_motion(clip, folder / "a.npz");
   save_paired_motion(clip, folder / "b.npz");
   Suite suite = test::playback_suite();
-  suite.clips = {0, 0, {folder / "a.npz", folder / "b.npz"}};
+  suite.clips = {};
+  suite.clips.files = {folder / "a.npz", folder / "b.npz"};
   EXPECT_THAT(test::thrown_message<InputError>([&] { run(suite, folder / "run"); }), HasSubstr("ids name episodes"));
 }
 
