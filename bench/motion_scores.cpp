@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -177,7 +178,8 @@ std::string score_table(const std::map<std::string, std::map<std::string, double
     const std::string name(metric.name);
     const bool of_a_motion = metric.group == MetricGroup::kRetargeting || metric.group == MetricGroup::kOtherReading ||
                              metric.group == MetricGroup::kGrounding || metric.group == MetricGroup::kObject;
-    if (of_a_motion && summary.at("all").contains(name)) add_row(name, metric.unit, name, false);
+    const auto has = [&](const std::string& column) { return summary.at(column).contains(name); };
+    if (of_a_motion && std::ranges::any_of(columns, has)) add_row(name, metric.unit, name, false);
   }
   for (const auto& [name, title] : detector_rows()) add_row(title, "", name, true);
   return text;

@@ -263,16 +263,17 @@ void add_files(Keys& keys) {
 }
 
 void add_verdict_and_record(Keys& keys) {
-  keys.push_back(group_key("detector",
-                           {field<Suite>({.name = "version",
-                                          .meaning = "which verdict is the headline; the others are stored too",
-                                          .choices = choices_of(version_names())},
-                                         &Suite::detector),
-                            field<Suite>({.name = "thresholds",
-                                          .meaning = "`paper`: Table S11; `strict`: the stricter set; `act`: the rules that know the act",
-                                          .choices = choices_of(threshold_names())},
-                                         &Suite::thresholds)},
-                           With::kClips));
+  keys.push_back(group_key(
+      "detector",
+      {field<Suite>({.name = "version",
+                     .meaning = "which verdict is the headline; the others are stored too",
+                     .choices = choices_of(version_names())},
+                    &Suite::detector),
+       field<Suite>({.name = "thresholds",
+                     .meaning = "`paper`: Table S11; `strict`: the stricter set; `act`: the rules that know the act",
+                     .choices = choices_of(threshold_names())},
+                    &Suite::thresholds)},
+      With::kClips));
   keys.push_back(
       group_key("limits", {field<Suite>({.name = "wall_s_per_episode",
                                          .meaning = "an episode past it is a time-out (a failure); waiting for "

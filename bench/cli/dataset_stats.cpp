@@ -18,9 +18,18 @@ namespace {
 
 bool is_dataset(const std::string& folder) { return std::filesystem::exists(folder + "/dataset.json"); }
 
+std::vector<std::string> files_of(const std::string& folder) {
+  if (is_dataset(folder)) return find_motion_files({(std::filesystem::path(folder) / "people").string()});
+  try {
+    return find_motion_files({folder});
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}; expected a data set of duet or clips (NPZ)", error.what()));
+  }
+}
+
 // Of the people of a data set, or of the clips in a folder.
 InteractionSet interactions_of(const std::string& folder) {
-  const std::vector<std::string> files = find_motion_files({is_dataset(folder) ? folder + "/people" : folder});
+  const std::vector<std::string> files = files_of(folder);
   InteractionSet set{.name = std::filesystem::path(folder).lexically_normal().filename().string(),
                      .tasks = std::vector<Task>(files.size(), Task::kHug),
                      .clips = std::vector<InteractionStatistics>(files.size())};

@@ -123,8 +123,12 @@ TEST(ObjectTerm, LbfgsGoesDownInLanesAndInDouble) {
     options.kernel = kernel;
     const PairProblem problem = make_pair_problem(carrying(40, 6), test::g1(), options);
     const PairSolution solution = solve_pair(problem, options);
-    for (std::size_t i = 1; i < solution.total.size(); ++i) EXPECT_LE(solution.total[i], solution.total[i - 1]);
-    EXPECT_LT(solution.total.back(), 0.8 * solution.total.front());
+    const auto imitation = static_cast<std::size_t>(imitation_iterations(options));
+    for (std::size_t i = 1; i < solution.total.size(); ++i)  // the weights change once
+      if (i != imitation) {
+        EXPECT_LE(solution.total[i], solution.total[i - 1]);
+      }
+    EXPECT_LT(solution.total.back(), 0.8 * solution.total[imitation]);
   }
 }
 
