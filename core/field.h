@@ -158,11 +158,11 @@ Field<Owner> field(FieldWords words, Member member, double Owner::*least) {
 // A field of a type of its own: what it may be, its text, and what sets it from one (what was expected, "" where it is
 // set).
 template <typename Owner>
-Field<Owner> field(FieldWords words, std::string values, std::function<std::string(const Owner&)> text,
+Field<Owner> field(FieldWords words, const std::string& values, std::function<std::string(const Owner&)> text,
                    const std::function<std::string(Owner&, const std::string&)>& assign) {
   Field<Owner> made;
   static_cast<FieldWords&>(made) = std::move(words);
-  made.values = std::move(values);
+  made.values = values;
   made.text = std::move(text);
   made.assign = [assign](Owner& owner, const std::string& said, const FieldRange&) { return assign(owner, said); };
   return made;

@@ -163,11 +163,13 @@ void add_bodies(const People& people, InteractionStatistics& result) {
   result.stature = result.arm_length = 0.0;
   for (const HumanMotion* person : people) {
     std::vector<double> heads;
+    heads.reserve(static_cast<std::size_t>(person->frames()));
     for (int t = 0; t < person->frames(); ++t) heads.push_back(joint(*person, t, kHead).z() - lowest_of(*person, t));
     result.stature += 0.5 * quantile(std::move(heads), 0.5);
     for (const auto& [shoulder, elbow, wrist] :
          {std::array{kLeftShoulder, kLeftElbow, kLeftWrist}, std::array{kRightShoulder, kRightElbow, kRightWrist}}) {
       std::array<std::vector<double>, 2> bones;
+      for (std::vector<double>& lengths : bones) lengths.reserve(static_cast<std::size_t>(person->frames()));
       for (int t = 0; t < person->frames(); ++t) {
         bones[0].push_back((joint(*person, t, elbow) - joint(*person, t, shoulder)).norm());
         bones[1].push_back((joint(*person, t, wrist) - joint(*person, t, elbow)).norm());

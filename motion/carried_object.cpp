@@ -65,6 +65,7 @@ CarriedObject held(const CarriedObject& object, int before, int after) {
 }
 
 CarriedObject mirrored(const CarriedObject& object) {
+  if (object.empty()) return object;
   CarriedObject result = object;
   result.keypoints.row(1) *= -1.0;
   for (Pose& X_WO : result.poses) {

@@ -151,5 +151,7 @@ TEST(CarriedObject, AnotherObjectIsAnotherClip) {
   EXPECT_NE(clip_digest(motion), with);
 }
 
+TEST(CarriedObject, NoneIsNoneInTheMirror) { EXPECT_TRUE(mirrored(CarriedObject{}).empty()); }
+
 }  // namespace
 }  // namespace duet
