@@ -23,8 +23,8 @@ Field<Options> amount(const char* name, const char* meaning, Member member, cons
   return field<Options>(words(name, meaning, {.low = 0.0}, unit), member);
 }
 template <typename Member>
-Field<Options> choice(const char* name, std::vector<std::string> names, const char* meaning, Member member) {
-  return field<Options>({.name = name, .meaning = meaning, .choices = std::move(names)}, member);
+Field<Options> choice(const char* name, const std::vector<std::string>& names, const char* meaning, Member member) {
+  return field<Options>({.name = name, .meaning = meaning, .choices = names}, member);
 }
 Field<Options> flag(const char* name, const char* meaning, bool Options::*member) {
   return choice(name, {"off", "on"}, meaning, member);
@@ -108,7 +108,7 @@ FieldTable<Options> make_table() {
                   &Options::root_translation),
            choice("keypoints", {"nine", "eleven", "seven"},
                   "head, shoulders, elbows, wrists, hands; with hips; without hands", &Options::keypoints),
-            keypoint_list(),
+           keypoint_list(),
            flag("filter", "Gaussian over time, kernel 5, sigma 0.75, once at the end", &Options::filter),
            flag("adapt-human", "whether the partner is moved", &Options::adapt_human),
            choice("kernel", {"auto", "scalar", "v2", "v3", "v4"},

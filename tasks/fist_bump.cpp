@@ -75,7 +75,7 @@ void perform_fist_bump(Scene& scene, Draws& draws) {
       return in_world(person.act, meet + Eigen::Vector3d(ahead, side_sign(side) * 0.04, up));
     };
     const Eigen::Vector3d contact = in_world(person.act, meet - Eigen::Vector3d(kKnuckles, 0.0, 0.0));
-    const Hold at_contact = at_point([=](double) { return contact; }, kFistPole, kStraightWrist);
+    const Hold at_contact = at_point([p = Eigen::Vector3d(contact)](double) { return p; }, kFistPole, kStraightWrist);
     ArmTrack& arm = person.arms[side];
     const double first = scene.act_begin + person.reaction;
     const double begin = first + k * answer * std::max(0.0, bump.strike - kFistRaise - first);

@@ -77,7 +77,7 @@ void perform_high_five(Scene& scene, Draws& draws) {
     const Eigen::Vector3d meet = seen_by(k, scene.layout, scene.layout.meet);
     const Eigen::Vector3d contact = in_world(person.act, meet - Eigen::Vector3d(kPalm, 0.0, 0.0));
     const Eigen::Vector3d ready = in_world(person.act, meet + Eigen::Vector3d(-back, side_sign(side) * 0.08, -0.02));
-    const Hold at_contact = at_point([=](double) { return contact; }, kPole, kWrist);
+    const Hold at_contact = at_point([p = Eigen::Vector3d(contact)](double) { return p; }, kPole, kWrist);
     ArmTrack& arm = person.arms[side];
     const double begin = scene.act_begin + person.reaction;
     arm.to(begin, begin + kFiveRaise, ready_near(ready), {0.10, 0.05, 0.0});
