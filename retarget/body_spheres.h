@@ -1,5 +1,5 @@
-// Spheres along the robot's arms, trunk, head and thighs and along the partner's body, and which of them must not lie in
-// each other: what PAIR's penetration term sees of the two bodies.
+// Spheres along the robot's arms, trunk, head and thighs and along the partner's body, and which of them must not lie
+// in each other: what PAIR's penetration term sees of the two bodies.
 #pragma once
 
 #include <vector>
@@ -24,8 +24,8 @@ struct BodySpheres {
 };
 
 // Adds the robot's spheres to the points of `chain`. Pairs within the robot are those of regions that its card lets
-// touch; pairs of the two bodies leave out hands against hands and arms, which are meant to meet, and thighs against what
-// is above the hips.
+// touch; pairs of the two bodies leave out hands against hands and arms, which are meant to meet, and thighs against
+// what is above the hips.
 BodySpheres make_body_spheres(const RobotModel& robot, UprightChain& chain, const HumanMotion& partner);
 
 }  // namespace duet

@@ -66,7 +66,7 @@ TEST(ObjectMetrics, ErrorIsTheMeanOverFramesHandsAndKeypoints) {
 
 TEST(ObjectMetrics, ContactIsCountedPerFrameHandAndThreshold) {
   PairedMotion motion = holding(4);
-  ASSERT_GT(span(motion), 0.5);  // the object is at the left hand
+  ASSERT_GT(span(motion), 0.5);                              // the object is at the left hand
   motion.source_reactor.joints.at(2, kLeftHand).z() += 0.3;  // outside 0.2, inside 0.35
   const std::array<ContactCounts, 3> counts = object_contact_counts(motion, g1());
   EXPECT_EQ(counts[0].tp, 3);
