@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "duet/core/require.h"
+#include "duet/core/synthetic_id.h"
 #include "duet/motion/synthesis/people_stage.h"
 #include "duet/motion/synthesis/render.h"
 #include "duet/motion/synthesis/stage.h"
@@ -103,7 +104,7 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   synthesis::look_away(staged.scene);
 
   InteractionClip clip;
-  clip.id = fmt::format("{}-{}-s{}-{:04}", people ? "people" : "synth", to_string(task), options.seed, options.index);
+  clip.id = synthetic_clip_id(people ? "people" : "synth", to_string(task), options.seed, options.index);
   clip.task = task;
   std::array<HumanMotion, 2> motions = render(staged.scene.people, staged.frames, options.rate_hz, staged.showing);
   clip.a = std::move(motions[0]);
