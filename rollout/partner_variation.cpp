@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "duet/core/clock.h"
+#include "duet/core/pose.h"
+#include "duet/core/skeleton.h"
 
 namespace duet {
 namespace {
@@ -61,6 +63,59 @@ void scale_bodies(double scale, PointTracks& joints) {
   }
 }
 
+// Where it is on the ground beside where the clip has it.
+class Way {
+ public:
+  Way(const PartnerVariation& variation, double yaw, int act_begin)
+      : back_(-std::cos(yaw), -std::sin(yaw), 0.0),
+        left_(-std::sin(yaw), std::cos(yaw), 0.0),
+        comes_(variation.comes_m.value_or(0.0)),
+        on_(variation.moves_on_m.value_or(0.0)),
+        aside_(variation.aside_m.value_or(0.0)),
+        half_(std::max(1.0, 0.5 * act_begin)) {}
+
+  // `at`: frames since the episode's first.
+  [[nodiscard]] Eigen::Vector3d offset(double at) const {
+    const double come = comes_ * (1.0 - smooth(at / half_)), go = smooth((at - half_) / half_);
+    return (come + go * on_) * back_ + go * aside_ * left_;
+  }
+
+ private:
+  static double smooth(double s) {
+    s = std::clamp(s, 0.0, 1.0);
+    return s * s * (3.0 - 2.0 * s);
+  }
+
+  Eigen::Vector3d back_, left_;
+  double comes_, on_, aside_, half_;
+};
+
+bool has_way(const PartnerVariation& variation) {
+  return variation.comes_m || variation.moves_on_m || variation.aside_m;
+}
+
+// The mirror image of a pose in the vertical plane through the pelvis along the heading, left and right exchanged.
+void mirror_frame(const PointTracks& joints, int t, HumanMotion& motion) {
+  const Eigen::Quaterniond R_WH = yaw_rotation(heading(joints, t));
+  const Eigen::Vector3d pelvis = joints.at(t, kPelvis), mirror(1.0, -1.0, 1.0);
+  for (int j = 0; j < kSmplJoints; ++j) {
+    const Eigen::Vector3d p_H = R_WH.conjugate() * (joints.at(t, kSmplMirror[j]) - pelvis);
+    motion.joints.at(t, j) = pelvis + R_WH * p_H.cwiseProduct(mirror);
+  }
+  if (motion.rotations.empty()) return;
+  const auto first = motion.rotations.begin() + static_cast<std::ptrdiff_t>(t) * kSmplJoints;
+  const std::vector<Eigen::Quaterniond> before(first, first + kSmplJoints);
+  for (int j = 0; j < kSmplJoints; ++j) {
+    const Eigen::Quaterniond R_HJ = R_WH.conjugate() * before[static_cast<std::size_t>(kSmplMirror[j])];
+    first[j] = R_WH * Eigen::Quaterniond(R_HJ.w(), -R_HJ.x(), R_HJ.y(), -R_HJ.z());  // S R S, S = diag(1, -1, 1)
+  }
+}
+
+void mirror_poses(HumanMotion& motion) {
+  const PointTracks joints = motion.joints;
+  for (int t = 0; t < motion.frames(); ++t) mirror_frame(joints, t, motion);
+}
+
 }  // namespace
 
 int episode_ticks(const PartnerVariation& variation, int reference_ticks) {
@@ -76,13 +131,22 @@ HumanMotion partner_motion(const HumanMotion& clip, const std::optional<PartnerV
   motion.joints = PointTracks(frames, clip.joints.points());
   motion.rotations.reserve(clip.rotations.empty() ? 0 : static_cast<std::size_t>(frames) * kSmplJoints);
   const double last = clip.frames() - 1;
-  PlayHead head(variation.value_or(PartnerVariation()), phases);
+  const PartnerVariation varied = variation.value_or(PartnerVariation());
+  const int act = std::min(clip_frame + phases.act_begin, clip.frames() - 1);
+  const Way way(varied, has_way(varied) ? heading(clip.joints, act) : 0.0, phases.act_begin);
+  std::vector<double> places(static_cast<std::size_t>(frames));
+  PlayHead head(varied, phases);
   for (int t = 0; t < frames; ++t, head.advance()) {
     const double at = std::min(clip_frame + head.at(), last);
     const double whole = std::floor(at);
     add_frame(clip, static_cast<int>(whole), at - whole, t, motion);
+    places[static_cast<std::size_t>(t)] = head.at();
   }
-  if (variation && variation->scale != 1.0) scale_bodies(variation->scale, motion.joints);
+  if (varied.scale != 1.0) scale_bodies(varied.scale, motion.joints);
+  if (varied.other_hand.value_or(false)) mirror_poses(motion);
+  if (has_way(varied))
+    for (int t = 0; t < frames; ++t)
+      motion.joints.frame(t).colwise() += way.offset(places[static_cast<std::size_t>(t)]);
   return motion;
 }
 

@@ -1,5 +1,6 @@
-// A partner who moves otherwise than the clip: of another size, faster, later, hesitating, or turning back. Physics,
-// policy, detectors and recording all have this partner; the robot's reference stays that of the clip.
+// A partner who moves otherwise than the clip: of another size, faster, later, hesitating, turning back, walking up,
+// moving on, with the other hand. Physics, policy, detectors and recording all have this partner; the robot's reference
+// stays that of the clip.
 #pragma once
 
 #include <optional>
@@ -16,6 +17,12 @@ struct PartnerVariation {
   double shift_s = 0.0;
   double hesitate_s = 0.0;  // stands still so long at half of its preparation [s]
   bool abort = false;       // at the middle of the act it goes back the way it came, as fast, and stays where it began
+  // Ways on the ground, the body as in the clip, in the axes of its heading in the first frame of the act, in which it
+  // faces the other person. Absent: none, and not written, as in suites of before.
+  std::optional<double> comes_m = {};     // begins so far behind its place and is there after half of its preparation
+  std::optional<double> moves_on_m = {};  // over the second half of it goes so far back, and stays there
+  std::optional<double> aside_m = {};     // and so far to its left
+  std::optional<bool> other_hand = {};    // every pose is the mirror image of the clip's, about its own middle plane
 };
 
 // Ticks of an episode whose reference has so many (50 Hz): as many more as the partner needs to do at least what it

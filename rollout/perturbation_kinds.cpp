@@ -158,7 +158,28 @@ const FieldTable<PartnerVariation>& partner_fields() {
                &V::hesitate_s),
       field<V>({.name = "abort",
                 .meaning = "at the middle of the act it goes back along its own path and stays where it began"},
-               &V::abort)};
+               &V::abort),
+      field<V>({.name = "comes_m",
+                .meaning = "it begins so far behind its place and walks up in the first half of its preparation",
+                .unit = "m",
+                .range = {0.0, 5.0}},
+               &V::comes_m),
+      field<V>(
+          {.name = "moves_on_m",
+           .meaning = "in the second half of its preparation it goes so far back (below 0: forward) and stays there",
+           .unit = "m",
+           .range = {-1.0, 2.0}},
+          &V::moves_on_m),
+      field<V>({.name = "aside_m",
+                .meaning = "and so far to its left (below 0: to its right)",
+                .unit = "m",
+                .range = {-2.0, 2.0}},
+               &V::aside_m),
+      field<V>({.name = "other_hand",
+                .meaning = "it does with the left what the clip's person does with the right",
+                .choices = {"false", "true"}},
+               &V::other_hand)};
+  return table;
   return table;
 }
 

@@ -34,7 +34,8 @@ ReferenceStream::ReferenceStream(std::shared_ptr<const RobotModel> robot, const 
   require(options.motions == 0.0 || (options.data && !options.data->empty()),
           "reference stream: a share of motions is asked for, but there are none");
   if (options.crouch > 0.0) bounds_ = robot_->bounds_of_root();
-  require(!options.moves_upper_body || upper_.empty() || !robot_->roles.pose_ranges.empty(),
+  const bool draws_poses = options.moves_upper_body || options.holds_upper_body;
+  require(!draws_poses || upper_.empty() || !robot_->roles.pose_ranges.empty(),
           fmt::format("reference stream: robot '{}' has no 'pose_ranges' in its card, which random poses need",
                       robot_->name));
   if (options.data)
@@ -92,8 +93,9 @@ void ReferenceStream::follow_motion() {
 
 void ReferenceStream::draw_pose(Random& random, Eigen::VectorXd& q) const {
   q = robot_->neutral;
-  if (!options_.moves_upper_body) return;
-  const double share = random.chance(0.25) ? 0.0 : 1.0;  // some goals are the neutral pose
+  if (!options_.moves_upper_body && !options_.holds_upper_body) return;
+  // Some goals are the neutral pose; one that is held is not.
+  const double share = !options_.holds_upper_body && random.chance(0.25) ? 0.0 : 1.0;
   for (const int joint : upper_) {
     const auto range = robot_->roles.pose_ranges.find(joint);
     const double still = robot_->neutral[joint];
@@ -107,7 +109,7 @@ void ReferenceStream::move_upper_body(Random& random) {
   segment_ += kTick;
   if (segment_ >= segment_length_) {
     from_ = to_;
-    draw_pose(random, to_);
+    if (!options_.holds_upper_body) draw_pose(random, to_);
     segment_ = 0.0;
     segment_length_ = random.uniform(0.6, 2.0);
   }

@@ -24,12 +24,13 @@ struct ScriptedCommand {
 
 struct StreamOptions {
   bool moves_upper_body = true;
-  bool from_neutral = false;  // the upper body's first pose is the neutral one, in which the robot can begin
-  double moving = 0.0;        // share of command segments in which the root moves; 0: it stands for ever
-  double max_speed = 0.4;     // forward; sideways and back about half of it [m/s]
-  double crouch = 0.0;        // share of segments with another height of the pelvis
-  double bow = 0.0;           // share of segments with the pelvis pitched
-  double motions = 0.0;       // share of episodes that follow one of `data`
+  bool holds_upper_body = false;  // goes to one pose that is drawn and stays in it, in the place of moving on
+  bool from_neutral = false;      // the upper body's first pose is the neutral one, in which the robot can begin
+  double moving = 0.0;            // share of command segments in which the root moves; 0: it stands for ever
+  double max_speed = 0.4;         // forward; sideways and back about half of it [m/s]
+  double crouch = 0.0;            // share of segments with another height of the pelvis
+  double bow = 0.0;               // share of segments with the pelvis pitched
+  double motions = 0.0;           // share of episodes that follow one of `data`
   std::shared_ptr<const std::vector<RobotMotion>> data;  // shared by all streams; read-only
   std::optional<ScriptedCommand> script;                 // in place of random commands
 };

@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <numbers>
+
 #include "duet/backends/factory.h"
 #include "duet/bench/runner.h"
 #include "duet/controllers/registry.h"
+#include "duet/core/pose.h"
 #include "duet/core/require.h"
 #include "duet/policies/registry.h"
 #include "duet/rollout/act_episode.h"
@@ -103,6 +106,68 @@ TEST(PartnerVariation, ScaleKeepsTheWayAndTheGround) {
               1.1 * 0.01 * int{kHead} * std::hypot(10.0, 1.0), kRounding);
 }
 
+// A person who stands at x = 2 and faces -x, its right hand raised.
+HumanMotion standing_clip() {
+  HumanMotion clip;
+  clip.joints = PointTracks(kClipFrames, kSmplJoints);
+  for (int t = 0; t < kClipFrames; ++t) {
+    for (int j = 0; j < kSmplJoints; ++j) {
+      const double side = kSmplNames[j].starts_with("left") ? -0.2 : kSmplNames[j].starts_with("right") ? 0.2 : 0.0;
+      clip.joints.at(t, j) = Eigen::Vector3d(2.0, side, 1.0);
+    }
+    clip.joints.at(t, kRightHand) = Eigen::Vector3d(1.5, 0.3, 1.2);
+  }
+  clip.rotations.assign(static_cast<std::size_t>(kClipFrames) * kSmplJoints, yaw_rotation(std::numbers::pi));
+  for (int t = 0; t < kClipFrames; ++t)
+    clip.rotations[static_cast<std::size_t>(t) * kSmplJoints + kRightHand] =
+        yaw_rotation(std::numbers::pi) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitX());
+  return clip;
+}
+
+HumanMotion varied(const PartnerVariation& variation, int frames = 250) {
+  return partner_motion(standing_clip(), variation, kPhases, kClipFrame, frames);
+}
+
+TEST(PartnerVariation, APartnerWhoComesWalksUpInTheFirstHalfOfItsPreparation) {
+  const HumanMotion motion = varied({.comes_m = 1.5});
+  EXPECT_NEAR(motion.joints.at(0, kPelvis).x(), 3.5, kRounding);  // behind its place, as it faces -x
+  EXPECT_NEAR(motion.joints.at(25, kPelvis).x(), 2.75, kRounding);
+  EXPECT_NEAR(motion.joints.at(50, kPelvis).x(), 2.0, kRounding);
+  EXPECT_NEAR(motion.joints.at(249, kPelvis).x(), 2.0, kRounding);
+  EXPECT_NEAR(motion.joints.at(0, kPelvis).y(), 0.0, kRounding);
+}
+
+TEST(PartnerVariation, APartnerWhoMovesOnStaysThere) {
+  const HumanMotion motion = varied({.moves_on_m = 0.3, .aside_m = 0.2});
+  EXPECT_NEAR(motion.joints.at(50, kPelvis).x(), 2.0, kRounding);
+  EXPECT_NEAR(motion.joints.at(75, kPelvis).x(), 2.15, kRounding);
+  for (const int t : {100, 249}) {
+    EXPECT_NEAR(motion.joints.at(t, kPelvis).x(), 2.3, kRounding) << t;
+    EXPECT_NEAR(motion.joints.at(t, kPelvis).y(), -0.2, kRounding) << t;  // its left
+    EXPECT_NEAR(motion.joints.at(t, kRightHand).y(), 0.1, kRounding) << t;
+  }
+}
+
+// Who waits before it comes stands where it begins.
+TEST(PartnerVariation, WaysGoByItsOwnTime) {
+  const HumanMotion motion = varied({.shift_s = 1.0, .comes_m = 1.0});
+  EXPECT_NEAR(motion.joints.at(50, kPelvis).x(), 3.0, kRounding);
+  EXPECT_NEAR(motion.joints.at(100, kPelvis).x(), 2.0, kRounding);
+}
+
+TEST(PartnerVariation, TheOtherHandIsTheMirrorImageInItsOwnMiddlePlane) {
+  const HumanMotion motion = varied({.other_hand = true}, 2);
+  EXPECT_NEAR((motion.joints.at(1, kLeftHand) - Eigen::Vector3d(1.5, -0.3, 1.2)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((motion.joints.at(1, kRightHand) - Eigen::Vector3d(2.0, 0.2, 1.0)).norm(), 0.0, kRounding);
+  EXPECT_NEAR((motion.joints.at(1, kHead) - Eigen::Vector3d(2.0, 0.0, 1.0)).norm(), 0.0, kRounding);
+  const auto turn = [&](int joint) { return motion.rotations[static_cast<std::size_t>(kSmplJoints + joint)]; };
+  EXPECT_NEAR(turn(kHead).angularDistance(yaw_rotation(std::numbers::pi)), 0.0, 1e-7);
+  EXPECT_NEAR(turn(kLeftHand).angularDistance(yaw_rotation(std::numbers::pi) *
+                                              Eigen::AngleAxisd(-0.4, Eigen::Vector3d::UnitX())),
+              0.0, 1e-7);
+  EXPECT_EQ(varied({.other_hand = false}, 2).joints, varied({}, 2).joints);
+}
+
 std::vector<Perturbation> read(const std::string& list) {
   return parse_suite(
              "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\nengines: [playback]\n"
@@ -127,8 +192,22 @@ TEST(PartnerVariation, IsReadStrictlyAndWrittenOut) {
   EXPECT_THAT(refusal("{hesitate_s: -1}"), HasSubstr("hesitate_s: expected"));
   EXPECT_THAT(refusal("{shift_s: 31}"), HasSubstr("shift_s: expected"));
   EXPECT_THAT(refusal("{abort: 2}"), HasSubstr("abort"));
+  EXPECT_THAT(refusal("{comes_m: -1}"), HasSubstr("comes_m: expected a number from 0, at most 5 m, found -1"));
+  EXPECT_THAT(refusal("{moves_on_m: 3}"), HasSubstr("moves_on_m: expected"));
+  EXPECT_THAT(refusal("{aside_m: 3}"), HasSubstr("aside_m: expected"));
+  EXPECT_THAT(refusal("{other_hand: 2}"), HasSubstr("other_hand"));
   EXPECT_THAT(refusal("{sped: 2}"), HasSubstr("speed"));
   EXPECT_THAT(refusal("2"), HasSubstr("partner"));
+}
+
+// Hashes of suites of before depend on it.
+TEST(PartnerVariation, WhatIsNotAskedForIsNotWritten) {
+  EXPECT_EQ(to_yaml(read("[{name: slow, partner: {speed: 0.8}}]")[0]),
+            "{name: slow, partner: {scale: 1, speed: 0.8, shift_s: 0, hesitate_s: 0, abort: false}}");
+  const std::string all =
+      "{name: far, partner: {scale: 1, speed: 1, shift_s: 0, hesitate_s: 0, abort: false, comes_m: 1, moves_on_m: 0.3, "
+      "aside_m: -0.2, other_hand: true}}";
+  EXPECT_EQ(to_yaml(read("[" + all + "]")[0]), all);
 }
 
 // The partner of the recording is the varied one, the robot's reference is not touched.

@@ -54,6 +54,25 @@ TEST(ReferenceStream, AScriptMovesTheRootByVelocityTimesTime) {
   EXPECT_NEAR(stream.reference().X_WB.p.y(), 0.6, 1e-9);
 }
 
+TEST(ReferenceStream, AnUpperBodyThatIsHeldGoesToOnePoseAndStays) {
+  StreamOptions options;
+  options.moves_upper_body = false;
+  options.holds_upper_body = options.from_neutral = true;
+  ReferenceStream stream(g1(), options);
+  Random random(3, 3);
+  Eigen::VectorXd last = g1()->neutral;
+  for (int episode = 0; episode < 20; ++episode) {
+    stream.reset(random);
+    for (int t = 0; t < 100; ++t) stream.advance(random);  // a pose is reached within 2 s
+    const Eigen::VectorXd held = stream.reference().q;
+    EXPECT_GT((held - g1()->neutral).norm(), 0.1) << episode;  // never the neutral one
+    EXPECT_GT((held - last).norm(), 0.1) << episode;
+    for (int t = 0; t < 400; ++t) stream.advance(random);
+    EXPECT_EQ(stream.reference().q, held) << episode;
+    last = held;
+  }
+}
+
 TEST(ReferenceStream, EveryDirectionIsCommandedInTraining) {
   ReferenceStream stream(g1(), wbc_stage("walk").stream);
   Random random(3, 3);
