@@ -103,6 +103,8 @@ std::string html_report(const ReportContent& content) {
     if (!body.empty()) sections.push_back({id, title, std::move(body)});
   };
   add("leaderboard", "Leaderboard", leaderboard_section(content));
+  add("people", "Recorded and synthetic people", people_html(content.people));
+  add("levels", "Levels", levels_html(content.levels));
   add("policies", "Policies", policies_html(content.policies.policies));
   add("perturbations", "Perturbations", degradation_html(content.policies.degradation));
   add("reactivity", "Reactivity", reactivity_html(content.policies.reactivity));

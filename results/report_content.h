@@ -12,8 +12,10 @@
 #include "duet/results/controller_table.h"
 #include "duet/results/cross_engine.h"
 #include "duet/results/leaderboard.h"
+#include "duet/results/level_table.h"
 #include "duet/results/line_plot.h"
 #include "duet/results/metric_column.h"
+#include "duet/results/people_table.h"
 #include "duet/results/policy_report.h"
 #include "duet/results/training_curves.h"
 #include "duet/results/walk_table.h"
@@ -44,6 +46,8 @@ struct ReportContent {
   std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
   std::vector<ClipStory> stories;
   std::optional<CrossEngine> cross_engine;  // section "Across engines"
+  PeopleTable people;                       // section "Recorded and synthetic people", where it has entries
+  std::vector<LevelTable> levels;           // section "Levels", likewise
   WalkTable walking;                        // section "Walking by command", likewise
   ContactTable contacts;                    // section "Contact with people", where it has groups
   ControllerTable controllers;              // section "Controllers", where it has entries

@@ -46,6 +46,8 @@ std::string plots_html(const std::vector<LinePlot>& plots);
 std::string policies_html(const PolicyTable& table);
 std::string degradation_html(const Degradation& result);
 std::string reactivity_html(const ReactivityTable& table);
+std::string people_html(const PeopleTable& table);
+std::string levels_html(const std::vector<LevelTable>& tables);
 
 // Tables and foot heights; the curves. "" where there are none.
 std::string controllers_html(const ReportContent& content);

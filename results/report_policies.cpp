@@ -1,4 +1,5 @@
-// The sections "Policies", "Perturbations" and "Reactivity" of the HTML report.
+// The sections "Policies", "Perturbations", "Reactivity", "Recorded and synthetic people" and "Levels" of the HTML
+// report.
 #include "duet/results/report_parts.h"
 
 namespace duet {
@@ -17,6 +18,10 @@ std::string policies_html(const PolicyTable& table) { return section_html({}, po
 std::string degradation_html(const Degradation& result) {
   return section_html(degradation_plots(result), degradation_tables(result));
 }
+
+std::string people_html(const PeopleTable& table) { return section_html({}, people_tables(table)); }
+
+std::string levels_html(const std::vector<LevelTable>& tables) { return section_html({}, titled_levels(tables)); }
 
 std::string reactivity_html(const ReactivityTable& table) {
   return section_html(reactivity_plots(table), reactivity_tables(table));
