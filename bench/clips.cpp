@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <variant>
 
@@ -19,6 +20,7 @@
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/motion/synthesis.h"
+#include "duet/motion/tracked_clip.h"
 #include "duet/retarget/pair.h"
 
 namespace duet {
@@ -31,25 +33,42 @@ struct SyntheticClip {
   int index;
   std::uint64_t seed;
   Likeness like;
+  bool cropped, tracked;
   const ClipVariant* variant;  // of the suite; null: as drawn
 };
-using ClipSource = std::variant<std::string, SyntheticClip>;  // a file, or what is synthesised
+struct ClipSource {
+  std::variant<std::string, SyntheticClip> from;  // a file, or what is synthesised
+  bool other_role = false;
+};
 
-void add_synthetic(const std::vector<Task>& tasks, const SuiteClips& clips, std::vector<ClipSource>& sources) {
-  for (const Task task : tasks) {
-    for (int index = 0; index < clips.synth_per_task; ++index) {
-      if (clips.variants.empty())
-        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, clips.synth_like, nullptr});
-      for (const ClipVariant& variant : clips.variants)
-        sources.emplace_back(SyntheticClip{task, index, clips.synth_seed, clips.synth_like, &variant});
+// Each of `sources` in the roles that the suite asks for, the other one after its own.
+std::vector<ClipSource> in_roles(const std::vector<ClipSource>& sources, ClipRoles roles) {
+  std::vector<ClipSource> list;
+  for (const ClipSource& source : sources) {
+    list.push_back(source);
+    if (roles == ClipRoles::kBoth) list.push_back({source.from, true});
+  }
+  return list;
+}
+
+void add_synthetic(Task task, int count, bool cropped, const SuiteClips& clips, std::vector<ClipSource>& sources) {
+  SyntheticClip clip{task, 0, clips.synth_seed, clips.synth_like, cropped, clips.synth_tracked, nullptr};
+  for (clip.index = 0; clip.index < count; ++clip.index) {
+    clip.variant = nullptr;
+    if (clips.variants.empty()) sources.push_back({clip});
+    for (const ClipVariant& variant : clips.variants) {
+      clip.variant = &variant;
+      sources.push_back({clip});
     }
   }
 }
 
-std::vector<ClipSource> list_sources(const Suite& suite) {
-  std::vector<ClipSource> sources(suite.clips.files.begin(), suite.clips.files.end());
-  add_synthetic(suite.tasks, suite.clips, sources);
-  return sources;
+// Files, or what is synthesised in their place.
+std::vector<ClipSource> list_sources(const std::vector<Task>& tasks, const SuiteClips& clips) {
+  std::vector<ClipSource> sources;
+  for (const std::string& file : clips.files) sources.push_back({file});
+  for (const Task task : tasks) add_synthetic(task, clips.synth_per_task, false, clips, sources);
+  return in_roles(sources, clips.roles);
 }
 
 InteractionClip with_padding(InteractionClip clip, const ClipPadding& pad) {
@@ -73,11 +92,11 @@ InteractionClip synthesize(const SyntheticClip& source) {
   options.seed = source.seed;
   options.index = source.index;
   if (source.like == Likeness::kPeople) like_people(source, options);
-  if (source.variant == nullptr) return synthesize(source.task, options);
-  options.side = source.variant->side;
-  options.target_height = source.variant->target_height;
+  if (source.cropped) options.before = options.after = std::nullopt;
+  if (source.variant != nullptr) vary(*source.variant, options);
   InteractionClip clip = synthesize(source.task, options);
-  clip.id += "-" + source.variant->name;
+  if (source.tracked) clip = tracked(clip, {}, source.seed);
+  if (source.variant != nullptr) clip.id += "-" + source.variant->name;
   return clip;
 }
 
@@ -85,11 +104,21 @@ InteractionClip synthesize(const SyntheticClip& source) {
 std::string label_of(const SyntheticClip& clip) {
   std::string label = fmt::format("{} {} {}", to_string(clip.task), clip.seed, clip.index);
   if (clip.like != Likeness::kRehearsed) label += fmt::format(" like={}", name_of(likeness_names(), clip.like));
+  if (clip.cropped) label += " cropped";
+  if (clip.tracked) label += " tracked";
   if (clip.variant == nullptr) return label;
   label += " " + clip.variant->name;
   if (clip.variant->side) label += fmt::format(" {}", name_of(side_names(), *clip.variant->side));
   if (clip.variant->target_height) label += fmt::format(" {}", *clip.variant->target_height);
+  if (clip.variant->distance) label += fmt::format(" distance={}", *clip.variant->distance);
+  if (clip.variant->outcome) label += fmt::format(" {}", name_of(act_outcome_names(), *clip.variant->outcome));
   return label;
+}
+
+// The other person than before is whom the robot replaces.
+InteractionClip in_other_role(InteractionClip clip) {
+  set_reactor(clip, clip.reactor == Person::kA ? Person::kB : Person::kA);
+  return clip;
 }
 
 // What all clips of a suite have in common.
@@ -113,15 +142,22 @@ LoadedMotion find_or_make(const PreparedClips& prepared, const std::string& labe
 // A file that is only read is not kept.
 LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const PairOptions& options,
                        const ClipPadding& pad, const PreparedClips& prepared) {
-  if (const auto* file = std::get_if<std::string>(&source)) {
+  const std::string role = source.other_role ? " other role" : "";
+  if (const auto* file = std::get_if<std::string>(&source.from)) {
     const Npz npz = Npz::load(*file);
-    const auto read = [&] { return load_or_retarget(npz, robot, options, Implausible::kRefused, pad); };
+    const auto read = [&] {
+      return load_or_retarget(npz, robot, options, Implausible::kRefused, pad, source.other_role);
+    };
     const bool keep = prepared.keeps() && kind_of(npz) == MotionFile::kClip;
-    return keep ? find_or_make(prepared, sha256_file(*file), read) : read();
+    return keep ? find_or_make(prepared, sha256_file(*file) + role, read) : read();
   }
-  const auto& clip = std::get<SyntheticClip>(source);
-  const auto make = [&] { return LoadedMotion{retarget(with_padding(synthesize(clip), pad), robot, options), {}}; };
-  return prepared.keeps() ? find_or_make(prepared, label_of(clip), make) : make();
+  const auto& clip = std::get<SyntheticClip>(source.from);
+  const auto make = [&] {
+    InteractionClip made = with_padding(synthesize(clip), pad);
+    if (source.other_role) made = in_other_role(std::move(made));
+    return LoadedMotion{retarget(made, robot, options), {}};
+  };
+  return prepared.keeps() ? find_or_make(prepared, label_of(clip) + role, make) : make();
 }
 
 // A folder of clips that all lack phases is one matter, not a thousand lines.
@@ -198,16 +234,20 @@ MotionFile kind_of(const Npz& npz) {
 }
 
 LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
-                              Implausible implausible, const ClipPadding& pad) {
+                              Implausible implausible, const ClipPadding& pad, bool other_role) {
   return naming_file(npz.name(), [&]() -> LoadedMotion {
     switch (kind_of(npz)) {
       case MotionFile::kClip: {
         ForeignClip read = read_foreign_clip(npz, implausible);
-        return {retarget(with_padding(std::move(read.clip), pad), robot, options), std::move(read.notes)};
+        InteractionClip clip = with_padding(std::move(read.clip), pad);
+        if (other_role) clip = in_other_role(std::move(clip));
+        return {retarget(clip, robot, options), other_role ? std::vector<std::string>() : std::move(read.notes)};
       }
       case MotionFile::kPaired:
         if (pad.any())
           throw InputError("expected a clip of two people, as only these can be padded, found a paired motion");
+        if (other_role)
+          throw InputError("expected a clip of two people, as only these have two roles, found a paired motion");
         return {read_paired_motion(npz), {}};
       case MotionFile::kRecording:
         break;
@@ -231,15 +271,29 @@ std::vector<PairedMotion> empty_clips(const std::vector<SuiteReference>& referen
   return clips;
 }
 
+// Beside clips of files the synthesised ones of the same tasks, so many for each.
+std::vector<ClipSource> list_twins(const std::vector<LoadedMotion>& read, const Suite& suite) {
+  std::vector<ClipSource> sources;
+  for (const Task task : suite.tasks) {
+    const auto of_task = [&](const LoadedMotion& motion) { return motion.motion.task == task; };
+    const auto count = static_cast<int>(std::ranges::count_if(read, of_task) / (suite.clips.copies()));
+    add_synthetic(task, count * suite.clips.synth_per_file, true, suite.clips, sources);
+  }
+  return in_roles(sources, suite.clips.roles);
+}
+
 }  // namespace
 
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& prepare) {
   if (!suite.references.empty()) return empty_clips(suite.references);
   const PreparedClips prepared(prepare.keep_in, maker_of(suite, robot));
-  std::vector<PairedMotion> clips = by_task(make_clips(list_sources(suite), robot, pair_options(suite), threads,
-                                                       progress, suite.clips.pad, prepared, prepare.stop),
-                                            suite.tasks);
+  const auto make = [&](const std::vector<ClipSource>& sources) {
+    return make_clips(sources, robot, pair_options(suite), threads, progress, suite.clips.pad, prepared, prepare.stop);
+  };
+  std::vector<LoadedMotion> made = make(list_sources(suite.tasks, suite.clips));
+  if (suite.clips.synth_per_file > 0) std::ranges::move(make(list_twins(made, suite)), std::back_inserter(made));
+  std::vector<PairedMotion> clips = by_task(std::move(made), suite.tasks);
   if (clips.empty()) throw InputError(fmt::format("{}: no clip is left for the tasks of the suite", suite.file));
   for (const PairedMotion& clip : clips) check_robot(clip, robot);
   check_ids(clips);
@@ -252,9 +306,29 @@ std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::ve
   clips.synth_like = like;
   clips.synth_per_task = per_task;
   clips.synth_seed = seed;
-  std::vector<ClipSource> sources;
-  add_synthetic(tasks, clips, sources);
-  return by_task(make_clips(sources, robot, {}, threads, progress), tasks);
+  return by_task(make_clips(list_sources(tasks, clips), robot, {}, threads, progress), tasks);
+}
+
+bool is_dataset(const std::string& folder) { return fs::exists(fs::path(folder) / "dataset.json"); }
+
+namespace {
+
+std::string people_folder(const std::string& dataset) {
+  const fs::path people = fs::path(dataset) / "people";
+  if (!fs::exists(people) || fs::is_empty(people))
+    throw InputError(
+        fmt::format("'{}' is a data set in which no recording was kept: its tables/refused.csv says why, "
+                    "and `--gates` of `duet dataset` by which gates recordings are judged",
+                    dataset));
+  return people.string();
+}
+
+}  // namespace
+
+std::vector<std::string> find_clip_files(const std::vector<std::string>& paths) {
+  std::vector<std::string> places;
+  for (const std::string& path : paths) places.push_back(is_dataset(path) ? people_folder(path) : path);
+  return find_motion_files(places);
 }
 
 std::vector<std::string> find_motion_files(const std::vector<std::string>& paths) {

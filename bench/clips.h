@@ -31,10 +31,12 @@ struct LoadedMotion {
   std::vector<std::string> notes;  // what a clip's reader should know (motion/plausibility.h)
 };
 
-// A clip, padded and retargeted, or a paired motion. Throws InputError; for a recording with what is needed instead,
-// and for a paired motion that is to be padded.
+// A clip, padded and retargeted, or a paired motion; `other_role`: with the robot in the place of the other person.
+// Throws InputError; for a recording with what is needed instead, and for a paired motion that is to be padded or to
+// change roles.
 LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
-                              Implausible implausible = Implausible::kRefused, const ClipPadding& pad = {});
+                              Implausible implausible = Implausible::kRefused, const ClipPadding& pad = {},
+                              bool other_role = false);
 
 // Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads; what
 // there is to know of them is noted on `progress`. Throws InputError where none remains, Stopped (bench/stop_sign.h)
@@ -48,6 +50,11 @@ std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::ve
                                           Likeness like = Likeness::kRehearsed);
 
 PairOptions pair_options(const Suite& suite);
+
+// What find_motion_files gives, but of a folder that is a data set (docs/datasets.md) its people alone.
+std::vector<std::string> find_clip_files(const std::vector<std::string>& paths);
+// Whether a folder is a data set that `duet dataset` made.
+bool is_dataset(const std::string& folder);
 
 // NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not
 // there or where nothing is found.

@@ -145,6 +145,14 @@ bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
          (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation));
 }
 
+std::vector<Task> tasks_of_own_clips(const Suite& suite) {
+  if (!suite.references.empty()) return std::vector<Task>(suite.references.size(), Task::kHug);
+  std::vector<Task> tasks;
+  const std::size_t per_task = suite.clips.synth_per_task * suite.clips.copies();
+  for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
+  return tasks;
+}
+
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
   std::int64_t total = 0;
   for (EpisodeSpec spec : combinations_of(suite)) {

@@ -74,6 +74,9 @@ std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies)
 // arm to every choice of policies.
 bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part);
 
+// Tasks of the clips that the suite makes itself, or of its commanded velocities, which have none: any stands for it.
+std::vector<Task> tasks_of_own_clips(const Suite& suite);
+
 // How many episodes of a suite, over clips of these tasks, belong to one of these parts.
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts);
 

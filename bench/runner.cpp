@@ -150,16 +150,6 @@ std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPa
   return missing;
 }
 
-// Tasks of the clips that the suite makes itself; those of files are known when they are read.
-std::vector<Task> tasks_of_clips(const Suite& suite) {
-  if (!suite.references.empty())
-    return std::vector<Task>(suite.references.size(), Task::kHug);  // commands have none, and nobody asks
-  std::vector<Task> tasks;
-  const std::size_t per_task = suite.clips.synth_per_task * std::max<std::size_t>(1, suite.clips.variants.size());
-  for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
-  return tasks;
-}
-
 std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
   std::vector<Task> tasks;
   tasks.reserve(clips.size());
@@ -273,6 +263,7 @@ void require_names_of(const std::string& directory, const Suite& suite) {
 }  // namespace
 
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
+  require_clips(suite);
   check_filters(options, suite);
   check_decision_of(options, suite);
   RunSummary summary;
@@ -301,7 +292,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
   const StopSign stop(options.time_limit, options.begin);
   try {
-    if (suite.clips.files.empty()) ask_for(suite, tasks_of_clips(suite), options, run, summary);
+    if (suite.clips.files.empty()) ask_for(suite, tasks_of_own_clips(suite), options, run, summary);
     const PrepareOptions prepare{.keep_in = directory, .stop = &stop};
     std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress, prepare);
     if (!suite.clips.files.empty()) ask_for(suite, tasks_of(clips), options, run, summary);

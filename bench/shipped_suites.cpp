@@ -29,14 +29,6 @@ std::string head_comment(const std::string& yaml) {
   return comment;
 }
 
-// The task of each clip that the suite's synthesis makes.
-std::vector<Task> synthetic_clips(const Suite& suite) {
-  const std::size_t each = suite.clips.synth_per_task * std::max<std::size_t>(1, suite.clips.variants.size());
-  std::vector<Task> clips;
-  for (const Task task : suite.tasks) clips.insert(clips.end(), each, task);
-  return clips;
-}
-
 }  // namespace
 
 std::vector<std::string> shipped_suite_names() {
@@ -51,7 +43,7 @@ ShippedSuite shipped_suite(const std::string& name) {
   const std::string file = path_of(name);
   const Suite suite = load_suite(file);
   return {name, fmt::format("{} {}", suite.name, suite.version), first_sentence(read_file(file)),
-          count_episodes(suite, synthetic_clips(suite), {RunPart()})};
+          count_episodes(suite, tasks_of_own_clips(suite), {RunPart()}), suite.clips.given};
 }
 
 std::string suite_file(const std::string& suite) {

@@ -14,6 +14,7 @@ struct ShippedSuite {
   std::string version;        // "hhoi-core 2.0.0"
   std::string question;       // the first sentence of the comment that begins the file
   std::int64_t episodes = 0;  // the null arm included, in the engines that this machine has where the suite names none
+  bool clips_given = false;   // its clips are those of who runs it: no episode is counted
 };
 
 // In alphabetical order. Throws MissingError where the folder is not there.

@@ -135,6 +135,8 @@ ReportContent report_content(const Run& run, bool with_clips, const std::vector<
   content.foot_plots = foot_plots(rows);
   content.certificate = run.info.certificate;
   content.walking = walk_table(rows);
+  content.people = people_table(rows);
+  content.levels = level_tables(rows);
   if (!with_clips || !suite.references.empty()) return content;
 
   const auto robot = load_shared_robot(suite.robot);

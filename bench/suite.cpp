@@ -1,5 +1,7 @@
 #include "duet/bench/suite.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "duet/bench/suite_names.h"
@@ -26,6 +28,17 @@ const Item& find_named(const std::vector<Item>& items, const char* kind, const s
 
 }  // namespace
 
+std::size_t SuiteClips::copies() const {
+  return std::max<std::size_t>(1, variants.size()) * (roles == ClipRoles::kBoth ? 2 : 1);
+}
+
+void vary(const ClipVariant& variant, SynthesisOptions& options) {
+  options.side = variant.side;
+  options.target_height = variant.target_height;
+  if (variant.distance) options.distance = variant.distance;
+  if (variant.outcome) options.outcome = variant.outcome;
+}
+
 const SuiteController& controller_of(const Suite& suite, const std::string& name) {
   return find_named(suite.controllers, "controller", name);
 }
@@ -38,5 +51,13 @@ Perturbation perturbation_of(const Suite& suite, const std::string& name) {
 std::vector<std::string> controller_names_of(const Suite& suite) { return names_of(suite.controllers); }
 std::vector<std::string> policy_names_of(const Suite& suite) { return names_of(suite.policies); }
 std::vector<std::string> perturbation_names_of(const Suite& suite) { return names_of(suite.perturbations); }
+
+void require_clips(const Suite& suite) {
+  if (!suite.clips.given) return;
+  throw InputError(
+      fmt::format("{}: its clips are not part of duet: expected --clips PATH (a data set of `duet dataset retarget`, "
+                  "or clips of two people) or -s 'clips.files=[PATH]', found none",
+                  suite.file));
+}
 
 }  // namespace duet

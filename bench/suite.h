@@ -29,7 +29,12 @@ struct ClipVariant {
   std::string name;  // follows the clip's id; once per suite
   std::optional<Side> side{};
   std::optional<double> target_height{};  // [m]
+  std::optional<double> distance{};       // of the roots at the start [m]
+  std::optional<ActOutcome> outcome{};    // of people only
 };
+
+// Gives what the variant asks for to the options of its clip.
+void vary(const ClipVariant& variant, SynthesisOptions& options);
 
 // How long both people stand as in the first and the last frame of each clip around it.
 struct ClipPadding {
@@ -40,11 +45,18 @@ struct ClipPadding {
 
 struct SuiteClips {
   int synth_per_task = 0;  // synthesised clips of each task, or
+  int synth_per_file = 0;  // of each task so many for each of its files, beside these
   std::uint64_t synth_seed = 42;
   Likeness synth_like = Likeness::kRehearsed;
+  bool synth_tracked = false;           // as a depth camera sees them (motion/tracked_clip.h)
   std::vector<std::string> files;       // clips or paired motions (NPZ)
+  bool given = false;                   // the files are yet to be given (`duet run --clips`)
   std::vector<ClipVariant> variants{};  // of synthesised clips; none: each as it is drawn
   ClipPadding pad{};
+  ClipRoles roles = ClipRoles::kOwn;
+
+  // How often each clip is there: in each variant, in each role.
+  [[nodiscard]] std::size_t copies() const;
 };
 
 // A controller as a suite names it: one of duet's, or an IO descriptor, with options, under a name of its own.
@@ -105,6 +117,9 @@ Perturbation perturbation_of(const Suite& suite, const std::string& name);
 std::vector<std::string> controller_names_of(const Suite& suite);
 std::vector<std::string> policy_names_of(const Suite& suite);
 std::vector<std::string> perturbation_names_of(const Suite& suite);
+
+// Throws InputError where the suite's clips are still to be given, saying how.
+void require_clips(const Suite& suite);
 
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});

@@ -13,6 +13,7 @@ namespace duet {
 // Of clips.synth and clips.pad.
 const FieldTable<SuiteClips>& synth_fields();
 const FieldTable<ClipPadding>& padding_fields();
+const Field<SuiteClips>& roles_field();
 
 // Fills suite.clips; suite.file is set. Throws InputError: file, line, expected, found.
 void read_clips(const YamlSection& top, Suite& suite);

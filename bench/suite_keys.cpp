@@ -68,13 +68,18 @@ SuiteKey clips_key() {
   for (const FieldRow& row : field_rows(synth_fields(), SuiteClips()))
     key.rows.push_back(
         {"clips.synth." + row.name, row.values, row.name == "per_task" ? "" : row.fallback, row.meaning});
-  key.rows.push_back({"clips.synth.variants", "a list of {name, side, target_height}", "",
-                      "every clip once in each (`side`: `left` or `right` hand, `target_height` of contact or gesture "
-                      "[m]; at least one of them), all else drawn as without; ids end in the name"});
-  key.rows.push_back({"clips.files", "a list of paths", "",
-                      "clips or paired motions (NPZ), or folders of them, in the place of `synth`"});
+  key.rows.push_back(
+      {"clips.synth.variants", "a list of {name, side, target_height, distance, outcome}", "",
+       "every clip once in each (`side`: `left` or `right` hand, `target_height` of contact or gesture "
+       "[m], `distance` of the roots at the start [m], `outcome` of an act like people's: `complete`, "
+       "`hesitant` or `aborted`; at least one of them), all else drawn as without; ids end in the name"});
+  key.rows.push_back({"clips.files", "a list of paths, or given", "",
+                      "clips or paired motions (NPZ), folders of them or data sets (their people), in the place of "
+                      "`synth.per_task`; `given`: who runs the suite gives them with `--clips`"});
   for (const FieldRow& row : field_rows(padding_fields(), ClipPadding()))
     key.rows.push_back({"clips.pad." + row.name, row.values, row.fallback, row.meaning});
+  for (const FieldRow& row : field_rows(FieldTable<SuiteClips>{roles_field()}, SuiteClips()))
+    key.rows.push_back({"clips." + row.name, row.values, row.fallback, row.meaning});
   return key;
 }
 

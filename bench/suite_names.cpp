@@ -24,6 +24,17 @@ const NameTable<Side>& side_names() {
   return names;
 }
 
+const NameTable<ActOutcome>& act_outcome_names() {
+  static const NameTable<ActOutcome> names = {
+      {"complete", ActOutcome::kComplete}, {"hesitant", ActOutcome::kHesitant}, {"aborted", ActOutcome::kAborted}};
+  return names;
+}
+
+const NameTable<ClipRoles>& role_names() {
+  static const NameTable<ClipRoles> names = {{"own", ClipRoles::kOwn}, {"both", ClipRoles::kBoth}};
+  return names;
+}
+
 const NameTable<Likeness>& likeness_names() {
   static const NameTable<Likeness> names = {{"rehearsed", Likeness::kRehearsed}, {"people", Likeness::kPeople}};
   return names;

@@ -15,6 +15,7 @@ namespace duet {
 // auto: act where the controller cannot walk, else approach
 enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
 enum class RecordTrajectories { kNone, kFailures, kAll };
+enum class ClipRoles { kOwn, kBoth };  // whom the robot replaces: whom the clip says, or each person in turn
 
 template <typename E>
 using NameTable = std::vector<std::pair<std::string, E>>;
@@ -25,6 +26,8 @@ bool is_path_option(std::string_view option);
 
 const NameTable<SuiteStart>& start_names();
 const NameTable<Side>& side_names();
+const NameTable<ActOutcome>& act_outcome_names();
+const NameTable<ClipRoles>& role_names();
 const NameTable<Likeness>& likeness_names();  // "rehearsed", "people"
 // Throws std::invalid_argument that begins with `option` and lists the names.
 Likeness likeness_of(std::string_view option, const std::string& name);

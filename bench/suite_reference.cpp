@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 
 #include "duet/controllers/registry.h"
 #include "duet/core/names.h"
@@ -25,12 +26,16 @@ std::string default_name(const Eigen::Vector3d& velocity) {
   return fmt::format("{}_{}", kNames[axis][velocity[axis] < 0.0], std::abs(velocity[axis]));
 }
 
-bool reads_moving(const YamlSection& item) {
-  if (!item.has("upper_body")) return false;
+constexpr std::array<const char*, 3> kUpperBodies = {"still", "held", "moving"};  // in the order of UpperBody
+
+UpperBody read_upper_body(const YamlSection& item) {
+  if (!item.has("upper_body")) return UpperBody::kStill;
   const std::string text = item.text("upper_body");
-  if (text != "still" && text != "moving")
-    item.fail(item.line("upper_body"), fmt::format("upper_body: expected 'still' or 'moving', found '{}'", text));
-  return text == "moving";
+  const auto found = std::ranges::find(kUpperBodies, text);
+  if (found == kUpperBodies.end())
+    item.fail(item.line("upper_body"),
+              fmt::format("upper_body: expected 'still', 'held' or 'moving', found '{}'", text));
+  return static_cast<UpperBody>(found - kUpperBodies.begin());
 }
 
 SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
@@ -44,7 +49,7 @@ SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
   reference.begin = in_range(item, "begin", 0.0, {0.0, reference.seconds, true});
   reference.end = in_range(item, "end", reference.seconds, {reference.begin, reference.seconds, true});
   reference.pause = in_range(item, "pause", 0.0, {0.0, 600.0, true});
-  reference.moves_upper_body = reads_moving(item);
+  reference.upper_body = read_upper_body(item);
   reference.name = item.has("name") ? item.text("name") : default_name(reference.velocity);
   if (!is_plain_name(reference.name))
     item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(reference.name)));
@@ -77,7 +82,7 @@ std::string references_yaml(const std::vector<SuiteReference>& references) {
     text += fmt::format(
         "  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}}}\n",
         reference.name, v.x(), v.y(), v.z(), reference.seconds, reference.begin, reference.end, reference.pause,
-        reference.moves_upper_body ? "moving" : "still");
+        kUpperBodies.at(static_cast<std::size_t>(reference.upper_body)));
   }
   return text;
 }
@@ -93,7 +98,8 @@ const SuiteReference& reference_of(const std::vector<SuiteReference>& references
 
 StreamOptions stream_options(const SuiteReference& reference) {
   StreamOptions options;
-  options.moves_upper_body = reference.moves_upper_body;
+  options.moves_upper_body = reference.upper_body == UpperBody::kMoving;
+  options.holds_upper_body = reference.upper_body == UpperBody::kHeld;
   options.from_neutral = true;
   options.script = ScriptedCommand{
       .velocity = reference.velocity, .begin = reference.begin, .end = reference.end, .pause = reference.pause};

@@ -15,13 +15,16 @@ namespace duet {
 // In rows the policy's name; their task is kWalkRows (results/walk_table.h).
 inline constexpr const char* kVelocityPolicy = "velocity";
 
+// In the neutral pose; in one that is drawn for the episode; between poses that are drawn for it.
+enum class UpperBody { kStill, kHeld, kMoving };
+
 struct SuiteReference {
   std::string name;                                    // in rows the clip; once per suite
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // forward, to the left [m/s], yaw rate [rad/s], in the heading
   double seconds = 14.0;                               // of the episode
   double begin = 0.0, end = 14.0;                      // when the command holds; else the root stands [s]
   double pause = 0.0;                                  // above 0: on and off in turn, each for so long [s]
-  bool moves_upper_body = false;                       // between poses that are drawn for the episode
+  UpperBody upper_body = UpperBody::kStill;
 
   // Whether the command holds from the first tick to the last.
   [[nodiscard]] bool constant() const { return begin <= 0.0 && end >= seconds && pause <= 0.0; }

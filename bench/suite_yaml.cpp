@@ -44,9 +44,9 @@ void check_commands(const YamlSection& top, const Suite& suite) {
 void check_whole(const YamlSection& top, const Suite& suite) {
   if (!suite.references.empty()) check_commands(top, suite);
   check_variants(top, suite);
-  const std::size_t variants = std::max<std::size_t>(1, suite.clips.variants.size());
-  const std::size_t made = suite.clips.synth_per_task * suite.tasks.size() * variants;
-  require_sane_size(suite, static_cast<std::int64_t>(made + suite.clips.files.size() + suite.references.size()));
+  const SuiteClips& clips = suite.clips;
+  const std::size_t made = clips.synth_per_task * suite.tasks.size() + clips.files.size() * (1 + clips.synth_per_file);
+  require_sane_size(suite, static_cast<std::int64_t>(made * clips.copies() + suite.references.size()));
 }
 
 Suite read_suite(const YAML::Node& document, const std::string& file) {

@@ -16,12 +16,9 @@
 namespace duet::cli {
 namespace {
 
-bool is_dataset(const std::string& folder) { return std::filesystem::exists(folder + "/dataset.json"); }
-
 std::vector<std::string> files_of(const std::string& folder) {
-  if (is_dataset(folder)) return find_motion_files({(std::filesystem::path(folder) / "people").string()});
   try {
-    return find_motion_files({folder});
+    return find_clip_files({folder});
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}; expected a data set of duet or clips (NPZ)", error.what()));
   }

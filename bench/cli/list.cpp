@@ -274,7 +274,8 @@ std::vector<Listed> list_suites() {
   std::vector<Listed> list;
   for (const std::string& name : shipped_suite_names()) {
     const ShippedSuite suite = shipped_suite(name);
-    list.push_back({name, fmt::format("{}, {} episodes: {}", suite.version, suite.episodes, suite.question)});
+    const std::string size = suite.clips_given ? "clips of your own" : fmt::format("{} episodes", suite.episodes);
+    list.push_back({name, fmt::format("{}, {}: {}", suite.version, size, suite.question)});
   }
   return list;
 }

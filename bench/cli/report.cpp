@@ -70,6 +70,18 @@ std::string html_text(const Run& run, const std::vector<std::string>& notes, con
 
 // What changes when only the engine does, and what the robot's contacts do to people, where there is anything to say.
 void write_tables(const Tables& tables, const std::string& format, const Writer& write) {
+  if (tables.has_people()) {
+    if (format == "md") write("people.md", people_table_markdown(tables.people), format);
+    if (format == "csv") write("people.csv", people_table_csv(tables.people), format);
+    if (format == "json") write("people.json", people_table_json(tables.people).dump(2) + "\n", format);
+    if (format == "tex") write("people.tex", people_table_latex(tables.people), format);
+  }
+  if (tables.has_levels()) {
+    if (format == "md") write("levels.md", levels_markdown(tables.levels), format);
+    if (format == "csv") write("levels.csv", levels_csv(tables.levels), format);
+    if (format == "json") write("levels.json", levels_json(tables.levels).dump(2) + "\n", format);
+    if (format == "tex") write("levels.tex", levels_latex(tables.levels), format);
+  }
   if (tables.has_engines()) {
     if (format == "md")
       write("engines.md",

@@ -39,8 +39,10 @@ struct RunArguments {
 void use_clips(const std::vector<std::string>& paths, Suite& suite) {
   if (paths.empty()) return;
   require(suite.references.empty(), "--clips: the suite has a `reference` and no clips");
-  suite.clips = {.files = {}, .pad = suite.clips.pad};
-  for (const std::string& file : find_motion_files(paths))
+  if (suite.clips.synth_per_task > 0) suite.clips = {.files = {}, .pad = suite.clips.pad, .roles = suite.clips.roles};
+  suite.clips.given = false;
+  suite.clips.files.clear();
+  for (const std::string& file : find_clip_files(paths))
     suite.clips.files.push_back(std::filesystem::absolute(file).string());
 }
 
@@ -67,6 +69,7 @@ Suite read_suite(const RunArguments& arguments) {
   Suite suite = load_suite(suite_file(arguments.suite), overrides);
   suite.allow_programs = arguments.allow_programs;
   use_clips(arguments.clips, suite);
+  require_clips(suite);
   for (const std::string& text : arguments.networks) {
     const auto [actor, path] = split_assignment(text);
     set_network(suite, actor, std::filesystem::absolute(path).lexically_normal().string());
@@ -230,7 +233,7 @@ void add_run(CLI::App& app, Session& session) {
   command->add_option("-o,--output", arguments->output,
                       "run directory; an unfinished run of the same suite is resumed");
   command->add_option("--clips", arguments->clips,
-                      "clips or paired motions (NPZ, folders) in the place of the suite's");
+                      "clips or paired motions (NPZ, folders), or a data set's people, in the place of the suite's");
   command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
   command->add_option("--network", arguments->networks,
                       "NAME=PATH: the network of one of the suite's controllers or policies (repeatable)");

@@ -16,12 +16,17 @@ Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& ce
           .contacts = contact_table(rows),
           .controllers = controller_table(rows),
           .walking = walk_table(rows),
+          .people = people_table(rows),
+          .levels = level_tables(rows),
           .certificate = certificate};
 }
 
 std::string tables_text(const Tables& tables) {
-  if (tables.has_walking()) return walk_table_markdown(tables.walking);
+  const std::string levels = levels_markdown(tables.levels);
+  if (tables.has_walking()) return levels + (levels.empty() ? "" : "\n") + walk_table_markdown(tables.walking);
   std::vector<std::string> parts = {leaderboard_markdown(tables.leaderboard, !tables.has_engines())};
+  if (tables.has_people()) parts.push_back(people_table_markdown(tables.people));
+  if (tables.has_levels()) parts.push_back(levels);
   if (tables.has_controllers()) parts.push_back(controller_table_markdown(tables.controllers));
   if (tables.has_engines()) {
     parts.push_back(cross_engine_markdown(tables.engines));
@@ -33,6 +38,8 @@ std::string tables_text(const Tables& tables) {
 
 void add_tables(const Tables& tables, nlohmann::json& json) {
   json["leaderboard"] = leaderboard_json(tables.leaderboard);
+  if (tables.has_people()) json["people"] = people_table_json(tables.people);
+  if (tables.has_levels()) json["levels"] = levels_json(tables.levels);
   if (tables.has_engines()) json["engines"] = cross_engine_json(tables.engines);
   if (tables.has_controllers()) json["controllers"] = controller_table_json(tables.controllers);
   if (tables.has_walking()) json["walking"] = walk_table_json(tables.walking);

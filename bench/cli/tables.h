@@ -9,6 +9,8 @@
 #include "duet/results/controller_table.h"
 #include "duet/results/cross_engine.h"
 #include "duet/results/leaderboard.h"
+#include "duet/results/level_table.h"
+#include "duet/results/people_table.h"
 #include "duet/results/walk_table.h"
 
 namespace duet::cli {
@@ -19,11 +21,15 @@ struct Tables {
   ContactTable contacts;
   ControllerTable controllers;
   WalkTable walking;
+  PeopleTable people;
+  std::vector<LevelTable> levels;
   nlohmann::json certificate;  // null: none is attached
 
   [[nodiscard]] bool has_engines() const { return engines.engines.size() > 1; }
   [[nodiscard]] bool has_contacts() const { return !contacts.groups.empty(); }
   [[nodiscard]] bool has_controllers() const { return !controllers.entries.empty(); }
+  [[nodiscard]] bool has_people() const { return !people.entries.empty(); }
+  [[nodiscard]] bool has_levels() const { return !levels.empty(); }
   [[nodiscard]] bool has_walking() const { return !walking.entries.empty(); }
 };
 
@@ -32,7 +38,7 @@ Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& ce
 // Markdown for a terminal: where robots walk by command how they do, and nothing of acts; else, with several engines
 // the metrics of each are left to the files; their drift is shown.
 std::string tables_text(const Tables& tables);
-// "leaderboard", and where there are any "engines", "contacts" and "controllers", added to `json`.
+// "leaderboard", and where there are any "people", "levels", "engines", "contacts" and "controllers", added to `json`.
 void add_tables(const Tables& tables, nlohmann::json& json);
 
 }  // namespace duet::cli

@@ -200,8 +200,11 @@ TEST(Suite, VariantsThatCannotBeAreRefused) {
   };
   EXPECT_THAT(with("[{name: low, target_height: 0.9}]"),
               AllOf(HasSubstr("s.yaml:4"), HasSubstr("target_height 0.9 m")));
+  EXPECT_THAT(with("[{name: a, outcome: aborted}]"), HasSubstr("outcome are of clips like people"));
+  EXPECT_THAT(with("[{name: a, outcome: lost}]"), HasSubstr("unknown outcome 'lost'"));
+  EXPECT_THAT(with("[{name: a, distance: 1}]"), HasSubstr("distance 1 m is out of range; expected [2, 5] m"));
   EXPECT_THAT(with("[{name: a, side: up}]"), HasSubstr("unknown side 'up'"));
-  EXPECT_THAT(with("[{name: a}]"), HasSubstr("expected side or target_height, found neither"));
+  EXPECT_THAT(with("[{name: a}]"), HasSubstr("expected side, target_height, distance or outcome, found none"));
   EXPECT_THAT(with("[{side: left}]"), HasSubstr("name"));
   EXPECT_THAT(with("[{name: 'a b', side: left}]"), HasSubstr("letters, digits"));
   EXPECT_THAT(with("[{name: a, side: left}, {name: a, side: right}]"), HasSubstr("'a' is there twice"));

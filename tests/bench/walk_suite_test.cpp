@@ -66,7 +66,8 @@ TEST(WalkSuite, WhatHasNoMeaningBesideACommandIsRefusedByItsLine) {
   EXPECT_THAT(refusal("{velocity: [0, 0, 40]}"), HasSubstr("at most 10 m/s"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0], seconds: 0}"), HasSubstr("seconds: expected a number from 0.2"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0], begin: 3, end: 2}"), HasSubstr("end: expected a number from 3"));
-  EXPECT_THAT(refusal("{velocity: [0, 0, 0], upper_body: dancing}"), HasSubstr("'still' or 'moving'"));
+  EXPECT_THAT(refusal("{velocity: [0, 0, 0], upper_body: dancing}"),
+              HasSubstr("expected 'still', 'held' or 'moving', found 'dancing'"));
   EXPECT_THAT(refusal("[{velocity: [0, 0, 0]}, {velocity: [0, 0, 0]}]"), HasSubstr("'stand' is there twice"));
   EXPECT_THAT(refusal("[]"), HasSubstr("expected at least one, found none"));
   EXPECT_THAT(refusal("{velocity: [0, 0, 0]}", "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\n"),
@@ -126,6 +127,21 @@ TEST(WalkSuite, TheShippedNetworksStandAndWalk) {
     EXPECT_EQ(row.outcome, Outcome::kOk) << row.controller << " " << row.clip << " " << row.message;
     EXPECT_LT(row.metrics.at("upper_body_error"), 0.10) << row.controller << " " << row.clip;
   }
+}
+
+// The last stage of a ladder that is passed is printed above the walks.
+TEST(WalkSuite, PrintsTheStagesThatItNames) {
+  const ScratchFolder folder;
+  write_file(folder / "w.yaml",
+             yaml("[{name: stage_1_own, velocity: [0, 0, 0], seconds: 2}, "
+                  "{name: stage_2_held-forward, velocity: [0.2, 0, 0], seconds: 2, upper_body: held}]"));
+  const test::Answer ended = test::duet_program("run '" + (folder / "w.yaml") + "' -o '" + (folder / "run") + "'");
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  EXPECT_THAT(ended.out, ::testing::AllOf(HasSubstr("### Stages"), HasSubstr("2 held"), HasSubstr("95 % or more")));
+  const test::Answer report = test::duet_program("report '" + (folder / "run") + "' -f md,csv,json,tex,html");
+  ASSERT_EQ(report.code, 0) << report.err;
+  for (const char* file : {"levels.md", "levels.csv", "levels.json", "levels.tex"})
+    EXPECT_THAT(report.err, HasSubstr(file));
 }
 
 TEST(WalkSuite, RunsAgainToTheSameRows) {
