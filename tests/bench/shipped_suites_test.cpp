@@ -3,7 +3,9 @@
 #include <filesystem>
 
 #include "duet/bench/demonstrations.h"
+#include "duet/bench/run_identity.h"
 #include "duet/bench/training_motions.h"
+#include "duet/results/level_table.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -37,6 +39,47 @@ TEST(ShippedSuites, SayWhatTheyAsk) {
   EXPECT_THAT(reactivity.version, ::testing::StartsWith("hhoi-reactivity "));
   EXPECT_EQ(reactivity.episodes, 21 * 3 * 6 * 3);  // clips, tasks, shifts, two policies and the null arm
   for (const std::string& name : shipped_suite_names()) EXPECT_NE(shipped_suite(name).question, "") << name;
+}
+
+TEST(ShippedSuites, OneWithoutClipsOfItsOwnSaysSo) {
+  EXPECT_TRUE(shipped_suite("real").clips_given);
+  EXPECT_FALSE(shipped_suite("people").clips_given);
+  EXPECT_EQ(shipped_suite("wbc_gates").episodes, 13 * 6 * 32);  // commands, perturbations, episodes
+}
+
+// Rows of before compare with those of now only where these stay.
+TEST(ShippedSuites, OfBeforeKeepTheirHash) {
+  const std::vector<std::pair<const char*, const char*>> hashes = {
+      {"policies", "a0d7db1cd6cea09d3fa91b04c73547d5274f0ca955b0d25a07edfb7a34820ac8"},
+      {"partner", "1b2d782b000e7d78e5ba8de3efa71307d90167cc205385e9d5a4fb8423a634d6"},
+      {"reactivity", "877fa5a480f5516c1e371e3f833191406a10dbbe779650bc3ef8cc2e34de97cc"},
+      {"spatial", "d92ceb7411507d78e567c54b1ca0377d2d8cafb77ae733889b472c079d47fbe9"},
+      {"wbc_gates", "f137a5d4a1b110114915274b4fe478b1553dc045f5a8b630621a70c75c285257"}};
+  for (const auto& [name, hash] : hashes) EXPECT_EQ(suite_hash(load_suite(suite_file(name))), hash) << name;
+}
+
+// Each level of the ladder has all that the ones before it have.
+TEST(ShippedSuites, TheLevelsOfHardGoUp) {
+  const Suite suite = load_suite(suite_file("hard"));
+  int level = 0;
+  for (const Perturbation& perturbation : suite.perturbations) {
+    const std::optional<LevelName> found = level_of("level", perturbation.name);
+    if (perturbation.name == kCleanName) continue;
+    ASSERT_TRUE(found.has_value()) << perturbation.name;
+    EXPECT_EQ(found->level, ++level);
+  }
+  EXPECT_EQ(level, 7);
+  for (std::size_t i = 2; i < suite.perturbations.size(); ++i) {
+    const Perturbation &easier = suite.perturbations[i - 1], &harder = suite.perturbations[i];
+    const PartnerVariation &one = *easier.partner, &two = *harder.partner;
+    EXPECT_GE(two.hesitate_s, one.hesitate_s) << harder.name;
+    EXPECT_GE(two.comes_m.value_or(0.0), one.comes_m.value_or(0.0)) << harder.name;
+    EXPECT_GE(two.moves_on_m.value_or(0.0), one.moves_on_m.value_or(0.0)) << harder.name;
+    EXPECT_GE(two.other_hand.value_or(false), one.other_hand.value_or(false)) << harder.name;
+    EXPECT_GE(harder.perception.jitter, easier.perception.jitter) << harder.name;
+    EXPECT_GE(harder.perception.latency_ms, easier.perception.latency_ms) << harder.name;
+    EXPECT_NE(to_yaml(harder).substr(harder.name.size()), to_yaml(easier).substr(easier.name.size())) << harder.name;
+  }
 }
 
 TEST(ShippedSuites, FirstSentenceEndsAtAFullStopOrAQuestionMark) {
