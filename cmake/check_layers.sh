@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The include order of the rooms (docs/architecture.md, "Rooms") and of the units. Prints each include that breaks the
 # order of the rooms and each circle of units; exit 1.
-#   core < tasks < motion, robots, nn < io, formats, retarget, backends, controllers, policies, metrics < rollout < training < bench
+#   core < tasks < motion, robots, nn < io, formats, retarget, backends, controllers, policies, metrics < rollout < hardware, training < bench
 #   results uses core only; metrics, policies and controllers never include backends; a vendor's header stays in its engine.
 # A unit is a header with the .cpp file of its name; a .cpp file without such a header is a unit of its own. No two units
 # include each other, directly or through others.
@@ -22,6 +22,7 @@ declare -A may=(
   [policies]="core tasks robots nn io policies"
   [metrics]="core tasks motion robots metrics"
   [rollout]="core tasks motion robots backends controllers policies metrics rollout"
+  [hardware]="core tasks motion robots backends controllers policies metrics rollout hardware"
   [training]="core tasks motion robots nn io backends controllers policies metrics rollout training"
   [results]="core results"
   [datasets]="core tasks motion robots formats retarget metrics results datasets"
@@ -37,7 +38,7 @@ for room in "${!may[@]}"; do
     esac
   done < <(grep -rnE '^#include "duet/[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
 done
-rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench)
+rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench)
 vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
   hits=$(grep -rnE "^#include [<\"]($2)" "${rooms[@]}" --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)

@@ -1,0 +1,76 @@
+#include "duet/hardware/body_distance.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/hardware/limited_robot.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+constexpr double kRounding = 1e-9;
+
+TEST(BodyDistance, FallsByAsMuchAsThePersonComesNearer) {
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  const RobotState state = test::g1()->standing_state();
+  const HumanJoints far = test::standing_adult({2.0, 0.0, 0.95}), near = test::standing_adult({1.5, 0.0, 0.95});
+  const double first = distance.measure(state.X_WB, state.q, &far, 0.1, false).person;
+  const double second = distance.measure(state.X_WB, state.q, &near, 0.1, false).person;
+  EXPECT_LT(second, first - 0.4);
+  EXPECT_GT(second, 0.5);
+}
+
+TEST(BodyDistance, UncertaintyIsTakenOff) {
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  const RobotState state = test::g1()->standing_state();
+  const HumanJoints person = test::standing_adult({1.0, 0.0, 0.95});
+  const BodyGaps certain = distance.measure(state.X_WB, state.q, &person, 0.0, false);
+  const BodyGaps unsure = distance.measure(state.X_WB, state.q, &person, 0.1, false);
+  EXPECT_NEAR(certain.person - unsure.person, 0.1, kRounding);
+  EXPECT_NEAR(certain.head - unsure.head, 0.1, kRounding);
+}
+
+TEST(BodyDistance, TheHeadIsInFrontOfTheRobot) {
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  const RobotState state = test::g1()->standing_state();
+  const HumanJoints person = test::standing_adult({1.0, 0.0, 0.95});
+  EXPECT_GT(distance.measure(state.X_WB, state.q, &person, 0.0, false).head_from_robot.x(), 0.7);
+}
+
+TEST(BodyDistance, WhatMayTouchCountsApartAndOnlyDuringTheAct) {
+  BodyDistance distance(test::g1(), test::adult_body(), {{"hand", "hand"}});
+  const RobotState state = test::g1()->standing_state();
+  const HumanJoints person = test::standing_adult({0.8, 0.0, 0.95});
+  const BodyGaps before = distance.measure(state.X_WB, state.q, &person, 0.1, false);
+  EXPECT_EQ(before.touched, -1);
+  EXPECT_EQ(before.touch, BodyGaps::kFar);
+  const BodyGaps during = distance.measure(state.X_WB, state.q, &person, 0.1, true);
+  ASSERT_GE(during.touched, 0);
+  EXPECT_EQ(distance.human().capsules[during.touched].region, "hand");
+  EXPECT_LT(during.touch, 1.0);
+  EXPECT_GE(during.person, before.person);
+}
+
+TEST(BodyDistance, WithoutAPersonEverythingIsFar) {
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  const RobotState state = test::g1()->standing_state();
+  const BodyGaps gaps = distance.measure(state.X_WB, state.q, nullptr, 0.1, false);
+  EXPECT_EQ(gaps.person, BodyGaps::kFar);
+  EXPECT_EQ(gaps.head, BodyGaps::kFar);
+  EXPECT_LT(gaps.self, 1.0);
+}
+
+std::string refusal(const TouchPair& touch) {
+  return test::thrown_message<std::invalid_argument>([&] { BodyDistance(test::g1(), test::adult_body(), {touch}); });
+}
+
+TEST(BodyDistance, RefusesTouchesThatCannotOrMustNotBe) {
+  EXPECT_THAT(refusal({"wing", "hand"}), HasSubstr("expected a region of robot 'g1', found 'wing'"));
+  EXPECT_THAT(refusal({"hand", "tail"}), HasSubstr("expected a region of a person, found 'tail'"));
+  for (const char* region : {"head", "neck"})
+    EXPECT_THAT(refusal({"hand", region}), HasSubstr("expected a region that may be touched")) << region;
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,128 @@
+// The limiter beside a person.
+#include <gmock/gmock.h>
+
+#include "duet/core/skeleton.h"
+#include "tests/hardware/limited_robot.h"
+
+namespace duet {
+namespace {
+
+using test::LimitedRobot;
+
+struct Meeting : LimitedRobot {
+  explicit Meeting(double distance, const std::vector<TouchPair>& touches = {})
+      : LimitedRobot(setup_with(touches)), adult(test::standing_adult({distance, 0.0, 0.95})) {
+    input.person = &adult;
+    command.root.forward = 0.25;
+  }
+  static LimiterSetup setup_with(const std::vector<TouchPair>& touches) {
+    LimiterSetup setup = test::beside_an_adult();
+    setup.touches = touches;
+    return setup;
+  }
+  double speed_after(int ticks) {
+    for (int k = 0; k < ticks; ++k) tick();
+    return out.root.forward;
+  }
+  HumanJoints adult;
+};
+
+TEST(LimiterBesideAPerson, FarAwayItWalks) {
+  Meeting meeting(4.0);
+  EXPECT_NEAR(meeting.speed_after(100), 0.25, 1e-6);
+  EXPECT_EQ(meeting.counted(ClampReason::kSeparation), 0);
+}
+
+TEST(LimiterBesideAPerson, WithinReachOfAPersonsStepItStands) {
+  Meeting meeting(1.2);
+  EXPECT_EQ(meeting.speed_after(50), 0.0);
+  EXPECT_EQ(meeting.counted(ClampReason::kSeparation), 50);
+}
+
+// S = vh (Tr + Ts) + v (Tr + Ts / 2) + Z solved for v, shared by root and arms.
+TEST(LimiterBesideAPerson, BetweenTheTwoTheSpeedIsThatOfTheDistance) {
+  Meeting meeting(1.8);
+  const double speed = meeting.speed_after(150);
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  const double gap = distance.measure(meeting.input.state.X_WB, meeting.out.q, &meeting.adult, 0.10, false).person;
+  const double allowed = (gap - 1.6 * 0.73 - 0.1) / 0.43;
+  const double all = std::hypot(0.25, 0.15) + 0.5 * 0.6;
+  ASSERT_GT(allowed, 0.0);
+  ASSERT_LT(allowed, all);
+  EXPECT_NEAR(speed, 0.25 * allowed / all, 1e-6);
+}
+
+TEST(LimiterBesideAPerson, AFasterPersonIsKeptFurtherAway) {
+  Meeting meeting(2.6);
+  EXPECT_GT(meeting.speed_after(100), 0.1);
+  meeting.input.person_speed = 3.0;
+  EXPECT_NEAR(meeting.speed_after(100), 0.0, 1e-6);
+}
+
+TEST(LimiterBesideAPerson, NobodyMovesBesideAPersonWhoIsNotSeen) {
+  Meeting unseen(4.0);
+  unseen.input.person = nullptr;
+  EXPECT_EQ(unseen.speed_after(10), 0.0);
+  EXPECT_EQ(unseen.counted(ClampReason::kPartnerUnknown), 10);
+  Meeting lost(4.0);
+  lost.input.odometry = false;  // whose frame the person's joints are in
+  EXPECT_EQ(lost.speed_after(10), 0.0);
+  EXPECT_EQ(lost.counted(ClampReason::kPartnerUnknown), 10);
+}
+
+const std::vector<TouchPair> kHug = {{"hand", "hand"},       {"hand", "forearm"}, {"forearm", "hand"},
+                                     {"forearm", "forearm"}, {"hand", "chest"},   {"hand", "abdomen"},
+                                     {"hand", "thigh"},      {"hand", "pelvis"}};
+
+TEST(LimiterBesideAPerson, DuringTheActItMovesAndTouchIsSlow) {
+  Meeting before(0.8, kHug);
+  EXPECT_EQ(before.speed_after(50), 0.0);
+  Meeting during(0.8, kHug);
+  during.input.acting = true;
+  EXPECT_GT(during.speed_after(100), 0.02);
+}
+
+TEST(LimiterBesideAPerson, ATouchIsNoFasterThanItsRegionBears) {
+  LimiterSetup setup = Meeting::setup_with(kHug);
+  for (RegionLimits& region : setup.contact_limits.regions) region.quasi_static_n = 5.0;
+  Meeting meeting(0.55, kHug);
+  meeting.input.acting = true;
+  Limiter weak(setup);
+  for (int k = 0; k < 100; ++k) {
+    meeting.command.stamp += 0.02;
+    weak.tick(&meeting.command, meeting.input, meeting.state, meeting.out, meeting.counts);
+  }
+  EXPECT_GT(meeting.counted(ClampReason::kTouchSpeed), 0);
+  EXPECT_LT(meeting.out.root.forward, 0.02);
+}
+
+TEST(LimiterBesideAPerson, TheRootDoesNotGoTowardsAHead) {
+  // Bent down to the robot: a head at its own height, nothing else near.
+  Meeting meeting(3.0, kHug);
+  meeting.input.acting = true;
+  for (int j : {kNeck, kHead}) meeting.adult.col(j) += Eigen::Vector3d(-2.4, 0.0, -0.35);
+  EXPECT_LE(meeting.speed_after(60), 1e-9);
+  EXPECT_GT(meeting.counted(ClampReason::kHeadDistance), 0);
+}
+
+TEST(LimiterBesideAPerson, AnArmStopsBeforeAHead) {
+  Meeting meeting(3.0);
+  meeting.command.root.forward = 0.0;
+  const auto& arm = test::g1()->roles.arms[0];
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  // A head half a metre in front of the left hand's way, and a person who is told to stand still.
+  for (int j : {kNeck, kHead}) meeting.adult.col(j) = Eigen::Vector3d(0.62, 0.2, j == kHead ? 1.15 : 1.0);
+  meeting.input.acting = true;
+  meeting.command.q[arm[0]] = -1.2;
+  meeting.command.q[arm[3]] = 1.5;
+  double nearest = BodyGaps::kFar;
+  for (int k = 0; k < 400; ++k) {
+    meeting.move();
+    nearest =
+        std::min(nearest, distance.measure(meeting.input.state.X_WB, meeting.out.q, &meeting.adult, 0.10, true).head);
+  }
+  EXPECT_GT(nearest, 0.245);
+}
+
+}  // namespace
+}  // namespace duet
