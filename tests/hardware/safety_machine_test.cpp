@@ -1,0 +1,306 @@
+#include "duet/hardware/safety_machine.h"
+
+#include <gtest/gtest.h>
+
+#include "duet/core/random.h"
+#include "tests/hardware/simulated_safety.h"
+
+namespace duet {
+namespace {
+
+using test::kTick;
+using test::SimulatedSafety;
+using Spoil = std::function<void(SafetyInput&)>;
+constexpr double kTicks = 2.5 * kTick;  // what may pass until a tick notices [s]
+
+SimulatedSafety in_state(SafetyState state) {
+  SimulatedSafety robot;
+  robot.go_to(state);
+  EXPECT_EQ(robot.memory.state, state) << safety_state_name(state);
+  return robot;
+}
+
+TEST(SafetyMachine, IsOfflineUntilARobotIsHeardOf) {
+  SimulatedSafety robot;
+  robot.run_for(1.0, [](SafetyInput& in) { in.state_at = kNever; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kOffline);
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+}
+
+TEST(SafetyMachine, IsReadyAfterTwoSecondsOfEverythingWell) {
+  SimulatedSafety robot = in_state(SafetyState::kListen);
+  robot.run_for(1.9);
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  robot.run_for(0.2);
+  EXPECT_EQ(robot.memory.state, SafetyState::kReady);
+}
+
+TEST(SafetyMachine, ABadMomentBeginsTheTwoSecondsAnew) {
+  SimulatedSafety robot = in_state(SafetyState::kListen);
+  robot.run_for(1.5);
+  robot.tick([](SafetyInput& in) { in.health.tilt = 0.6; });
+  robot.input.health.tilt = 0.0;
+  robot.run_for(1.9);
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  robot.run_for(0.2);
+  EXPECT_EQ(robot.memory.state, SafetyState::kReady);
+}
+
+TEST(SafetyMachine, ReadyEndsWithWhatMadeItReady) {
+  SimulatedSafety robot = in_state(SafetyState::kReady);
+  robot.tick([](SafetyInput& in) { in.health.joints_in_range = false; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+}
+
+TEST(SafetyMachine, ArmsOnlyFromReady) {
+  SimulatedSafety robot = in_state(SafetyState::kListen);
+  robot.run_for(1.0, [](SafetyInput& in) { in.arm = true; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  EXPECT_EQ(in_state(SafetyState::kArmed).memory.state, SafetyState::kArmed);
+}
+
+TEST(SafetyMachine, AnArmingLapsesAfterAMinute) {
+  SimulatedSafety robot = in_state(SafetyState::kArmed);
+  robot.run_for(59.9);
+  EXPECT_EQ(robot.memory.state, SafetyState::kArmed);
+  robot.run_for(0.2);
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kLapsed);
+  robot.run_for(5.1);
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+}
+
+TEST(SafetyMachine, RunsOnlyWhenItStands) {
+  SimulatedSafety robot = in_state(SafetyState::kStand);
+  robot.input.stands = false;
+  robot.tick([](SafetyInput& in) { in.run = true; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kStand);
+  robot.input.stands = true;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kRun);
+}
+
+TEST(SafetyMachine, DoesNotRunWithoutDeadManPlannerPersonOrOdometry) {
+  for (double SafetyInput::*at :
+       {&SafetyInput::dead_man_at, &SafetyInput::planner_at, &SafetyInput::person_at, &SafetyInput::odometry_at}) {
+    SimulatedSafety robot = in_state(SafetyState::kStand);
+    robot.run_for(0.1, [at](SafetyInput& in) {
+      in.run = true;
+      in.*at = kNever;
+    });
+    EXPECT_EQ(robot.memory.state, SafetyState::kStand);
+  }
+}
+
+struct Fault {
+  const char* name;
+  Spoil spoil;
+  SafetyState reached;  // from running
+  double within;        // [s]
+};
+
+Spoil cut(double SafetyInput::*at) {
+  return [at, last = 0.0](SafetyInput& in) mutable {
+    if (last == 0.0) last = in.now - kTick;
+    in.*at = last;
+  };
+}
+
+std::vector<Fault> faults() {
+  return {{"no states", cut(&SafetyInput::state_at), SafetyState::kHold, 0.020},
+          {"no planner", cut(&SafetyInput::planner_at), SafetyState::kHold, 0.6},
+          {"no person", cut(&SafetyInput::person_at), SafetyState::kHold, 0.25},
+          {"no odometry", cut(&SafetyInput::odometry_at), SafetyState::kHold, 0.15},
+          {"no remote", cut(&SafetyInput::remote_at), SafetyState::kHold, 0.2},
+          {"dead man", cut(&SafetyInput::dead_man_at), SafetyState::kHold, 0.2},
+          {"bad states", [](SafetyInput& in) { in.bad_states = 1; }, SafetyState::kHold, 0.006},
+          {"many bad states", [](SafetyInput& in) { in.bad_states = 10; }, SafetyState::kDamp, 0.0},
+          {"odometry jump", [](SafetyInput& in) { in.odometry_step = 0.2; }, SafetyState::kHold, 0.0},
+          {"tilt", [](SafetyInput& in) { in.health.tilt = 0.7; }, SafetyState::kHold, 0.0},
+          {"fall", [](SafetyInput& in) { in.health.tilt = 1.2; }, SafetyState::kDamp, 0.0},
+          {"joint speed", [](SafetyInput& in) { in.health.joint_speed = 12.0; }, SafetyState::kDamp, 0.0},
+          {"gyro", [](SafetyInput& in) { in.health.gyro = 7.0; }, SafetyState::kDamp, 0.0},
+          {"warm", [](SafetyInput& in) { in.health.winding = 110.0; }, SafetyState::kHold, 0.0},
+          {"hot", [](SafetyInput& in) { in.health.casing = 90.0; }, SafetyState::kDamp, 0.0},
+          {"charge", [](SafetyInput& in) { in.health.charge = 10.0; }, SafetyState::kHold, 0.0},
+          {"motor", [](SafetyInput& in) { in.health.motor_error = true; }, SafetyState::kDamp, 0.0},
+          {"mode", [](SafetyInput& in) { in.health.mode_is_expected = false; }, SafetyState::kDamp, 0.0},
+          {"foreign writer", [](SafetyInput& in) { in.foreign_writer = true; }, SafetyState::kHold, 0.0},
+          {"stop key", [](SafetyInput& in) { in.stop_key = true; }, SafetyState::kDamp, 0.0},
+          {"paused", [](SafetyInput& in) { in.now += 1.0; }, SafetyState::kDamp, 1.0},
+          {"short pause", [](SafetyInput& in) { in.now += 0.05; }, SafetyState::kHold, 0.05},
+          {"clock back", [](SafetyInput& in) { in.now -= 1.0; }, SafetyState::kDamp, 0.0}};
+}
+
+TEST(SafetyMachine, EachFaultReachesItsStateInItsTime) {
+  for (const Fault& fault : faults()) {
+    SimulatedSafety robot = in_state(SafetyState::kRun);
+    const double taken = robot.time_to_leave(SafetyState::kRun, fault.spoil);
+    EXPECT_EQ(robot.memory.state, fault.reached) << fault.name;
+    EXPECT_LE(taken, fault.within + kTicks) << fault.name;
+    EXPECT_EQ(robot.order().share, 0.0) << fault.name;
+  }
+}
+
+// A pause: the ages are those of before it, so the first tick after it stops, whatever comes next.
+TEST(SafetyMachine, AfterAPauseNoTickMoves) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.input.now += 1.0;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kLoopLate);
+  robot.run_for(1.0);
+  EXPECT_EQ(robot.order().share, 0.0);
+}
+
+TEST(SafetyMachine, ALatePlannerMayComeBackWithinTwoSeconds) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.run_for(1.5, cut(&SafetyInput::planner_at));
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  EXPECT_FALSE(robot.order().opens);
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kRun);
+}
+
+TEST(SafetyMachine, APlannerThatStaysAwayEndsInDampingAfterTwoSeconds) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  const Spoil away = cut(&SafetyInput::planner_at);
+  robot.run_for(1.98, away);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.run_for(0.03, away);
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kHeldTooLong);
+}
+
+TEST(SafetyMachine, NoOtherHoldEndsInRunning) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.tick([](SafetyInput& in) { in.foreign_writer = true; });
+  robot.input.foreign_writer = false;
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+}
+
+TEST(SafetyMachine, APlannersHoldWithAnotherFaultDoesNotEndInRunning) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.run_for(0.7, cut(&SafetyInput::planner_at));
+  robot.tick([](SafetyInput& in) {
+    in.planner_at = in.now - 1.0;
+    in.health.tilt = 0.6;
+  });
+  robot.input.health.tilt = 0.0;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kTilt);
+}
+
+TEST(SafetyMachine, AHoldOpensTheArmsAndWaitsForThemBeforeItDamps) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.input.hands_clear = false;
+  robot.input.foreign_writer = true;
+  robot.run_for(3.0);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  EXPECT_TRUE(robot.order().opens);
+  robot.input.hands_clear = true;
+  robot.tick();
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kForeignWriter);
+}
+
+TEST(SafetyMachine, WhatDampsDoesNotWaitForTheArms) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.input.hands_clear = false;
+  robot.input.foreign_writer = true;
+  robot.tick();
+  robot.tick([](SafetyInput& in) { in.stop_key = true; });
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+}
+
+TEST(SafetyMachine, DampingLastsFiveSecondsAndThenLatches) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.tick([](SafetyInput& in) { in.health.tilt = 1.2; });
+  robot.input.health.tilt = 0.0;
+  robot.run_for(4.9);
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  robot.run_for(0.2);
+  EXPECT_EQ(robot.memory.state, SafetyState::kFault);
+  robot.input.arm = robot.input.stand = robot.input.run = true;
+  robot.run_for(100.0);
+  EXPECT_EQ(robot.memory.state, SafetyState::kFault);
+  EXPECT_TRUE(robot.order().damps);
+}
+
+TEST(SafetyMachine, AfterTheStopKeyItMayBeArmedAnew) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.tick([](SafetyInput& in) { in.stop_key = true; });
+  robot.input.stop_key = false;
+  robot.run_for(5.1);
+  EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  robot.run_for(2.1);
+  EXPECT_EQ(robot.memory.state, SafetyState::kReady);
+}
+
+TEST(SafetyMachine, AFaultWhileTheOperatorsStopDampsLatches) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.tick([](SafetyInput& in) { in.stop_key = true; });
+  robot.input.stop_key = false;
+  robot.tick([](SafetyInput& in) { in.health.motor_error = true; });
+  robot.run_for(5.1);
+  EXPECT_EQ(robot.memory.state, SafetyState::kFault);
+}
+
+// Every state meets every fault: none starts to move by it, and only listening and damping stay as they are.
+TEST(SafetyMachine, EveryStateMeetsEveryFault) {
+  for (const SafetyState state :
+       {SafetyState::kListen, SafetyState::kReady, SafetyState::kArmed, SafetyState::kStand}) {
+    for (const Fault& fault : faults()) {
+      SimulatedSafety robot = in_state(state);
+      for (int k = 0; k < 1000; ++k) robot.tick(fault.spoil);
+      EXPECT_NE(robot.memory.state, SafetyState::kRun) << safety_state_name(state) << ", " << fault.name;
+      EXPECT_EQ(robot.order().share, 0.0) << safety_state_name(state) << ", " << fault.name;
+      if (state <= SafetyState::kReady) {
+        EXPECT_FALSE(robot.order().writes) << safety_state_name(state) << ", " << fault.name;
+      }
+    }
+  }
+}
+
+TEST(SafetyMachine, WhatEachStateAllows) {
+  const auto order = [](SafetyState state) { return in_state(state).order(); };
+  for (const SafetyState state : {SafetyState::kListen, SafetyState::kReady}) EXPECT_FALSE(order(state).writes);
+  EXPECT_TRUE(order(SafetyState::kArmed).writes && order(SafetyState::kArmed).damps);
+  EXPECT_TRUE(order(SafetyState::kStand).writes && order(SafetyState::kStand).stands);
+  EXPECT_FALSE(order(SafetyState::kStand).damps);
+  EXPECT_EQ(order(SafetyState::kRun).share, 1.0);
+}
+
+// Whatever comes in: nothing planned moves outside running, nothing is written before arming, a fault stays one.
+TEST(SafetyMachine, RandomEventsBreakNoRule) {
+  Random random(19, 4);
+  const std::vector<Fault> all = faults();
+  for (int episode = 0; episode < 200; ++episode) {
+    SimulatedSafety robot;
+    bool armed = false;
+    for (int k = 0; k < 4000; ++k) {
+      const SafetyState before = robot.memory.state;
+      robot.input.arm = random.chance(0.01);
+      robot.input.stand = random.chance(0.05);
+      robot.input.run = random.chance(0.05);
+      robot.input.health = {};
+      robot.input.odometry_step = 0.0;
+      robot.input.foreign_writer = robot.input.stop_key = false;
+      const Fault& fault = all[random.below(static_cast<int>(all.size()))];
+      robot.tick(random.chance(0.001) ? fault.spoil : Spoil());
+      const SafetyOrder order = robot.order();
+      armed = armed || (before == SafetyState::kReady && robot.memory.state == SafetyState::kArmed);
+      ASSERT_TRUE(order.share == 0.0 || robot.memory.state == SafetyState::kRun);
+      ASSERT_TRUE(!order.writes || armed);
+      ASSERT_FALSE(order.damps && order.share > 0.0);
+      ASSERT_TRUE(before != SafetyState::kFault || robot.memory.state == SafetyState::kFault);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace duet

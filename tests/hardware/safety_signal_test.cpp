@@ -1,0 +1,217 @@
+// Each timeout and each threshold by its name, just before and just after it.
+#include "duet/hardware/safety_signal.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <set>
+
+namespace duet {
+namespace {
+
+constexpr double kNow = 50.0;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+SafetyInput well() {
+  SafetyInput input;
+  input.now = kNow;
+  input.state_at = input.planner_at = input.person_at = input.odometry_at = kNow;
+  input.remote_at = input.dead_man_at = kNow;
+  return input;
+}
+
+Assessment assessed(const SafetyInput& input, bool moving = true, const SafetyRules& rules = {}) {
+  return assess(rules, input, {}, kNow - input.period, moving);
+}
+
+TEST(SafetySignals, EverythingWellIsFine) {
+  EXPECT_EQ(assessed(well()).level, StopLevel::kFine);
+  EXPECT_EQ(assessed(well()).cause, StopCause::kNone);
+}
+
+struct Timeout {
+  const char* name;
+  double SafetyInput::*at;
+  AgeLimits expected;  // the table of docs/hardware.md
+  StopCause cause;
+};
+
+constexpr double kForever = std::numeric_limits<double>::infinity();
+const Timeout kTimeouts[] = {
+    {"state", &SafetyInput::state_at, {0.006, 0.020, 0.100}, StopCause::kStateAge},
+    {"planner", &SafetyInput::planner_at, {0.25, 0.6, 2.0}, StopCause::kPlannerAge},
+    {"person", &SafetyInput::person_at, {0.1, 0.25, kForever}, StopCause::kPersonAge},
+    {"odometry", &SafetyInput::odometry_at, {0.05, 0.15, kForever}, StopCause::kOdometryAge},
+    {"remote", &SafetyInput::remote_at, {0.1, 0.2, 3.0}, StopCause::kRemoteAge},
+    {"dead man", &SafetyInput::dead_man_at, {0.1, 0.2, 3.0}, StopCause::kDeadMan},
+};
+
+void expect_level_after(const Timeout& timeout, double age, StopLevel level) {
+  if (age == kForever) return;
+  SafetyInput input = well();
+  input.*timeout.at = kNow - age;
+  const Assessment found = assessed(input);
+  EXPECT_EQ(found.level, level) << timeout.name << " after " << age;
+  if (level != StopLevel::kFine) {
+    EXPECT_EQ(found.cause, timeout.cause) << timeout.name;
+  }
+}
+
+TEST(SafetySignals, EachAgeHasItsWarningHoldAndDamping) {
+  constexpr double kALittle = 1e-4;
+  for (const Timeout& timeout : kTimeouts) {
+    expect_level_after(timeout, timeout.expected.warn - kALittle, StopLevel::kFine);
+    expect_level_after(timeout, timeout.expected.warn + kALittle, StopLevel::kWarn);
+    expect_level_after(timeout, timeout.expected.hold - kALittle, StopLevel::kWarn);
+    expect_level_after(timeout, timeout.expected.hold + kALittle, StopLevel::kHold);
+    expect_level_after(timeout, timeout.expected.damp - kALittle, StopLevel::kHold);
+    expect_level_after(timeout, timeout.expected.damp + kALittle, StopLevel::kDamp);
+  }
+}
+
+TEST(SafetySignals, WhatHasNeverComeHolds) {
+  for (const Timeout& timeout : kTimeouts) {
+    SafetyInput input = well();
+    input.*timeout.at = kNever;
+    EXPECT_GE(assessed(input).level, StopLevel::kHold) << timeout.name;
+  }
+}
+
+TEST(SafetySignals, ATimeThatIsNotANumberDamps) {
+  SafetyInput input = well();
+  input.state_at = kNan;
+  EXPECT_EQ(assessed(input).level, StopLevel::kDamp);
+}
+
+TEST(SafetySignals, ATickThatComesLate) {
+  SafetyInput input = well();
+  const auto late = [&](double seconds) { return assess({}, input, {}, kNow - input.period - seconds, true); };
+  EXPECT_EQ(late(0.004).level, StopLevel::kFine);
+  EXPECT_EQ(late(0.006).level, StopLevel::kWarn);
+  EXPECT_EQ(late(0.039).level, StopLevel::kWarn);
+  EXPECT_EQ(late(0.041).level, StopLevel::kHold);
+  EXPECT_EQ(late(0.101).level, StopLevel::kDamp);
+  EXPECT_EQ(late(0.101).cause, StopCause::kLoopLate);
+}
+
+TEST(SafetySignals, AClockThatFallsDamps) {
+  const Assessment found = assess({}, well(), {}, kNow + 0.001, true);
+  EXPECT_EQ(found.level, StopLevel::kDamp);
+  EXPECT_EQ(found.cause, StopCause::kClock);
+}
+
+BadStates bad_states(int count, double spacing) {
+  BadStates bad;
+  for (int k = count - 1; k >= 0; --k) note_bad_states(1, kNow - k * spacing, bad);
+  return bad;
+}
+
+TEST(SafetySignals, BadStatesWarnHoldAndDampByTheirNumber) {
+  const auto level = [](const BadStates& bad) { return assess({}, well(), bad, kNow - 0.002, true).level; };
+  EXPECT_EQ(level(bad_states(1, 0.002)), StopLevel::kWarn);
+  EXPECT_EQ(level(bad_states(2, 0.002)), StopLevel::kWarn);
+  EXPECT_EQ(level(bad_states(3, 0.024)), StopLevel::kHold);
+  EXPECT_EQ(level(bad_states(3, 0.026)), StopLevel::kWarn);
+  EXPECT_EQ(level(bad_states(9, 0.002)), StopLevel::kHold);
+  EXPECT_EQ(level(bad_states(10, 0.011)), StopLevel::kDamp);
+  EXPECT_NE(level(bad_states(10, 0.012)), StopLevel::kDamp);
+}
+
+TEST(SafetySignals, ManyBadStatesInOneTickCountAll) {
+  BadStates bad;
+  note_bad_states(1000, kNow, bad);
+  EXPECT_EQ(assess({}, well(), bad, kNow, true).level, StopLevel::kDamp);
+}
+
+struct Threshold {
+  const char* name;
+  double RobotHealth::*value;
+  double hold, damp;  // where it begins; infinity: never
+  StopCause cause;
+};
+
+TEST(SafetySignals, TheRobotsHealthHoldsOrDamps) {
+  constexpr double kALittle = 1e-3;
+  for (const Threshold& t : {Threshold{"tilt", &RobotHealth::tilt, 0.5, 1.0, StopCause::kTilt},
+                             Threshold{"joint speed", &RobotHealth::joint_speed, 10.0, 10.0, StopCause::kJointSpeed},
+                             Threshold{"gyro", &RobotHealth::gyro, 6.0, 6.0, StopCause::kGyro},
+                             Threshold{"casing", &RobotHealth::casing, 75.0, 85.0, StopCause::kTemperature},
+                             Threshold{"winding", &RobotHealth::winding, 100.0, 120.0, StopCause::kTemperature}}) {
+    SafetyInput input = well();
+    input.health.*t.value = t.hold - kALittle;
+    EXPECT_EQ(assessed(input).level, StopLevel::kFine) << t.name;
+    if (t.hold < t.damp) {
+      input.health.*t.value = t.hold + kALittle;
+      EXPECT_EQ(assessed(input).level, StopLevel::kHold) << t.name;
+      input.health.*t.value = t.damp - kALittle;
+      EXPECT_EQ(assessed(input).level, StopLevel::kHold) << t.name;
+    }
+    input.health.*t.value = t.damp + kALittle;
+    EXPECT_EQ(assessed(input).level, StopLevel::kDamp) << t.name;
+    EXPECT_EQ(assessed(input).cause, t.cause) << t.name;
+    input.health.*t.value = kNan;
+    EXPECT_EQ(assessed(input).level, StopLevel::kDamp) << t.name;
+  }
+}
+
+void expect_stop(const std::function<void(SafetyInput&)>& spoil, StopLevel level, StopCause cause) {
+  SafetyInput input = well();
+  spoil(input);
+  EXPECT_EQ(assessed(input).level, level) << stop_cause_name(cause);
+  EXPECT_EQ(assessed(input).cause, cause);
+}
+
+TEST(SafetySignals, EverythingElseHasItsLevel) {
+  expect_stop([](SafetyInput& in) { in.health.charge = 19.9; }, StopLevel::kHold, StopCause::kCharge);
+  expect_stop([](SafetyInput& in) { in.health.motor_error = true; }, StopLevel::kDamp, StopCause::kMotorError);
+  expect_stop([](SafetyInput& in) { in.health.mode_is_expected = false; }, StopLevel::kDamp, StopCause::kMode);
+  expect_stop([](SafetyInput& in) { in.foreign_writer = true; }, StopLevel::kHold, StopCause::kForeignWriter);
+  expect_stop([](SafetyInput& in) { in.stop_key = true; }, StopLevel::kDamp, StopCause::kStopKey);
+  expect_stop([](SafetyInput& in) { in.odometry_step = 0.101; }, StopLevel::kHold, StopCause::kOdometryJump);
+  expect_stop([](SafetyInput& in) { in.odometry_step = kNan; }, StopLevel::kHold, StopCause::kOdometryJump);
+}
+
+TEST(SafetySignals, StandingNeedsNeitherPlannerNorPersonNorOdometryNorDeadMan) {
+  SafetyInput input = well();
+  input.planner_at = input.person_at = input.odometry_at = input.dead_man_at = kNever;
+  EXPECT_EQ(assessed(input, false).level, StopLevel::kFine);
+}
+
+TEST(SafetySignals, APersonAndOdometryCountWhereTheyAreNeeded) {
+  SafetyRules rules;
+  rules.person_present = rules.walks = false;
+  SafetyInput input = well();
+  input.person_at = input.odometry_at = kNever;
+  EXPECT_EQ(assessed(input, true, rules).level, StopLevel::kFine);
+}
+
+TEST(SafetySignals, TheWorstIsNamedAndThePlannerLast) {
+  SafetyInput input = well();
+  input.planner_at = kNow - 1.0;
+  input.person_at = kNow - 1.0;
+  EXPECT_EQ(assessed(input).cause, StopCause::kPersonAge);
+  input.health.tilt = 2.0;
+  EXPECT_EQ(assessed(input).cause, StopCause::kTilt);
+}
+
+TEST(SafetySignals, ALatePlannerMayUseHalfAndThenLess) {
+  const SafetyRules rules;
+  EXPECT_EQ(planner_share(rules, 0.0), 1.0);
+  EXPECT_EQ(planner_share(rules, 0.25), 1.0);
+  EXPECT_NEAR(planner_share(rules, 0.2501), 0.5, 1e-3);
+  EXPECT_NEAR(planner_share(rules, 0.425), 0.25, 1e-9);
+  EXPECT_NEAR(planner_share(rules, 0.6), 0.0, 1e-9);
+  EXPECT_EQ(planner_share(rules, 0.7), 0.0);
+  EXPECT_EQ(planner_share(rules, kNan), 0.0);
+}
+
+TEST(SafetySignals, EachCauseHasItsOwnName) {
+  std::set<std::string_view> names;
+  for (std::size_t k = 0; k < kStopCauses; ++k)
+    EXPECT_TRUE(names.insert(stop_cause_name(static_cast<StopCause>(k))).second) << k;
+  EXPECT_EQ(stop_cause_name(StopCause::kHeldTooLong), "held_too_long");
+}
+
+}  // namespace
+}  // namespace duet
