@@ -39,6 +39,7 @@ class BodyDistance {
   // where they may touch. `may_touch`: the task's act lasts.
   const BodyGaps& measure(const Pose& X_WB, const Eigen::VectorXd& q, const HumanJoints* person, double uncertainty,
                           bool may_touch);
+  [[nodiscard]] const BodyGaps& gaps() const { return gaps_; }  // of the last call
   [[nodiscard]] const HumanBody& human() const { return human_; }
 
  private:

@@ -98,6 +98,14 @@ LimiterState Limiter::start(const RobotState& measured) const {
   return state;
 }
 
+void Limiter::restart(const Eigen::VectorXd& q, LimiterState& state) const {
+  state.forward = state.lateral = state.yaw = {};
+  state.height = {setup_.limits.height, 0.0};
+  for (int joint = 0; joint < setup_.robot->dof(); ++joint) state.joints[joint] = {q[joint], 0.0};
+  state.good.root = {0.0, 0.0, 0.0, setup_.limits.height};
+  state.good.q = q;
+}
+
 void Limiter::tick(const MotionCommand* received, const LimiterInput& input, LimiterState& state, LimitedCommand& out,
                    ClampCounts& counts) {
   admit(received, state, counts);

@@ -75,12 +75,16 @@ class Limiter {
   // At rest where the robot is measured, no command taken yet. Throws std::invalid_argument for a state of another size
   // or not finite.
   [[nodiscard]] LimiterState start(const RobotState& state) const;
+  // The same in place, from finite angles of the right number; no allocation. The newest stamp is kept.
+  void restart(const Eigen::VectorXd& q, LimiterState& state) const;
 
   // Takes a newly received command (null: none came), or refuses it as a whole; then one step of the outputs towards
   // the last good one. `state` is finite and of the robot's size.
   void tick(const MotionCommand* received, const LimiterInput& input, LimiterState& state, LimitedCommand& out,
             ClampCounts& counts);
 
+  // Of the arms at rest after the last tick, in the last tick's pose of the root.
+  [[nodiscard]] const BodyGaps& gaps() const { return distance_.gaps(); }
   [[nodiscard]] const LimiterSetup& setup() const { return setup_; }
   [[nodiscard]] const AxisBounds& joint_bounds(int joint) const { return joint_bounds_[joint]; }
 

@@ -1,0 +1,104 @@
+// What alone may write to the robot: reads its states, keeps the state machine, limits what the planner asks for,
+// builds and sends the frame. A pure function of what was received and of the caller's clock but for its transport;
+// tick() allocates nothing. One owner, one thread. docs/hardware.md, "Guard".
+#pragma once
+
+#include <array>
+#include <functional>
+
+#include "duet/hardware/arming.h"
+#include "duet/hardware/contact_watch.h"
+#include "duet/hardware/frame_transport.h"
+#include "duet/hardware/limiter.h"
+#include "duet/hardware/odometry.h"
+#include "duet/hardware/safety_machine.h"
+
+namespace duet {
+
+struct GuardSetup {
+  LimiterSetup limiter;  // its dt is the guard's period
+  SafetyRules rules;
+  int mode_machine = 5;  // that the robot has to report
+  JointCommand stance;   // of the joints that the limiter does not move: targets and gains
+  bool dry_run = true;
+};
+
+// What a planner sends. `sequence` rises; an older or repeated message is dropped.
+struct PlannerMessage {
+  std::uint64_t sequence = 0;
+  MotionCommand command;
+  bool acting = false;
+};
+
+// The partner's joints in the frame of odometry, as somebody estimated them.
+struct PersonMessage {
+  std::uint64_t sequence = 0;
+  HumanJoints joints = HumanJoints::Zero();  // [m]
+};
+
+// Of the last tick, for logs and displays.
+struct GuardStatus {
+  SafetyMemory safety;
+  SafetyOrder order;
+  SafetyInput input;
+  LimitedCommand limited;
+  ClampCounts clamps{};
+  ContactReading contact;
+  long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
+  long old_messages = 0;    // of planner or perception, dropped
+  long bad_messages = 0;    // of perception: not finite, or a person who jumped
+  bool sent = false;        // a frame left in this tick
+  LowCommandFrame frame{};  // it
+};
+
+class RobotGuard {
+ public:
+  // Throws as Limiter does, and std::invalid_argument for a stance of another size. In a dry run no writer is ever
+  // made.
+  RobotGuard(const GuardSetup& setup, FrameTransport& transport, VelocitySink& velocity);
+
+  // `now`: reception, by the clock of tick().
+  void receive(const PlannerMessage& message, double now);
+  void receive(const PersonMessage& message, double now);
+  void receive(const OdometrySample& sample);
+  // The operator has armed: arming_refusal() was empty. Ignored in a dry run.
+  void arm();
+
+  void tick(double now);
+
+  [[nodiscard]] const GuardStatus& status() const { return status_; }
+  [[nodiscard]] const RobotReading& reading() const { return reading_; }
+  [[nodiscard]] const LimiterInput& limiter_input() const { return input_; }
+
+ private:
+  void read_states(double now);
+  void read_operator(double now);
+  void check_robot();
+  void follow_stance();
+  void command(double now);
+  void send();
+  [[nodiscard]] bool hands_are_clear() const;
+
+  GuardSetup setup_;
+  FrameTransport& transport_;
+  VelocitySink& velocity_;
+  Limiter limiter_;
+  ContactWatch contact_;
+  LimiterState limiter_state_;
+  LimiterInput input_;
+  PlannerMessage planner_;
+  bool planner_is_new_ = false, any_planner_ = false;
+  PersonMessage person_;
+  double person_speed_ = 0.0;
+  OdometrySample odometry_;
+  RobotReading reading_;
+  std::vector<AxisState> stance_;  // of all joints, on the way to the stance
+  JointCommand joints_;
+  SafetyMemory safety_;
+  SafetyInput next_;
+  bool armed_ = false, was_planned_ = false;
+  int ticks_to_writers_ = 0;
+  GuardStatus status_;
+};
+
+}  // namespace duet

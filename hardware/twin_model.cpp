@@ -1,0 +1,115 @@
+#include "duet/hardware/twin_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "duet/core/require.h"
+#include "duet/hardware/frame_checksum.h"
+
+namespace duet {
+namespace {
+
+constexpr double kInertia = 0.2;   // of every joint: what its motor and link turn [kg m^2]
+constexpr double kFriction = 0.5;  // [N m s/rad]
+
+void check(const TwinOptions& options) {
+  for (const double value : {options.lag, options.delay, options.place_noise, options.speed_noise, options.joint_noise})
+    require(std::isfinite(value) && value >= 0.0, fmt::format("twin: expected numbers of at least 0, found {}", value));
+  require(std::isfinite(options.drift), fmt::format("twin: expected a finite drift, found {}", options.drift));
+}
+
+}  // namespace
+
+TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options)
+    : robot_(std::move(robot)), options_(options), random_(options.seed, stream_key({"twin"})) {
+  require(robot_ != nullptr && robot_->dof() == kG1Motors,
+          fmt::format("twin: expected a robot of {} joints, found another", kG1Motors));
+  check(options_);
+  const RobotState standing = robot_->standing_state();
+  q_ = standing.q;
+  X_WB_ = standing.X_WB;
+  v_.setZero(kG1Motors);
+  tau_.setZero(kG1Motors);
+  asked_.height = X_WB_.p.z();
+}
+
+void TwinModel::obey(const LowCommandFrame& frame) {
+  const bool whole = frame.crc == checksum_of(frame);
+  if (!whole || frame.mode_machine != options_.mode_machine || frame.mode_pr != kPitchRollMode) {
+    ++refused_;
+    return;
+  }
+  ++obeyed_;
+  command_ = frame;
+}
+
+void TwinModel::step_joints(double dt) {
+  for (int j = 0; j < kG1Motors; ++j) {
+    const MotorCommandFrame& motor = command_.motor[j];
+    const double effort = robot_->joints[j].effort;
+    double tau = 0.0;
+    if (motor.mode == 1) tau = motor.kp * (motor.q - q_[j]) + motor.kd * (motor.dq - v_[j]) + motor.tau;
+    tau_[j] = std::clamp(tau, -effort, effort);
+    v_[j] += dt * (tau_[j] - kFriction * v_[j]) / kInertia;
+    q_[j] = std::clamp(q_[j] + dt * v_[j], robot_->joints[j].lower, robot_->joints[j].upper);
+  }
+}
+
+void TwinModel::step_root(double dt) {
+  late_.push_back({time_, asked_});
+  while (late_.size() > 1 && late_[1].at <= time_ - options_.delay) late_.pop_front();
+  const VelocityCommand velocity =
+      late_.front().at <= time_ - options_.delay ? late_.front().velocity : VelocityCommand{};
+  const double share = std::min(dt / std::max(options_.lag, dt), 1.0);
+  speed_ += share * (Eigen::Vector2d(velocity.forward, velocity.lateral) - speed_);
+  yaw_rate_ += share * (velocity.yaw_rate - yaw_rate_);
+  const double yaw = yaw_of(X_WB_.R) + dt * yaw_rate_;
+  X_WB_.p.head<2>() += dt * (Eigen::Rotation2Dd(yaw) * speed_);
+  X_WB_.R = yaw_rotation(yaw);
+  drifted_ += dt * options_.drift;
+}
+
+void TwinModel::step(double dt) {
+  time_ += dt;
+  step_joints(dt);
+  step_root(dt);
+}
+
+void TwinModel::write_state(LowStateFrame& frame) {
+  std::memset(&frame, 0, sizeof(frame));
+  frame.mode_pr = static_cast<std::uint8_t>(condition.mode_pr);
+  frame.mode_machine = static_cast<std::uint8_t>(options_.mode_machine + condition.mode_machine_offset);
+  frame.tick = ++tick_;
+  const Eigen::Quaterniond R =
+      X_WB_.R * Eigen::Quaterniond(Eigen::AngleAxisd(condition.roll, Eigen::Vector3d::UnitX()));
+  const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
+  for (int k = 0; k < 4; ++k) frame.imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
+  frame.imu.gyroscope[2] = static_cast<float>(yaw_rate_ + condition.gyro);
+  frame.imu.accelerometer[2] = 9.81f;
+  for (int j = 0; j < kG1Motors; ++j) {
+    MotorStateFrame& motor = frame.motor[j];
+    motor.mode = command_.motor[j].mode;
+    motor.q = static_cast<float>(q_[j] + options_.joint_noise * random_.normal());
+    motor.dq = static_cast<float>(v_[j] + condition.joint_speed);
+    motor.tau_est = static_cast<float>(tau_[j]);
+    motor.temperature[0] = static_cast<std::int16_t>(condition.casing);
+    motor.temperature[1] = static_cast<std::int16_t>(condition.winding);
+    motor.motorstate = condition.motor_error ? 1 : 0;
+  }
+  write_remote(remote, frame.wireless_remote);
+  seal(frame);
+}
+
+OdometrySample TwinModel::odometry(double now) {
+  OdometrySample sample{.X_WB = X_WB_, .at = now, .valid = true};
+  const Eigen::Vector2d noise(random_.normal(), random_.normal());
+  sample.X_WB.p.head<2>() += options_.place_noise * noise + Eigen::Vector2d(drifted_, 0.0);
+  sample.v_WB.head<2>() = Eigen::Rotation2Dd(yaw_of(X_WB_.R)) * speed_;
+  sample.v_WB.x() += options_.speed_noise * random_.normal();
+  return sample;
+}
+
+}  // namespace duet

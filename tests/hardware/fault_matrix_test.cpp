@@ -1,0 +1,274 @@
+// Faults on the way between twin and guard: each reaches its state within the time of its table, and every frame that
+// was sent is inside its limits.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "duet/core/random.h"
+#include "tests/hardware/guarded_twin.h"
+
+namespace duet {
+namespace {
+
+using test::GuardedTwin;
+using Frames = GuardedTwin::Frames;
+constexpr double kTick = GuardedTwin::kDt;
+constexpr double kMostStep = 0.5 * kTick + 1e-6;  // of a target between two frames [rad]
+
+void expect_inside(const GuardedTwin& robot, const char* name) {
+  EXPECT_EQ(robot.bad_frames, 0) << name;
+  EXPECT_LE(robot.largest_step, kMostStep) << name;
+  EXPECT_EQ(robot.twin.refused_frames(), 0) << name;
+}
+
+struct WireFault {
+  const char* name;
+  std::function<void(Frames&)> spoil;
+  SafetyState reached;
+  StopCause cause;
+  double within;  // [s]
+};
+
+std::function<void(Frames&)> in_each(const std::function<void(LowStateFrame&)>& change) {
+  return [change](Frames& frames) {
+    for (LowStateFrame& frame : frames) {
+      change(frame);
+      seal(frame);
+    }
+  };
+}
+
+std::function<void(Frames&)> flipped(int every) {
+  return [every, k = 0](Frames& frames) mutable {
+    if (++k % every == 0)
+      for (LowStateFrame& frame : frames) reinterpret_cast<unsigned char*>(&frame)[100] ^= 4;
+  };
+}
+
+std::function<void(Frames&)> frozen() {
+  return [tick = 0u](Frames& frames) mutable {
+    for (LowStateFrame& frame : frames) {
+      if (tick == 0u) tick = frame.tick;
+      frame.tick = tick;
+      seal(frame);
+    }
+  };
+}
+
+// Everything comes `ticks` late from now on.
+std::function<void(Frames&)> delayed(std::size_t ticks) {
+  return [ticks, waiting = Frames()](Frames& frames) mutable {
+    waiting.insert(waiting.end(), frames.begin(), frames.end());
+    frames.clear();
+    if (waiting.size() <= ticks) return;
+    frames.push_back(waiting.front());
+    waiting.pop_front();
+  };
+}
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+std::vector<WireFault> wire_faults() {
+  using S = SafetyState;
+  using C = StopCause;
+  return {{"all dropped", [](Frames& f) { f.clear(); }, S::kHold, C::kStateAge, 0.020},
+          {"50 ms late", delayed(25), S::kHold, C::kStateAge, 0.020},
+          {"500 ms late", delayed(250), S::kHold, C::kStateAge, 0.020},
+          {"every bit flipped", flipped(1), S::kHold, C::kBadStates, 0.050},
+          {"frozen tick", frozen(), S::kHold, C::kBadStates, 0.050},
+          {"tick back", in_each([](LowStateFrame& f) { f.tick -= 100; }), S::kHold, C::kBadStates, 0.050},
+          {"nan angle", in_each([](LowStateFrame& f) { f.motor[5].q = kNan; }), S::kHold, C::kBadStates, 0.050},
+          {"inf speed", in_each([](LowStateFrame& f) { f.motor[5].dq = kInf; }), S::kHold, C::kBadStates, 0.050},
+          {"nan torque", in_each([](LowStateFrame& f) { f.motor[5].tau_est = kNan; }), S::kHold, C::kBadStates, 0.050},
+          {"nan imu", in_each([](LowStateFrame& f) { f.imu.quaternion[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
+          {"nan gyro", in_each([](LowStateFrame& f) { f.imu.gyroscope[0] = kNan; }), S::kHold, C::kBadStates, 0.050},
+          {"huge speed", in_each([](LowStateFrame& f) { f.motor[5].dq = 1e30f; }), S::kDamp, C::kJointSpeed, 0.0},
+          {"wrong mode_machine", in_each([](LowStateFrame& f) { f.mode_machine = 6; }), S::kDamp, C::kMode, 0.0},
+          {"wrong mode_pr", in_each([](LowStateFrame& f) { f.mode_pr = 1; }), S::kDamp, C::kMode, 0.0},
+          {"remote lost", in_each([](LowStateFrame& f) { std::fill_n(f.wireless_remote, kRemoteBytes, 0); }), S::kHold,
+           C::kRemoteAge, 0.2}};
+}
+
+TEST(FaultMatrix, EachFaultOfTheWireReachesItsState) {
+  for (const WireFault& fault : wire_faults()) {
+    GuardedTwin robot;
+    robot.start();
+    ASSERT_EQ(robot.state(), SafetyState::kRun) << fault.name;
+    robot.spoil = fault.spoil;
+    const double taken = robot.time_to_leave(SafetyState::kRun);
+    EXPECT_EQ(robot.state(), fault.reached) << fault.name;
+    EXPECT_EQ(robot.cause(), fault.cause) << fault.name << ": " << stop_cause_name(robot.cause());
+    EXPECT_LE(taken, fault.within + 2.5 * kTick) << fault.name;
+    robot.run_for(1.0);
+    EXPECT_EQ(robot.guard.status().limited.root.forward, 0.0) << fault.name;
+    expect_inside(robot, fault.name);
+  }
+}
+
+// Less than what holds: it runs on, and nothing bad leaves.
+TEST(FaultMatrix, RunsOnThroughALittle) {
+  const std::vector<std::pair<const char*, std::function<void(Frames&)>>> little = {
+      {"5 % dropped",
+       [random = Random(19, 8)](Frames& f) mutable {
+         if (random.chance(0.05)) f.clear();
+       }},
+      {"half dropped",
+       [k = 0](Frames& f) mutable {
+         if (++k % 2 == 0) f.clear();
+       }},
+      {"one flipped in 30", flipped(30)},
+      {"5 ms late", delayed(2)},
+      {"reordered once",
+       [k = 0, kept = Frames()](Frames& f) mutable {
+         if (++k == 20) std::swap(kept, f);
+         if (k == 21) f.insert(f.end(), kept.begin(), kept.end());
+       }},
+      {"duplicated once",
+       [k = 0](Frames& f) mutable {
+         if (++k == 20) f.push_back(f.front());
+       }},
+      {"denormal torque", in_each([](LowStateFrame& f) { f.motor[5].tau_est = 1e-42f; })}};
+  for (const auto& [name, spoil] : little) {
+    GuardedTwin robot;
+    robot.start();
+    robot.message.command.root.forward = 0.1;
+    robot.spoil = spoil;
+    robot.run_for(1.5);
+    EXPECT_EQ(robot.state(), SafetyState::kRun) << name << ": " << stop_cause_name(robot.cause());
+    EXPECT_NEAR(robot.velocity.last.forward, 0.1, 1e-6) << name;
+    expect_inside(robot, name);
+  }
+}
+
+TEST(FaultMatrix, EachConditionOfTheRobotReachesItsState) {
+  struct Case {
+    const char* name;
+    std::function<void(TwinCondition&)> change;
+    SafetyState reached;
+    StopCause cause;
+  };
+  for (const Case& c :
+       {Case{"warm casing", [](TwinCondition& t) { t.casing = 78.0; }, SafetyState::kHold, StopCause::kTemperature},
+        Case{"hot winding", [](TwinCondition& t) { t.winding = 125.0; }, SafetyState::kDamp, StopCause::kTemperature},
+        Case{"leaning", [](TwinCondition& t) { t.roll = 0.6; }, SafetyState::kHold, StopCause::kTilt},
+        Case{"fallen", [](TwinCondition& t) { t.roll = 1.5; }, SafetyState::kDamp, StopCause::kTilt},
+        Case{"motor error", [](TwinCondition& t) { t.motor_error = true; }, SafetyState::kDamp, StopCause::kMotorError},
+        Case{"joint speed", [](TwinCondition& t) { t.joint_speed = 12.0; }, SafetyState::kDamp, StopCause::kJointSpeed},
+        Case{"gyro", [](TwinCondition& t) { t.gyro = 7.0; }, SafetyState::kDamp, StopCause::kGyro}}) {
+    GuardedTwin robot;
+    robot.start();
+    c.change(robot.twin.condition);
+    EXPECT_LE(robot.time_to_leave(SafetyState::kRun), 2.5 * kTick) << c.name;
+    EXPECT_EQ(robot.state(), c.reached) << c.name;
+    EXPECT_EQ(robot.cause(), c.cause) << c.name;
+    robot.run_for(1.0);
+    expect_inside(robot, c.name);
+  }
+}
+
+TEST(FaultMatrix, APlannerThatDiesHoldsAndThenDamps) {
+  GuardedTwin robot;
+  robot.start();
+  robot.message.command.root.forward = 0.2;
+  robot.run_for(1.0);
+  robot.plans = false;
+  EXPECT_NEAR(robot.time_to_leave(SafetyState::kRun), 0.6, 0.03);
+  EXPECT_EQ(robot.cause(), StopCause::kPlannerAge);
+  EXPECT_LT(robot.velocity.last.forward, 0.05);  // slowed down before it held
+  robot.run_for(1.5);
+  EXPECT_EQ(robot.state(), SafetyState::kDamp);
+  expect_inside(robot, "planner");
+}
+
+TEST(FaultMatrix, APausedGuardDampsWithoutAStep) {
+  for (const double pause : {0.15, 1.0}) {
+    GuardedTwin robot;
+    robot.start();
+    robot.message.command.root.forward = 0.2;
+    robot.run_for(1.0);
+    for (double left = pause; left > 0.0; left -= kTick) robot.step_twin();
+    robot.now += pause;
+    robot.tick();
+    EXPECT_EQ(robot.state(), SafetyState::kDamp) << pause;
+    EXPECT_EQ(robot.cause(), StopCause::kLoopLate) << pause;
+    robot.run_for(0.5);
+    expect_inside(robot, "pause");
+  }
+}
+
+TEST(FaultMatrix, TheDeadManStopsInAFifthOfASecond) {
+  GuardedTwin robot;
+  robot.start();
+  robot.drop_key(RemoteKey::kR1);
+  EXPECT_NEAR(robot.time_to_leave(SafetyState::kRun), 0.2, 0.01);
+  EXPECT_EQ(robot.cause(), StopCause::kDeadMan);
+}
+
+TEST(FaultMatrix, OdometryThatStopsOrJumpsHolds) {
+  GuardedTwin stopped;
+  stopped.start();
+  stopped.measures = false;
+  EXPECT_NEAR(stopped.time_to_leave(SafetyState::kRun), 0.15, 0.01);
+  EXPECT_EQ(stopped.cause(), StopCause::kOdometryAge);
+  GuardedTwin jumped;
+  jumped.start();
+  OdometrySample sample = jumped.twin.odometry(jumped.now);
+  sample.X_WB.p.x() += 0.15;
+  jumped.guard.receive(sample);
+  jumped.tick();
+  EXPECT_EQ(jumped.state(), SafetyState::kHold);
+  EXPECT_EQ(jumped.cause(), StopCause::kOdometryJump);
+}
+
+TEST(FaultMatrix, APersonWhoDisappearsHolds) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.start();
+  robot.sees = false;
+  EXPECT_NEAR(robot.time_to_leave(SafetyState::kRun), 0.25, 0.04);
+  EXPECT_EQ(robot.cause(), StopCause::kPersonAge);
+}
+
+TEST(FaultMatrix, APersonWhoTeleportsIsNotBelieved) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.start();
+  robot.person.joints.colwise() += Eigen::Vector3d(3.0, 0.0, 0.0);
+  robot.see();
+  EXPECT_EQ(robot.guard.status().bad_messages, 1);
+  robot.person.joints(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  robot.see();
+  EXPECT_EQ(robot.guard.status().bad_messages, 2);
+}
+
+TEST(FaultMatrix, APersonWhoComesNearStopsTheRoot) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.start();
+  robot.message.command.root.forward = 0.2;
+  robot.run_for(1.0);
+  EXPECT_GT(robot.velocity.last.forward, 0.1);
+  for (int k = 0; k < 60; ++k) {  // walks up to the robot
+    robot.person.joints.colwise() += Eigen::Vector3d(-0.05, 0.0, 0.0);
+    robot.run_for(0.034);
+  }
+  robot.run_for(0.5);
+  EXPECT_NEAR(robot.velocity.last.forward, 0.0, 1e-6);
+  EXPECT_GT(counted(robot.guard.status().clamps, ClampReason::kSeparation), 0);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+}
+
+TEST(FaultMatrix, AJitterOfFiveCentimetresIsBorne) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.start();
+  Random random(19, 9);
+  const HumanJoints still = robot.person.joints;
+  for (int k = 0; k < 60; ++k) {
+    for (int j = 0; j < 24; ++j)
+      for (int axis = 0; axis < 3; ++axis) robot.person.joints(axis, j) = still(axis, j) + random.uniform(-0.05, 0.05);
+    robot.run_for(0.034);
+  }
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+  EXPECT_EQ(robot.guard.status().bad_messages, 0);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,82 @@
+#include "duet/hardware/twin_model.h"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+
+#include "duet/hardware/frame_checksum.h"
+#include "tests/hardware/limited_robot.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+constexpr double kDt = 0.002;
+
+LowCommandFrame towards(double offset) {
+  JointCommand command = test::g1()->default_command(test::g1()->neutral);
+  command.q_target.array() += offset;
+  LowCommandFrame frame;
+  build_command(command, 5, frame);
+  return frame;
+}
+
+TEST(TwinModel, ItsJointsGoWhereTheyAreTold) {
+  TwinModel twin(test::g1(), {});
+  twin.obey(towards(0.1));
+  for (int k = 0; k < 2000; ++k) twin.step(kDt);
+  EXPECT_LT((twin.q() - test::g1()->neutral).array().abs().maxCoeff(), 0.11);
+  EXPECT_GT((twin.q() - test::g1()->neutral)[15], 0.09);
+}
+
+TEST(TwinModel, ObeysOnlyWholeFramesForItself) {
+  TwinModel twin(test::g1(), {});
+  LowCommandFrame frame = towards(0.1);
+  frame.motor[0].q += 1.0f;
+  twin.obey(frame);
+  frame = towards(0.1);
+  frame.mode_machine = 6;
+  frame.crc = checksum_of(frame);
+  twin.obey(frame);
+  EXPECT_EQ(twin.refused_frames(), 2);
+  EXPECT_EQ(twin.obeyed_frames(), 0);
+}
+
+TEST(TwinModel, ItsRootFollowsAfterDelayAndLag) {
+  TwinModel twin(test::g1(), {.lag = 0.3, .delay = 0.1});
+  twin.obey(VelocityCommand{0.2, 0.0, 0.0, 0.74});
+  for (int k = 0; k < 49; ++k) twin.step(kDt);
+  EXPECT_EQ(twin.root_speed(), 0.0);
+  for (int k = 0; k < 151; ++k) twin.step(kDt);
+  EXPECT_NEAR(twin.root_speed(), 0.2 * (1.0 - std::exp(-1.0)), 0.003);
+}
+
+TEST(TwinModel, TheSameSeedGivesTheSameFrames) {
+  const TwinOptions noisy{.place_noise = 0.01, .joint_noise = 0.001, .seed = 7};
+  TwinModel a(test::g1(), noisy), b(test::g1(), noisy);
+  for (int k = 0; k < 20; ++k) {
+    LowStateFrame from_a, from_b;
+    a.write_state(from_a);
+    b.write_state(from_b);
+    EXPECT_EQ(std::memcmp(&from_a, &from_b, sizeof(from_a)), 0);
+    EXPECT_EQ(a.odometry(0.0).X_WB.p, b.odometry(0.0).X_WB.p);
+  }
+}
+
+TEST(TwinModel, OdometryDrifts) {
+  TwinModel twin(test::g1(), {.drift = 0.05});
+  for (int k = 0; k < 500; ++k) twin.step(kDt);
+  EXPECT_NEAR(twin.odometry(0.0).X_WB.p.x() - twin.root().p.x(), 0.05, 1e-9);
+}
+
+TEST(TwinModel, RefusesAnotherRobotAndNegativeOptions) {
+  const auto refusal = [](const char* robot, const TwinOptions& options) {
+    return test::thrown_message<std::invalid_argument>([&] { TwinModel(load_shared_robot(robot), options); });
+  };
+  EXPECT_THAT(refusal("g1_12dof", {}), HasSubstr("expected a robot of 29 joints"));
+  EXPECT_THAT(refusal("", {.lag = -1.0}), HasSubstr("expected numbers of at least 0, found -1"));
+}
+
+}  // namespace
+}  // namespace duet
