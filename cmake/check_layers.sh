@@ -52,6 +52,7 @@ vendor backends/dart 'dart/'
 vendor results 'sqlite3\.h'
 vendor robots 'urdf_'
 vendor nn 'onnx/|google/protobuf'
+vendor hardware/dds 'dds/'
 
 # "UNIT INCLUDED-UNIT" for each include between two units.
 unit_includes() {

@@ -155,7 +155,8 @@ void RobotGuard::read_operator(double now) {
   const bool fresh = next_.state_at == now && reading_.remote.heard;
   if (fresh) next_.remote_at = now;
   if (fresh && reading_.remote.holds(kDeadMan)) next_.dead_man_at = now;
-  next_.stop_key = fresh && reading_.remote.asks_to_stop();
+  next_.stop_key = stop_asked_ || (fresh && reading_.remote.asks_to_stop());
+  stop_asked_ = false;
   next_.stand = fresh && reading_.remote.holds(kStandUp);
   next_.run = fresh && reading_.remote.holds(kRun);
 }

@@ -63,6 +63,8 @@ class RobotGuard {
   void receive(const OdometrySample& sample);
   // The operator has armed: arming_refusal() was empty. Ignored in a dry run.
   void arm();
+  // As the stop key does, at the next tick.
+  void stop() { stop_asked_ = true; }
 
   void tick(double now);
 
@@ -96,7 +98,7 @@ class RobotGuard {
   JointCommand joints_;
   SafetyMemory safety_;
   SafetyInput next_;
-  bool armed_ = false, was_planned_ = false;
+  bool armed_ = false, was_planned_ = false, stop_asked_ = false;
   int ticks_to_writers_ = 0;
   GuardStatus status_;
 };

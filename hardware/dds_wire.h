@@ -1,0 +1,44 @@
+// The G1's topics over DDS: the robot's side as the guard sees it, and the twin's side. Quality of service is set by
+// hand (volatile, the last sample; writers reliable, readers best effort: a late state is worse than none), the
+// configuration comes from DdsPlace alone: what the environment says about DDS is not read. One owner, one thread.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "duet/hardware/dds_place.h"
+#include "duet/hardware/frame_transport.h"
+#include "duet/hardware/odometry.h"
+
+namespace duet {
+
+// Whether this build has DDS (DUET_WITH_DDS).
+bool has_dds();
+
+class RobotWire : public FrameTransport {
+ public:
+  // The newest sample of the maker's odometry topic; false where none has come. Its place and velocity; `at` is left.
+  virtual bool take(OdometrySample& sample) = 0;
+  using FrameTransport::take;
+};
+
+class TwinWire {
+ public:
+  virtual ~TwinWire() = default;
+  virtual bool take(LowCommandFrame& frame) = 0;
+  virtual void write(const LowStateFrame& frame) = 0;
+  virtual void write(const OdometrySample& sample) = 0;
+  // How many write commands now.
+  virtual int command_writers() = 0;
+};
+
+// Throw std::invalid_argument as check_place does, MissingError in a build without DDS, std::runtime_error with the
+// library's message where it refuses (no such interface).
+std::unique_ptr<RobotWire> open_robot_wire(const DdsPlace& place);
+std::unique_ptr<TwinWire> open_twin_wire(const DdsPlace& place);
+
+// SHA-256 of what DDS tells others of a type ("unitree_hg::msg::dds_::LowCmd_"): its information, then its mapping.
+// Throws std::invalid_argument for an unknown type, MissingError without DDS.
+std::string dds_type_digest(const std::string& type);
+
+}  // namespace duet

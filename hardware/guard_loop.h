@@ -1,0 +1,38 @@
+// The guard in real time: the only place that reads a clock. Every 2 ms it takes what came over the local socket and
+// the wire, and ticks. One thread.
+#pragma once
+
+#include <functional>
+
+#include "duet/hardware/datagram_socket.h"
+#include "duet/hardware/dds_wire.h"
+#include "duet/hardware/robot_guard.h"
+
+namespace duet {
+
+// CLOCK_MONOTONIC [s].
+double monotonic_seconds();
+
+// Velocities as HOMIE's processes and the twin take them, 50 times a second.
+class LcmVelocity final : public VelocitySink {
+ public:
+  explicit LcmVelocity(DatagramSocket socket) : socket_(std::move(socket)) {}
+  void send(const VelocityCommand& velocity) override;
+
+ private:
+  DatagramSocket socket_;
+  std::uint32_t sequence_ = 0;
+  long calls_ = 0;
+};
+
+// A velocity that nobody executes: of a dry run.
+class NoVelocity final : public VelocitySink {
+ public:
+  void send(const VelocityCommand&) override {}
+};
+
+// Runs until `go_on`, called after each tick, is false. `planner` may be null. `period` of ticks [s].
+void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, double period,
+               const std::function<bool(double now)>& go_on);
+
+}  // namespace duet
