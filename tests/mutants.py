@@ -3,11 +3,16 @@
 
   ./run mutants [SEED] [COUNT] [ROOM...]     (builds first; SEED 1, COUNT 40, all rooms)
 
-A changed file is compiled with the command of its build, and with the files that are compiled together with it, in a
-scratch folder (build/mutants), and linked in front of the room's library; the source tree and the build are only read.
-Then the tests of its room run, those first that include the file's header, and after them the tests of every room that
-links it: a changed engine, library or command reaches them through DUET_ENGINES and DUET_PROGRAM. A test that fails, a
-crash and a run out of its time limit have noticed the change.
+A changed file is compiled with the command of its build in a scratch folder (build/mutants) and linked in front of the
+room's library; the source tree and the build are only read. Then the tests of its room run, quick suites first, and
+among them those that include the file's header. A test that fails, a crash and a run out of its time limit have noticed
+the change.
+
+The file is compiled alone at first: its definitions win over those of the library. Where it has variables of its own,
+which such a program has twice, the test that noticed must pass with the unchanged file linked likewise. What the room's
+tests let pass, and what does not compile alone, is compiled with the files that its build compiles together with it (a
+minute), and the tests of every room that links it run too: a changed engine, library or command reaches them through
+DUET_ENGINES and DUET_PROGRAM. Only then it has survived.
 
 What is not drawn: headers; lines of `for (`, `require(`, `throw` and `fmt::` (loops that run out of an array and words of
 messages); bench/benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
@@ -15,11 +20,12 @@ runs it. A change that gives
 the same machine code, or that stands in tests/mutants_equivalent.txt with its reason, is counted apart.
 
 The draw depends on the seed and on the lines alone, so that a commit elsewhere leaves it as it is. A second call with the
-same seed goes on where the first ended; it asks again only what survived. Report: build/mutants/SEED.txt.
+same seed goes on where the first ended; it asks again only what survived, and gives both shares. Report:
+build/mutants/SEED.txt; the verdicts: build/mutants/SEED.tsv, which goes on on another machine as tests/mutants_asked/SEED.tsv.
 """
 import argparse
+import collections
 import concurrent.futures
-import hashlib
 import json
 import os
 import pathlib
@@ -32,122 +38,12 @@ import sys
 import threading
 import time
 
-ROOMS = 'core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench'.split()
-OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' > '), (r' \+ ', ' - '), (r' - ', ' + '),
-             (r' \* ', ' + '), (r' / ', ' * '), (r' \+= ', ' -= '), (r' -= ', ' += '), (r' && ', ' || '),
-             (r' \|\| ', ' && '), (r' == ', ' != '), (r' != ', ' == '), (r'std::max\(', 'std::min('),
-             (r'std::min\(', 'std::max('), (r'\b0\.5\b', '0.6'), (r'return true;', 'return false;'),
-             (r'return false;', 'return true;'), (r'if \(!', 'if ('), (r'\[0\]', '[1]')]
-SKIPPED_LINES = ('require(', 'throw ', 'fmt::', '#', 'template', 'for (', 'using ', 'typedef', 'static_assert')
-SKIPPED_FILES = ('bench/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'cli/train_dstar.cpp')
-EQUIVALENT = 'tests/mutants_equivalent.txt'
-OUTPUT = re.compile(r'(?<= -o )\S+')
+from mutants_build import EQUIVALENT, ROOMS, SKIPPED_FILES, Build, Compiled, OUTPUT, equivalents, mutants_of
+
+ASKED = 'tests/mutants_asked'
+ASKED_VERDICTS = ('noticed', 'unnoticed', 'SURVIVED')
+QUICK = 1000  # milliseconds of a test suite
 MEMORY = 12 << 30
-
-
-def code_of(line):
-    """The line with comments and the insides of strings blanked, so that only code is changed."""
-    line = re.sub(r'"(\\.|[^"\\])*"|\'(\\.|[^\'\\])\'', lambda m: m[0][0] + ' ' * (len(m[0]) - 2) + m[0][0], line)
-    return re.sub(r'//.*', lambda m: ' ' * len(m[0]), line)
-
-
-class Mutant:
-    def __init__(self, path, number, line, span, new, seed):
-        self.path, self.number, self.original = path, number, line.strip()
-        self.line = line[:span[0]] + new + line[span[1]:]
-        self.changed = self.line.strip()
-        identity = f'{path}\n{self.original}\n{span[0] - len(line) + len(line.lstrip())}\n{new}'
-        self.key = hashlib.sha256(identity.encode()).hexdigest()[:16]
-        self.rank = hashlib.sha256(f'{seed}\n{self.key}\n{number}'.encode()).hexdigest()
-
-    def __str__(self):
-        return f'{self.path}:{self.number}  {self.original}  =>  {self.changed}'
-
-
-def mutants_of(path, seed):
-    for i, line in enumerate(pathlib.Path(path).read_text().split('\n')):
-        code = code_of(line)
-        if any(word in code for word in SKIPPED_LINES) or code.strip().startswith('*'):
-            continue
-        for old, new in OPERATORS:
-            for found in re.finditer(old, code):
-                yield Mutant(path, i + 1, line, found.span(), new, seed)
-
-
-def equivalents():
-    """{(path, line, changed line): reason} of the kept list; says which of its entries fit no line any more."""
-    known, path, old, new = {}, '', '', ''
-    for line in pathlib.Path(EQUIVALENT).read_text().splitlines():
-        sign, text = line[:2], line[2:].strip()
-        if sign == '@ ':
-            path = text
-        elif sign == '- ':
-            old = text
-        elif sign == '+ ':
-            new = text
-        elif sign == '= ':
-            known[path, old, new] = text
-    for path, old, _ in known:
-        if not os.path.exists(path) or old not in [x.strip() for x in pathlib.Path(path).read_text().split('\n')]:
-            print(f'{EQUIVALENT}: {path} has no line "{old}" any more', file=sys.stderr)
-    return known
-
-
-class Build:
-    """What the build knows: how each file is compiled, how each program and module is linked."""
-
-    def __init__(self, folder):
-        self.folder = os.path.abspath(folder)
-        self.compile, self.unit = {}, {}  # of a file: the command, and the several files that are compiled at once
-        for entry in json.load(open(f'{self.folder}/compile_commands.json')):
-            united = os.path.basename(entry['file']).startswith('unity_')
-            files = re.findall(r'#include "(.*)"', pathlib.Path(entry['file']).read_text()) if united else [entry['file']]
-            for file in map(os.path.relpath, files):
-                self.compile[file] = entry['command']
-                if united:
-                    self.unit[file] = entry['file']
-        self.links = {}
-        for command in subprocess.check_output(['ninja', '-C', self.folder, '-t', 'commands'], text=True).split('\n'):
-            found = OUTPUT.search(command)
-            if command.startswith(': && ') and found and ' -c ' not in command:
-                self.links[found[0]] = command[len(': && '):].split(' && ')[0]
-        self.programs = {r: f'tests/{r}/{r}_test' for r in ROOMS if f'tests/{r}/{r}_test' in self.links}
-        self.engines = [out for out in self.links if out.startswith('engines/')]
-
-    def object_of(self, path):
-        return OUTPUT.search(self.compile[path])[0]
-
-    def library_of(self, path):
-        room = path.split('/')[0]
-        return f'{room}/libduet_{room}.a'
-
-    def holds(self, target, path):
-        """Whether the target is linked from this file's object or from its room's library."""
-        words = self.links[target].split()
-        in_library = f'/duet_{path.split("/")[0]}.dir/' in self.object_of(path)
-        return self.object_of(path) in words or (in_library and self.library_of(path) in words)
-
-    def link(self, target, path, object_file, output):
-        command = OUTPUT.sub(output, self.links[target])
-        if self.object_of(path) in command.split():
-            command = command.replace(f' {self.object_of(path)} ', f' {object_file} ')
-        else:
-            command = command.replace(f' {self.library_of(path)} ', f' {object_file} {self.library_of(path)} ', 1)
-        done = subprocess.run(command, shell=True, cwd=self.folder, capture_output=True, text=True)
-        if done.returncode:
-            sys.exit(f'{target} could not be linked: {done.stderr.strip()}')
-
-    def suites_about(self, path, room):
-        """Names of the test suites of the room whose file includes the changed file's header."""
-        header = re.sub(r'\.cpp$', '.h', path)
-        names = set()
-        for test in pathlib.Path(f'tests/{room}').glob('*_test.cpp'):
-            text = test.read_text()
-            if f'"duet/{header}"' in text or test.stem == pathlib.Path(path).stem + '_test':
-                names.update(re.findall(r'^TEST(?:_[FP])?\((\w+),', text, re.M))
-        if '/cli/' in path:
-            names.add('CommandLine')
-        return sorted(names)
 
 
 def limited(cpu_seconds):
@@ -196,34 +92,51 @@ def who_noticed(code, text):
     return name if failed else f'{name} (exit {code})'
 
 
-class Trials:
-    def __init__(self, build, scratch):
-        self.build, self.scratch, self.lock = build, scratch, threading.Lock()
+def suite_times(log):
+    """{suite: milliseconds} of a program's output."""
+    return {name: int(ms) for name, ms in re.findall(r'^\[-+\] \d+ tests? from (\S+) .*\((\d+) ms total\)$', log, re.M)}
 
-    def cpu_seconds(self, room):
-        """The limit for the tests of a room: five times what they take unchanged, where they have to pass."""
+
+class Trials:
+    def __init__(self, build, scratch, quick):
+        self.build, self.scratch, self.quick, self.lock = build, scratch, quick, threading.Lock()
+
+    def baseline(self, room):
+        """Processor seconds of the tests of a room, which have to pass unchanged, and {suite: milliseconds}."""
         file = self.scratch / 'baseline.json'
         program = f'{self.build.folder}/{self.build.programs[room]}'
         stamp = os.stat(program).st_mtime
         with self.lock:
             known = json.loads(file.read_text()) if file.exists() else {}
-            if known.get(room, [0, 0])[0] != stamp:
+            if known.get(room, [0])[0] != stamp:
                 log = self.scratch / f'baseline-{room}.log'
                 noticed, seconds = run_tests(program, '', dict(os.environ), 600, log)
                 if noticed:
                     raise SystemExit(f'{room}_test does not pass unchanged: {noticed} ({log})')
-                known[room] = [stamp, seconds]
+                known[room] = [stamp, seconds, suite_times(log.read_text(errors='replace'))]
                 file.write_text(json.dumps(known))
-        return int(20 + 5 * known[room][1])
+        return known[room][1:]
 
-    def compile(self, folder, path, text):
-        """The object file of the changed text, None where it does not compile."""
+    def cpu_seconds(self, room):
+        """The limit for the tests of a room: five times what they take unchanged."""
+        return int(20 + 5 * self.baseline(room)[0])
+
+    def filters(self, path, room):
+        """One for each run of a room's tests: quick suites before slow ones, each time those about the file first."""
+        about = self.build.suites_about(path, room)
+        groups = {}
+        for suite, ms in self.baseline(room)[1].items():
+            groups.setdefault((ms >= QUICK, suite.split('/')[-1] not in about and suite not in about), []).append(suite)
+        return [':'.join(f'{suite}.*' for suite in groups[key]) for key in sorted(groups)]
+
+    def compile(self, folder, path, text, united=False):
+        """The text in place of the file; None where it does not compile."""
         source = folder / pathlib.Path(path).name
         source.write_text(text)
-        if unit := self.build.unit.get(path):
-            others = pathlib.Path(unit).read_text()
+        if united:
+            others = pathlib.Path(self.build.unit[path]).read_text()
+            (folder / 'unity.cpp').write_text(others.replace(f'"{os.path.abspath(path)}"', f'"{source}"'))
             source = folder / 'unity.cpp'
-            source.write_text(others.replace(f'"{os.path.abspath(path)}"', f'"{folder / pathlib.Path(path).name}"'))
         output = folder / (source.name + '.o')
         words = self.build.compile[path].split()
         while '=' in words[0] or words[0].endswith(('/cmake', '/ccache')) or words[0] in ('-E', 'env'):
@@ -232,45 +145,42 @@ class Trials:
         quote = os.path.abspath(os.path.dirname(path))
         done = subprocess.run(f'{command} -w -iquote {quote} -c {source}', shell=True, cwd=self.build.folder,
                               capture_output=True)
-        return output if done.returncode == 0 else None
+        return Compiled(path, output, united) if done.returncode == 0 else None
 
-    def same_machine_code(self, path, object_file):
-        original = pathlib.Path(self.build.folder) / self.build.object_of(path)
-        return original.read_bytes() == object_file.read_bytes()
+    def unchanged(self, folder, path):
+        (folder / 'unchanged').mkdir(exist_ok=True)
+        return self.compile(folder / 'unchanged', path, pathlib.Path(path).read_text())
 
-    def environment(self, folder, path, object_file, room):
+    def environment(self, folder, changed, room):
         """Engines and program with the change in them, where this room's tests use them."""
         environment = dict(os.environ, TMPDIR=str(folder / 'tmp'))
         shutil.rmtree(folder / 'tmp', ignore_errors=True)
         (folder / 'tmp').mkdir()
         uses_engines = 'libduet_backends.a' in self.build.links[self.build.programs[room]]
-        if uses_engines and any(self.build.holds(engine, path) for engine in self.build.engines):
+        if uses_engines and any(self.build.holds(engine, changed.path) for engine in self.build.engines):
             shutil.rmtree(folder / 'engines', ignore_errors=True)
             (folder / 'engines').mkdir()
             for engine in self.build.engines:
-                if self.build.holds(engine, path):
-                    self.build.link(engine, path, object_file, str(folder / engine))
+                if self.build.holds(engine, changed.path):
+                    self.build.link(engine, changed, str(folder / engine))
                 else:
                     (folder / engine).symlink_to(f'{self.build.folder}/{engine}')
             environment['DUET_ENGINES'] = str(folder / 'engines')
-        if room == 'bench' and self.build.holds('duet', path):
-            self.build.link('duet', path, object_file, str(folder / 'duet'))
+        if room == 'bench' and self.build.holds('duet', changed.path):
+            self.build.link('duet', changed, str(folder / 'duet'))
             environment['DUET_PROGRAM'] = str(folder / 'duet')
         return environment
 
-    def noticed_by_room(self, folder, path, object_file, room):
-        program = self.build.programs[room]
-        environment = self.environment(folder, path, object_file, room)
-        changed = f'{self.build.folder}/{program}'
-        if self.build.holds(program, path):
-            changed = str(folder / f'{room}_test')
-            self.build.link(program, path, object_file, changed)
-        suites = self.build.suites_about(path, room)
-        about = ':'.join(f'{name}.*:*/{name}.*' for name in suites)
-        noticed, limit = '', self.cpu_seconds(room)
-        for filters in ([about, '-' + about] if about else ['']):
-            noticed = noticed or run_tests(changed, filters, environment, limit, folder / 'log')[0]
-        return noticed
+    def noticed_by_room(self, folder, changed, room, filters):
+        environment = self.environment(folder, changed, room)
+        program = f'{self.build.folder}/{self.build.programs[room]}'
+        if self.build.holds(self.build.programs[room], changed.path):
+            program = str(folder / f'{room}_test')
+            self.build.link(self.build.programs[room], changed, program)
+        for tests in filters:
+            if noticed := run_tests(program, tests, environment, self.cpu_seconds(room), folder / 'log')[0]:
+                return noticed
+        return ''
 
     def rooms_for(self, path):
         """The file's room first, then each room whose tests link it, hold it in an engine or in the program."""
@@ -281,44 +191,71 @@ class Trials:
             (held_by_engine and 'libduet_backends.a' in self.build.links[program]))]
         return [own] + above
 
+    def noticed(self, folder, changed, rooms):
+        """Which test of these rooms notices first, '' where none does."""
+        for room in rooms:
+            if noticed := self.noticed_by_room(folder, changed, room, self.filters(changed.path, room)):
+                return '' if self.is_of_the_recipe(folder, changed, room, noticed) else f'{room}: {noticed}'
+        return ''
+
+    def is_of_the_recipe(self, folder, changed, room, noticed):
+        """Whether the unchanged file, compiled alone, fails that test too: its variables are there twice."""
+        if changed.united or not changed.has_variables():
+            return False
+        test = noticed.split(' ')[0]
+        unchanged = self.unchanged(folder, changed.path)
+        return self.noticed_by_room(folder / 'unchanged', unchanged, room, [test if '.' in test else '-*']) != ''
+
     def verdict(self, mutant, folder):
         lines = pathlib.Path(mutant.path).read_text().split('\n')
         lines[mutant.number - 1] = mutant.line
-        object_file = self.compile(folder, mutant.path, '\n'.join(lines))
-        if object_file is None:
+        text, rooms = '\n'.join(lines), self.rooms_for(mutant.path)
+        alone = self.compile(folder, mutant.path, text)
+        if alone and (noticed := self.noticed(folder, alone, rooms[:1])):
+            return 'noticed', noticed
+        unchanged = self.unchanged(folder, mutant.path)
+        if unchanged and not alone:
             return 'nocompile', ''
-        if self.same_machine_code(mutant.path, object_file):
+        if alone and unchanged.object.read_bytes() == alone.object.read_bytes():
             return 'same', 'the machine code is the same'
-        for room in self.rooms_for(mutant.path):
-            noticed = self.noticed_by_room(folder, mutant.path, object_file, room)
-            if noticed:
-                return 'noticed', f'{room}: {noticed}'
-        return 'SURVIVED', ''
+        if self.quick:
+            return 'unnoticed', ''
+        if alone and (noticed := self.noticed(folder, alone, rooms[1:])):
+            return 'noticed', noticed
+        if mutant.path not in self.build.unit:
+            return 'SURVIVED', ''
+        united = self.compile(folder, mutant.path, text, united=True)
+        if not united:
+            return 'nocompile', ''
+        noticed = self.noticed(folder, united, rooms)
+        return ('noticed', noticed) if noticed else ('SURVIVED', '')
 
     def control(self, path, folder):
         """The recipe with nothing changed: says whether a test complains all the same."""
-        object_file = self.compile(folder, path, pathlib.Path(path).read_text())
-        if object_file is None:
-            return f'control: {path} does not compile'
-        room = path.split('/')[0]
-        noticed = self.noticed_by_room(folder, path, object_file, room)
-        return f'control: {path} is unchanged, yet {room}: {noticed}' if noticed else ''
+        unchanged = self.compile(folder, path, pathlib.Path(path).read_text())
+        noticed = unchanged and self.noticed(folder, unchanged, self.rooms_for(path)[:1])
+        return f'control: {path} is unchanged, yet {noticed}' if noticed else ''
 
 
 class Report:
-    """Verdicts by key in build/mutants/SEED.json, kept from call to call; the text for people beside it."""
+    """Verdicts by key, kept from call to call in SEED.tsv (key, verdict at first, verdict now, by); SEED.txt is for people."""
 
-    def __init__(self, file):
-        self.file, self.lock = file, threading.Lock()
-        self.known = json.loads(file.read_text()) if file.exists() else {}
-        self.lines, self.count = [], {}
+    def __init__(self, scratch, seed, settled):
+        self.file, self.settled = scratch / f'{seed}.tsv', settled
+        self.known, self.lines, self.met = {}, [], []
+        for file in (pathlib.Path(ASKED) / f'{seed}.tsv', self.file):
+            for line in file.read_text().splitlines() if file.exists() else []:
+                key, first, now, by = line.split('\t')
+                self.known[key] = first, now, by
 
     def add(self, mutant, verdict, by):
-        with self.lock:
-            self.known[mutant.key] = [verdict, by]
-            self.count[verdict] = self.count.get(verdict, 0) + 1
-            self.say(f'{verdict:10} {mutant}' + (f'  [{by}]' if by else ''))
-            self.file.write_text(json.dumps(self.known))
+        first = self.known.get(mutant.key, ['unnoticed'])[0]
+        first = verdict if first == 'unnoticed' else first
+        if verdict != 'equivalent' or first != verdict:
+            self.known[mutant.key] = first, verdict, by
+        self.met.append((first, verdict))
+        self.say(f'{verdict:10} {mutant}' + (f'  [{by}]' if by else ''))
+        self.file.write_text(''.join('\t'.join((key, *known)) + '\n' for key, known in sorted(self.known.items())))
 
     def say(self, line):
         self.lines.append(line)
@@ -326,11 +263,26 @@ class Report:
         self.file.with_suffix('.txt').write_text('\n'.join(self.lines) + '\n')
 
     def earlier(self, mutant):
-        verdict, by = self.known.get(mutant.key, ['', ''])
-        return (verdict, by) if verdict in ('noticed', 'nocompile', 'same') else None
+        _, verdict, by = self.known.get(mutant.key, ['', '', ''])
+        return (verdict, by) if verdict in self.settled else None
 
     def asked(self):
-        return self.count.get('noticed', 0) + self.count.get('SURVIVED', 0)
+        """How many were asked: what was found equivalent only afterwards is among them."""
+        return sum(first in ASKED_VERDICTS for first, _ in self.met)
+
+    def share(self, place):
+        """How many of those asked were noticed at first (0) or now (1): the words, and the percentage."""
+        verdicts = [met[place] for met in self.met if met[place] in ASKED_VERDICTS]
+        noticed = verdicts.count('noticed')
+        percent = 100 * noticed / len(verdicts) if verdicts else 0
+        return f'noticed {noticed} of {len(verdicts)} ({percent:.1f} %)', percent
+
+    def summary(self):
+        count = collections.Counter(verdict for _, verdict in self.met)
+        at_first, now = self.share(0)[0], self.share(1)[0]
+        return ((f'at first {at_first}\n' if at_first != now else '') +
+                f'{now}; apart from these: {count["equivalent"]} equivalent ({EQUIVALENT}), {count["same"]} with the same '
+                f'machine code, {count["nocompile"]} that did not compile')
 
 
 def drawn(arguments, build):
@@ -371,7 +323,9 @@ def parsed():
     parser.add_argument('rooms', nargs='*', default=ROOMS, metavar='ROOM', choices=ROOMS + [ROOMS])
     parser.add_argument('-j', '--jobs', type=int, default=int(os.environ.get('DUET_JOBS', os.cpu_count())))
     parser.add_argument('--gate', type=float, default=0, metavar='PERCENT', help='exit 1 where fewer are noticed')
-    parser.add_argument('--control', action='store_true', help='first the recipe with the first file unchanged')
+    parser.add_argument('--control', type=int, default=0, metavar='N', help='first the recipe with N files unchanged')
+    parser.add_argument('--quick', action='store_true', help='only the file compiled alone and the tests of its room: what these let pass waits')
+    parser.add_argument('--again', action='store_true', help='with --quick: ask again what passed in earlier calls')
     parser.add_argument('--list', action='store_true', help='print the draw and try nothing')
     parser.add_argument('--build', default='build/release', metavar='FOLDER')
     return parser.parse_args()
@@ -387,21 +341,17 @@ def main():
         return 0
     scratch = pathlib.Path('build/mutants').resolve()
     scratch.mkdir(parents=True, exist_ok=True)
-    trials, report = Trials(build, scratch), Report(scratch / f'{arguments.seed}.json')
-    if arguments.control:
-        (scratch / 'worker0').mkdir(exist_ok=True)
-        if complaint := trials.control(mutants[0].path, scratch / 'worker0'):
+    settled = ['noticed', 'nocompile', 'same'] + ['unnoticed', 'SURVIVED'] * (arguments.quick and not arguments.again)
+    trials, report = Trials(build, scratch, arguments.quick), Report(scratch, arguments.seed, settled)
+    (scratch / 'worker0').mkdir(exist_ok=True)
+    for path in list(dict.fromkeys(m.path for m in mutants))[:arguments.control]:
+        if complaint := trials.control(path, scratch / 'worker0'):
             report.say(complaint)
             return 1
     began = time.monotonic()
     ask(mutants, arguments, trials, report)
-    noticed, asked = report.count.get('noticed', 0), report.asked()
-    share = 100 * noticed / asked if asked else 0
-    report.say(f'noticed {noticed} of {asked} ({share:.1f} %); apart from these: {report.count.get("equivalent", 0)} equivalent '
-               f'({EQUIVALENT}), {report.count.get("same", 0)} with the same machine code, '
-               f'{report.count.get("nocompile", 0)} that did not compile; seed {arguments.seed}, '
-               f'{len(mutants)} to draw from, {time.monotonic() - began:.0f} s')
-    return 1 if share < arguments.gate else 0
+    report.say(f'{report.summary()}; seed {arguments.seed}, {len(mutants)} to draw from, {time.monotonic() - began:.0f} s')
+    return 1 if report.share(1)[1] < arguments.gate else 0
 
 
 if __name__ == '__main__':
