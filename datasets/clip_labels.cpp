@@ -7,18 +7,13 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
 namespace {
 
 constexpr std::string_view kLabelsHeader = "clip,label";
-
-std::string_view without_blanks(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(kBlanks) + 1 - begin);
-}
 
 }  // namespace
 
@@ -32,7 +27,7 @@ ClipLabels parse_clip_labels(std::string_view text, const std::string& name) {
   while (!text.empty()) {
     ++number;
     const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = without_blanks(text.substr(0, end));
+    const std::string_view line = trimmed(text.substr(0, end));
     text.remove_prefix(std::min(end + 1, text.size()));
     if (number == 1) {
       if (line != kLabelsHeader)
@@ -43,9 +38,9 @@ ClipLabels parse_clip_labels(std::string_view text, const std::string& name) {
     if (std::count(line.begin(), line.end(), ',') != 1)
       refuse(fmt::format("expected 2 fields ({}), found '{}'", kLabelsHeader, shown(line)));
     const std::size_t comma = line.find(',');
-    const std::string clip(without_blanks(line.substr(0, comma)));
+    const std::string clip(trimmed(line.substr(0, comma)));
     if (clip.empty()) refuse("expected a clip's name before the comma, found none");
-    if (!labels.emplace(clip, without_blanks(line.substr(comma + 1))).second)
+    if (!labels.emplace(clip, trimmed(line.substr(comma + 1))).second)
       refuse(fmt::format("clip '{}' is there twice", shown(clip)));
   }
   if (number == 0) {

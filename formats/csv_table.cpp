@@ -7,29 +7,13 @@
 
 #include "duet/core/number.h"
 #include "duet/core/require.h"
+#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
 namespace {
 
 constexpr std::size_t kMostColumns = 4096;
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlank);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlank) - begin + 1);
-}
-
-void split_fields(std::string_view line, std::vector<std::string_view>& fields) {
-  fields.clear();
-  for (std::size_t begin = 0;;) {
-    const std::size_t comma = line.find(',', begin);
-    fields.push_back(trimmed(line.substr(begin, comma == std::string_view::npos ? comma : comma - begin)));
-    if (comma == std::string_view::npos) return;
-    begin = comma + 1;
-  }
-}
 
 void read_meta(std::string_view line, CsvTable& table) {
   const std::string_view text = trimmed(line.substr(1));
@@ -44,7 +28,8 @@ class TableReader {
 
   void take(std::string_view line, int number) {
     if (line.front() == '#') return read_meta(line, table_);
-    split_fields(line, fields_);
+    fields_ = split(line, ',');
+    for (std::string_view& field : fields_) field = trimmed(field);
     if (fields_.size() > kMostColumns)
       fail(number, fmt::format("expected at most {} columns, found {}", kMostColumns, fields_.size()));
     if (values_.empty() && table_.columns.empty() && names_columns()) return take_names(number);

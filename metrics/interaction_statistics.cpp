@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <optional>
 #include <vector>
 
+#include "duet/core/number.h"
 #include "duet/core/order_statistics.h"
 #include "duet/core/require.h"
 #include "duet/metrics/clip_statistics.h"
@@ -190,10 +190,9 @@ void add_bodies(const People& people, InteractionStatistics& result) {
 
 double source_rate(const InteractionClip& clip) {
   const auto told = clip.source.find("source_rate_hz");
-  double rate = 0.0;
   if (told == clip.source.end()) return clip.rate_hz();
-  const auto [end, error] = std::from_chars(told->second.data(), told->second.data() + told->second.size(), rate);
-  return error == std::errc() && rate > 0.0 ? rate : clip.rate_hz();
+  const std::optional<double> rate = parse_number(told->second);
+  return rate && *rate > 0.0 ? *rate : clip.rate_hz();
 }
 
 }  // namespace

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "build_info.h"
+#include "duet/core/split.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -38,24 +39,23 @@ constexpr std::array<std::string_view, 16> kFlagsThatMatter = {
     "sse4_2",   "avx",      "fma",      "f16c",        "avx2",        "bmi2",     "avx512f", "avx512dq",
     "avx512bw", "avx512vl", "avx512cd", "avx512_vnni", "avx512_bf16", "amx_tile", "asimd",   "sve"};
 
-std::string trimmed(const std::string& text) {
-  const std::size_t begin = text.find_first_not_of(" \t\n");
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(" \t\n") - begin + 1);
-}
+constexpr std::string_view kBlanks = " \t\n";
 
 std::string first_line(const std::string& path) {
   std::ifstream file(path);
   std::string line;
   std::getline(file, line);
-  return trimmed(line);
+  return std::string(trimmed(line, kBlanks));
 }
 
 // The value of the first "name : value" line, "" where there is none.
 std::string proc_value(const std::string& path, std::string_view name) {
   std::ifstream file(path);
-  for (std::string line; std::getline(file, line);) {
+  for (std::string read; std::getline(file, read);) {
+    const std::string_view line = read;
     const std::size_t colon = line.find(':');
-    if (colon != std::string::npos && trimmed(line.substr(0, colon)) == name) return trimmed(line.substr(colon + 1));
+    if (colon != std::string_view::npos && trimmed(line.substr(0, colon), kBlanks) == name)
+      return std::string(trimmed(line.substr(colon + 1), kBlanks));
   }
   return "";
 }

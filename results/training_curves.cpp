@@ -10,6 +10,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
@@ -25,24 +26,14 @@ bool is_level(const std::vector<double>& values) {
   return finite.size() > 1 && std::ranges::count(finite, finite.front()) == std::ssize(finite);
 }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return "";
-  return text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-}
-
-std::vector<std::string> split(std::string_view line) {
+std::vector<std::string> cells_of(std::string_view line) {
   std::vector<std::string> cells;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    cells.emplace_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
-  }
+  for (const std::string_view cell : split(line, ',')) cells.emplace_back(trimmed(cell));
   return cells;
 }
 
 std::vector<std::string> read_header(std::string_view line, const std::string& name) {
-  std::vector<std::string> columns = split(line);
+  std::vector<std::string> columns = cells_of(line);
   if (columns.size() < 2)
     throw InputError(fmt::format("{}:1: expected two or more columns, found {}", name, columns.size()));
   if (columns.size() > kMostColumns)
@@ -81,7 +72,7 @@ TrainingCurves parse_curves(std::string_view csv, const std::string& name) {
     }
     if (line.empty()) continue;
     const std::string place = fmt::format("{}:{}", name, number);
-    const std::vector<std::string> cells = split(line);
+    const std::vector<std::string> cells = cells_of(line);
     if (cells.size() != curves.columns.size())
       throw InputError(fmt::format("{}: expected {} cells, found {}", place, curves.columns.size(), cells.size()));
     for (std::size_t i = 0; i < cells.size(); ++i)

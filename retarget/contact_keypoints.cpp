@@ -3,32 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
+#include <optional>
 
 #include "duet/core/names.h"
+#include "duet/core/number.h"
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
+#include "duet/core/split.h"
 
 namespace duet {
 namespace {
 
-std::vector<std::string_view> split(std::string_view text, char mark) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = text.find(mark);
-    parts.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) return parts;
-    text.remove_prefix(end + 1);
-  }
-}
-
 double weight_of(std::string_view text, std::string_view entry) {
-  double value = 0.0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  require(error == std::errc() && stop == text.data() + text.size() && std::isfinite(value) && value >= 0.0,
+  const std::optional<double> value = parse_number(text);
+  require(value.has_value() && *value >= 0.0,
           fmt::format("keypoint '{}': expected a weight, a finite number of zero or more, found '{}'", entry, text));
-  return value;
+  return *value;
 }
 
 ContactKeypoint keypoint_of(std::string_view entry) {

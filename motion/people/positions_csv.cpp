@@ -12,31 +12,23 @@
 
 #include "duet/core/order_statistics.h"
 #include "duet/core/require.h"
+#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
 namespace {
 
 constexpr std::size_t kMostCsvColumns = 4096;
+constexpr std::string_view kBlanksAndQuotes = " \t\r\"";
 constexpr double kEvenTimes = 0.1;  // of a period
 
 [[noreturn]] void refuse_csv(const std::string& name, const std::string& fault) {
   throw InputError(fmt::format("'{}': {}", shown(name, kShownSentence), fault));
 }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r\"");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r\"") - first + 1);
-}
-
 std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
-  }
+  std::vector<std::string_view> fields = split(line, ',');
+  for (std::string_view& field : fields) field = trimmed(field, kBlanksAndQuotes);
   return fields;
 }
 
@@ -44,7 +36,7 @@ std::vector<std::string_view> fields_of(std::string_view line) {
 std::optional<std::string_view> next_line(std::string_view text, std::size_t& at, int& number) {
   while (at < text.size()) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = trimmed(text.substr(at, end - at));
+    const std::string_view line = trimmed(text.substr(at, end - at), kBlanksAndQuotes);
     at = end + 1;
     ++number;
     if (!line.empty() && line[0] != '#') return line;
