@@ -116,8 +116,7 @@ std::string sentence(const PairDecision& pair, double alpha) {
   if (pair.clips == 0) return fmt::format("{}: no clip has an episode of both\n", judgement(pair));
   return fmt::format(
       "{}: {:+.1f} points [{:.1f}, {:.1f}] ({:g} %, valid at every look), e-value {:.3g}, anytime p {:.3g}, {} clips, "
-      "of "
-      "which {} favour {} and {} {}\n",
+      "of which {} favour {} and {} {}\n",
       judgement(pair), 100.0 * pair.difference + 0.0, 100.0 * pair.interval.low, 100.0 * pair.interval.high,
       100.0 * (1.0 - alpha), pair.e_value, pair.p, pair.clips, pair.better, pair.a, pair.worse, pair.b);
 }
