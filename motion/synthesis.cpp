@@ -76,18 +76,6 @@ Phases phases_of(const Staged& staged, double rate_hz) {
   return {begin, std::clamp(frame(staged.scene.act_end), begin + 1, staged.frames)};
 }
 
-std::string_view to_string(ActOutcome outcome) {
-  switch (outcome) {
-    case ActOutcome::kComplete:
-      return "complete";
-    case ActOutcome::kHesitant:
-      return "hesitant";
-    case ActOutcome::kAborted:
-      break;
-  }
-  return "aborted";
-}
-
 }  // namespace
 
 InteractionClip synthesize(Task task, const SynthesisOptions& options) {
@@ -117,7 +105,7 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   clip.source["index"] = std::to_string(options.index);
   if (people) {
     clip.source["like"] = "people";
-    clip.source["outcome"] = to_string(outcome);
+    clip.source["outcome"] = kActOutcomeNames.at(static_cast<std::size_t>(outcome));
   }
   clip.source["side"] = staged.scene.cast.side == 0 ? "left" : "right";
   return clip;

@@ -1,8 +1,10 @@
 // What varies from one synthesised clip to another.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 namespace duet {
 
@@ -14,6 +16,7 @@ enum class Likeness { kRehearsed, kPeople };
 
 // How an act goes: done, done after a half-raised hand has waited, or broken off before anything touches.
 enum class ActOutcome { kComplete, kHesitant, kAborted };
+inline constexpr std::array<std::string_view, 3> kActOutcomeNames = {"complete", "hesitant", "aborted"};  // likewise
 
 // What varies; an empty field is drawn from (seed, task, index). Ranges and draws: docs/conventions.md.
 struct SynthesisOptions {

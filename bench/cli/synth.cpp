@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
@@ -31,10 +32,11 @@ std::vector<Task> chosen_tasks(const std::string& name) {
 }
 
 ActOutcome parse_outcome(const std::string& name) {
-  if (name == "complete") return ActOutcome::kComplete;
-  if (name == "hesitant") return ActOutcome::kHesitant;
-  require(name == "aborted", fmt::format("--outcome: expected complete, hesitant or aborted, found '{}'", name));
-  return ActOutcome::kAborted;
+  const auto& known = kActOutcomeNames;
+  const auto* const found = std::ranges::find(known, name);
+  require(found != known.end(),
+          fmt::format("--outcome: expected {}, {} or {}, found '{}'", known[0], known[1], known[2], name));
+  return static_cast<ActOutcome>(found - known.begin());
 }
 
 void run_synth(const Session& session, SynthArguments arguments) {
