@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <map>
 
 #include "duet/core/require.h"
@@ -11,10 +10,6 @@ namespace duet {
 namespace {
 
 TaskClip task_clip_of(const EpisodeSpec& spec) { return {std::string(to_string(spec.clip->task)), spec.clip->clip_id}; }
-
-bool is_listed(const std::vector<std::string>& names, const std::string& name) {
-  return names.empty() || std::ranges::find(names, name) != names.end();
-}
 
 }  // namespace
 
@@ -44,9 +39,9 @@ DecisionSchedule decision_schedule(const EpisodePlan& plan, const RunPart& part,
 
 std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const RunPart& part) {
   std::erase_if(rows, [&](const EpisodeRow& row) {
-    const bool perturbed = row.engine == kPlaybackEngine || is_listed(part.perturbations, row.perturbation);
-    return !is_listed(part.engines, row.engine) || !is_listed(part.controllers, row.controller) ||
-           !is_listed(part.policies, row.policy) || !is_listed(part.tasks, row.task) || !perturbed;
+    const bool perturbed = row.engine == kPlaybackEngine || chosen(part.perturbations, row.perturbation);
+    return !chosen(part.engines, row.engine) || !chosen(part.controllers, row.controller) ||
+           !chosen(part.policies, row.policy) || !chosen(part.tasks, row.task) || !perturbed;
   });
   return rows;
 }

@@ -70,11 +70,11 @@ std::vector<EpisodeArm> arms_of(const Suite& suite) {
   return arms;
 }
 
-bool chosen(const std::vector<std::string>& names, std::string_view name) {
-  return names.empty() || std::find(names.begin(), names.end(), name) != names.end();
-}
-
 }  // namespace
+
+bool chosen(const std::vector<std::string>& names, std::string_view name) {
+  return names.empty() || std::ranges::find(names, name) != names.end();
+}
 
 bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine || is_available(engine); }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "duet/bench/bodies.h"
@@ -69,6 +70,9 @@ class EpisodePlan {
 
 // All of it at once.
 std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies);
+
+// Whether the choice holds this name; none at all is a choice of every name.
+bool chosen(const std::vector<std::string>& names, std::string_view name);
 
 // Whether the episode, of a clip of this task, belongs to the part; playback to every choice of perturbations, the null
 // arm to every choice of policies.

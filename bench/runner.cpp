@@ -17,10 +17,6 @@
 namespace duet {
 namespace {
 
-bool chosen(const std::vector<std::string>& filter, const std::string& name) {
-  return filter.empty() || std::find(filter.begin(), filter.end(), name) != filter.end();
-}
-
 RunPart part_of(const RunOptions& options) {
   const std::vector<std::string>& policies = options.decide.asked() ? options.decide.policies : options.policies;
   return {options.engines, options.controllers, policies, options.tasks, options.perturbations};
