@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
+#include <limits>
+#include <span>
 
 #include "tests/support.h"
 
@@ -19,6 +22,16 @@ TEST(Quantile, IsLinearBetweenOrderStatistics) {
   EXPECT_DOUBLE_EQ(quantile({7.0}, 0.3), 7.0);
   EXPECT_TRUE(std::isnan(quantile({}, 0.5)));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { quantile({1.0}, 1.5); }), HasSubstr("found 1.5"));
+}
+
+TEST(Quantile, OfSortedValuesReadsNothingBehindThem) {
+  const double kNothing = std::numeric_limits<double>::quiet_NaN();
+  const std::array values = {1.0, 2.0, 4.0, kNothing};
+  const std::span<const double> sorted = std::span(values).first(3);
+  EXPECT_DOUBLE_EQ(quantile_of_sorted(sorted, 0.0), 1.0);
+  EXPECT_DOUBLE_EQ(quantile_of_sorted(sorted, 0.75), 3.0);
+  EXPECT_DOUBLE_EQ(quantile_of_sorted(sorted, 1.0), 4.0);
+  EXPECT_TRUE(std::isnan(quantile_of_sorted({}, 0.5)));
 }
 
 TEST(Kendall, CountsPairsAndCorrectsForTies) {

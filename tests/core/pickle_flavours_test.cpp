@@ -1,4 +1,5 @@
 // What each flavour of pickle may hold beyond NumPy's own arrays (tests/formats holds the tests of those).
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <zlib.h>
 
@@ -156,6 +157,29 @@ std::string pickled_object_array(const std::string& item) {
   out.call("numpy.core.multiarray", "_reconstruct").call("numpy", "ndarray").integer(0).raw("\x85").bytes("b");
   out.raw("\x87R(").integer(1).raw(")").dtype("O8", "|").raw("\x89](" + item + "etb.");
   return out.str();
+}
+
+TEST(Pickle, ProtocolsTwoToFiveAreRead) {
+  for (int protocol = 0; protocol <= 7; ++protocol) {
+    const std::string bytes = PickleWriter(protocol).raw("N.").str();
+    if (protocol >= 2 && protocol <= 5)
+      EXPECT_NO_THROW((void)parse_pickle(bytes, "x.pkl", PickleFlavour::kNumPy)) << protocol;
+    else
+      EXPECT_THAT(thrown_message<InputError>([&] { (void)parse_pickle(bytes, "x.pkl", PickleFlavour::kNumPy); }),
+                  HasSubstr(fmt::format("expected pickle protocol 2 to 5, found {}", protocol)));
+  }
+}
+
+TEST(Pickle, EncodedBytesAreLatin1) {
+  std::string bytes = PickleWriter(2).doubles({1}, {-1.0}).raw(".").str();  // 0xbf and 0xf0 in UTF-8: c2 bf c3 b0
+  const auto read = [&] {
+    const Pickle pickle = parse_pickle(bytes, "x.pkl", PickleFlavour::kNumPy);
+    return array_values(pickle, pickle[pickle.root], "array");
+  };
+  EXPECT_THAT(read(), ElementsAre(-1.0));
+  bytes.at(bytes.find('\xc3')) = '\xc4';  // a code point above 255
+  EXPECT_THAT(thrown_message<InputError>(read),
+              HasSubstr("array: the encoded bytes are not Latin-1 text at their byte"));
 }
 
 TEST(ObjectNpy, TheOneObjectIsRead) {
