@@ -101,6 +101,18 @@ TEST(HumanMotion, ResampledFramesEndAtTheLastInstantInside) {
   for (int frames = 1; frames < 400; ++frames) EXPECT_EQ(resampled_frames(3 * frames - 2, 150.0, 50.0), frames);
 }
 
+TEST(HumanMotion, AnInstantIsAFramesToABillionthOfAPeriod) {
+  for (const double off : {-1e-10, 0.0, 1e-10})
+    for (const int frame : {0, 1, 3}) {
+      const FrameBetween at = frame_between(frame + off, 5);
+      EXPECT_EQ(at.frame, frame) << off;
+      EXPECT_EQ(at.part, 0.0) << off;
+    }
+  const FrameBetween between = frame_between(2.25, 5);
+  EXPECT_EQ(between.frame, 2);
+  EXPECT_EQ(between.part, 0.25);
+}
+
 TEST(HumanMotion, ResampleRefusesRatesThatAreNoRates) {
   const HumanMotion motion = moving_person(3, 50.0, Eigen::Vector3d::Zero());
   for (const double rate_hz : {0.0, -1.0, std::nan(""), std::numeric_limits<double>::infinity()})
