@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "duet/core/clock.h"
 #include "tests/training/fixtures.h"
 
 namespace duet {
@@ -96,8 +99,55 @@ TEST_F(WbcEnvironmentInMujoco, TrackingErrorsAreSumsOfMagnitudes) {
   const std::vector<float> action(29, 0.2F);
   for (int tick = 0; tick < 10; ++tick) environment.step(action);
   const TrackingStatistics sums = environment.take_statistics();
-  for (const double sum : {sums.root_xy, sums.heading, sums.upper_body, sums.joints}) EXPECT_GT(sum, 0.0);
+  for (const double sum : {sums.root_xy, sums.heading, sums.upper_body, sums.joints, sums.action_rate})
+    EXPECT_GT(sum, 0.0);
   EXPECT_EQ(environment.take_statistics().joints, 0.0);
+}
+
+// A robot that sways, for which nothing is rewarded or costs but what the test adds.
+WbcTask unrewarded() {
+  WbcTask task = wbc_stage("stand");
+  task.domain.kick = 0.0;
+  RewardWeights& w = task.reward;
+  for (double* weight : {&w.root_xy,  &w.root_near,   &w.upper_body,  &w.hands,       &w.joints,   &w.height,
+                         &w.attitude, &w.velocity,    &w.clock,       &w.lift,        &w.foothold, &w.both_feet,
+                         &w.stance,   &w.action_rate, &w.action_jerk, &w.action,      &w.torque,   &w.limits,
+                         &w.slip,     &w.spin,        &w.joint_speed, &w.self_contact})
+    *weight = 0.0;
+  return task;
+}
+
+TEST_F(WbcEnvironmentInMujoco, ARewardFallsOffWithTheSquareOfTheErrorOverItsWidth) {
+  WbcTask task = unrewarded();
+  task.reward.root_xy = 2.0;
+  task.reward.root_xy_width = 0.03;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  for (int tick = 0; tick < 10; ++tick) {
+    const double reward = environment.step(std::vector<float>(29, 0.2F)).reward;
+    const double error = environment.take_statistics().root_xy;
+    EXPECT_GT(error, 0.0);
+    EXPECT_NEAR(reward, kTick * 2.0 * std::exp(-std::pow(error / 0.03, 2)), 1e-12);
+  }
+}
+
+TEST_F(WbcEnvironmentInMujoco, TheErrorOfTheJointsIsTheirMean) {
+  WbcTask task = unrewarded();
+  task.reward.joints = 1.0;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  const double reward = environment.step(std::vector<float>(29, 0.2F)).reward;
+  const double rms = task.reward.joints_width * std::sqrt(-std::log(reward / kTick));
+  const double mean = environment.take_statistics().joints;
+  EXPECT_LE(mean, rms * (1.0 + 1e-9));
+  EXPECT_GE(mean, rms / std::sqrt(29.0));  // no fewer: one joint has all of it
+}
+
+TEST_F(WbcEnvironmentInMujoco, FeetThatSlipOnTheGroundCost) {
+  WbcTask task = unrewarded();
+  task.reward.slip = 1.0;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  double sum = 0.0;
+  for (int tick = 0; tick < 10; ++tick) sum += environment.step(std::vector<float>(29, 0.2F)).reward;
+  EXPECT_LT(sum, 0.0);
 }
 
 }  // namespace
