@@ -35,6 +35,7 @@ struct SyntheticClip {
   Likeness like;
   bool cropped, tracked;
   const ClipVariant* variant;  // of the suite; null: as drawn
+  bool varied = false;         // how long who is like people stands before the act, and how
 };
 struct ClipSource {
   std::variant<std::string, SyntheticClip> from;  // a file, or what is synthesised
@@ -75,27 +76,45 @@ InteractionClip with_padding(InteractionClip clip, const ClipPadding& pad) {
   return pad.any() ? padded(clip, pad.before, pad.after) : std::move(clip);
 }
 
+constexpr double kStandingBefore = 4.0, kStandingAfter = 2.0;  // [s]; as recordings are padded
+
 // A robot needs time to come and to go, and an act that is broken off is none to succeed in: who is like people stands
 // before and after, and goes through with it.
 void like_people(const SyntheticClip& source, SynthesisOptions& options) {
-  constexpr double kBefore = 4.0, kAfter = 2.0;  // [s]; as recordings are padded
   constexpr double kHesitant = 0.1;
   Random random(source.seed, stream_key({"hesitates", to_string(source.task), std::to_string(source.index)}));
   options.like = Likeness::kPeople;
-  options.before = kBefore;
-  options.after = kAfter;
+  options.before = kStandingBefore;
+  options.after = kStandingAfter;
   options.outcome = random.chance(kHesitant) ? ActOutcome::kHesitant : ActOutcome::kComplete;
+}
+
+// What a policy learns from has no wait of one length, which it could count, and half of it is padded as recordings
+// are: both people frozen in the first frame of the act.
+ClipPadding vary_standing(const SyntheticClip& source, SynthesisOptions& options) {
+  constexpr double kShortest = 2.5, kLongest = 5.5;  // before the act [s]
+  Random random(source.seed, stream_key({"stands", to_string(source.task), std::to_string(source.index)}));
+  const double before = random.uniform(kShortest, kLongest);
+  if (random.chance(0.5)) {
+    options.before = before;
+    return {};
+  }
+  options.before = options.after = std::nullopt;  // cropped as recordings are
+  return {before, kStandingAfter};
 }
 
 InteractionClip synthesize(const SyntheticClip& source) {
   SynthesisOptions options;
   options.seed = source.seed;
   options.index = source.index;
+  ClipPadding frozen;
   if (source.like == Likeness::kPeople) like_people(source, options);
+  if (source.varied) frozen = vary_standing(source, options);
   if (source.cropped) options.before = options.after = std::nullopt;
   if (source.variant != nullptr) vary(*source.variant, options);
   InteractionClip clip = synthesize(source.task, options);
   if (source.tracked) clip = tracked(clip, {}, source.seed);
+  clip = with_padding(std::move(clip), frozen);
   if (source.variant != nullptr) clip.id += "-" + source.variant->name;
   return clip;
 }
@@ -300,13 +319,16 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
   return clips;
 }
 
-std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
-                                          std::uint64_t seed, int threads, Progress& progress, Likeness like) {
+std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOptions& pair,
+                                          const std::vector<Task>& tasks, int per_task, std::uint64_t seed, int threads,
+                                          Progress& progress, Likeness like) {
   SuiteClips clips;
   clips.synth_like = like;
   clips.synth_per_task = per_task;
   clips.synth_seed = seed;
-  return by_task(make_clips(list_sources(tasks, clips), robot, {}, threads, progress), tasks);
+  std::vector<ClipSource> sources = list_sources(tasks, clips);
+  for (ClipSource& source : sources) std::get<SyntheticClip>(source.from).varied = like == Likeness::kPeople;
+  return by_task(make_clips(sources, robot, pair, threads, progress), tasks);
 }
 
 bool is_dataset(const std::string& folder) { return fs::exists(fs::path(folder) / "dataset.json"); }

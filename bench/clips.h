@@ -44,10 +44,11 @@ LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const Pai
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& options = {});
 
-// Clips that are no suite's: `per_task` of each task, for training.
-std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const std::vector<Task>& tasks, int per_task,
-                                          std::uint64_t seed, int threads, Progress& progress,
-                                          Likeness like = Likeness::kRehearsed);
+// Clips that are no suite's: `per_task` of each task, for training. People stand 2.5 to 5.5 s before the act, half of
+// them frozen in its first frame as padded recordings are.
+std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOptions& pair,
+                                          const std::vector<Task>& tasks, int per_task, std::uint64_t seed, int threads,
+                                          Progress& progress, Likeness like = Likeness::kRehearsed);
 
 PairOptions pair_options(const Suite& suite);
 

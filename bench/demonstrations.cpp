@@ -81,49 +81,68 @@ void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
           take.partner.slice(0, frames));
 }
 
+struct Demonstrators {
+  const std::shared_ptr<const RobotModel>& robot;
+  const DemonstrationOptions& options;
+  const PolicyMaker& make_policy;
+  Progress& progress;
+  const std::function<bool()>& stop;
+};
+
+// Adds the takes of one task; false where it was stopped.
+bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& pair, const Demonstrators& by,
+                 DemonstrationSet& set) {
+  const DemonstrationOptions& options = by.options;
+  const bool itself = options.policy == "replay";
+  const int per_task = itself ? kind.per_task : std::min(kind.per_task, options.followed);
+  const int starts = itself ? options.starts : 1;
+  const std::vector<PairedMotion> clips =
+      synthetic_clips(*by.robot, pair, {task}, per_task, options.seed, options.threads, by.progress, kind.like);
+  std::vector<std::optional<Take>> made(clips.size() * starts);
+  by.progress.start(fmt::format("demonstrating {}", to_string(task)), static_cast<int>(made.size()), "takes");
+  parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
+    if (by.stop()) return;
+    const PairedMotion& clip = clips[i / starts];
+    made[i] = take_of(clip, *by.robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
+    const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
+    if (followed) follow(*made[i], by.robot, options, by.make_policy);
+    by.progress.advance();
+  });
+  by.progress.finish();
+  if (by.stop()) return false;
+  for (std::optional<Take>& take : made) {
+    add(*take, itself, set);
+    take.reset();
+  }
+  return true;
+}
+
 }  // namespace
 
 std::string origin_of(const DemonstrationOptions& options) {
-  const std::string clips =
-      fmt::format("{} clips of each task{} (seed {}), {} start{} of each{}", options.per_task,
-                  options.like == Likeness::kPeople ? " like people" : "", options.seed, options.starts,
-                  options.starts == 1 ? "" : "s",
-                  options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
+  std::string clips;
+  for (const auto& [like, per_task] : options.clips)
+    clips += fmt::format("{}{}{}{}", clips.empty() ? "" : " and ", per_task, clips.empty() ? " clips of each task" : "",
+                         like == Likeness::kPeople ? " like people" : "");
+  clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
+                       options.starts, options.starts == 1 ? "" : "s",
+                       options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
-  return fmt::format("{}, {} followed in {} under {} by {}", clips, options.followed, options.engine,
+  return fmt::format("{}, {} of a kind followed in {} under {} by {}", clips, options.followed, options.engine,
                      options.controller, options.policy);
 }
 
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop) {
-  const bool itself = options.policy == "replay";
-  const int per_task = itself ? options.per_task : std::min(options.per_task, options.followed);
-  const int starts = itself ? options.starts : 1;
   const PolicyMaker maker = policy_maker(options.policy, robot, options.policy_options);
+  const PairOptions pair = make_pair_options({{"mode", options.pair_mode}});
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   set.origin = origin_of(options);
-  for (const Task task : kPaperTasks) {  // one at a time: hours of clips and takes are gigabytes
-    const std::vector<PairedMotion> clips =
-        synthetic_clips(*robot, {task}, per_task, options.seed, options.threads, progress, options.like);
-    std::vector<std::optional<Take>> made(clips.size() * starts);
-    progress.start(fmt::format("demonstrating {}", to_string(task)), static_cast<int>(made.size()), "takes");
-    parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
-      if (stop()) return;
-      const PairedMotion& clip = clips[i / starts];
-      made[i] = take_of(clip, *robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
-      const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
-      if (followed) follow(*made[i], robot, options, maker);
-      progress.advance();
-    });
-    progress.finish();
-    if (stop()) return std::nullopt;
-    for (std::optional<Take>& take : made) {
-      add(*take, itself, set);
-      take.reset();
-    }
-  }
+  for (const DemonstrationClips& kind : options.clips)
+    for (const Task task : kPaperTasks)  // one at a time: hours of clips and takes are gigabytes
+      if (!demonstrate(task, kind, pair, {robot, options, maker, progress, stop}, set)) return std::nullopt;
   return set;
 }
 

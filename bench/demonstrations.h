@@ -16,13 +16,18 @@
 
 namespace duet {
 
-struct DemonstrationOptions {
-  int per_task = 300;  // clips of each task
-  std::uint64_t seed = 880001;
+struct DemonstrationClips {
   Likeness like = Likeness::kRehearsed;
+  int per_task = 0;
+};
+
+struct DemonstrationOptions {
+  std::vector<DemonstrationClips> clips = {{Likeness::kRehearsed, 80}, {Likeness::kPeople, 400}};
+  std::uint64_t seed = 880001;
+  std::string pair_mode = "best";          // of PAIR (docs/retargeting.md)
   int starts = 2;                          // of each clip, drawn as A.4.4 has it
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
-  int followed = 120;                      // clips of each task whose first start is also followed in the engine
+  int followed = 200;  // clips of each kind and task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
   int threads = 1;
   // Who acts: the demonstration itself, also seen as it is, or a policy, on the clips that are followed; then the robot
@@ -33,7 +38,8 @@ struct DemonstrationOptions {
 
 inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
 
-// "300 clips of each task (seed 880001), 2 starts of each, 120 followed in mujoco under wbc_sim by replay".
+// "80 clips of each task and 400 like people (seed 880001), retargeted by best, 2 starts of each, up to 200 of a kind
+// followed in mujoco under wbc_sim by replay".
 std::string origin_of(const DemonstrationOptions& options);
 
 // A rollout in which the robot fell is kept up to a second before the fall, and dropped where less than two seconds are

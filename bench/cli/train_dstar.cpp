@@ -1,6 +1,7 @@
 // duet train dstar | dp | <ablation>: the learnt policies, and the split of clips that they never see.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
@@ -10,9 +11,11 @@
 #include "duet/bench/suite_names.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
+#include "duet/core/number.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
+#include "duet/core/text.h"
 #include "duet/policies/dstar/network.h"
 #include "duet/training/dstar/retrieval.h"
 #include "duet/training/dstar/trainer.h"
@@ -32,6 +35,7 @@ struct DstarArguments {
 
 constexpr const char* kRetrieval = "retrieval";
 constexpr int kLibraryWindows = 6000;
+constexpr int kMostClips = 100000;
 constexpr int kValidationPerTask = 6, kGoldenWindows = 8;
 constexpr double kAgreement = 1e-4;  // between libtorch's plans and those of inference
 
@@ -69,7 +73,7 @@ DstarData data_of(Session& session, const DstarArguments& arguments) {
   data.train = demonstrations(session, data.robot, arguments.data, (folder / "train.safetensors").string());
   DemonstrationOptions held = arguments.data;
   held.seed = kValidationSeed;
-  held.per_task = std::min(arguments.data.per_task, kValidationPerTask);
+  for (DemonstrationClips& kind : held.clips) kind.per_task = std::min(kind.per_task, kValidationPerTask);
   held.starts = 1;
   data.validation = demonstrations(session, data.robot, held, (folder / "validation.safetensors").string());
   const std::string split =
@@ -99,7 +103,7 @@ void add_round(Session& session, const DstarArguments& arguments, int round, Dst
 
 // A small training whose outcome can be checked in minutes.
 void make_small(DstarArguments& arguments) {
-  arguments.data.per_task = 12;
+  arguments.data.clips = {{Likeness::kPeople, 12}};
   arguments.data.starts = 1;
   arguments.data.engine = "";
   arguments.rounds = 0;
@@ -186,6 +190,21 @@ void train_or_stop(Session& session, DstarArguments& arguments, const std::strin
   }
 }
 
+// "people:400": the manner and how many clips of each task.
+std::vector<DemonstrationClips> clips_of(const std::vector<std::string>& kinds) {
+  std::vector<DemonstrationClips> clips;
+  for (const std::string& kind : kinds) {
+    const auto colon = kind.find(':');
+    const std::optional<double> count =
+        colon == std::string::npos ? std::nullopt : parse_number(kind.substr(colon + 1));
+    if (!count || *count < 1.0 || *count > kMostClips || *count != std::floor(*count))
+      throw std::invalid_argument(fmt::format(
+          "--clips: expected a manner, ':' and 1 to {} clips, as in people:400, found '{}'", kMostClips, shown(kind)));
+    clips.push_back({likeness_of("--clips", kind.substr(0, colon)), static_cast<int>(*count)});
+  }
+  return clips;
+}
+
 void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
   auto arguments = std::make_shared<DstarArguments>();
   arguments->run.folder = "runs/policies";
@@ -199,12 +218,13 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
   DstarRun& run = arguments->run;
   command->add_option("-o,--output", run.folder, "folder: demonstrations in data/, one subfolder per policy")
       ->capture_default_str();
-  command->add_option("--clips", arguments->data.per_task, "synthesised clips of each task")->capture_default_str();
   command
-      ->add_option_function<std::string>(
-          "--like", [arguments](const std::string& name) { arguments->data.like = likeness_of("--like", name); },
-          "whose way the people of the clips have: rehearsed or people (docs/synthesis.md)")
-      ->default_str("rehearsed");
+      ->add_option_function<std::vector<std::string>>(
+          "--clips", [arguments](const std::vector<std::string>& kinds) { arguments->data.clips = clips_of(kinds); },
+          "synthesised clips of each task by whose way people have (docs/synthesis.md): rehearsed:N, people:N or both")
+      ->default_str("rehearsed:80 people:400");
+  command->add_option("--mode", arguments->data.pair_mode, "of retargeting: paper, grounded or best")
+      ->capture_default_str();
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
   command
       ->add_option("--start", arguments->start,

@@ -113,6 +113,18 @@ TEST(CommandLine, TrainingAPolicyWithoutLibtorchSaysHowToGetIt) {
   EXPECT_FALSE(std::filesystem::exists(folder / "runs"));
 }
 
+TEST(CommandLine, ClipsOfATrainingAreAMannerAndACount) {
+  const auto refusal = [](const std::string& kind) {
+    const Answer answer = duet_program("train dstar --clips " + kind);
+    EXPECT_EQ(answer.code, 2) << kind;
+    return answer.err;
+  };
+  const std::string expected = "--clips: expected a manner, ':' and 1 to 100000 clips, as in people:400, found ";
+  for (const char* kind : {"people", "people:0", "people:-3", "people:2.5", "people:x", "people:100001"})
+    EXPECT_THAT(refusal(kind), HasSubstr(expected + "'" + kind + "'"));
+  EXPECT_THAT(refusal("persons:3"), HasSubstr("--clips: expected rehearsed or people, found 'persons'"));
+}
+
 TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
   const Answer controllers = duet_program("list controllers");
   EXPECT_EQ(controllers.code, 0) << controllers.err;

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <vector>
 
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"
@@ -14,7 +16,8 @@ namespace {
 
 DemonstrationOptions small_options() {
   DemonstrationOptions options;
-  options.per_task = 3;
+  options.clips = {{Likeness::kRehearsed, 3}};
+  options.pair_mode = "paper";
   options.starts = 2;
   options.followed = 1;
   options.engine = "playback";  // the robot is where it is told to be: nobody falls
@@ -55,7 +58,7 @@ TEST(MakeDemonstrations, MoreThreadsAndMoreClipsChangeNoneOfThem) {
   DemonstrationOptions options = small_options();
   const DemonstrationSet first = made(options);
   options.threads = 1;
-  options.per_task = 4;
+  options.clips.front().per_task = 4;
   const DemonstrationSet second = made(options);
   ASSERT_EQ(first.list[1].clip_id, second.list[1].clip_id);
   const int frames = first.list[1].frames;
@@ -66,12 +69,18 @@ TEST(MakeDemonstrations, MoreThreadsAndMoreClipsChangeNoneOfThem) {
 TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
   DemonstrationOptions options = small_options();
   EXPECT_EQ(made(options).origin,
-            "3 clips of each task (seed 880001), 2 starts of each, 1 followed in playback under pd by replay");
+            "3 clips of each task (seed 880001), retargeted by paper, 2 starts of each, 1 of a kind followed in "
+            "playback under "
+            "pd by replay");
   options.starts = 1;
   options.engine = "";
-  EXPECT_EQ(origin_of(options), "3 clips of each task (seed 880001), 1 start of each, none followed");
-  options.like = Likeness::kPeople;
-  EXPECT_EQ(origin_of(options), "3 clips of each task like people (seed 880001), 1 start of each, none followed");
+  EXPECT_EQ(origin_of(options),
+            "3 clips of each task (seed 880001), retargeted by paper, 1 start of each, none followed");
+  options.clips.push_back({Likeness::kPeople, 40});
+  options.pair_mode = "best";
+  EXPECT_EQ(
+      origin_of(options),
+      "3 clips of each task and 40 like people (seed 880001), retargeted by best, 1 start of each, none followed");
 }
 
 TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
@@ -80,12 +89,35 @@ TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
   options.starts = 1;
   options.start = StartMode::kSimToReal;
   const DemonstrationSet set = made(options);
-  EXPECT_EQ(set.origin,
-            "3 clips of each task (seed 880001), 1 start of each for the real robot (Algorithm 7), none followed");
+  EXPECT_EQ(
+      set.origin,
+      "3 clips of each task (seed 880001), retargeted by paper, 1 start of each for the real robot (Algorithm 7), none "
+      "followed");
   const Demonstration& first = set.list.front();
   // Arms down, all the way up to 16 frames before the act.
   EXPECT_EQ(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 16).q.tail(14));
   EXPECT_NE(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 8).q.tail(14));
+}
+
+TEST(MakeDemonstrations, PeopleWaitForNoLengthThatCouldBeCounted) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.clips = {{Likeness::kPeople, 6}};
+  const DemonstrationSet set = made(options);
+  std::vector<int> begins;
+  for (const Demonstration& entry : set.list) begins.push_back(entry.phases.act_begin);
+  const auto [shortest, longest] = std::ranges::minmax(begins);
+  EXPECT_GE(shortest, 125);  // 2.5 s
+  EXPECT_GT(longest - shortest, 75);
+}
+
+TEST(MakeDemonstrations, BothKindsOfClipsAreInOneSet) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.clips = {{Likeness::kRehearsed, 1}, {Likeness::kPeople, 2}};
+  EXPECT_THAT(made(options).list, ::testing::SizeIs(18));
 }
 
 TEST(MakeDemonstrations, StoppedTheyAreNone) {

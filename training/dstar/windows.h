@@ -27,7 +27,8 @@ struct WindowOptions {
   int long_stride = 1;    // of the network's configuration
   bool augment = true;
   // A robot that has gone astray is not asked to be back at once: the root of anchor k is at most so far from it.
-  double reach = 0.25, speed = 0.6;          // [m], and [m/s] times its 0.5 k s
+  // It leads no faster than WBC-Sim follows.
+  double reach = 0.1, speed = 0.5;           // [m], and [m/s] times its 0.5 k s
   double turn_reach = 0.3, turn_rate = 0.8;  // [rad], [rad/s]
 };
 
