@@ -17,6 +17,15 @@ struct LevelCounts {
 };
 using CountsByLevel = std::map<int, LevelCounts>;
 
+// The headline; whom a commanded velocity leads has to follow it by half, so that standing is no walking.
+bool passes(const EpisodeRow& row) {
+  const auto metric = [&](const char* name) {
+    const auto found = row.metrics.find(name);
+    return found == row.metrics.end() ? 0.0 : found->second;
+  };
+  return headline_success(row) && metric("speed_forward") >= 0.5 * metric("command_forward");
+}
+
 // Of its perturbation or of its clip, whichever is higher.
 std::optional<LevelName> level_of_row(std::string_view word, const EpisodeRow& row) {
   const std::optional<LevelName> perturbed = level_of(word, row.perturbation), clip = level_of(word, row.clip);
@@ -62,7 +71,7 @@ LevelTable ladder_table(const Ladder& ladder, const std::map<PolicyKey, Perturbe
         add_level_name(ladder, *found, names);
         LevelCounts& of_level = counts[key][found->level];
         ++of_level.n;
-        of_level.k += headline_success(*row) ? 1 : 0;
+        of_level.k += passes(*row) ? 1 : 0;
       }
     }
   }

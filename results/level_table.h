@@ -1,6 +1,7 @@
 // How far a policy or a controller comes on a ladder of difficulty: success at each level, from rows whose perturbation
 // or clip is named after one ("level_3_walks_up", "stage_2_held-forward"). A row is of the higher of the two; a clean
-// one without a level in its clip's name is of level 0. The null arm is left out. Nothing depends on the order of rows.
+// one without a level in its clip's name is of level 0. A command to walk forward is passed at half of its speed or
+// more. The null arm is left out. Nothing depends on the order of rows.
 #pragma once
 
 #include <optional>

@@ -87,6 +87,17 @@ TEST(LevelTable, ARowIsOfTheHigherOfItsPerturbationAndItsClip) {
   EXPECT_FALSE(tables[0].entries[0].reached.has_value());  // 75 % of the first stage is not 95 %
 }
 
+TEST(LevelTable, WhoStandsWhereItShouldWalkDoesNotPass) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.policy = "velocity", .perturbation = "stage_1_own", .successes = "1110"}, rows);
+  add_episodes({.policy = "velocity", .perturbation = "stage_2_held", .successes = "1"}, rows);
+  for (const auto& [row, speed] : {std::pair(0, 0.3), std::pair(1, 0.15), std::pair(2, 0.14), std::pair(3, 0.3)}) {
+    rows[row].metrics["command_forward"] = 0.3;
+    rows[row].metrics["speed_forward"] = speed;
+  }
+  EXPECT_EQ(level_tables(rows).at(0).entries.at(0).levels.at(0).k, 2);
+}
+
 TEST(LevelTable, RowsWithoutLevelsAreNoTable) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "11"}, rows);
