@@ -88,6 +88,22 @@ std::string stage_times(const DatasetSummary& summary) {
   return text.empty() ? "" : fmt::format("time: {} of {}\n", text, format_duration(all));
 }
 
+// Recordings that are cropped to the act lack what comes before and after it. Who reads that most are refused for it
+// is told that the time can be added.
+std::string cropped_hint(const std::vector<DatasetEntry>& entries) {
+  const std::vector<std::string> one_gate = {std::string(to_string(Gate::kTemporalCompleteness))};
+  const auto cropped = std::ranges::count_if(entries, [&](const DatasetEntry& entry) {
+    return entry.status == ClipStatus::kRejected && entry.gates == one_gate;
+  });
+  if (cropped == 0) return "";
+  return fmt::format(
+      "{} refused for the time before or after the act alone: if they are cropped to it, --gates "
+      "motion-fidelity,interaction-clarity,kinematic-feasibility keeps them, and --pad 4,2 or suites/real.yaml adds "
+      "the "
+      "time\n",
+      cropped);
+}
+
 std::string summary_text(const DatasetSummary& summary, const std::string& folder,
                          const std::vector<DatasetEntry>& entries) {
   std::string text = fmt::format("{}: {} clips of format '{}'{}\n\n{}\n", folder, summary.clips, summary.format,
@@ -99,7 +115,7 @@ std::string summary_text(const DatasetSummary& summary, const std::string& folde
     text += fmt::format("{}: {}\n", refused.rows[i][0], refused.rows[i][3]);
   if (refused.rows.size() > kShownRefusals)
     text += fmt::format("... and {} more in {}/tables/refused.csv\n", refused.rows.size() - kShownRefusals, folder);
-  return text + stage_times(summary) + fmt::format("card: {}/card.html\n", folder);
+  return text + cropped_hint(entries) + stage_times(summary) + fmt::format("card: {}/card.html\n", folder);
 }
 
 nlohmann::json summary_json(const DatasetSummary& summary, const std::string& folder) {

@@ -4,6 +4,9 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "duet/core/npz.h"
+#include "duet/core/skeleton.h"
+#include "duet/motion/synthesis.h"
 #include "tests/bench/program.h"
 
 namespace duet {
@@ -52,6 +55,31 @@ TEST_F(DatasetCommand, RecordingsBecomeAllRobotsAndGoOn) {
   const Answer converted = duet_program("dataset convert " + out_ + " --to gmr -o " + (folder_ / "gmr"));
   EXPECT_EQ(converted.code, 0) << converted.err;
   EXPECT_THAT(converted.out, HasSubstr("motions in format 'gmr'"));
+}
+
+// Most recordings of SBU are so.
+TEST_F(DatasetCommand, RecordingsThatAreCroppedToTheActAreToldHowTheyAreKept) {
+  SynthesisOptions options;
+  options.like = Likeness::kPeople;
+  options.outcome = ActOutcome::kComplete;
+  for (options.index = 0; options.index < 4; ++options.index) {
+    const InteractionClip clip = synthesize(Task::kHandshake, options);
+    Npz npz;
+    npz.set("a", clip.a.joints);
+    npz.set("b", clip.b.joints);
+    npz.set("joints", std::vector<std::string>(kSmplNames.begin(), kSmplNames.end()));
+    npz.set_number("rate_hz", clip.rate_hz());
+    npz.set_text("label", "handshake");
+    npz.save(folder_ / ("cropped-" + std::to_string(options.index) + ".npz"));
+  }
+  const std::string files = "dataset curate " + (folder_ / "") + "cropped-*.npz -o " + out_;
+  const Answer all = duet_program(files);
+  EXPECT_EQ(all.code, 0) << all.err;
+  EXPECT_THAT(all.out, testing::AllOf(HasSubstr("refused for the time before or after the act alone"),
+                                      HasSubstr("suites/real.yaml adds the time")));
+  const Answer three = duet_program(files + "-three --gates motion-fidelity,interaction-clarity,kinematic-feasibility");
+  EXPECT_THAT(three.out, testing::Not(HasSubstr("before or after the act alone")));
+  EXPECT_THAT(three.out, HasSubstr("| rejected                   |     0 |"));
 }
 
 TEST_F(DatasetCommand, InspectSaysWhatIsFoundAndWritesNothing) {
