@@ -23,7 +23,8 @@ bool passes(const EpisodeRow& row) {
     const auto found = row.metrics.find(name);
     return found == row.metrics.end() ? 0.0 : found->second;
   };
-  return headline_success(row) && metric("speed_forward") >= 0.5 * metric("command_forward");
+  const double command = metric("command_forward");
+  return headline_success(row) && (command <= 0.0 || metric("speed_forward") >= 0.5 * command);
 }
 
 // Of its perturbation or of its clip, whichever is higher.

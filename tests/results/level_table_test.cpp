@@ -91,11 +91,14 @@ TEST(LevelTable, WhoStandsWhereItShouldWalkDoesNotPass) {
   std::vector<EpisodeRow> rows;
   add_episodes({.policy = "velocity", .perturbation = "stage_1_own", .successes = "1110"}, rows);
   add_episodes({.policy = "velocity", .perturbation = "stage_2_held", .successes = "1"}, rows);
+  rows[4].metrics = {{"command_forward", 0.0}, {"speed_forward", -0.001}};  // nobody asked it to walk
   for (const auto& [row, speed] : {std::pair(0, 0.3), std::pair(1, 0.15), std::pair(2, 0.14), std::pair(3, 0.3)}) {
     rows[row].metrics["command_forward"] = 0.3;
     rows[row].metrics["speed_forward"] = speed;
   }
-  EXPECT_EQ(level_tables(rows).at(0).entries.at(0).levels.at(0).k, 2);
+  const LevelEntry entry = level_tables(rows).at(0).entries.at(0);
+  EXPECT_EQ(entry.levels.at(0).k, 2);
+  EXPECT_EQ(entry.levels.at(1).k, 1);
 }
 
 TEST(LevelTable, RowsWithoutLevelsAreNoTable) {
