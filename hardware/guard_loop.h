@@ -5,8 +5,8 @@
 #include <functional>
 
 #include "duet/hardware/datagram_socket.h"
-#include "duet/hardware/dds_wire.h"
 #include "duet/hardware/robot_guard.h"
+#include "duet/hardware/robot_wire.h"
 
 namespace duet {
 

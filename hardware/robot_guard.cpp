@@ -61,7 +61,7 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
   stance_.resize(kG1Motors);
   planner_.command.q.setZero(kG1Motors);
   status_.limited.q.setZero(kG1Motors);
-  status_.limited.kp = status_.limited.kd = status_.limited.q;
+  status_.limited.kp = status_.limited.kd = status_.restart_q = status_.limited.q;
   next_.period = setup_.limiter.dt;
 }
 
@@ -129,9 +129,10 @@ void RobotGuard::tick(double now) {
 
 void RobotGuard::read_states(double now) {
   next_.bad_states = 0;
-  LowStateFrame frame;
-  while (transport_.take(frame)) {
-    switch (read_state(frame, reading_)) {
+  status_.took_state = false;
+  while (transport_.take(status_.state_frame)) {
+    status_.took_state = true;
+    switch (read_state(status_.state_frame, reading_)) {
       case FrameFault::kNone:
         ++status_.states;
         next_.state_at = now;
@@ -217,9 +218,8 @@ void RobotGuard::command(double now) {
   const bool planned = safety_.state == SafetyState::kRun || safety_.state == SafetyState::kHold;
   input_.release = planned && (status_.order.opens || status_.contact.release);
   if (status_.order.stands) follow_stance();
-  if (planned && !was_planned_) limiter_.restart(joints_.q_target, limiter_state_);
-  was_planned_ = planned;
-  if (!planned) limiter_.restart(reading_.state.q, limiter_state_);
+  restart_limiter(planned);
+  status_.received = planner_is_new_;
   const MotionCommand* received = planner_is_new_ ? &planner_.command : nullptr;
   limiter_.tick(received, input_, limiter_state_, status_.limited, status_.clamps);
   planner_is_new_ = false;
@@ -229,6 +229,15 @@ void RobotGuard::command(double now) {
     joints_.kp[joint] = status_.limited.kp[joint];
     joints_.kd[joint] = status_.limited.kd[joint];
   }
+}
+
+// Planned motion begins where the stance was sent; before it, the limiter only watches.
+void RobotGuard::restart_limiter(bool planned) {
+  status_.restarted = !planned || !was_planned_;
+  was_planned_ = planned;
+  if (!status_.restarted) return;
+  status_.restart_q = planned ? joints_.q_target : reading_.state.q;
+  limiter_.restart(status_.restart_q, limiter_state_);
 }
 
 void RobotGuard::send() {

@@ -45,8 +45,13 @@ struct GuardStatus {
   ClampCounts clamps{};
   ContactReading contact;
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
-  long old_messages = 0;    // of planner or perception, dropped
-  long bad_messages = 0;    // of perception: not finite, or a person who jumped
+  long old_messages = 0;   // of planner or perception, dropped
+  long bad_messages = 0;   // of perception: not finite, or a person who jumped
+  bool received = false;   // a planner's command was handed to the limiter
+  bool restarted = false;  // the limiter began anew, from
+  Eigen::VectorXd restart_q;
+  bool took_state = false;  // a state came in this tick, whole or not
+  LowStateFrame state_frame{};
   bool sent = false;        // a frame left in this tick
   LowCommandFrame frame{};  // it
 };
@@ -71,6 +76,7 @@ class RobotGuard {
   [[nodiscard]] const GuardStatus& status() const { return status_; }
   [[nodiscard]] const RobotReading& reading() const { return reading_; }
   [[nodiscard]] const LimiterInput& limiter_input() const { return input_; }
+  [[nodiscard]] const MotionCommand& planned() const { return planner_.command; }
 
  private:
   void read_states(double now);
@@ -78,6 +84,7 @@ class RobotGuard {
   void check_robot();
   void follow_stance();
   void command(double now);
+  void restart_limiter(bool planned);
   void send();
   [[nodiscard]] bool hands_are_clear() const;
 

@@ -1,4 +1,4 @@
-#include "duet/hardware/dds_wire.h"
+#include "duet/hardware/dds/dds_wire.h"
 
 #include <dds/dds.h>
 #include <fmt/format.h>

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "duet/hardware/datagram_socket.h"
-#include "duet/hardware/dds_wire.h"
+#include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/lcm_message.h"
 #include "duet/hardware/twin_fault.h"
 

@@ -1,5 +1,5 @@
 // The guard and the twin over DDS, as two processes. Nothing here asserts how long a tick or a message takes.
-#include "duet/hardware/dds_wire.h"
+#include "duet/hardware/dds/dds_wire.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>

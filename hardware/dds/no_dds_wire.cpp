@@ -1,6 +1,6 @@
 // A build without DDS: everything else of the room is there.
 #include "duet/core/require.h"
-#include "duet/hardware/dds_wire.h"
+#include "duet/hardware/dds/dds_wire.h"
 
 namespace duet {
 namespace {

@@ -1,0 +1,26 @@
+// The G1's topics over DDS. Quality of service is set by hand (volatile, the last sample; writers reliable, readers
+// best effort: a late state is worse than none); the configuration comes from DdsPlace alone: what the environment says
+// about DDS is not read.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "duet/hardware/dds_place.h"
+#include "duet/hardware/robot_wire.h"
+
+namespace duet {
+
+// Whether this build has DDS (DUET_WITH_DDS).
+bool has_dds();
+
+// Throw std::invalid_argument as check_place and check_twin_place do, MissingError in a build without DDS,
+// std::runtime_error with the library's message where it refuses (no such interface).
+std::unique_ptr<RobotWire> open_robot_wire(const DdsPlace& place);
+std::unique_ptr<TwinWire> open_twin_wire(const DdsPlace& place);
+
+// SHA-256 of what DDS tells others of a type ("unitree_hg::msg::dds_::LowCmd_"): its information, then its mapping.
+// Throws std::invalid_argument for an unknown type, MissingError without DDS.
+std::string dds_type_digest(const std::string& type);
+
+}  // namespace duet

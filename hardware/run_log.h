@@ -1,0 +1,88 @@
+// The log of a run: everything that reached the limiter, what it made of it, and the frames, in one append-only MCAP
+// file (docs/hardware.md, "Log"). A thread of its own writes; the guard's tick only copies into a ring, and what finds
+// no room there is counted.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "duet/hardware/mcap.h"
+#include "duet/hardware/robot_guard.h"
+
+namespace duet {
+
+// What a tick of the limiter took and gave, to the bit. Numbers as in LimiterInput, MotionCommand and LimitedCommand.
+struct TickRecord {
+  double now;
+  std::uint64_t flags;  // TickFlag
+  double root_pose[7];  // position, quaternion x, y, z, w
+  double root_velocity[3], root_gyro[3];
+  double q[kG1Motors], v[kG1Motors];
+  double share, person_speed;
+  double person[3 * 24];
+  double restart_q[kG1Motors];
+  double stamp, asked_root[4], asked_q[kG1Motors];
+  double sent_root[4], sent_q[kG1Motors], sent_kp[kG1Motors], sent_kd[kG1Motors];
+};
+enum TickFlag : std::uint64_t {
+  kTickOdometry = 1,
+  kTickPerson = 2,
+  kTickActing = 4,
+  kTickRelease = 8,
+  kTickReceived = 16,
+  kTickRestarted = 32,
+};
+
+TickRecord record_of(const RobotGuard& guard);
+void read_record(const TickRecord& record, LimiterInput& input, HumanJoints& person, MotionCommand& command);
+
+class RunLog {
+ public:
+  // Makes `path` and writes what the limiter was made of. Throws StorageError.
+  RunLog(const std::string& path, const GuardSetup& setup);
+  ~RunLog();
+  RunLog(const RunLog&) = delete;
+  RunLog& operator=(const RunLog&) = delete;
+
+  // Of the guard's last tick. No allocation, no file, no lock.
+  void add(const RobotGuard& guard);
+  [[nodiscard]] long dropped() const { return dropped_; }
+  [[nodiscard]] bool good() const { return good_; }
+
+ private:
+  struct Slot {
+    TickRecord tick;
+    LowStateFrame received;
+    LowCommandFrame frame;
+    bool took = false, sent = false, changed = false;
+    SafetyState state = SafetyState::kOffline;
+    StopCause cause = StopCause::kNone;
+  };
+  void write_slots();
+  void write_slot(const Slot& slot);
+  void write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame);
+
+  McapWriter writer_;
+  std::vector<Slot> ring_;
+  std::atomic<std::uint64_t> added_ = 0, written_ = 0;
+  std::atomic<bool> ends_ = false, good_ = true;
+  SafetyState last_state_ = SafetyState::kOffline;
+  long dropped_ = 0;
+  std::uint32_t sequence_ = 0;
+  std::thread thread_;
+};
+
+struct LogReplay {
+  long ticks = 0, different = 0;
+  bool whole = false;               // the log has its end
+  std::vector<std::string> events;  // states and causes, in order
+};
+
+// Passes a log through a limiter made of what stands in it, and compares each output to the bit. Throws InputError for
+// a file that is no such log, or made for another robot than the one whose card is here.
+LogReplay replay_log(const std::string& path);
+
+}  // namespace duet

@@ -1,0 +1,221 @@
+#include "duet/hardware/run_log.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "tests/backends/allocation_count.h"
+#include "tests/hardware/guarded_twin.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::GuardedTwin;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+TEST(Mcap, WhatIsWrittenIsRead) {
+  const test::ScratchFolder folder;
+  {
+    McapWriter writer(folder / "a.mcap");
+    writer.add({1, "first", "json", "", "", ""});
+    writer.add({2, "second", "cdr", "Type", "omgidl", "struct Type {};"});
+    EXPECT_TRUE(writer.write(2, 7, 1234567890123, bytes_of("abc")));
+    EXPECT_TRUE(writer.write(1, 8, 5, bytes_of("")));
+  }
+  std::vector<std::string> found;
+  const std::string bytes = read_file(folder / "a.mcap");
+  const McapFile file = read_mcap(bytes_of(bytes), "a.mcap", [&](const McapChannel& c, const McapMessage& m) {
+    found.push_back(c.topic + c.schema_name + std::to_string(m.sequence) + "@" + std::to_string(m.time) + ":" +
+                    std::string(reinterpret_cast<const char*>(m.data.data()), m.data.size()));
+  });
+  EXPECT_THAT(found, ElementsAre("secondType7@1234567890123:abc", "first8@5:"));
+  EXPECT_TRUE(file.whole);
+  EXPECT_EQ(file.messages, 2);
+}
+
+// The bytes that the format's specification prescribes, for its smallest file: magic, header, end of data, footer,
+// magic.
+TEST(Mcap, TheSmallestFileHasTheBytesOfTheSpecification) {
+  const test::ScratchFolder folder;
+  { McapWriter writer(folder / "a.mcap"); }
+  const std::string bytes = read_file(folder / "a.mcap");
+  const std::string magic("\x89MCAP0\r\n", 8);
+  ASSERT_EQ(bytes.size(), 8u + (9 + 4 + 8) + (9 + 4) + (9 + 20) + 8);
+  EXPECT_EQ(bytes.substr(0, 8), magic);
+  EXPECT_EQ(bytes.substr(bytes.size() - 8), magic);
+  EXPECT_EQ(bytes.substr(8, 13), std::string("\x01\x0c\0\0\0\0\0\0\0\0\0\0\0", 13));
+  EXPECT_EQ(bytes.substr(29, 9), std::string("\x0f\x04\0\0\0\0\0\0\0", 9));
+  EXPECT_EQ(bytes.substr(42, 9), std::string("\x02\x14\0\0\0\0\0\0\0", 9));
+}
+
+TEST(Mcap, AFileIsNotMadeTwice) {
+  const test::ScratchFolder folder;
+  { McapWriter writer(folder / "a.mcap"); }
+  EXPECT_THAT(test::thrown_message<StorageError>([&] { McapWriter writer(folder / "a.mcap"); }),
+              HasSubstr("cannot make"));
+}
+
+std::string small_file(const test::ScratchFolder& folder) {
+  {
+    McapWriter writer(folder / "small.mcap");
+    writer.add({1, "first", "json", "", "", ""});
+    for (int k = 0; k < 5; ++k) writer.write(1, k, k, bytes_of("abcdef"));
+  }
+  return read_file(folder / "small.mcap");
+}
+
+TEST(Mcap, AFileOfAKilledWriterIsReadToItsLastRecord) {
+  const test::ScratchFolder folder;
+  const std::string bytes = small_file(folder);
+  long before = 0;
+  for (std::size_t length = 8; length < bytes.size(); ++length) {
+    const McapFile file =
+        read_mcap(bytes_of(bytes).first(length), "cut", [](const McapChannel&, const McapMessage&) {});
+    EXPECT_GE(file.messages, before) << length;
+    before = file.messages;
+  }
+  EXPECT_EQ(before, 5);
+}
+
+TEST(Mcap, RefusesWhatIsDamaged) {
+  const test::ScratchFolder folder;
+  const std::string good = small_file(folder);
+  const auto refusal = [](const std::string& bytes) {
+    return test::thrown_message<InputError>(
+        [&] { read_mcap(bytes_of(bytes), "x.mcap", [](const McapChannel&, const McapMessage&) {}); });
+  };
+  EXPECT_EQ(refusal("not an mcap file at all"), "x.mcap: expected an MCAP file, found another");
+  std::string bad = good;
+  bad[good.find("abcdef")] ^= 1;
+  EXPECT_EQ(refusal(bad), "x.mcap: the checksum of the data does not agree");
+  bad = good;
+  bad[good.find("abcdef") - 22] = 9;
+  EXPECT_EQ(refusal(bad), "x.mcap: expected channel 9, found none");
+}
+
+// A run with arms, walking, a planner that comes back and the operator's stop.
+void run_and_log(const std::string& path, const GuardSetup& setup) {
+  GuardedTwin robot(setup, {.place_noise = 0.001, .joint_noise = 1e-4});
+  RunLog log(path, setup);
+  const auto run_for = [&](double seconds) {
+    for (double left = seconds; left > 0.5 * GuardedTwin::kDt; left -= GuardedTwin::kDt) {
+      robot.tick();
+      log.add(robot.guard);
+      if (robot.ticks % 500 == 0) std::this_thread::sleep_for(std::chrono::milliseconds(30));  // the writer's turn
+    }
+  };
+  robot.hold_key(RemoteKey::kR1);
+  run_for(2.2);
+  robot.guard.arm();
+  run_for(0.01);
+  robot.hold_key(RemoteKey::kStart);
+  run_for(0.1);
+  robot.drop_key(RemoteKey::kStart);
+  robot.hold_key(RemoteKey::kA);
+  robot.message.command.root.forward = 0.3;
+  robot.message.command.q.array() += 0.5;
+  run_for(2.0);
+  robot.plans = false;
+  run_for(0.8);
+  robot.plans = true;
+  run_for(0.3);
+  robot.hold_key(RemoteKey::kSelect);
+  run_for(0.2);
+  EXPECT_EQ(log.dropped(), 0);
+  EXPECT_TRUE(log.good());
+}
+
+void expect_same_bits(const GuardSetup& setup) {
+  const test::ScratchFolder folder;
+  run_and_log(folder / "run.mcap", setup);
+  const LogReplay replay = replay_log(folder / "run.mcap");
+  EXPECT_GT(replay.ticks, 2500);
+  EXPECT_EQ(replay.different, 0);
+  EXPECT_TRUE(replay.whole);
+  std::string events;
+  for (const std::string& event : replay.events) events += event;
+  for (const char* state : {"listen", "ready", "armed", "stand", "run", "hold", "damp"})
+    EXPECT_THAT(events, HasSubstr(state));
+}
+
+TEST(RunLog, ReplayedThroughTheLimiterGivesTheSameBits) { expect_same_bits(test::twin_guard()); }
+
+TEST(RunLog, HoldsTheFramesAsTheyWere) {
+  const test::ScratchFolder folder;
+  run_and_log(folder / "run.mcap", test::twin_guard());
+  long commands = 0, states = 0;
+  const std::string bytes = read_file(folder / "run.mcap");
+  read_mcap(bytes_of(bytes), "run.mcap", [&](const McapChannel& channel, const McapMessage& message) {
+    if (channel.message_encoding != "cdr") return;
+    EXPECT_EQ(channel.schema_encoding, "omgidl");
+    const bool command = channel.topic == "rt/lowcmd";
+    ++(command ? commands : states);
+    EXPECT_EQ(message.data.size(), 4 + (command ? sizeof(LowCommandFrame) : sizeof(LowStateFrame)));
+    if (command) {
+      LowCommandFrame frame;
+      std::memcpy(&frame, message.data.data() + 4, sizeof(frame));
+      EXPECT_EQ(frame.crc, checksum_of(frame));
+    }
+  });
+  EXPECT_GT(states, 2500);
+  EXPECT_GT(commands, 1500);
+}
+
+TEST(RunLog, BesideAPersonToo) {
+  GuardSetup setup = test::twin_guard(true);
+  setup.limiter.limits.arm_speed = 0.4;
+  setup.limiter.touches = {{"hand", "hand"}};
+  expect_same_bits(setup);
+}
+
+TEST(RunLog, AnotherLimiterIsNoticed) {
+  const test::ScratchFolder folder;
+  run_and_log(folder / "run.mcap", test::twin_guard());
+  std::string bytes = read_file(folder / "run.mcap");
+  const std::string speed = "\"arm_speed\":\"0.5\"";
+  const std::size_t at = bytes.find(speed);
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, speed.size(), "\"arm_speed\":\"0.4\"");
+  bytes.resize(bytes.size() - 60);  // without the checksum of the data
+  write_file(folder / "other.mcap", bytes);
+  EXPECT_GT(replay_log(folder / "other.mcap").different, 0);
+}
+
+TEST(RunLog, ACutLogIsReplayedAsFarAsItGoes) {
+  const test::ScratchFolder folder;
+  run_and_log(folder / "run.mcap", test::twin_guard());
+  const std::string bytes = read_file(folder / "run.mcap");
+  write_file(folder / "cut.mcap", bytes.substr(0, bytes.size() / 2));
+  const LogReplay replay = replay_log(folder / "cut.mcap");
+  EXPECT_GT(replay.ticks, 1000);
+  EXPECT_EQ(replay.different, 0);
+  EXPECT_FALSE(replay.whole);
+}
+
+TEST(RunLog, RefusesWhatIsNoLogOfARun) {
+  const test::ScratchFolder folder;
+  (void)small_file(folder);
+  EXPECT_THAT(test::thrown_message<InputError>([&] { (void)replay_log(folder / "small.mcap"); }),
+              HasSubstr("expected the log of a run, found an MCAP file without one"));
+  write_file(folder / "text", "text");
+  EXPECT_THAT(test::thrown_message<InputError>([&] { (void)replay_log(folder / "text"); }),
+              HasSubstr("expected an MCAP file"));
+}
+
+TEST(RunLog, ATickIsAddedWithoutAllocation) {
+  if (!test::allocations_are_counted()) GTEST_SKIP() << "not run: the sanitizer has a malloc of its own";
+  const test::ScratchFolder folder;
+  GuardedTwin robot;
+  RunLog log(folder / "run.mcap", test::twin_guard());
+  robot.start();
+  const long before = test::allocation_count();
+  log.add(robot.guard);
+  EXPECT_EQ(test::allocation_count(), before);
+}
+
+}  // namespace
+}  // namespace duet
