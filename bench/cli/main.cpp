@@ -11,6 +11,7 @@
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/hw.h"
 #include "duet/bench/version.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -101,6 +102,8 @@ int main(int argc, char** argv) {
   add_verify(app, session);
   add_bench(app, session);
   add_train(app, session);
+  add_hardware(app, session);
+  add_replay_log(app, session);
   add_completion(app, session);
   return run_command(app, argc, argv, session);
 }

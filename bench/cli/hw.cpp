@@ -1,0 +1,313 @@
+// duet hw: listen to a robot, guard it, plan for it, stop it; each says first what it will do. duet replay-log.
+#include "duet/bench/cli/hw.h"
+
+#include <fmt/format.h>
+
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <random>
+
+#include "duet/core/require.h"
+#include "duet/hardware/dds/dds_wire.h"
+#include "duet/hardware/guard_loop.h"
+#include "duet/hardware/guard_message.h"
+#include "duet/hardware/robot_config.h"
+#include "duet/hardware/run_log.h"
+
+namespace duet::cli {
+namespace {
+
+constexpr double kPlanPeriod = 0.02;  // [s]
+constexpr const char* kNotSafetyRated =
+    "This software is not safety-rated. It replaces neither gantry nor emergency stop nor spotter.";
+volatile std::sig_atomic_t asked_to_end = 0;
+
+struct HardwareArguments {
+  std::string config, socket = "duet-guard.socket", log, command = "0,0,0";
+  double seconds = 5.0;
+  int velocity_port = 0;
+};
+
+void end_on_signals() {
+  asked_to_end = 0;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { asked_to_end = 1; });
+}
+
+std::string where(const RobotConfig& config) {
+  return fmt::format("{} '{}', domain {} on {}", config.twin ? "twin" : "robot", config.permission.robot,
+                     config.permission.domain, config.permission.interface);
+}
+
+// Why it is not ready, or "ready".
+std::string readiness(const GuardStatus& status) {
+  if (status.safety.state == SafetyState::kOffline) return "no state has come";
+  const std::string_view missing = missing_for_arming(SafetyRules{}, status.safety, status.input);
+  return missing.empty() ? std::string(safety_state_name(status.safety.state)) : fmt::format("missing: {}", missing);
+}
+
+std::string clamp_text(const ClampCounts& clamps) {
+  std::string text;
+  for (std::size_t k = 0; k < kClampReasons; ++k)
+    if (clamps[k] > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", kClampNames[k], clamps[k]);
+  return text.empty() ? "none" : text;
+}
+
+nlohmann::json status_json(const GuardStatus& status) {
+  nlohmann::json clamps = nlohmann::json::object();
+  for (std::size_t k = 0; k < kClampReasons; ++k) clamps[std::string(kClampNames[k])] = status.clamps[k];
+  return {{"state", safety_state_name(status.safety.state)},
+          {"cause", stop_cause_name(status.safety.cause)},
+          {"readiness", readiness(status)},
+          {"states", status.states},
+          {"checksum_faults", status.checksum_faults},
+          {"tick_faults", status.tick_faults},
+          {"number_faults", status.number_faults},
+          {"clamps", clamps}};
+}
+
+std::string status_text(const GuardStatus& status, double seconds) {
+  const RobotHealth& health = status.input.health;
+  return fmt::format(
+      "{}\n  {} states in {:.1f} s; {} with a wrong checksum, {} old, {} not finite\n  tilt {:.3f} rad, hottest casing "
+      "{:.0f} and winding {:.0f} degrees C, remote control {}\n  other writers of commands: {}\n  clamps: {}",
+      readiness(status), status.states, seconds, status.checksum_faults, status.tick_faults, status.number_faults,
+      health.tilt, health.casing, health.winding, status.input.remote_at == kNever ? "not heard" : "heard",
+      status.input.foreign_writer ? "yes" : "none", clamp_text(status.clamps));
+}
+
+void listen_for(Session& session, const HardwareArguments& arguments, bool with_planner) {
+  const RobotConfig config = read_robot_config(arguments.config);
+  note(session,
+       fmt::format("listens to {} for {} s; {}. Nothing is written to it: no writer is made.", where(config),
+                   arguments.seconds,
+                   with_planner ? fmt::format("takes a planner's commands at '{}' and limits them", arguments.socket)
+                                : "reads only"));
+  const std::unique_ptr<RobotWire> wire = open_robot_wire(config.place());
+  NoVelocity nobody;
+  const GuardSetup setup = guard_setup(config, true);
+  RobotGuard guard(setup, *wire, nobody);
+  std::optional<DatagramSocket> planner;
+  if (with_planner) planner.emplace(DatagramSocket::at_path(arguments.socket));
+  std::unique_ptr<RunLog> log;
+  if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
+  end_on_signals();
+  const double begin = monotonic_seconds();
+  run_guard(guard, *wire, planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
+    if (log) log->add(guard);
+    return asked_to_end == 0 && now - begin < arguments.seconds;
+  });
+  const GuardStatus& status = guard.status();
+  print(session, status_text(status, monotonic_seconds() - begin), status_json(status));
+  if (status.states == 0) throw MissingError(fmt::format("no state of {} has come", where(config)));
+}
+
+// A word for a person to type; not a secret.
+std::string new_word() {
+  constexpr const char* kWords[] = {"kestrel", "heron", "plover", "osprey", "dunlin", "linnet", "avocet", "merlin"};
+  std::random_device random;
+  return fmt::format("{}-{:03d}", kWords[random() % std::size(kWords)], random() % 1000);
+}
+
+ArmingFacts facts_for(const RobotConfig& config, const GuardSetup& setup, const HardwareArguments& arguments,
+                      const RunLog& log) {
+  ArmingFacts facts;
+  facts.permission = config.permission;
+  facts.twin = config.twin;
+  facts.asked_to_arm = true;
+  facts.contact_limits = setup.limiter.contact_limits;
+  facts.log_is_open = log.good();
+  facts.free_log_bytes =
+      static_cast<double>(std::filesystem::space(std::filesystem::absolute(arguments.log).parent_path()).available);
+  facts.shown_nonce = new_word();
+  facts.shown_at = monotonic_seconds();
+  return facts;
+}
+
+// Follows the guard until it has stopped for good; says each change of state.
+class ArmedRun {
+ public:
+  ArmedRun(Session& session, RobotGuard& guard, RunLog& log, ArmingFacts facts)
+      : session_(session), guard_(guard), log_(log), facts_(std::move(facts)) {}
+
+  bool go_on(double now) {
+    log_.add(guard_);
+    const GuardStatus& status = guard_.status();
+    const SafetyState state = status.safety.state;
+    if (state != last_) {
+      note(session_, fmt::format("{} ({})", safety_state_name(state), stop_cause_name(status.safety.cause)));
+      last_ = state;
+    }
+    if (state == SafetyState::kReady && !armed_) try_to_arm(now, status);
+    if (asked_to_end != 0 && !status.order.writes) return false;
+    if (asked_to_end != 0) guard_.stop();
+    // Damped to the end: the operator's stop comes back to listening, everything else is a fault.
+    return state != SafetyState::kFault && !(armed_ && !status.order.writes && state == SafetyState::kListen) &&
+           refusal_.empty();
+  }
+  [[nodiscard]] const std::string& refusal() const { return refusal_; }
+
+ private:
+  void try_to_arm(double now, const GuardStatus& status) {
+    facts_.now = now;
+    facts_.remote_key_held = now - status.input.dead_man_at < 0.1;
+    facts_.reported_mode_machine = guard_.reading().mode_machine;
+    refusal_ = arming_refusal(facts_);
+    if (!refusal_.empty()) return;
+    guard_.arm();
+    armed_ = true;
+  }
+
+  Session& session_;
+  RobotGuard& guard_;
+  RunLog& log_;
+  ArmingFacts facts_;
+  SafetyState last_ = SafetyState::kOffline;
+  bool armed_ = false;
+  std::string refusal_;
+};
+
+void run_arm(Session& session, const HardwareArguments& arguments) {
+  const RobotConfig config = read_robot_config(arguments.config);
+  if (!config.twin)
+    throw MissingError(
+        "arming a robot needs an executor for it (HOMIE's processes, the maker's service), and this build has none: a "
+        "twin can be armed, a robot can be listened to ('hw check', 'hw dry-run')");
+  const GuardSetup setup = guard_setup(config, false);
+  RunLog log(arguments.log, setup);
+  ArmingFacts facts = facts_for(config, setup, arguments, log);
+  note(session,
+       fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A while R1 is "
+                   "held, logs to '{}'. Ctrl-C damps it.\ntype '{}' within {} s to arm:",
+                   kNotSafetyRated, where(config), arguments.socket, arguments.log, facts.shown_nonce, kNonceTime));
+  std::getline(std::cin, facts.typed_nonce);
+  facts.now = monotonic_seconds();
+  facts.reported_mode_machine = config.permission.mode_machine;  // not heard yet: asked again when it is
+  facts.remote_key_held = true;
+  if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
+  DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
+  const std::unique_ptr<RobotWire> wire = open_robot_wire(config.place());
+  LcmVelocity velocity(DatagramSocket::to_port(static_cast<std::uint16_t>(arguments.velocity_port)));
+  RobotGuard guard(setup, *wire, velocity);
+  ArmedRun run(session, guard, log, facts);
+  end_on_signals();
+  run_guard(guard, *wire, &planner, setup.limiter.dt, [&](double now) { return run.go_on(now); });
+  if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
+  print(session,
+        fmt::format("{}; log '{}', {} ticks left out", safety_state_name(guard.status().safety.state), arguments.log,
+                    log.dropped()),
+        status_json(guard.status()));
+  if (guard.status().safety.state == SafetyState::kFault) session.exit_code = kExitGate;
+}
+
+void run_plan(Session& session, const HardwareArguments& arguments) {
+  const std::shared_ptr<const RobotModel> robot = load_shared_robot();
+  PlannerMessage message;
+  message.command.root = parse_velocity_command(arguments.command, HardwareLimits{}.height);
+  message.command.q = robot->neutral;
+  note(session,
+       fmt::format("asks the guard at '{}' for {} (forward, left [m/s], turn [rad/s]) with the arms in the neutral "
+                   "pose for {} s, then for standing still. The guard limits it.",
+                   arguments.socket, arguments.command, arguments.seconds));
+  DatagramSocket guard = DatagramSocket::to_path(arguments.socket);
+  GuardBuffer buffer;
+  end_on_signals();
+  const double begin = monotonic_seconds();
+  long sent = 0;
+  message.sequence = static_cast<std::uint64_t>(begin * 1e6);
+  for (double now = begin; asked_to_end == 0 && now - begin < arguments.seconds + 1.0; now = monotonic_seconds()) {
+    if (now - begin > arguments.seconds) message.command.root = {0.0, 0.0, 0.0, message.command.root.height};
+    message.command.stamp = now;
+    ++message.sequence;
+    if (!guard.send(std::span<const std::byte>(buffer).first(encode(message, buffer))))
+      throw std::runtime_error(fmt::format("the guard at '{}' has gone", arguments.socket));
+    ++sent;
+    std::this_thread::sleep_for(std::chrono::duration<double>(kPlanPeriod));
+  }
+  print(session, fmt::format("{} commands sent", sent), {{"sent", sent}});
+}
+
+void run_stop(Session& session, const HardwareArguments& arguments) {
+  note(session, fmt::format("asks the guard at '{}' to damp the robot", arguments.socket));
+  DatagramSocket guard = DatagramSocket::to_path(arguments.socket);
+  GuardBuffer buffer;
+  const bool sent = guard.send(std::span<const std::byte>(buffer).first(encode_stop(buffer)));
+  if (!sent) throw std::runtime_error(fmt::format("the guard at '{}' has gone", arguments.socket));
+  print(session, "asked", {{"asked", true}});
+}
+
+using HardwareCommand = void (*)(Session&, const HardwareArguments&);
+
+CLI::App* add_one(CLI::App& hardware, Session& session, const std::shared_ptr<HardwareArguments>& arguments,
+                  const std::string& name, const std::string& description, const std::string& example,
+                  HardwareCommand command) {
+  CLI::App* app = add_command(hardware, session, name, description, example);
+  app->callback([&session, arguments, command] { command(session, *arguments); });
+  return app;
+}
+
+void add_config(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("config", arguments.config, "configuration of the robot or twin (YAML)")->required();
+}
+
+void add_socket(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("--socket", arguments.socket, "local socket of the guard")->capture_default_str();
+}
+
+void add_seconds(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("--seconds", arguments.seconds, "how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+}
+
+void run_replay(Session& session, const std::string& path) {
+  const LogReplay replay = replay_log(path);
+  print(session,
+        fmt::format("{}: {} ticks, {} with another output; the log {}", path, replay.ticks, replay.different,
+                    replay.whole ? "is whole" : "was cut off"),
+        {{"ticks", replay.ticks}, {"different", replay.different}, {"whole", replay.whole}, {"events", replay.events}});
+  if (replay.different > 0) session.exit_code = kExitDeterminism;
+}
+
+}  // namespace
+
+void add_hardware(CLI::App& app, Session& session) {
+  CLI::App* hardware =
+      app.add_subcommand("hw", "a real G1, or its twin: check, dry-run, arm, run, stop (not safety-rated)");
+  hardware->require_subcommand(1);
+  const auto arguments = std::make_shared<HardwareArguments>();
+  CLI::App* check =
+      add_one(*hardware, session, arguments, "check", "listen to it and say what is missing; writes nothing",
+              "duet hw check examples/hardware/twin.yaml",
+              [](Session& s, const HardwareArguments& a) { listen_for(s, a, false); });
+  CLI::App* dry = add_one(*hardware, session, arguments, "dry-run",
+                          "the whole guard with a planner, but without a writer: nothing can reach the robot",
+                          "duet hw dry-run examples/hardware/twin.yaml --seconds 20",
+                          [](Session& s, const HardwareArguments& a) { listen_for(s, a, true); });
+  CLI::App* arm =
+      add_one(*hardware, session, arguments, "arm", "guard it: the process that alone may write to it (a twin)",
+              "duet hw arm examples/hardware/twin.yaml --log run.mcap --velocity-port 15001", run_arm);
+  CLI::App* plan = add_one(*hardware, session, arguments, "run", "ask the guard for a velocity, for a time",
+                           "duet hw run --command 0.2,0,0 --seconds 5", run_plan);
+  CLI::App* stop =
+      add_one(*hardware, session, arguments, "stop", "ask the guard to damp the robot", "duet hw stop", run_stop);
+  for (CLI::App* listens : {check, dry, arm}) add_config(listens, *arguments);
+  for (CLI::App* talks : {dry, arm, plan, stop}) add_socket(talks, *arguments);
+  for (CLI::App* lasts : {check, dry, plan}) add_seconds(lasts, *arguments);
+  for (CLI::App* logs : {check, dry}) logs->add_option("--log", arguments->log, "log to make (MCAP)");
+  arm->add_option("--log", arguments->log, "log to make (MCAP)")->required();
+  arm->add_option("--velocity-port", arguments->velocity_port, "UDP port of 127.0.0.1 that takes velocities")
+      ->required()
+      ->check(CLI::Range(1, 65535));
+  plan->add_option("--command", arguments->command, "\"vx,vy,wz\" [m/s, m/s, rad/s]")->capture_default_str();
+}
+
+void add_replay_log(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "replay-log",
+                                  "pass a run's log through the limiter again: the same bits, or exit code 5",
+                                  "duet replay-log run.mcap");
+  const auto path = std::make_shared<std::string>();
+  command->add_option("log", *path, "log of `duet hw arm` or `dry-run` (MCAP)")->required();
+  command->callback([&session, path] { run_replay(session, *path); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,98 @@
+// `duet hw` and `duet replay-log` as a user types them, with a twin as a second process.
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "duet/core/file.h"
+#include "duet/hardware/dds_place.h"
+#include "tests/bench/program.h"
+
+namespace duet {
+namespace {
+
+using test::Answer;
+using test::duet_program;
+using ::testing::HasSubstr;
+
+// Other domains and ports than the tests of the wire have, by the process.
+int own_domain() {
+  return kFirstTwinDomain + (static_cast<int>(getpid()) + 50) % (kLastTwinDomain - kFirstTwinDomain + 1);
+}
+int own_port() { return 20000 + static_cast<int>(getpid()) % 20000; }
+
+std::string config_of(const std::string& more = "twin: true\ninterface: lo\nallow_motion: true\nperson: false\n") {
+  return "schema: duet.robot/1\nrobot: twin\nmode_machine: 5\ndomain: " + std::to_string(own_domain()) + "\n" + more;
+}
+
+std::string twin_command(const std::string& seconds) {
+  return std::string(DUET_TWIN) + " --operated --seconds " + seconds + " --domain " + std::to_string(own_domain()) +
+         " --velocity-port " + std::to_string(own_port()) + " >/dev/null 2>&1 & ";
+}
+
+TEST(HwCommand, SaysFirstThatNothingIsWrittenAndThenThatNobodyAnswers) {
+  const test::ScratchFolder folder;
+  write_file(folder / "twin.yaml", config_of());
+  const Answer answer = duet_program("hw check --seconds 0.5 " + (folder / "twin.yaml"));
+  EXPECT_EQ(answer.code, 4);
+  EXPECT_THAT(answer.err, HasSubstr("Nothing is written to it: no writer is made."));
+  EXPECT_THAT(answer.err, HasSubstr("no state of twin 'twin'"));
+}
+
+TEST(HwCommand, RefusesAConfigurationThatIsWrong) {
+  const test::ScratchFolder folder;
+  write_file(folder / "bad.yaml", config_of("interface: auto\n"));
+  const Answer answer = duet_program("hw check " + (folder / "bad.yaml"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("expected the name of one (not 'auto')"));
+}
+
+TEST(HwCommand, ARobotCannotBeArmedInThisBuild) {
+  const test::ScratchFolder folder;
+  write_file(folder / "robot.yaml", config_of("interface: lo\nallow_motion: true\n"));
+  const Answer answer =
+      duet_program("hw arm " + (folder / "robot.yaml") + " --velocity-port 15001 --log " + (folder / "run.mcap"));
+  EXPECT_EQ(answer.code, 4);
+  EXPECT_THAT(answer.err, HasSubstr("arming a robot needs an executor"));
+}
+
+TEST(HwCommand, AWrongWordArmsNothing) {
+  const test::ScratchFolder folder;
+  write_file(folder / "twin.yaml", config_of());
+  const Answer answer = duet_program(
+      "hw arm " + (folder / "twin.yaml") + " --velocity-port 15001 --log " + (folder / "run.mcap"), "echo wrong |");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("not armed: expected the word on the screen, found 'wrong'"));
+  EXPECT_THAT(answer.err, HasSubstr("not safety-rated"));
+}
+
+TEST(HwCommand, RunAndStopSayThatNoGuardIsThere) {
+  for (const char* command : {"run", "stop"}) {
+    const Answer answer = duet_program(std::string("hw ") + command + " --socket /tmp/no-such-guard");
+    EXPECT_EQ(answer.code, 2) << command;
+    EXPECT_THAT(answer.err, HasSubstr("nobody receives at '/tmp/no-such-guard'")) << command;
+  }
+}
+
+TEST(HwCommand, ADryRunOfATwinIsReadyAndItsLogIsTheSameAgain) {
+  const test::ScratchFolder folder;
+  write_file(folder / "twin.yaml", config_of());
+  const Answer dry = duet_program("hw dry-run --json --seconds 4 --socket " + (folder / "guard") + " --log " +
+                                      (folder / "run.mcap") + " " + (folder / "twin.yaml"),
+                                  twin_command("7"));
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_THAT(dry.out, HasSubstr("\"checksum_faults\": 0"));
+  const Answer replay = duet_program("replay-log --json " + (folder / "run.mcap"));
+  EXPECT_EQ(replay.code, 0) << replay.err;
+  EXPECT_THAT(replay.out, HasSubstr("\"different\": 0"));
+}
+
+TEST(HwCommand, ReplayRefusesWhatIsNoLog) {
+  const test::ScratchFolder folder;
+  write_file(folder / "text", "text");
+  const Answer answer = duet_program("replay-log " + (folder / "text"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("expected an MCAP file"));
+}
+
+}  // namespace
+}  // namespace duet
