@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "duet/bench/benchmarks/hardware.h"
 #include "duet/bench/benchmarks/parts.h"
 #include "duet/motion/synthesis.h"
 
@@ -17,6 +18,7 @@ const std::vector<Benchmark>& benchmarks() {
     add_policy_benchmarks(all);
     add_runner_benchmarks(all);
     add_wbc_benchmarks(all);
+    add_hardware_benchmarks(all);
     return all;
   }();
   return list;
