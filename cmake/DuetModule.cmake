@@ -77,7 +77,7 @@ function(duet_add_module room)
 endfunction()
 
 function(duet_add_test room)
-  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SERIAL" "" "SOURCES;LINK" ${ARGN})
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${room}_test ${ARG_SOURCES})
@@ -90,7 +90,7 @@ function(duet_add_test room)
   target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h>)
   # A test whose data are not there says "not run: ... absent" and counts as skipped.
   gtest_discover_tests(${room}_test TEST_PREFIX "${room}/" DISCOVERY_TIMEOUT 60
-                       WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTIES TIMEOUT 300)
+                       WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTIES TIMEOUT 300 RUN_SERIAL "${ARG_SERIAL}")
 endfunction()
 
 function(duet_add_fuzzer name)

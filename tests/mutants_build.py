@@ -8,7 +8,7 @@ import subprocess
 import sys
 import typing
 
-ROOMS = 'core tasks motion robots nn io formats retarget backends controllers policies metrics rollout results datasets training bench'.split()
+ROOMS = 'core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench'.split()
 OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' > '), (r' \+ ', ' - '), (r' - ', ' + '),
              (r' \* ', ' + '), (r' / ', ' * '), (r' \+= ', ' -= '), (r' -= ', ' += '), (r' && ', ' || '),
              (r' \|\| ', ' && '), (r' == ', ' != '), (r' != ', ' == '), (r'std::max\(', 'std::min('),
