@@ -71,7 +71,7 @@ std::string_view stop_cause_name(StopCause cause) { return kCauseNames[static_ca
 
 void note_bad_states(int count, double now, BadStates& bad) {
   for (int k = 0; k < std::min(count, static_cast<int>(BadStates::kKept)); ++k) {
-    std::ranges::rotate(bad.at, bad.at.end() - 1);
+    std::rotate(bad.at.begin(), bad.at.end() - 1, bad.at.end());
     bad.at.front() = now;
   }
 }
