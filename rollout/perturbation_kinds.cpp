@@ -180,7 +180,6 @@ const FieldTable<PartnerVariation>& partner_fields() {
                 .choices = {"false", "true"}},
                &V::other_hand)};
   return table;
-  return table;
 }
 
 // What the controller and the robot meet.
