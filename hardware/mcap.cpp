@@ -1,6 +1,7 @@
 #include "duet/hardware/mcap.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <array>
@@ -27,21 +28,9 @@ enum McapKind : std::uint8_t {
   kMcapDataEnd = 0x0F
 };
 
-// CRC-32 as of zlib and Ethernet.
-constexpr std::array<std::uint32_t, 256> kMcapTable = [] {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    std::uint32_t crc = byte;
-    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1u) != 0 ? 0xEDB88320u : 0u);
-    table[byte] = crc;
-  }
-  return table;
-}();
-
 std::uint32_t more_checksum(std::uint32_t checksum, std::span<const std::byte> bytes) {
-  std::uint32_t crc = ~checksum;
-  for (const std::byte byte : bytes) crc = (crc >> 8) ^ kMcapTable[(crc ^ static_cast<std::uint32_t>(byte)) & 0xFFu];
-  return ~crc;
+  if (bytes.empty()) return checksum;  // where there is no place at all, zlib begins anew
+  return static_cast<std::uint32_t>(crc32_z(checksum, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
 }
 
 template <typename T>
