@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <map>
 #include <tuple>
 
@@ -35,13 +34,6 @@ PeopleRates people_rates(const PeopleCounts& counts, double level) {
   return {make_rate(counts.successes, counts.n, level), make_rate(counts.falls, counts.n, level)};
 }
 
-// Of two independent shares.
-Interval newcombe_independent(const Rate& a, const Rate& b) {
-  const double d = a.rate - b.rate;
-  return {d - std::hypot(a.rate - a.interval.low, b.interval.high - b.rate),
-          d + std::hypot(a.interval.high - a.rate, b.rate - b.interval.low)};
-}
-
 PeopleEntry people_entry(const PolicyKey& key, const std::string& task, const BothPeople& counts, double level) {
   PeopleEntry entry{.key = key,
                     .task = task,
@@ -49,7 +41,8 @@ PeopleEntry people_entry(const PolicyKey& key, const std::string& task, const Bo
                     .synthetic = people_rates(counts.synthetic, level),
                     .interval = {}};
   entry.difference = entry.recorded.success.rate - entry.synthetic.success.rate;
-  entry.interval = newcombe_independent(entry.recorded.success, entry.synthetic.success);
+  entry.interval = newcombe_independent(counts.recorded.successes, counts.recorded.n, counts.synthetic.successes,
+                                        counts.synthetic.n, level);
   return entry;
 }
 

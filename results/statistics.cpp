@@ -119,6 +119,15 @@ Interval newcombe_paired(long both, long only_a, long only_b, long neither, doub
           .high = difference + square_and_add(a.high - p_a, p_b - b.low, correlation)};
 }
 
+Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level) {
+  const Interval a = wilson(k_a, n_a, level), b = wilson(k_b, n_b, level);
+  if (n_a == 0 || n_b == 0) return {.low = -1.0, .high = 1.0};
+  const double p_a = static_cast<double>(k_a) / static_cast<double>(n_a);
+  const double p_b = static_cast<double>(k_b) / static_cast<double>(n_b);
+  return {.low = p_a - p_b - square_and_add(p_a - a.low, b.high - p_b, 0.0),
+          .high = p_a - p_b + square_and_add(a.high - p_a, p_b - b.low, 0.0)};
+}
+
 double mcnemar_exact(long only_a, long only_b) {
   require(only_a >= 0 && only_b >= 0,
           fmt::format("McNemar: expected counts of at least 0, found {} and {}", only_a, only_b));

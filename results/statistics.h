@@ -20,6 +20,9 @@ Interval wilson(long k, long n, double level = 0.95);
 // Newcombe's interval (method 10, paired) of p_a - p_b from the paired table: both, only a, only b, neither.
 Interval newcombe_paired(long both, long only_a, long only_b, long neither, double level = 0.95);
 
+// Newcombe's interval (method 10, independent) of k_a / n_a - k_b / n_b. Throws as wilson does.
+Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level = 0.95);
+
 // Exact two-sided McNemar p-value from the discordant counts.
 double mcnemar_exact(long only_a, long only_b);
 

@@ -151,6 +151,13 @@ double enumerated_mcnemar(long only_a, long only_b) {
   return std::min(1.0, 2.0 * static_cast<double>(as_extreme) / static_cast<double>(1L << n));
 }
 
+// Newcombe 1998 (Statistics in Medicine 17, 873), table II, example (a), method 10: 56/70 against 48/80.
+TEST(Newcombe, OfTwoIndependentSharesIsThatOfThePaper) {
+  const Interval interval = newcombe_independent(56, 70, 48, 80);
+  EXPECT_NEAR(interval.low, 0.0524, 5e-5);
+  EXPECT_NEAR(interval.high, 0.3339, 5e-5);
+}
+
 TEST(McNemar, EqualsEnumeration) {
   for (long a = 0; a <= 8; ++a) {
     for (long b = 0; b <= 8; ++b) EXPECT_NEAR(mcnemar_exact(a, b), enumerated_mcnemar(a, b), 1e-13) << a << " " << b;
