@@ -6,6 +6,7 @@
 #include "duet/core/clock.h"
 #include "duet/core/pose.h"
 #include "duet/core/skeleton.h"
+#include "duet/core/smooth_step.h"
 
 namespace duet {
 namespace {
@@ -81,10 +82,7 @@ class Way {
   }
 
  private:
-  static double smooth(double s) {
-    s = std::clamp(s, 0.0, 1.0);
-    return s * s * (3.0 - 2.0 * s);
-  }
+  static double smooth(double s) { return smooth_step(std::clamp(s, 0.0, 1.0)); }
 
   Eigen::Vector3d back_, left_;
   double comes_, on_, aside_, half_;

@@ -9,6 +9,7 @@
 #include "duet/controllers/stance.h"
 #include "duet/core/clock.h"
 #include "duet/core/require.h"
+#include "duet/core/smooth_step.h"
 
 namespace duet {
 namespace {
@@ -113,8 +114,7 @@ void ReferenceStream::move_upper_body(Random& random) {
     segment_ = 0.0;
     segment_length_ = random.uniform(0.6, 2.0);
   }
-  const double s = segment_ / segment_length_;
-  const double share = s * s * (3.0 - 2.0 * s);
+  const double share = smooth_step(segment_ / segment_length_);
   for (const int joint : upper_) reference_.q[joint] = from_[joint] + share * (to_[joint] - from_[joint]);
 }
 

@@ -5,14 +5,13 @@
 #include <numbers>
 
 #include "duet/core/clock.h"
+#include "duet/core/smooth_step.h"
 
 namespace duet {
 namespace {
 
 constexpr double kFilter = kTick / 0.15;  // of the reference's velocity
 constexpr int kHalfCyclesAtRest = 2;      // in which the feet come together before they stand
-
-double smooth(double s) { return s * s * (3.0 - 2.0 * s); }
 
 }  // namespace
 
@@ -59,7 +58,7 @@ FootPlace Gait::foot(int side) const {
   if (!stepping_) return {.x = 0.0, .y = sign * options_.half_width};
   const double progress = swing_progress();
   const bool swings = side == swing_foot();
-  const double ahead = (swings ? smooth(progress) - 0.5 : 0.5 - progress) * half_period();  // [s]
+  const double ahead = (swings ? smooth_step(progress) - 0.5 : 0.5 - progress) * half_period();  // [s]
   const double yaw = velocity_.z() * ahead;
   FootPlace place;
   place.x = velocity_.x() * ahead - std::sin(yaw) * sign * options_.half_width;
