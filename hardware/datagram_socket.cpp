@@ -55,6 +55,16 @@ bool somebody_receives(const sockaddr_un& address) {
   return answered;
 }
 
+template <typename Address>
+int connected(int family, const Address& address, const std::string& refusal) {
+  const int descriptor = make_socket(family);
+  if (connect(descriptor, generic(address), sizeof(address)) == 0) return descriptor;
+  const int why = errno;
+  close(descriptor);
+  errno = why;
+  fail(refusal);
+}
+
 }  // namespace
 
 DatagramSocket DatagramSocket::at_path(const std::string& path) {
@@ -72,11 +82,7 @@ DatagramSocket DatagramSocket::at_path(const std::string& path) {
 }
 
 DatagramSocket DatagramSocket::to_path(const std::string& path) {
-  const sockaddr_un address = address_of(path);
-  DatagramSocket made(make_socket(AF_UNIX));
-  if (connect(made.descriptor_, generic(address), sizeof(address)) != 0)
-    fail(fmt::format("nobody receives at '{}'", path));
-  return made;
+  return DatagramSocket(connected(AF_UNIX, address_of(path), fmt::format("nobody receives at '{}'", path)));
 }
 
 DatagramSocket DatagramSocket::at_port(std::uint16_t port) {
@@ -88,11 +94,7 @@ DatagramSocket DatagramSocket::at_port(std::uint16_t port) {
 }
 
 DatagramSocket DatagramSocket::to_port(std::uint16_t port) {
-  const sockaddr_in address = loopback(port);
-  DatagramSocket made(make_socket(AF_INET));
-  if (connect(made.descriptor_, generic(address), sizeof(address)) != 0)
-    fail(fmt::format("cannot send to port {} of 127.0.0.1", port));
-  return made;
+  return DatagramSocket(connected(AF_INET, loopback(port), fmt::format("cannot send to port {} of 127.0.0.1", port)));
 }
 
 DatagramSocket::DatagramSocket(DatagramSocket&& other) noexcept

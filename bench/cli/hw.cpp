@@ -30,6 +30,7 @@ struct HardwareArguments {
   int velocity_port = 0;
 };
 
+// Not bench/interrupt.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to finish.
 void end_on_signals() {
   asked_to_end = 0;
   for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { asked_to_end = 1; });
@@ -201,6 +202,12 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   if (guard.status().safety.state == SafetyState::kFault) session.exit_code = kExitGate;
 }
 
+// The first `size` bytes of `message`.
+void tell(DatagramSocket& guard, const std::string& socket, const GuardBuffer& message, std::size_t size) {
+  if (!guard.send(std::span<const std::byte>(message).first(size)))
+    throw std::runtime_error(fmt::format("the guard at '{}' has gone", socket));
+}
+
 void run_plan(Session& session, const HardwareArguments& arguments) {
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
   PlannerMessage message;
@@ -220,8 +227,7 @@ void run_plan(Session& session, const HardwareArguments& arguments) {
     if (now - begin > arguments.seconds) message.command.root = {0.0, 0.0, 0.0, message.command.root.height};
     message.command.stamp = now;
     ++message.sequence;
-    if (!guard.send(std::span<const std::byte>(buffer).first(encode(message, buffer))))
-      throw std::runtime_error(fmt::format("the guard at '{}' has gone", arguments.socket));
+    tell(guard, arguments.socket, buffer, encode(message, buffer));
     ++sent;
     std::this_thread::sleep_for(std::chrono::duration<double>(kPlanPeriod));
   }
@@ -232,8 +238,7 @@ void run_stop(Session& session, const HardwareArguments& arguments) {
   note(session, fmt::format("asks the guard at '{}' to damp the robot", arguments.socket));
   DatagramSocket guard = DatagramSocket::to_path(arguments.socket);
   GuardBuffer buffer;
-  const bool sent = guard.send(std::span<const std::byte>(buffer).first(encode_stop(buffer)));
-  if (!sent) throw std::runtime_error(fmt::format("the guard at '{}' has gone", arguments.socket));
+  tell(guard, arguments.socket, buffer, encode_stop(buffer));
   print(session, "asked", {{"asked", true}});
 }
 
