@@ -142,8 +142,9 @@ const Field<SuiteClips>& roles_field() {
 
 void read_clips(const YamlSection& top, Suite& suite) {
   const YamlSection clips = section_below(top, suite.file, "clips", {"synth", "files", "pad", "roles"});
-  const YamlSection synth =
-      section_below(clips, suite.file, "synth", {"per_task", "per_file", "seed", "like", "tracked", "variants"});
+  std::vector<const char*> synth_keys = field_keys(synth_fields());
+  synth_keys.push_back("variants");
+  const YamlSection synth = section_below(clips, suite.file, "synth", synth_keys);
   read_fields(synth, synth_fields(), suite.clips);
   read_variants(synth, suite);
   read_files(clips, suite);
