@@ -1,5 +1,6 @@
 // duet train dstar | dp | <ablation>: the learnt policies, and the split of clips that they never see.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <cmath>
 #include <filesystem>
@@ -205,6 +206,13 @@ std::vector<DemonstrationClips> clips_of(const std::vector<std::string>& kinds) 
   return clips;
 }
 
+std::string text_of(const std::vector<DemonstrationClips>& clips) {
+  std::vector<std::string> kinds;
+  for (const auto& [like, per_task] : clips)
+    kinds.push_back(fmt::format("{}:{}", name_of(likeness_names(), like), per_task));
+  return fmt::format("{}", fmt::join(kinds, " "));
+}
+
 void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
   auto arguments = std::make_shared<DstarArguments>();
   arguments->run.folder = "runs/policies";
@@ -222,7 +230,7 @@ void add_policy(CLI::App& train_command, Session& session, const std::string& na
       ->add_option_function<std::vector<std::string>>(
           "--clips", [arguments](const std::vector<std::string>& kinds) { arguments->data.clips = clips_of(kinds); },
           "synthesised clips of each task by whose way people have (docs/synthesis.md): rehearsed:N, people:N or both")
-      ->default_str("rehearsed:80 people:400");
+      ->default_str(text_of(arguments->data.clips));
   command->add_option("--mode", arguments->data.pair_mode, "of retargeting: paper, grounded or best")
       ->capture_default_str();
   command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
