@@ -5,7 +5,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/robots/human_body.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_fields.h"
 
 namespace duet {
 namespace {
@@ -20,15 +20,7 @@ constexpr std::array<double, 24> kAdultBones = {0.12, 0.11, 0.11,  0.12,  0.40, 
                                                 0.11, 0.11, 0.29,  0.29,  0.25, 0.25, 0.085, 0.085};
 
 void read_limits(const std::string& file, const YAML::Node& node, HardwareLimits& limits) {
-  std::vector<const char*> known;
-  for (const Field<HardwareLimits>& limit : hardware_limit_fields()) known.push_back(limit.name.c_str());
-  const YamlSection section(file, node, "limits", known);
-  for (const Field<HardwareLimits>& limit : hardware_limit_fields()) {
-    if (!section.has(limit.name.c_str())) continue;
-    const std::string text = section.text(limit.name.c_str());
-    if (const std::string wrong = set_field(limit, limits, text); !wrong.empty())
-      section.fail(section.line(limit.name.c_str()), field_refusal(limit, wrong, text));
-  }
+  read_fields(YamlSection(file, node, "limits", field_keys(hardware_limit_fields())), hardware_limit_fields(), limits);
 }
 
 void read_touches(const YamlSection& top, std::vector<TouchPair>& touches) {
