@@ -28,7 +28,7 @@ PerturbationKind planned(std::string name, std::string meaning, FieldTable<Plan>
 
 // A kind of one value, under a key of its mapping: what the perturbation has of it where it is not clean, `fallback`
 // where the mapping is empty.
-PerturbationKind valued(std::string name, std::string meaning, const Field<Perturbation>& value,
+PerturbationKind valued(const std::string& name, std::string meaning, const Field<Perturbation>& value,
                         const std::string& fallback) {
   PerturbationKind kind{name, std::move(meaning), {{value.name, value.values, fallback, value.meaning}}, {}, {}};
   kind.read = [name, value, fallback](const YamlSection& item, const std::string& file, Perturbation& into) {

@@ -208,6 +208,7 @@ std::vector<DemonstrationClips> clips_of(const std::vector<std::string>& kinds) 
 
 std::string text_of(const std::vector<DemonstrationClips>& clips) {
   std::vector<std::string> kinds;
+  kinds.reserve(clips.size());
   for (const auto& [like, per_task] : clips)
     kinds.push_back(fmt::format("{}:{}", name_of(likeness_names(), like), per_task));
   return fmt::format("{}", fmt::join(kinds, " "));
