@@ -14,7 +14,7 @@ constexpr double kRate = 60.0;
 
 RawPeople two_people() {
   const JointLayout& layout = joint_layout("kinect-25");
-  RawPeople people{.id = "clip", .name = "clip.npz", .layout = &layout};
+  RawPeople people{.id = "clip", .name = "clip.npz", .layout = &layout, .joints = {}};
   for (PointTracks& joints : people.joints) {
     joints = PointTracks(kFrames, static_cast<int>(layout.names.size()));
     for (int t = 0; t < kFrames; ++t) joints.frame(t).setOnes();
