@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <numeric>
 
 #include "duet/bench/suite_names.h"
@@ -25,6 +26,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kInputsSchema = "duet.inputs/1";
 constexpr const char* kIndex = "inputs/inputs.json";
+constexpr const char* kClips = "clips";  // RunInput::of
 
 std::string in(const std::string& folder, const std::string& file) { return (fs::path(folder) / file).string(); }
 
@@ -91,9 +93,9 @@ class Keeper {
     for (std::size_t i = 0; i < files.size(); ++i) {
       const std::string name = fs::path(files[i]).filename().string();
       if (bytes <= kMostClipBytes) {
-        files[i] = copy("clips", "", files[i], fmt::format("inputs/clips/{:04}_{}", i, name));
+        files[i] = copy(kClips, "", files[i], fmt::format("inputs/clips/{:04}_{}", i, name));
       } else {
-        kept_.inputs.push_back({"clips", "", name, sha256_file(files[i]), false});
+        kept_.inputs.push_back({kClips, "", name, sha256_file(files[i]), false});
         files[i] = from_folder(files[i], folder_);
       }
     }
@@ -239,6 +241,41 @@ void find_files(const char* kind, std::vector<Actor>& actors, const std::vector<
   }
 }
 
+// {SHA-256: file} of the files below a folder, or of one file.
+std::map<std::string, std::string> by_digest(const std::string& place) {
+  std::map<std::string, std::string> files;
+  if (fs::is_regular_file(place)) files[sha256_file(place)] = place;
+  if (!fs::is_directory(place)) return files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(place))
+    if (entry.is_regular_file()) files[sha256_file(entry.path().string())] = entry.path().string();
+  return files;
+}
+
+// Each clip that the run does not keep: where the suite names it, else the file below `given` that has its bytes.
+void find_clips(std::vector<std::string>& files, const std::vector<RunInput>& inputs, const std::string& given,
+                const std::string& folder) {
+  std::map<std::string, std::string> found;
+  if (!given.empty() && (found = by_digest(given)).empty())
+    throw InputError(fmt::format("'{}': expected the clips of '{}', found no file", given, folder));
+  std::size_t i = 0;
+  for (const RunInput& input : inputs) {
+    if (input.of != kClips) continue;
+    if (i == files.size())
+      throw InputError(fmt::format("{}: expected {} clips, as suite.yaml names, found more", in(folder, kIndex), i));
+    std::string& file = files[i++];
+    if (input.kept) continue;
+    if (const auto other = found.find(input.sha256); other != found.end()) {
+      file = other->second;
+    } else if (!fs::exists(file)) {
+      throw MissingError(fmt::format(
+          "'{}' is without its clips: expected {} with the SHA-256 {}, found none{}", folder, input.file, input.sha256,
+          given.empty() ? "; say where they are with --clips" : fmt::format(" below '{}'", given)));
+    } else if (const std::string digest = sha256_file(file); digest != input.sha256) {
+      throw InputError(fmt::format("{}: SHA-256 expected {}, found {}", file, input.sha256, digest));
+    }
+  }
+}
+
 template <typename Actor>
 void rebase_actor(Actor& actor, const std::function<void(std::string&)>& rebase) {
   if (actor.use.ends_with(".yaml")) rebase(actor.use);
@@ -293,15 +330,27 @@ void keep_inputs(const KeptSuite& kept, const std::string& folder) {
 
 bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }
 
-Suite suite_of_run(const Run& run, const std::vector<std::string>& skipped_policies,
-                   const std::vector<std::string>& skipped_controllers) {
+Suite suite_of_run(const Run& run, const InputPlaces& places) {
   const std::vector<RunInput> inputs = read_inputs(run.path);
   for (const RunInput& input : inputs)
     if (input.kept) check_kept(input, run.path);
   Suite suite = parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
-  find_files("policy", suite.policies, skipped_policies, inputs, run.path);
-  find_files("controller", suite.controllers, skipped_controllers, inputs, run.path);
+  find_clips(suite.clips.files, inputs, places.clips, run.path);
+  find_files("policy", suite.policies, places.skipped_policies, inputs, run.path);
+  find_files("controller", suite.controllers, places.skipped_controllers, inputs, run.path);
   return suite;
+}
+
+Withheld without_clips(const std::string& run) {
+  Withheld withheld;
+  std::vector<RunInput> inputs = read_inputs(run);
+  for (RunInput& input : inputs) {
+    if (input.of != kClips || !input.kept) continue;
+    withheld.files.insert(input.file);
+    input.kept = false;
+  }
+  if (!withheld.files.empty()) withheld.replaced[kIndex] = to_json(inputs).dump(2) + "\n";
+  return withheld;
 }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/bench/run_identity.h"
+#include "duet/results/published.h"
 #include "duet/results/run_directory.h"
 
 namespace duet {
@@ -47,10 +48,18 @@ std::vector<RunInput> read_inputs(const std::string& folder);
 Suite rebased(Suite suite, const std::string& from, const std::string& to);
 
 // The suite of a run: from its suite.yaml, each network where it is found. Looked at are the place that the suite names
-// or duet's own, the run directory, what ships with duet and $DUET_MODELS. Throws InputError for a file that is not
-// what it was when the run was made, MissingError for one that is not there: which, the SHA-256 expected and found.
-// Policies and controllers in `skipped` are not looked at.
-Suite suite_of_run(const Run& run, const std::vector<std::string>& skipped_policies = {},
-                   const std::vector<std::string>& skipped_controllers = {});
+// or duet's own, the run directory, what ships with duet and $DUET_MODELS. Clips that the run does not keep are looked
+// for where the suite names them, and by what is in them among the files below `clips`. Throws InputError for a file
+// that is not what it was when the run was made, MissingError for one that is not there: which, the SHA-256 expected
+// and found. Policies and controllers in `skipped` are not looked at.
+struct InputPlaces {
+  std::vector<std::string> skipped_policies = {}, skipped_controllers = {};
+  std::string clips = {};  // a folder or one file; empty: nobody gave one
+};
+Suite suite_of_run(const Run& run, const InputPlaces& places = {});
+
+// What is left out where the clips of a run may not be passed on: the files, and an index that has their SHA-256 alone.
+// Empty for a run that keeps no clip.
+Withheld without_clips(const std::string& run);
 
 }  // namespace duet

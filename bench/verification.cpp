@@ -94,7 +94,7 @@ class Verifier {
     const Suite named = parse_suite(run_.info.suite_yaml, run_.path + "/suite.yaml");
     skipped_policies_ = without_rows(run_, policy_names_of(named), &EpisodeRow::policy);
     skipped_controllers_ = without_rows(run_, controller_names_of(named), &EpisodeRow::controller);
-    Suite suite = suite_of_run(run_, skipped_policies_, skipped_controllers_);
+    Suite suite = suite_of_run(run_, {skipped_policies_, skipped_controllers_, options_.clips});
     suite.allow_programs = options_.allow_programs;
     return suite;
   }

@@ -19,6 +19,7 @@ struct VerifyOptions {
   std::uint64_t seed = 1;
   int threads = 1;
   bool allow_programs = false;  // Suite::allow_programs
+  std::string clips = {};       // a folder or file with the clips that the run does not keep
 };
 
 struct RepeatedEpisode {

@@ -54,18 +54,28 @@ nlohmann::json description_of(const Run& run) {
           {"without", {"trace", "feet"}}};
 }
 
-void fill(const std::string& folder, const std::string& source, const Run& run) {
+// Copies what the run keeps of its inputs, but for what is withheld.
+void copy_inputs(const std::string& source, const std::string& folder, const Withheld& withheld) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(in(source, kInputs))) {
+    const std::string name = entry.path().lexically_relative(source).generic_string();
+    if (!entry.is_regular_file() || withheld.files.contains(name)) continue;
+    fs::create_directories(fs::path(in(folder, name)).parent_path());
+    fs::copy_file(entry.path(), in(folder, name));
+  }
+  for (const auto& [name, text] : withheld.replaced) write_file(in(folder, name), text);
+}
+
+void fill(const std::string& folder, const std::string& source, const Run& run, const Withheld& withheld) {
   write_file(in(folder, kRows), lean_rows(run));
   for (const char* name : kFiles)
     if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
-  if (const std::string inputs = in(source, kInputs); fs::exists(inputs))
-    fs::copy(inputs, in(folder, kInputs), fs::copy_options::recursive);
+  if (fs::exists(in(source, kInputs))) copy_inputs(source, folder, withheld);
   write_manifest(folder, description_of(run));
 }
 
 }  // namespace
 
-void publish_run(const std::string& run, const std::string& folder) {
+void publish_run(const std::string& run, const std::string& folder, const Withheld& withheld) {
   if (fs::exists(folder))
     throw InputError(fmt::format("'{}' is there already: what is published stays; choose another folder", folder));
   const Run loaded = load_run(run);
@@ -73,7 +83,7 @@ void publish_run(const std::string& run, const std::string& folder) {
   const std::string partial = fs::path(folder).lexically_normal().string() + ".partial";
   fs::remove_all(partial);
   try {
-    fill(partial, run, loaded);
+    fill(partial, run, loaded, withheld);
     fs::rename(partial, folder);
   } catch (...) {
     std::error_code ignored;

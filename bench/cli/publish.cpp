@@ -3,6 +3,7 @@
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
+#include "duet/bench/run_inputs.h"
 #include "duet/results/published.h"
 #include "duet/results/run_directory.h"
 
@@ -11,12 +12,12 @@ namespace {
 
 struct PublishArguments {
   std::string run, folder;
-  bool partial = false;
+  bool partial = false, without_clips = false;
 };
 
 void run_publish(Session& session, const PublishArguments& arguments) {
   require_whole(open_run(arguments.run), arguments.run, arguments.partial, "publish");
-  publish_run(arguments.run, arguments.folder);
+  publish_run(arguments.run, arguments.folder, arguments.without_clips ? without_clips(arguments.run) : Withheld{});
   const Run run = load_run(arguments.folder);
   const std::vector<std::string> notes = completeness_notes({arguments.folder}, {run});
   print(session,
@@ -38,6 +39,10 @@ void add_publish(CLI::App& app, Session& session) {
   command->add_option("run", arguments->run, "run directory")->required();
   command->add_option("-o,--output", arguments->folder, "folder to make")->required();
   command->add_flag("--partial", arguments->partial, "also a run that lacks episodes that were asked for");
+  command->add_flag(
+      "--without-clips", arguments->without_clips,
+      "leave out the clips, of recordings that may not be passed on: their SHA-256 stand in the index, and "
+      "who has them gives `duet verify --clips DIR`");
   command->callback([&session, arguments] { run_publish(session, *arguments); });
 }
 

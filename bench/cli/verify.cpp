@@ -86,6 +86,11 @@ void add_verify(CLI::App& app, Session& session) {
       ->check(CLI::Range(1, 1000000));
   command->add_flag("--all", arguments->options.all, "run all of them again");
   command->add_option("--seed", arguments->seed, "of the draw (default: another one each time, printed)");
+  command
+      ->add_option(
+          "--clips", arguments->options.clips,
+          "file or folder with the clips, where the run was published without them; they are found by what is in them")
+      ->check(CLI::ExistingPath);
   command->add_flag("--partial", arguments->partial, "episodes may be missing: the run is not finished");
   add_threads(command, arguments->options.threads);
   add_allow_programs(*command, arguments->options.allow_programs);

@@ -137,6 +137,52 @@ TEST_F(KeptRun, KeepsADescriptorWithTheProgramBesideIt) {
   EXPECT_TRUE(fs::exists(scratch_ / ("run/" + place + "duet_policy.py")));  // which it imports
 }
 
+// Recordings that may not be passed on: others read the rows, and who has the recordings repeats them.
+class PublishedWithoutClips : public KeptRun {
+ protected:
+  void SetUp() override {
+    KeptRun::SetUp();
+    make_run(load_suite(scratch_ / "here/suite.yaml"), scratch_ / "run");
+    publish_run(scratch_ / "run", scratch_ / "published", without_clips(scratch_ / "run"));
+    fs::copy(scratch_ / "here/mine.safetensors", scratch_ / "published/mine.safetensors");
+    fs::create_directories(scratch_ / "elsewhere/below");
+    fs::copy(scratch_ / "here/wave.npz", scratch_ / "elsewhere/renamed.npz");
+    fs::rename(scratch_ / "here/shake.npz", scratch_ / "elsewhere/below/shake.npz");
+    fs::remove_all(scratch_ / "here");
+    fs::remove_all(scratch_ / "run");
+  }
+};
+
+TEST_F(PublishedWithoutClips, HasItsRowsAndNoClip) {
+  EXPECT_FALSE(fs::exists(scratch_ / "published/inputs/clips"));
+  EXPECT_TRUE(fs::exists(scratch_ / "published/inputs/contact_limits.yaml"));
+  EXPECT_FALSE(load_run(scratch_ / "published").rows.empty());
+  for (const RunInput& input : read_inputs(scratch_ / "published")) EXPECT_EQ(input.kept, input.of == "contact_limits");
+}
+
+TEST_F(PublishedWithoutClips, IsRepeatedByWhoHasThem) {
+  EXPECT_EQ(objection(scratch_ / "published", scratch_ / "elsewhere"), "");
+}
+
+TEST_F(PublishedWithoutClips, SaysWhichClipIsMissing) {
+  const std::string digest = sha256_file(scratch_ / "elsewhere/renamed.npz");
+  EXPECT_THAT(objection(scratch_ / "published"),
+              AllOf(HasSubstr("is without its clips: expected inputs/clips/0000_wave.npz with the SHA-256 " + digest),
+                    HasSubstr("found none; say where they are with --clips")));
+  write_file(scratch_ / "elsewhere/renamed.npz", "another clip");
+  EXPECT_THAT(objection(scratch_ / "published", scratch_ / "elsewhere"),
+              AllOf(HasSubstr(digest), HasSubstr("found none below '" + (scratch_ / "elsewhere") + "'")));
+  fs::create_directories(scratch_ / "empty");
+  EXPECT_THAT(objection(scratch_ / "published", scratch_ / "empty"), HasSubstr("empty': expected the clips of"));
+}
+
+TEST_F(PublishedWithoutClips, AnotherClipInItsPlaceIsRefused) {
+  write_file(scratch_ / "published/inputs/clips/0000_wave.npz", "another clip");
+  EXPECT_THAT(objection(scratch_ / "published"),
+              AllOf(HasSubstr("0000_wave.npz: SHA-256 expected " + sha256_file(scratch_ / "elsewhere/renamed.npz")),
+                    HasSubstr("found " + sha256_hex("another clip"))));
+}
+
 TEST_F(KeptRun, AnotherNetworkUnderOneNameIsNotResumed) {
   const Suite suite = load_suite(scratch_ / "here/suite.yaml");
   make_run(suite, scratch_ / "run");

@@ -12,10 +12,10 @@
 namespace duet::test {
 
 // One sentence of what `duet verify --all` has against a run; "" where it has nothing.
-inline std::string objection(const std::string& folder) {
+inline std::string objection(const std::string& folder, const std::string& clips = "") {
   Progress quiet(Progress::Style::kQuiet);
   try {
-    const Verification found = verify_run(load_run(folder), {.all = true, .threads = 2}, quiet);
+    const Verification found = verify_run(load_run(folder), {.all = true, .threads = 2, .clips = clips}, quiet);
     if (!found.faults.empty()) return found.faults.front();
     if (!found.missing.empty()) return found.missing.front();
     for (const RepeatedEpisode& repeat : found.repeats)
