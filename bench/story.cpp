@@ -137,6 +137,8 @@ ReportContent report_content(const Run& run, bool with_clips, const std::vector<
   content.walking = walk_table(rows);
   content.people = people_table(rows);
   content.levels = level_tables(rows);
+  content.board = board(rows, content.entries, *content.cross_engine, content.contacts);
+  content.episodes = rows;
   if (!with_clips || !suite.references.empty()) return content;
 
   const auto robot = load_shared_robot(suite.robot);

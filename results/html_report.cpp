@@ -14,8 +14,10 @@
 namespace duet {
 namespace {
 
+// Open: what a reader looks at first; the others fold.
 struct Section {
   std::string id, title, body;
+  bool open = false;
 };
 
 std::string text_at(const nlohmann::json& json, std::initializer_list<const char*> keys) {
@@ -36,10 +38,12 @@ std::string header_html(const ReportContent& content) {
                            commit.empty() ? "" : fmt::format(" ({})", commit.substr(0, 10)));
   }
   if (!machine.empty()) html += fmt::format(R"(<p class="machine">{}</p>)", escape_html(machine));
+  html += verdict_html(content.board);
   if (!content.notes.empty()) {
-    html += R"(<ul class="notes">)";
+    html += fmt::format(R"(<details class="notes"{}><summary>What the figures are: {} notes</summary><ul>)",
+                        content.board.rows.empty() ? " open" : "", content.notes.size());
     for (const std::string& note : content.notes) html += fmt::format("<li>{}</li>", escape_html(note));
-    html += "</ul>";
+    html += "</ul></details>";
   }
   return html + "</header>\n";
 }
@@ -97,36 +101,52 @@ std::string navigation(const std::vector<Section>& sections) {
 
 }  // namespace
 
-std::string html_report(const ReportContent& content) {
+namespace {
+
+std::vector<Section> sections_of(const ReportContent& content) {
   std::vector<Section> sections;
-  const auto add = [&](const char* id, const char* title, std::string body) {
-    if (!body.empty()) sections.push_back({id, title, std::move(body)});
+  const auto add = [&](const char* id, const char* title, std::string body, bool open = false) {
+    if (!body.empty()) sections.push_back({id, title, std::move(body), open});
   };
-  add("leaderboard", "Leaderboard", leaderboard_section(content));
-  add("people", "Recorded and synthetic people", people_html(content.people));
-  add("levels", "Levels", levels_html(content.levels));
+  add("board", "Board", board_html(content.board), true);
+  add("walking", "Walking by command", walking_html(content.walking), true);
+  add("tasks", "Tasks", task_map_html(content.board, content.entries), true);
+  add("replays", "Replays", replays_html(content.replays), true);
+  add("episodes", "Episodes", episodes_html(content.episodes, content.replays));
+  add("engines", "Across engines", cross_engine_html(content));
+  add("controllers", "Controllers", controllers_html(content));
   add("policies", "Policies", policies_html(content.policies.policies));
   add("perturbations", "Perturbations", degradation_html(content.policies.degradation));
   add("reactivity", "Reactivity", reactivity_html(content.policies.reactivity));
-  add("controllers", "Controllers", controllers_html(content));
-  add("engines", "Across engines", cross_engine_html(content));
-  add("walking", "Walking by command", walking_html(content.walking));
   add("contacts", "Contact with people", contacts_html(content.contacts));
+  add("people", "Recorded and synthetic people", people_html(content.people));
+  add("levels", "Levels", levels_html(content.levels));
+  add("leaderboard", "Every engine and task", leaderboard_section(content), content.board.rows.empty());
   add("retargeting", "Retargeting", retargeting_html(content));
   add("clips", "Clips", stories_section(content));
   add("training", "Training", training_html(content));
   add("environment", "Environment", environment_section(content));
+  return sections;
+}
+
+std::string section_html(const Section& section) {
+  return fmt::format(
+      "<section id=\"{0}\" aria-labelledby=\"{0}-title\"><details class=\"fold\"{1}><summary><h2 "
+      "id=\"{0}-title\">{2}</h2></summary>\n{3}</details></section>\n",
+      section.id, section.open ? " open" : "", section.title, section.body);
+}
+
+}  // namespace
+
+std::string html_report(const ReportContent& content) {
+  const std::vector<Section> sections = sections_of(content);
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
       "<meta name=\"color-scheme\" content=\"light dark\"><title>{}</title>\n<style>{}</style></head>\n<body>",
       escape_html(content.title), report_style());
   html += header_html(content) + navigation(sections) + "<main>\n";
-  for (const Section& section : sections) {
-    html +=
-        fmt::format("<section id=\"{0}\" aria-labelledby=\"{0}-title\"><h2 id=\"{0}-title\">{1}</h2>\n{2}</section>\n",
-                    section.id, section.title, section.body);
-  }
+  for (const Section& section : sections) html += section_html(section);
   return html + fmt::format("</main>\n<script>{}</script>\n</body></html>\n", report_script());
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "duet/results/board.h"
 #include "duet/results/contact_table.h"
 #include "duet/results/controller_table.h"
 #include "duet/results/cross_engine.h"
@@ -37,8 +38,17 @@ struct ClipStory {  // one retargeted clip or rolled-out episode
   std::map<std::string, std::vector<double>> loss;  // term -> value per iteration
   std::map<std::string, double> metrics;            // catalogue names
 };
+// A clip that a replay page shows.
+struct ReportReplay {
+  std::string file, scene, name;  // address of the page as seen from the report, "hug/hug_000/0/clean", "Hug, hug_000"
+  int successes = 0, judged = 0;  // of the main arm
+  std::vector<std::string> keys;  // of its episodes
+};
 struct ReportContent {
   std::string title;
+  Board board;                        // the first screen
+  std::vector<EpisodeRow> episodes;   // section "Episodes"
+  std::vector<ReportReplay> replays;  // in that section
   nlohmann::json environment;
   std::vector<std::string> notes;  // options and caveats printed with the tables
   std::vector<LeaderboardEntry> entries;

@@ -15,6 +15,16 @@ struct TitledTable;  // results/cross_engine_tables.h
 std::string_view report_style();
 std::string_view report_script();
 
+// The first screen; "" for a board without rows.
+std::string verdict_html(const Board& board);
+std::string board_html(const Board& board);
+// Success by task (columns) and combination, in the board's order.
+std::string task_map_html(const Board& board, const std::vector<LeaderboardEntry>& entries);
+
+// "" where there are none.
+std::string replays_html(const std::vector<ReportReplay>& replays);
+std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays);
+
 // A table cell's drawing: the interval as a bar on [0, 1], the rate as a dot, the null arm (NaN: none) as a tick.
 std::string interval_bar_svg(double rate, const Interval& interval, double null_rate, int width_px);
 

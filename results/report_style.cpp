@@ -16,15 +16,48 @@ html{scroll-behavior:smooth}
 body{margin:0;background:var(--bg);color:var(--ink);font:15px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",
 "Noto Sans","Liberation Sans",Arial,sans-serif}
 main,header,nav ul{max-width:1360px;margin:0 auto;padding:0 28px}
-header{padding-top:36px;padding-bottom:18px}
-h1{font-size:30px;line-height:1.2;margin:0 0 6px;letter-spacing:-.01em}
+header{padding-top:22px;padding-bottom:12px}
+h1{font-size:17px;color:var(--soft);line-height:1.2;margin:0 0 6px;letter-spacing:-.01em}
 h2{font-size:21px;margin:44px 0 8px;padding-top:8px}
 h3{font-size:16px;margin:26px 0 6px}
 section>p{font-size:14px;color:var(--soft)}
 p{margin:6px 0;max-width:86ch}
 .machine{color:var(--soft);font-size:14px}
-.notes{margin:14px 0 0;padding:10px 16px 10px 34px;background:var(--faint);border-left:3px solid var(--line);max-width:100ch;
-font-size:14px}
+.answer{margin:10px 0 4px}
+.answer p{font-size:16px;margin:4px 0;max-width:92ch}
+.answer .first{font-size:21px;line-height:1.35;font-weight:600;max-width:70ch}
+.notes{margin:10px 0 0;max-width:100ch;font-size:14px}
+.notes ul{margin:6px 0;padding-left:20px}
+details.fold{border:0;background:none;padding:0;margin:0;border-top:1px solid var(--line)}
+details.fold>summary{padding:10px 0;list-style-position:outside}
+details.fold>summary h2{display:inline;margin:0;padding:0;font-size:19px}
+details.fold[open]{padding-bottom:14px}
+.ranked td,.ranked th{padding:6px 10px}
+.ranked .ci{white-space:normal;font-weight:400}
+.rate.big{font-size:18px}
+.rank{color:var(--soft)}
+.axis{display:block;max-width:none}
+.axis .g{stroke:var(--line)}
+.axis .b,.legend .b{fill:var(--bar);opacity:.16}
+.axis .m,.legend .m{stroke:var(--bar);stroke-width:2}
+.axis .null,.legend .null{stroke:var(--null);stroke-width:2.4;stroke-dasharray:3 2}
+.e1{fill:var(--t1)}.e2{fill:var(--t2)}.e3{fill:var(--t3)}.e4{fill:var(--t4)}.e5{fill:var(--t5)}.e6{fill:var(--t6)}.e7{fill:var(--t7)}
+.e8{fill:var(--t8)}
+.map td{text-align:center;min-width:74px;font-weight:600}
+.map td a{color:inherit;text-decoration:none;display:block}
+.map td a:hover,.map td a:focus{text-decoration:underline}
+.h0{background:#8882}
+.h1{background:rgb(0 114 178/.08)}.h2{background:rgb(0 114 178/.13)}.h3{background:rgb(0 114 178/.18)}.h4{background:rgb(0 114 178/.23)}
+.h5{background:rgb(0 114 178/.28)}.h6{background:rgb(0 114 178/.32)}.h7{background:rgb(0 114 178/.36)}.h8{background:rgb(0 114 178/.4)}
+.h9{background:rgb(0 114 178/.45)}
+.replays{list-style:none;padding:0;display:flex;flex-wrap:wrap;gap:8px 12px;margin:8px 0}
+.replays li{border:1px solid var(--line);border-radius:6px;background:var(--panel);padding:6px 12px}
+.tall{max-height:620px;overflow:auto}
+.tall thead th{position:sticky;top:0;background:var(--panel);z-index:1}
+.rows td{text-align:left;white-space:nowrap}
+.rows td:last-child{font-family:ui-monospace,"DejaVu Sans Mono",monospace;font-size:12px}
+.finder{display:flex;flex-wrap:wrap;gap:8px;align-items:center;margin:8px 0;font-size:14px}
+.finder input,.finder select{font:inherit;padding:4px 8px;border:1px solid var(--line);border-radius:6px;background:var(--panel);color:var(--ink);max-width:200px}
 nav{position:sticky;top:0;z-index:2;background:var(--bg);border-bottom:1px solid var(--line)}
 nav ul{display:flex;gap:22px;list-style:none;padding-top:8px;padding-bottom:8px;font-size:14px;flex-wrap:wrap}
 a{color:var(--robot)}
@@ -118,13 +151,22 @@ footer{max-width:1360px;margin:40px auto 30px;padding:0 28px;color:var(--soft);f
 [hidden]{display:none!important}
 @media(max-width:600px){main,header,nav ul{padding-left:12px;padding-right:12px}
 .context{display:none}.where{display:block}
-.sortable tbody th{position:sticky;left:0;background:var(--panel)}}
-@media print{nav,.filter{display:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
+.sortable tbody th{position:sticky;left:0;background:var(--panel)}
+.ranked thead{display:none}
+.ranked tr{display:grid;grid-template-columns:26px 1fr auto;border-top:1px solid var(--line);padding:8px 0 6px}
+.ranked td,.ranked th{border:0;padding:2px 8px;text-align:left!important;position:static!important}
+.ranked .plotcell{grid-column:1/4;grid-row:2}
+.ranked td:nth-child(n+5){grid-row:3;font-size:12px}
+.ranked td:nth-child(5)::before{content:"null "}.ranked td:nth-child(6)::before{content:"fell "}.ranked td:nth-child(7){display:none}
+.ranked td:nth-child(8){grid-column:3}
+.ranked .axis{width:100%;height:auto}.answer .first{font-size:18px}nav ul{gap:12px}}
+@media print{nav,.filter,.finder{display:none}.tall{max-height:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
 main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}
 )css";
 }
 
-// Sorting of tables, the filter of clips, open details on paper. Without a script everything is shown.
+// Sorting of tables, filters and search of episodes and clips, folds that open for what leads into them and on paper.
+// Without a script everything is there.
 std::string_view report_script() {
   return R"js(
 document.querySelectorAll('table.sortable th button').forEach(function(button){
@@ -147,6 +189,44 @@ document.querySelectorAll('.filter').forEach(function(bar){
       clip.hidden=chosen.dataset.task!==''&&clip.dataset.task!==chosen.dataset.task});
   });
 });
+function unfold(id){
+  var at=document.getElementById(id),fold=at&&at.querySelector('details.fold');
+  if(fold)fold.open=true;
+}
+addEventListener('hashchange',function(){unfold(location.hash.slice(1))});
+unfold(location.hash.slice(1));
+document.querySelectorAll('a[href^="#"]').forEach(function(a){a.addEventListener('click',function(){unfold(a.getAttribute('href').slice(1))})});
+(function(){
+  var table=document.querySelector('table.rows');if(!table)return;
+  var rows=Array.from(table.tBodies[0].rows),bar=document.createElement('div'),count=document.createElement('span'),selects={};
+  bar.className='finder';
+  var search=document.createElement('input');
+  search.type='search';search.placeholder='search';search.setAttribute('aria-label','Search episodes');bar.append(search);
+  Array.from(table.tHead.rows[0].cells).forEach(function(th,i){
+    var name=th.textContent,values=new Set(rows.map(function(r){return r.cells[i].textContent}));
+    if(name==='Clip'||name==='Key'||values.size<2)return;
+    var select=document.createElement('select');select.setAttribute('aria-label',name);
+    [''].concat(Array.from(values).sort()).forEach(function(v){var o=document.createElement('option');o.value=v;o.textContent=v||name+': all';select.append(o)});
+    selects[name]={select:select,column:i};select.addEventListener('change',show);bar.append(select);
+  });
+  function show(){
+    var n=0,text=search.value.toLowerCase(),on=Object.values(selects).filter(function(s){return s.select.value!==''});
+    rows.forEach(function(r){
+      var fits=on.every(function(s){return r.cells[s.column].textContent===s.select.value})&&(text===''||r.textContent.toLowerCase().indexOf(text)>=0);
+      r.hidden=!fits;if(fits)n++});
+    count.textContent=n+' of '+rows.length;
+  }
+  search.addEventListener('input',show);
+  count.setAttribute('role','status');bar.append(count);
+  table.closest('.scroll').before(bar);show();
+  document.querySelectorAll('a[data-controller]').forEach(function(a){
+    a.addEventListener('click',function(){
+      var want={Controller:a.dataset.controller,Policy:a.dataset.policy,Perturbation:a.dataset.perturbation,Task:a.dataset.task};
+      Object.keys(selects).forEach(function(name){selects[name].select.value=want[name]||''});
+      search.value='';show();
+    });
+  });
+})();
 addEventListener('beforeprint',function(){document.querySelectorAll('details').forEach(function(d){d.open=true})});
 )js";
 }

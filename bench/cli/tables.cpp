@@ -11,9 +11,14 @@
 namespace duet::cli {
 
 Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate) {
-  return {.leaderboard = leaderboard(rows),
-          .engines = across_engines(rows),
-          .contacts = contact_table(rows),
+  std::vector<LeaderboardEntry> entries = leaderboard(rows);
+  CrossEngine engines = across_engines(rows);
+  ContactTable contacts = contact_table(rows);
+  Board first = board(rows, entries, engines, contacts);
+  return {.board = std::move(first),
+          .leaderboard = std::move(entries),
+          .engines = std::move(engines),
+          .contacts = std::move(contacts),
           .controllers = controller_table(rows),
           .walking = walk_table(rows),
           .people = people_table(rows),
@@ -24,7 +29,9 @@ Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& ce
 std::string tables_text(const Tables& tables) {
   const std::string levels = levels_markdown(tables.levels);
   if (tables.has_walking()) return levels + (levels.empty() ? "" : "\n") + walk_table_markdown(tables.walking);
-  std::vector<std::string> parts = {leaderboard_markdown(tables.leaderboard, !tables.has_engines())};
+  std::vector<std::string> parts;
+  if (!tables.board.rows.empty()) parts.push_back(board_markdown(tables.board));
+  parts.push_back(leaderboard_markdown(tables.leaderboard, !tables.has_engines()));
   if (tables.has_people()) parts.push_back(people_table_markdown(tables.people));
   if (tables.has_levels()) parts.push_back(levels);
   if (tables.has_controllers()) parts.push_back(controller_table_markdown(tables.controllers));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/results/board.h"
 #include "duet/results/contact_table.h"
 #include "duet/results/controller_table.h"
 #include "duet/results/cross_engine.h"
@@ -16,6 +17,7 @@
 namespace duet::cli {
 
 struct Tables {
+  Board board;
   std::vector<LeaderboardEntry> leaderboard;
   CrossEngine engines;
   ContactTable contacts;
@@ -35,8 +37,9 @@ struct Tables {
 
 Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& certificate);
 
-// Markdown for a terminal: where robots walk by command how they do, and nothing of acts; else, with several engines
-// the metrics of each are left to the files; their drift is shown.
+// Markdown for a terminal, in the order of the HTML report: the verdict and the board first. Where robots walk by
+// command how they do, and nothing of acts; else, with several engines the metrics of each are left to the files; their
+// drift is shown.
 std::string tables_text(const Tables& tables);
 // "leaderboard", and where there are any "people", "levels", "engines", "contacts" and "controllers", added to `json`.
 void add_tables(const Tables& tables, nlohmann::json& json);
