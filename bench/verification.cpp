@@ -89,6 +89,23 @@ class Verifier {
     return std::move(result_);
   }
 
+  std::map<std::string, std::string> record(const std::vector<std::string>& keys, const std::string& folder) {
+    suite_.record = RecordTrajectories::kAll;  // only now: it is in the suite's hash
+    std::vector<std::string> hashes(keys.size());
+    progress_.start("running again", static_cast<int>(keys.size()), "episodes");
+    parallel_for_each(static_cast<int>(keys.size()), options_.threads, [&](int i) {
+      const auto place = place_.find(keys[i]);
+      if (place == place_.end())
+        throw InputError(fmt::format("'{}': episode {:.16} is no episode of its suite", run_.path, keys[i]));
+      hashes[i] = run_planned(plan_[place->second], folder).state_hash;
+      progress_.advance();
+    });
+    progress_.finish();
+    std::map<std::string, std::string> by_key;
+    for (std::size_t i = 0; i < keys.size(); ++i) by_key[keys[i]] = hashes[i];
+    return by_key;
+  }
+
  private:
   Suite read_suite() {
     const Suite named = parse_suite(run_.info.suite_yaml, run_.path + "/suite.yaml");
@@ -206,15 +223,21 @@ class Verifier {
   }
 
   [[nodiscard]] RepeatedEpisode repeated(const EpisodeRow& row, bool with_traces) const {
-    const EpisodeSpec& spec = plan_[place_.at(row.key)];
-    const PolicyOnBody& policy = bodies_.policy(spec.controller, spec.policy);
-    if (!policy.refusal.empty()) throw MissingError(policy.refusal);
-    EpisodeRow now = run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), "", policy.make);
+    EpisodeRow now = run_planned(plan_[place_.at(row.key)], "");
     if (!with_traces) {
       now.trace = {};
       now.feet = {};
     }
     return {row, now.state_hash, row_differences(row, now)};
+  }
+
+  [[nodiscard]] EpisodeRow run_planned(const EpisodeSpec& spec, const std::string& folder) const {
+    if (!can_run_in(spec.engine)) throw MissingError(fmt::format("engine '{}' is not on this machine", spec.engine));
+    if (const auto absent = bodies_.absent().find(spec.controller); absent != bodies_.absent().end())
+      throw MissingError(absent->second);
+    const PolicyOnBody& policy = bodies_.policy(spec.controller, spec.policy);
+    if (!policy.refusal.empty()) throw MissingError(policy.refusal);
+    return run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), folder, policy.make);
   }
 
   const Run& run_;
@@ -240,6 +263,12 @@ int Verification::different() const {
 Verification verify_run(const Run& run, const VerifyOptions& options, Progress& progress) {
   if (run.rows.empty()) throw InputError(fmt::format("'{}' has no episode to run again", run.path));
   return Verifier(run, options, progress).verify();
+}
+
+std::map<std::string, std::string> record_again(const Run& run, const std::vector<std::string>& keys,
+                                                const std::string& folder, const VerifyOptions& options,
+                                                Progress& progress) {
+  return Verifier(run, options, progress).record(keys, folder);
 }
 
 std::string other_machine_sentence(const nlohmann::json& environment, const std::string& here) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -43,5 +44,12 @@ std::string other_machine_sentence(const nlohmann::json& environment, const std:
 // Throws InputError where the run's inputs, suite, detectors, policies or controllers are not what run.json says or not
 // what this machine has (which, expected, found), MissingError for a network that is not there.
 Verification verify_run(const Run& run, const VerifyOptions& options, Progress& progress);
+
+// Runs these episodes of the run again and keeps their recordings in `folder`, as `record.trajectories` does; the hash
+// of their states by key. Throws as verify_run, and MissingError for an episode that this machine cannot run,
+// InputError for one that its suite does not plan.
+std::map<std::string, std::string> record_again(const Run& run, const std::vector<std::string>& keys,
+                                                const std::string& folder, const VerifyOptions& options,
+                                                Progress& progress);
 
 }  // namespace duet

@@ -1,6 +1,7 @@
 #include "duet/bench/cli/command.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cstdio>
 
@@ -30,6 +31,10 @@ void print(const Session& session, const std::string& text, const nlohmann::json
 
 void note(const Session& session, const std::string& text) {
   if (!session.quiet) print_error(printable(text) + "\n");
+}
+
+void suggest_next(const Session& session, const std::string& command) {
+  if (!session.json && isatty(STDERR_FILENO) != 0) note(session, "next: " + command);
 }
 
 void warn(const std::string& text) { print_error(fmt::format("duet: warning: {}\n", printable(text))); }

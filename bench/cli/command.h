@@ -41,6 +41,9 @@ void print(const Session& session, const std::string& text, const nlohmann::json
 // A message for the person, on standard error, unless quiet.
 void note(const Session& session, const std::string& text);
 
+// "next: duet report runs/core", on standard error where a person reads it: a terminal, and neither --quiet nor --json.
+void suggest_next(const Session& session, const std::string& command);
+
 // The option --allow-programs (docs/trust.md).
 void add_allow_programs(CLI::App& command, bool& allowed);
 
@@ -69,6 +72,7 @@ void add_dataset(CLI::App& app, Session& session);  // `dataset inspect`, `curat
 void add_score(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_report(CLI::App& app, Session& session);
+void add_replay(CLI::App& app, Session& session);
 void add_compare(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);

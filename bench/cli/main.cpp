@@ -103,6 +103,7 @@ int main(int argc, char** argv) {
   add_bench(app, session);
   add_train(app, session);
   add_hardware(app, session);
+  add_replay(app, session);
   add_replay_log(app, session);
   add_completion(app, session);
   return run_command(app, argc, argv, session);

@@ -7,6 +7,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/cli/tables.h"
+#include "duet/bench/replay/report_replays.h"
 #include "duet/bench/story.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
@@ -28,6 +29,17 @@ struct ReportArguments {
   std::vector<std::string> runs, formats = {"md", "html"}, curves;
   std::string output;
   bool no_clips = false;
+  ReplayChoice replays{.episodes = {},
+                       .engines = {},
+                       .controllers = {},
+                       .policies = {},
+                       .perturbations = {},
+                       .tasks = {},
+                       .scenes = 0,
+                       .run_again = false,
+                       .allow_programs = false,
+                       .card = {},
+                       .threads = 1};
   double min_effect = 0.0;  // [points]; 0: none is claimed
   int threads = default_threads();
 };
@@ -60,10 +72,31 @@ void write_leaderboard(const std::string& format, const std::vector<LeaderboardE
   if (format == "tex") write("leaderboard.tex", leaderboard_latex(entries), format);
 }
 
+// Pages beside the report; a viewer that is not there is named, and the report does without them.
+std::vector<ReportReplay> replays_of(const Run& run, const ReportArguments& arguments, const Writer& write,
+                                     std::vector<std::string>& notes, Progress& progress) {
+  if (arguments.replays.scenes == 0) return {};
+  if (arguments.runs.size() > 1) {
+    notes.emplace_back("Replays are made of one run; this report is of several (duet replay RUN).");
+    return {};
+  }
+  try {
+    ReplayChoice choice = arguments.replays;
+    choice.threads = arguments.threads;
+    return report_replays(
+        run, choice, load_viewer(),
+        [&](const std::string& name, const std::string& text) { write(name, text, "html"); }, progress);
+  } catch (const MissingError& error) {
+    notes.push_back(fmt::format("There are no replays: {}.", error.what()));
+    return {};
+  }
+}
+
 std::string html_text(const Run& run, const std::vector<std::string>& notes, const PolicyReport& policies,
-                      const ReportArguments& arguments, Progress& progress) {
+                      std::vector<ReportReplay> replays, const ReportArguments& arguments, Progress& progress) {
   ReportContent content = report_content(run, !arguments.no_clips, arguments.curves, arguments.threads, progress);
   content.policies = policies;
+  content.replays = std::move(replays);
   content.notes.insert(content.notes.begin(), notes.begin(), notes.end());
   return html_report(content);
 }
@@ -137,7 +170,11 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   };
   for (const std::string& format : arguments.formats) {
     write_leaderboard(format, tables.leaderboard, write);
-    if (format == "html") write("report.html", html_text(run, notes, policies, arguments, progress), format);
+    if (format == "html") {
+      std::vector<std::string> own = notes;
+      std::vector<ReportReplay> replays = replays_of(run, arguments, write, own, progress);
+      write("report.html", html_text(run, own, policies, std::move(replays), arguments, progress), format);
+    }
     if (format == "sqlite") {
       write_database(run.rows, inside(folder, "results.sqlite"), notes);
       wrote(inside(folder, "results.sqlite"));
@@ -148,6 +185,8 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   add_tables(tables, json);
   add_policy_report(policies, json);
   print(session, with_notes("md", tables_text(tables) + policy_report_text(policies), notes), json);
+  if (arguments.replays.scenes == 0)
+    suggest_next(session, fmt::format("duet replay {} -o {}/replay.html", arguments.runs.front(), folder));
 }
 
 }  // namespace
@@ -166,8 +205,15 @@ void add_report(CLI::App& app, Session& session) {
       ->add_option("--min-effect", arguments->min_effect,
                    "a difference that is claimed [points]: says which arms are too small for it, and what they need")
       ->check(CLI::Range(0.1, 99.0));
+  command
+      ->add_option(
+          "--replays", arguments->replays.scenes,
+          "clips to show in 3-D, where engines and policies agree least (`duet replay`); runs them again where "
+          "the run has kept no recording")
+      ->check(CLI::Range(1, 1000));
   command->add_flag("--no-clips", arguments->no_clips, "HTML without the clips' key frames and loss curves");
   add_threads(command, arguments->threads);
+  add_allow_programs(*command, arguments->replays.allow_programs);
   command->callback([&session, arguments] { run_report(session, *arguments); });
 }
 

@@ -1,0 +1,192 @@
+#include "duet/bench/replay/replay_source.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "duet/bench/verification.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
+#include "duet/robots/robot_cards.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Gone with its owner.
+class ScratchFolder {
+ public:
+  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("duet-replay-{}", getpid())) {
+    fs::create_directories(path_);
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  [[nodiscard]] std::string path() const { return path_.string(); }
+
+ private:
+  fs::path path_;
+};
+
+std::string recording_file(const std::string& folder, const EpisodeRow& row) {
+  return (fs::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
+}
+
+// An episode that never began has none.
+bool has_motion(const EpisodeRow& row) {
+  return row.frames > 0 && row.outcome != Outcome::kUnsupported && row.outcome != Outcome::kError;
+}
+
+std::shared_ptr<const RobotModel> robot_for(const std::string& digest, const std::string& card,
+                                            const std::string& what) {
+  if (!card.empty()) return load_shared_robot(card);
+  if (std::shared_ptr<const RobotModel> robot = robot_of_digest(digest)) return robot;
+  throw InputError(
+      fmt::format("{}: expected the robot card of digest {:.8}, which no card of this machine has; --card "
+                  "names one",
+                  what, digest));
+}
+
+void check_fit(const Recording& recording, const RobotModel& robot, const std::string& what) {
+  for (const RobotState& state : recording.robot)
+    if (state.q.size() != robot.dof())
+      throw InputError(
+          fmt::format("{}: expected the {} joints of '{}', found {}", what, robot.dof(), robot.name, state.q.size()));
+}
+
+std::string track_name(const EpisodeRow& row) {
+  const std::string policy = row.arm == "main"   ? row.policy
+                             : row.arm == "null" ? "null arm"
+                                                 : row.policy + ", shuffled";
+  return fmt::format("{} · {} · {}", row.engine, row.controller, policy);
+}
+
+ReplayTrack track_of(const EpisodeRow& row, const std::string& file, const ReplayChoice& choice) {
+  EpisodeRecording episode = read_episode_recording(Npz::load(file));
+  ReplayTrack track;
+  track.recording = std::move(episode.recording);
+  track.kept = episode.kept ? std::move(episode.kept) : KeptEpisode{row, {}, {}};
+  track.kept->row = row;
+  track.robot = robot_for(row.robot_digest, choice.card, fmt::format("episode {:.16}", row.key));
+  check_fit(track.recording, *track.robot, fmt::format("'{}'", file));
+  track.name = track_name(row);
+  return track;
+}
+
+void count(const ReplayTrack& track, ReplayScene& scene) {
+  if (!track.kept || track.kept->row.arm != "main" || !track.kept->row.success) return;
+  ++scene.judged;
+  scene.successes += *track.kept->row.success ? 1 : 0;
+}
+
+// What has to be run again, in a folder of its own.
+std::map<std::string, std::string> repeated_hashes(const Run& run, const ChosenRows& chosen, const ReplayChoice& choice,
+                                                   const std::string& folder, Progress& progress) {
+  std::vector<std::string> keys;
+  for (const ChosenScene& scene : chosen.scenes)
+    for (const EpisodeRow* row : scene.rows)
+      if (has_motion(*row) && (choice.run_again || !fs::exists(recording_file(run.path + "/trajectories", *row))))
+        keys.push_back(row->key);
+  if (keys.empty()) return {};
+  VerifyOptions options;
+  options.threads = choice.threads;
+  options.allow_programs = choice.allow_programs;
+  return record_again(run, keys, folder, options, progress);
+}
+
+ReplayScene scene_of(const Run& run, const ChosenScene& chosen, const ReplayChoice& choice, const std::string& scratch,
+                     const std::map<std::string, std::string>& hashes, std::vector<std::string>& notes) {
+  ReplayScene scene;
+  const EpisodeRow& first = *chosen.rows.front();
+  scene.id = chosen.id;
+  scene.name = first.clip;
+  scene.task = first.task;
+  scene.perturbation = first.perturbation;
+  for (const EpisodeRow* row : chosen.rows) {
+    const auto repeat = hashes.find(row->key);
+    const bool again = repeat != hashes.end();
+    const std::string file = recording_file(again ? scratch : run.path + "/trajectories", *row);
+    if (!has_motion(*row) || !fs::exists(file)) {
+      notes.push_back(fmt::format("{}, {}: {}, so there is no motion to show.", scene.id, track_name(*row),
+                                  row->message.empty() ? std::string(to_string(row->outcome)) : row->message));
+      continue;
+    }
+    ReplayTrack& track = scene.tracks.emplace_back(track_of(*row, file, choice));
+    track.repeat = fmt::format("duet replay {} --episodes {:.16} --run-again", run.path, row->key);
+    track.origin = !again                              ? "kept by the run"
+                   : repeat->second == row->state_hash ? "run again: the same states, bit for bit"
+                                                       : "run again: NOT the states that the run had";
+    count(track, scene);
+  }
+  return scene;
+}
+
+ReplayTrack track_of_file(const std::string& file, const std::string& card) {
+  EpisodeRecording episode = read_episode_recording(Npz::load(file));
+  ReplayTrack track;
+  track.recording = std::move(episode.recording);
+  track.kept = std::move(episode.kept);
+  track.robot =
+      track.kept ? robot_for(track.kept->row.robot_digest, card, fmt::format("'{}'", file)) : load_shared_robot(card);
+  check_fit(track.recording, *track.robot, fmt::format("'{}'", file));
+  const std::string stem = fs::path(file).stem().string();
+  track.name = track.kept ? track_name(track.kept->row) : stem;
+  track.origin = "read from " + file;
+  return track;
+}
+
+}  // namespace
+
+double ReplayScene::disagreement() const {
+  return judged == 0 ? 0.0 : static_cast<double>(std::min(successes, judged - successes)) / judged;
+}
+
+ReplayContent replay_of_run(const Run& run, const ReplayChoice& choice, Progress& progress) {
+  const ChosenRows chosen = chosen_rows(run.rows, choice);
+  const Suite suite = parse_suite(run.info.suite_yaml, run.path + "/suite.yaml");
+  const ScratchFolder scratch;
+  ReplayContent content;
+  content.title = fmt::format("{} {}", suite.name, suite.version);
+  content.notes = chosen.notes;
+  content.episodes_of_run = static_cast<long>(run.rows.size());
+  content.limits =
+      load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
+  const auto hashes = repeated_hashes(run, chosen, choice, scratch.path(), progress);
+  for (const ChosenScene& scene : chosen.scenes) {
+    ReplayScene made = scene_of(run, scene, choice, scratch.path(), hashes, content.notes);
+    if (!made.tracks.empty()) content.scenes.push_back(std::move(made));
+  }
+  if (content.scenes.empty())
+    throw InputError(fmt::format("'{}': none of the episodes chosen has a motion to show", run.path));
+  return content;
+}
+
+ReplayContent replay_of_files(const std::vector<std::string>& files, const std::string& card) {
+  ReplayContent content;
+  content.title = fs::path(files.front()).filename().string();
+  content.limits = load_contact_limits(default_contact_limits_path());
+  for (const std::string& file : files) {
+    ReplayTrack track = track_of_file(file, card);
+    const std::string id = track.kept ? scene_id(track.kept->row) : fs::path(file).stem().string();
+    auto scene = std::ranges::find(content.scenes, id, &ReplayScene::id);
+    if (scene == content.scenes.end()) {
+      scene = content.scenes.insert(content.scenes.end(), ReplayScene{});
+      scene->id = id;
+      scene->name = track.kept ? track.kept->row.clip : id;
+      scene->task = track.recording.task ? std::string(to_string(*track.recording.task)) : "";
+      scene->perturbation = track.kept ? track.kept->row.perturbation : "";
+    }
+    count(track, *scene);
+    scene->tracks.push_back(std::move(track));
+  }
+  return content;
+}
+
+}  // namespace duet

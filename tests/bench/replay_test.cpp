@@ -1,0 +1,309 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "duet/bench/replay/detector_trace.h"
+#include "duet/bench/replay/replay_columns.h"
+#include "duet/bench/replay/replay_header.h"
+#include "duet/bench/replay/replay_mcap.h"
+#include "duet/bench/replay/replay_page.h"
+#include "duet/bench/replay/replay_source.h"
+#include "duet/core/json.h"
+#include "duet/core/npz.h"
+#include "duet/core/require.h"
+#include "duet/hardware/mcap.h"
+#include "duet/results/json_fields.h"
+#include "tests/bench/fixtures.h"
+#include "tests/bench/program.h"
+#include "tests/bench/verified_run.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+// What viewer/src/columns.ts does.
+Eigen::MatrixXd read_columns(const std::string& bytes, const nlohmann::json& block) {
+  const auto at = block.at("at").get<std::size_t>(), rows = block.at("rows").get<std::size_t>();
+  const auto bases = block.at("bases").get<std::vector<double>>(), steps = block.at("steps").get<std::vector<double>>();
+  const std::size_t size = rows * bases.size();
+  Eigen::MatrixXd values(rows, bases.size());
+  for (std::size_t k = 0; k < bases.size(); ++k) {
+    std::int32_t before = 0, before_that = 0;
+    for (std::size_t t = 0; t < rows; ++t) {
+      const std::size_t place = at + k * rows + t;
+      const auto second = static_cast<std::uint8_t>(bytes.at(place)) | static_cast<std::uint8_t>(bytes.at(place + size))
+                                                                           << 8;
+      const auto value = static_cast<std::int16_t>(second + 2 * before - before_that);
+      before_that = before;
+      before = value;
+      values(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(k)) =
+          value == INT16_MIN ? NAN : bases[k] + value * steps[k];
+    }
+  }
+  return values;
+}
+
+TEST(ReplayColumns, KeepValuesToHalfAStep) {
+  Eigen::MatrixXd values(500, 3);
+  for (int t = 0; t < 500; ++t) values.row(t) << std::sin(0.02 * t), 5.0, t % 2 == 0 ? -30.0 : 30.0;
+  ReplayColumns columns;
+  columns.add(Eigen::MatrixXd::Ones(7, 2), 0.1);  // another block before it
+  const nlohmann::json block = columns.add(values, 1e-4);
+  const Eigen::MatrixXd back = read_columns(columns.bytes(), block);
+  EXPECT_LE((back - values).leftCols(2).cwiseAbs().maxCoeff(), 0.5e-4 * (1 + 1e-9));
+  // A range of 60 at that step is more than 16 bits: the step is a 65,534th of it.
+  EXPECT_LE((back - values).col(2).cwiseAbs().maxCoeff(), 60.0 / 65534 / 2 * (1 + 1e-9));
+  EXPECT_THROW(columns.add(values, 0.0), std::invalid_argument);
+}
+
+TEST(ReplayColumns, WhatIsNotFiniteStaysSo) {
+  Eigen::MatrixXd values(4, 2);
+  values << 1.0, NAN, INFINITY, NAN, 3.0, NAN, -INFINITY, NAN;
+  ReplayColumns columns;
+  const nlohmann::json block = columns.add(values, 0.01);
+  const Eigen::MatrixXd back = read_columns(columns.bytes(), block);
+  EXPECT_DOUBLE_EQ(back(0, 0), 1.0);
+  EXPECT_TRUE(std::isnan(back(1, 0)));
+  EXPECT_DOUBLE_EQ(back(2, 0), 3.0);
+  EXPECT_TRUE(back.col(1).array().isNaN().all());
+  ReplayColumns none;
+  EXPECT_EQ(none.add(Eigen::MatrixXd(0, 3), 0.01).at("rows"), 0);
+  EXPECT_EQ(none.bytes(), "");
+}
+
+EpisodeRow row_of(const std::string& engine, const std::string& controller, const std::string& clip, bool success,
+                  const std::string& arm = "main") {
+  EpisodeRow row;
+  row.engine = engine;
+  row.controller = controller;
+  row.policy = arm == "null" ? "null" : "dstar";
+  row.arm = arm;
+  row.task = "hug";
+  row.clip = clip;
+  row.success = success;
+  row.key = engine + controller + clip + arm;
+  return row;
+}
+
+std::vector<EpisodeRow> some_rows() {
+  return {row_of("ode", "vmc", "a", true),         row_of("mujoco", "vmc", "a", true),
+          row_of("ode", "vmc", "b", true),         row_of("mujoco", "vmc", "b", false),
+          row_of("ode", "pd", "a", false),         row_of("playback", "vmc", "b", true),
+          row_of("ode", "vmc", "b", false, "null")};
+}
+
+TEST(ReplayChoice, PutsTheClipWithTheLeastAgreementFirst) {
+  const std::vector<EpisodeRow> rows = some_rows();
+  ReplayChoice choice;
+  choice.controllers = {"vmc"};
+  const ChosenRows chosen = chosen_rows(rows, choice);
+  ASSERT_EQ(chosen.scenes.size(), 2U);
+  EXPECT_EQ(chosen.scenes[0].id, "hug/b/0/clean");
+  std::vector<std::string> order;
+  for (const EpisodeRow* row : chosen.scenes[0].rows) order.push_back(row->engine + " " + row->arm);
+  EXPECT_THAT(order, ElementsAre("mujoco main", "ode main", "playback main", "ode null"));
+  choice.scenes = 1;
+  const ChosenRows fewer = chosen_rows(rows, choice);
+  EXPECT_EQ(fewer.scenes.size(), 1U);
+  EXPECT_THAT(fewer.notes, ElementsAre(HasSubstr("The 1 of 2 clips")));
+}
+
+TEST(ReplayChoice, TakesTheBestControllerWhereNoneIsNamed) {
+  const std::vector<EpisodeRow> rows = some_rows();
+  const ChosenRows chosen = chosen_rows(rows, {});
+  EXPECT_THAT(chosen.notes, ElementsAre(HasSubstr("Controller vmc alone")));
+  for (const ChosenScene& scene : chosen.scenes)
+    for (const EpisodeRow* row : scene.rows) EXPECT_EQ(row->controller, "vmc");
+}
+
+TEST(ReplayChoice, FindsEpisodesByTheBeginningOfAKeyOrByTheirPlace) {
+  const std::vector<EpisodeRow> rows = some_rows();
+  ReplayChoice choice;
+  choice.episodes = {"odepd"};
+  const ChosenRows by_key = chosen_rows(rows, choice);
+  ASSERT_EQ(by_key.scenes.size(), 1U);
+  EXPECT_THAT(by_key.scenes[0].rows, ElementsAre(&rows[4]));
+  choice.episodes = {"hug/a"};
+  EXPECT_EQ(chosen_rows(rows, choice).scenes.at(0).rows.size(), 3U);
+}
+
+TEST(ReplayChoice, NamesWhatItDoesNotKnow) {
+  const std::vector<EpisodeRow> rows = some_rows();
+  const auto refused = [&](auto change) {
+    ReplayChoice choice;
+    change(choice);
+    return thrown_message<std::invalid_argument>([&] { chosen_rows(rows, choice); });
+  };
+  EXPECT_THAT(refused([](ReplayChoice& c) { c.engines = {"mujocco"}; }),
+              HasSubstr("unknown engine 'mujocco': did you mean 'mujoco'?"));
+  EXPECT_THAT(refused([](ReplayChoice& c) { c.episodes = {"nothing"}; }),
+              HasSubstr("no episode begins with 'nothing': expected the beginning of a key, or task/clip/episode"));
+  EXPECT_THAT(refused([](ReplayChoice& c) { c.engines = {"mujoco"}, c.controllers = {"pd"}; }),
+              HasSubstr("no episode of the run is what"));
+}
+
+Suite kept_suite(const std::string& record) {
+  return parse_suite(
+      "schema: duet.suite/1\nname: seen\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [hug]\n"
+      "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\n"
+      "record: {trajectories: " +
+          record + "}\n",
+      "seen.yaml");
+}
+
+using DuetRun = Run;  // testing::Test has one of its own
+
+class Replay : public testing::Test {
+ protected:
+  DuetRun run(const std::string& record) {
+    test::make_run(kept_suite(record), folder_ / record);
+    return load_run(folder_ / record);
+  }
+  ReplayContent content(const DuetRun& run, const ReplayChoice& choice = {}) {
+    Progress quiet(Progress::Style::kQuiet);
+    return replay_of_run(run, choice, quiet);
+  }
+  test::ScratchFolder folder_;
+};
+
+TEST_F(Replay, ReadsWhatTheRunKeptAndRunsTheRestAgainBitForBit) {
+  const ReplayContent kept = content(run("all")), again = content(run("none"));
+  ASSERT_EQ(kept.scenes.size(), 1U);
+  ASSERT_EQ(kept.scenes[0].tracks.size(), 2U);  // replay and the null arm
+  EXPECT_EQ(kept.scenes[0].tracks[0].origin, "kept by the run");
+  EXPECT_EQ(again.scenes[0].tracks[0].origin, "run again: the same states, bit for bit");
+  ReplayColumns columns;
+  EXPECT_EQ(replay_header(again, columns).at("robots").size(), 1U);  // shared by both tracks
+  const Recording &a = kept.scenes[0].tracks[0].recording, &b = again.scenes[0].tracks[0].recording;
+  ASSERT_EQ(a.frames(), b.frames());
+  for (int t = 0; t < a.frames(); ++t) EXPECT_EQ(a.robot[t].q, b.robot[t].q);
+}
+
+TEST_F(Replay, SaysWhereAnEpisodeThatRunsAgainIsNotWhatItWas) {
+  DuetRun changed = run("none");
+  changed.rows.front().state_hash = std::string(64, '0');
+  EXPECT_EQ(content(changed).scenes[0].tracks[0].origin, "run again: NOT the states that the run had");
+}
+
+TEST_F(Replay, NamesTheCardThatIsMissing) {
+  DuetRun other = run("all");
+  for (EpisodeRow& row : other.rows) row.robot_digest = "feedbeef00";
+  EXPECT_THAT(thrown_message<InputError>([&] { content(other); }),
+              AllOf(HasSubstr("expected the robot card of digest feedbeef, which no card of this machine has"),
+                    HasSubstr("--card names one")));
+  ReplayChoice choice;
+  choice.card = "t1";
+  EXPECT_THAT(thrown_message<InputError>([&] { content(other, choice); }), HasSubstr("joints of 't1', found 29"));
+}
+
+TEST_F(Replay, HoldsStatesToATenthOfAMillimetre) {
+  const ReplayContent content_of_run = content(run("all"));
+  ReplayColumns columns;
+  const nlohmann::json header = replay_header(content_of_run, columns);
+  const nlohmann::json& track = header.at("scenes").at(0).at("tracks").at(0);
+  const Recording& recording = content_of_run.scenes[0].tracks[0].recording;
+  const Eigen::MatrixXd position = read_columns(columns.bytes(), track.at("motion").at("position"));
+  const Eigen::MatrixXd q = read_columns(columns.bytes(), track.at("motion").at("q"));
+  ASSERT_EQ(q.rows(), recording.frames());
+  for (int t = 0; t < recording.frames(); ++t) {
+    EXPECT_LT((position.row(t).transpose() - recording.robot[t].X_WB.p).norm(), 1e-4);
+    EXPECT_LT((q.row(t).transpose() - recording.robot[t].q).cwiseAbs().maxCoeff(), 5e-5);
+  }
+}
+
+TEST_F(Replay, APageEscapesNamesAndHoldsNoAddress) {
+  ReplayContent hostile = content(run("all"));
+  const std::string evil = "</script><img src=x onerror=alert(1)>";
+  hostile.title = hostile.scenes[0].id = hostile.scenes[0].tracks[0].name = evil;
+  hostile.notes = {evil};
+  const std::string html = replay_page(hostile, {"/* viewer */", "/* style */"});
+  EXPECT_THAT(html, AllOf(Not(HasSubstr("<img")), HasSubstr("&lt;img src=x"), HasSubstr("/* viewer */"),
+                          Not(HasSubstr("http:")), Not(HasSubstr("https:")), HasSubstr("<noscript>")));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] {
+                replay_page(hostile, {"a</script>", ""});
+              }),
+              HasSubstr("expected no '</script' in it"));
+}
+
+TEST_F(Replay, ScenesThatAreTooLargeForOnePageAreSplit) {
+  ReplayContent content_of_run = content(run("all"));
+  content_of_run.scenes.resize(3, content_of_run.scenes.front());
+  for (int i = 0; i < 3; ++i) content_of_run.scenes[i].id = std::to_string(i);
+  const ViewerBundle viewer{"", ""};
+  EXPECT_EQ(replay_pages(content_of_run, viewer).size(), 1U);
+  const std::vector<ReplayPage> pages = replay_pages(content_of_run, viewer, 1000);
+  ASSERT_EQ(pages.size(), 3U);
+  EXPECT_THAT(pages[2].scenes, ElementsAre("2"));
+}
+
+TEST_F(Replay, TheVerdictOfATraceEndsAsTheRowsDoes) {
+  const ReplayContent content_of_run = content(run("all"));
+  const ReplayTrack& track = content_of_run.scenes[0].tracks[0];
+  const DetectorTrace trace =
+      detector_trace(track.recording, *track.robot, DetectorVersion::kRobot, ThresholdSet::kPaper, {}, 5);
+  ASSERT_FALSE(trace.frames.empty());
+  EXPECT_EQ(trace.frames.back(), track.recording.frames() - 1);
+  EXPECT_EQ(trace.success.back(), track.kept->row.success.value());
+  EXPECT_EQ(std::ssize(trace.evidence), track.recording.frames());
+  Recording alone = track.recording;
+  alone.partner = {};
+  EXPECT_TRUE(detector_trace(alone, *track.robot, DetectorVersion::kRobot, ThresholdSet::kPaper, {}, 5).frames.empty());
+  Recording diverged = track.recording;
+  diverged.robot[3].q[2] = NAN;
+  EXPECT_TRUE(
+      detector_trace(diverged, *track.robot, DetectorVersion::kRobot, ThresholdSet::kPaper, {}, 5).frames.empty());
+}
+
+TEST_F(Replay, TheMcapHoldsEveryTracksScenes) {
+  const ReplayContent content_of_run = content(run("all"));
+  write_replay_mcap(content_of_run, folder_ / "replay.mcap");
+  write_replay_mcap(content_of_run, folder_ / "replay.mcap");  // again: replaces it
+  const std::string bytes = read_file(folder_ / "replay.mcap");
+  int scenes = 0;
+  const McapFile file = read_mcap(
+      std::as_bytes(std::span(bytes)), "replay.mcap", [&](const McapChannel& channel, const McapMessage& message) {
+        if (channel.schema_name != "foxglove.SceneUpdate") return;
+        ++scenes;
+        const std::string text(reinterpret_cast<const char*>(message.data.data()), message.data.size());
+        EXPECT_EQ(parse_json(text, "scene").at("entities").size(), 3U);
+      });
+  EXPECT_TRUE(file.whole);
+  EXPECT_EQ(file.channels.size(), 4U);
+  const int frames = content_of_run.scenes[0].tracks[0].recording.frames();
+  EXPECT_EQ(scenes, 2 * ((frames + 1) / 2));
+}
+
+TEST_F(Replay, RecordingsOfAnybodyAreShownToo) {
+  const ReplayContent of_run = content(run("all"));
+  save_recording(of_run.scenes[0].tracks[0].recording, folder_ / "mine.npz");
+  const ReplayContent mine = replay_of_files({folder_ / "mine.npz"}, "");
+  ASSERT_EQ(mine.scenes.size(), 1U);
+  EXPECT_FALSE(mine.scenes[0].tracks[0].kept.has_value());
+  EXPECT_EQ(mine.scenes[0].tracks[0].name, "mine");
+  EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "mine.npz"}, "t1"); }),
+              HasSubstr("joints of 't1', found 29"));
+}
+
+TEST_F(Replay, TheCommandSaysWhatItCannotRead) {
+  write_file(folder_ / "other.npz", "no archive");
+  const test::Answer broken = test::duet_program("replay " + (folder_ / "other.npz") + " -o " + (folder_ / "a.mcap"));
+  EXPECT_EQ(broken.code, 2);
+  EXPECT_THAT(broken.err, HasSubstr("other.npz"));
+  const test::Answer format = test::duet_program("replay " + (folder_ / "other.npz") + " -f htm");
+  EXPECT_EQ(format.code, 2);
+  EXPECT_THAT(format.err, HasSubstr("unknown format 'htm': did you mean 'html'?"));
+  const test::Answer absent = test::duet_program("replay " + (folder_ / "nowhere") + " -f mcap");
+  EXPECT_EQ(absent.code, 2);
+  EXPECT_THAT(absent.err, HasSubstr("nowhere"));
+}
+
+}  // namespace
+}  // namespace duet

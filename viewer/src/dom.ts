@@ -1,0 +1,16 @@
+// Elements from names, attributes and children; text is only ever text.
+type Child = Node | string | null;
+
+export function el<K extends keyof HTMLElementTagNameMap>(
+    tag: K, attributes: Record<string, string> = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.append(...children.filter((child): child is Node | string => child !== null));
+  return element;
+}
+
+export function button(text: string, label: string, act: () => void, key = ''): HTMLButtonElement {
+  const made = el('button', {type: 'button', 'aria-label': label, title: key ? `${label} (${key})` : label}, text);
+  made.addEventListener('click', act);
+  return made;
+}

@@ -1,0 +1,275 @@
+// Draws capsules, cones and a floor by WebGL2: one mesh, one draw call a body. Small on purpose: a page holds it whole,
+// and a computer without a graphics card has to draw 250 capsules 30 times a second.
+import {View} from './camera';
+
+export type Colour = [number, number, number];
+
+// What an instance is made of: position 3, quaternion 4, radius, half length, taper, colour 3.
+const STRIDE = 13;
+
+export class Bodies {
+  data = new Float32Array(64 * STRIDE);
+  count = 0;
+
+  clear(): void { this.count = 0; }
+
+  // Along z of its frame; taper is the radius of the far end as a part of the near one's (1: a capsule, 0: a cone).
+  add(p: ArrayLike<number>, R: ArrayLike<number>, radius: number, half: number, taper: number, colour: Colour): void {
+    if ((this.count + 1) * STRIDE > this.data.length) {
+      const more = new Float32Array(2 * this.data.length);
+      more.set(this.data);
+      this.data = more;
+    }
+    const at = this.count++ * STRIDE, d = this.data;
+    for (let k = 0; k < 3; ++k) d[at + k] = p[k]!;
+    for (let k = 0; k < 4; ++k) d[at + 3 + k] = R[k]!;
+    d[at + 7] = radius;
+    d[at + 8] = half;
+    d[at + 9] = taper;
+    for (let k = 0; k < 3; ++k) d[at + 10 + k] = colour[k]!;
+  }
+}
+
+export interface Layer {
+  bodies: Bodies;
+  alpha: number; // below 1: a ghost
+  shadow: boolean;
+}
+
+export interface Theme {
+  background: Colour;
+  floor: Colour;
+  line: Colour;
+  shadow: number; // how dark
+}
+
+const BODY_VERTEX = `#version 300 es
+layout(location=0) in vec4 corner; // on the unit sphere, and which end
+layout(location=1) in vec3 place;
+layout(location=2) in vec4 turn; // w, x, y, z
+layout(location=3) in vec3 size; // radius, half length, taper
+layout(location=4) in vec3 tint;
+uniform mat4 view;
+uniform vec3 light;
+uniform float flatten;
+out vec3 normal;
+out vec3 colour;
+out vec3 world;
+vec3 turned(vec3 v) { return v + 2.0 * cross(turn.yzw, cross(turn.yzw, v) + turn.x * v); }
+void main() {
+  float r = size.x * (corner.w > 0.0 ? size.z : 1.0);
+  vec3 p = place + turned(corner.xyz * r + vec3(0.0, 0.0, corner.w * size.y));
+  if (flatten > 0.5) { p.xy -= light.xy / light.z * max(p.z, 0.0); p.z = 0.004; }
+  normal = turned(corner.xyz);
+  colour = tint;
+  world = p;
+  gl_Position = view * vec4(p, 1.0);
+}`;
+
+const BODY_FRAGMENT = `#version 300 es
+precision highp float;
+in vec3 normal;
+in vec3 colour;
+in vec3 world;
+uniform vec3 light;
+uniform vec3 eye;
+uniform float alpha;
+uniform float flatten;
+out vec4 pixel;
+void main() {
+  if (flatten > 0.5) { pixel = vec4(0.0, 0.0, 0.0, alpha); return; }
+  vec3 n = normalize(normal), to = normalize(eye - world);
+  float lit = 0.52 + 0.22 * n.z + 0.42 * max(dot(n, light), 0.0);
+  float rim = pow(1.0 - max(dot(n, to), 0.0), 3.0);
+  pixel = vec4(colour * lit + 0.12 * rim, alpha);
+}`;
+
+const FLOOR_VERTEX = `#version 300 es
+layout(location=0) in vec2 corner;
+uniform mat4 view;
+uniform vec2 middle;
+out vec2 place;
+void main() { place = middle + 16.0 * corner; gl_Position = view * vec4(place, 0.0, 1.0); }`;
+
+const FLOOR_FRAGMENT = `#version 300 es
+precision highp float;
+in vec2 place;
+uniform vec2 middle;
+uniform vec3 ground;
+uniform vec3 line;
+uniform vec3 background;
+out vec4 pixel;
+float lines(float period, float width) {
+  vec2 cell = place / period, near = abs(fract(cell - 0.5) - 0.5) / fwidth(cell);
+  return 1.0 - min(min(near.x, near.y) / width, 1.0);
+}
+void main() {
+  float far = smoothstep(2.5, 9.0, length(place - middle));
+  float mark = max(0.35 * lines(0.25, 1.0) * (1.0 - smoothstep(1.0, 4.0, length(place - middle))), 0.9 * lines(1.0, 1.3));
+  pixel = vec4(mix(mix(ground, line, mark), background, far), 1.0);
+}`;
+
+// A sphere that is cut at its middle: four numbers a corner, triangles by index.
+function capsuleMesh(around: number, rings: number): {corners: Float32Array; indices: Uint16Array} {
+  const corners: number[] = [], indices: number[] = [];
+  for (let r = 0; r <= 2 * rings + 1; ++r) {
+    const end = r <= rings ? -1 : 1, step = r <= rings ? r : r - 1;
+    const angle = -Math.PI / 2 + (Math.PI * step) / (2 * rings);
+    for (let i = 0; i <= around; ++i) {
+      const turn = (2 * Math.PI * i) / around;
+      corners.push(Math.cos(angle) * Math.cos(turn), Math.cos(angle) * Math.sin(turn), Math.sin(angle), end);
+      if (r === 0 || i === 0) continue;
+      const a = (r - 1) * (around + 1) + i - 1, b = a + around + 1;
+      indices.push(a, a + 1, b, b, a + 1, b + 1);
+    }
+  }
+  return {corners: new Float32Array(corners), indices: new Uint16Array(indices)};
+}
+
+export class Renderer {
+  private readonly gl: WebGL2RenderingContext;
+  private readonly body: WebGLProgram;
+  private readonly floor: WebGLProgram;
+  private readonly instances: WebGLBuffer;
+  private readonly bodyArray: WebGLVertexArrayObject;
+  private readonly floorArray: WebGLVertexArrayObject;
+  private readonly indices: number;
+  private readonly places = new Map<string, WebGLUniformLocation | null>();
+  readonly software: boolean;
+  drawn = 0; // instances of the last picture
+
+  // Throws where the browser has no WebGL2.
+  constructor(readonly canvas: HTMLCanvasElement) {
+    const probe = document.createElement('canvas').getContext('webgl2');
+    const info = probe?.getExtension('WEBGL_debug_renderer_info');
+    const name = probe && info ? String(probe.getParameter(info.UNMASKED_RENDERER_WEBGL)) : '';
+    this.software = /swiftshader|llvmpipe|software/i.test(name);
+    probe?.getExtension('WEBGL_lose_context')?.loseContext();
+    const gl = canvas.getContext('webgl2', {antialias: !this.software, stencil: true, alpha: false});
+    if (!gl) throw new Error('no WebGL2');
+    this.gl = gl;
+    this.body = program(gl, BODY_VERTEX, BODY_FRAGMENT);
+    this.floor = program(gl, FLOOR_VERTEX, FLOOR_FRAGMENT);
+    const mesh = this.software ? capsuleMesh(9, 2) : capsuleMesh(18, 6);
+    this.indices = mesh.indices.length;
+    this.bodyArray = gl.createVertexArray()!;
+    gl.bindVertexArray(this.bodyArray);
+    attribute(gl, mesh.corners, 4);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
+    this.instances = gl.createBuffer()!;
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
+    let offset = 0;
+    for (const [location, size] of [[1, 3], [2, 4], [3, 3], [4, 3]] as const) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 4 * STRIDE, 4 * offset);
+      gl.vertexAttribDivisor(location, 1);
+      offset += size;
+    }
+    this.floorArray = gl.createVertexArray()!;
+    gl.bindVertexArray(this.floorArray);
+    attribute(gl, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), 2);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.CULL_FACE);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+  }
+
+  begin(): void { this.drawn = 0; }
+
+  // Into a part of the canvas, in device pixels from its bottom left.
+  draw(x: number, y: number, width: number, height: number, view: View, middle: ArrayLike<number>, layers: Layer[],
+       theme: Theme): void {
+    const gl = this.gl;
+    gl.viewport(x, y, width, height);
+    gl.scissor(x, y, width, height);
+    gl.clearColor(...theme.background, 1);
+    gl.clearStencil(0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    gl.useProgram(this.floor);
+    gl.uniformMatrix4fv(this.at(this.floor, 'view'), false, view.matrix);
+    gl.uniform2f(this.at(this.floor, 'middle'), middle[0]!, middle[1]!);
+    gl.uniform3f(this.at(this.floor, 'ground'), ...theme.floor);
+    gl.uniform3f(this.at(this.floor, 'line'), ...theme.line);
+    gl.uniform3f(this.at(this.floor, 'background'), ...theme.background);
+    gl.bindVertexArray(this.floorArray);
+    gl.disable(gl.CULL_FACE);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    gl.enable(gl.CULL_FACE);
+    gl.useProgram(this.body);
+    gl.uniformMatrix4fv(this.at(this.body, 'view'), false, view.matrix);
+    gl.uniform3f(this.at(this.body, 'light'), 0.36, 0.28, 0.89);
+    gl.uniform3f(this.at(this.body, 'eye'), ...view.eye);
+    gl.bindVertexArray(this.bodyArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
+    for (const layer of layers) this.shadow(layer, theme);
+    for (const layer of layers) this.drawn += layer.bodies.count;
+    for (const layer of layers) if (layer.alpha >= 1) this.instancesOf(layer, 1, 0);
+    for (const layer of layers) if (layer.alpha < 1) this.ghost(layer);
+  }
+
+  private shadow(layer: Layer, theme: Theme): void {
+    const gl = this.gl;
+    if (!layer.shadow || layer.bodies.count === 0) return;
+    gl.enable(gl.STENCIL_TEST);
+    gl.stencilFunc(gl.EQUAL, 0, 0xff);
+    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
+    gl.enable(gl.BLEND);
+    gl.depthMask(false);
+    gl.disable(gl.CULL_FACE);
+    this.instancesOf(layer, theme.shadow * Math.min(1, layer.alpha), 1);
+    gl.enable(gl.CULL_FACE);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.STENCIL_TEST);
+  }
+
+  // First its depth alone, so that only its outer surface shines through.
+  private ghost(layer: Layer): void {
+    const gl = this.gl;
+    gl.colorMask(false, false, false, false);
+    this.instancesOf(layer, 1, 0);
+    gl.colorMask(true, true, true, true);
+    gl.enable(gl.BLEND);
+    gl.depthFunc(gl.EQUAL);
+    this.instancesOf(layer, layer.alpha, 0);
+    gl.depthFunc(gl.LESS);
+    gl.disable(gl.BLEND);
+  }
+
+  private instancesOf(layer: Layer, alpha: number, flatten: number): void {
+    const gl = this.gl, count = layer.bodies.count;
+    if (count === 0) return;
+    gl.uniform1f(this.at(this.body, 'alpha'), alpha);
+    gl.uniform1f(this.at(this.body, 'flatten'), flatten);
+    gl.bufferData(gl.ARRAY_BUFFER, layer.bodies.data.subarray(0, count * STRIDE), gl.STREAM_DRAW);
+    gl.drawElementsInstanced(gl.TRIANGLES, this.indices, gl.UNSIGNED_SHORT, 0, count);
+  }
+
+  private at(of: WebGLProgram, name: string): WebGLUniformLocation | null {
+    const key = (of === this.body ? 'b.' : 'f.') + name;
+    if (!this.places.has(key)) this.places.set(key, this.gl.getUniformLocation(of, name));
+    return this.places.get(key)!;
+  }
+}
+
+function attribute(gl: WebGL2RenderingContext, values: Float32Array, size: number): void {
+  gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+  gl.enableVertexAttribArray(0);
+  gl.vertexAttribPointer(0, size, gl.FLOAT, false, 0, 0);
+}
+
+function program(gl: WebGL2RenderingContext, vertex: string, fragment: string): WebGLProgram {
+  const made = gl.createProgram()!;
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
+    const shader = gl.createShader(kind)!;
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader) ?? 'shader');
+    gl.attachShader(made, shader);
+  }
+  gl.linkProgram(made);
+  if (!gl.getProgramParameter(made, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(made) ?? 'program');
+  return made;
+}
