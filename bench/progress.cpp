@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 namespace duet {
 namespace {
@@ -15,6 +16,12 @@ constexpr int kBarWidth = 24;
 
 double seconds_between(std::chrono::steady_clock::time_point a, std::chrono::steady_clock::time_point b) {
   return std::chrono::duration<double>(b - a).count();
+}
+
+// A bar moves the cursor: not where somebody has asked for plain text (no-color.org).
+bool draws_on_terminal() {
+  const char* plain = std::getenv("NO_COLOR");
+  return isatty(STDERR_FILENO) != 0 && (plain == nullptr || *plain == '\0');
 }
 
 }  // namespace
@@ -33,7 +40,7 @@ std::string format_duration(double seconds) {
 }
 
 Progress::Progress(Style style) : style_(style) {
-  if (style_ == Style::kAuto) style_ = isatty(STDERR_FILENO) != 0 ? Style::kBar : Style::kLines;
+  if (style_ == Style::kAuto) style_ = draws_on_terminal() ? Style::kBar : Style::kLines;
 }
 
 void Progress::start(const std::string& title, int total, const std::string& unit) {

@@ -84,6 +84,8 @@ void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
 void add_train(CLI::App& app, Session& session);
 void add_completion(CLI::App& app, Session& session);
+void add_man(CLI::App& app, Session& session);
+void add_walk(CLI::App& app, Session& session);
 void add_train_dstar(CLI::App& train, Session& session);  // below `train`: one command per policy, and `split`
 
 }  // namespace duet::cli

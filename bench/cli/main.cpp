@@ -105,6 +105,8 @@ int main(int argc, char** argv) {
   add_hardware(app, session);
   add_replay(app, session);
   add_replay_log(app, session);
+  add_walk(app, session);
   add_completion(app, session);
+  add_man(app, session);
   return run_command(app, argc, argv, session);
 }

@@ -130,6 +130,7 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
   }
   if (made.size() > kListed) text += fmt::format("... and {} more in {}\n", made.size() - kListed, arguments.output);
   print(session, text, {{"paired", results}});
+  suggest_next(session, fmt::format("duet run demo --clips {} -o runs/mine", arguments.output));
 }
 
 }  // namespace

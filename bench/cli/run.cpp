@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "duet/bench/certificate.h"
-#include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/cli/tables.h"
 #include "duet/bench/clips.h"
@@ -26,14 +26,6 @@
 
 namespace duet::cli {
 namespace {
-
-struct RunArguments {
-  std::string suite, output, start, partner, profile, certificate;
-  std::vector<std::string> overrides, clips, networks;
-  bool dry_run = false, allow_programs = false;
-  double min_effect = 5.0;  // [points]
-  RunOptions options;
-};
 
 // Clips given on the command line take the place of the suite's; a task without clips is left out.
 void use_clips(const std::vector<std::string>& paths, Suite& suite) {
@@ -148,7 +140,9 @@ void print_plan(const Session& session, const Suite& suite) {
         {{"suite", resolved_yaml(suite)}, {"hash", hash}, {"programs", programs}});
 }
 
-void run_run(Session& session, RunArguments arguments) {
+}  // namespace
+
+void run_suite_command(Session& session, RunArguments arguments) {
   catch_interrupts();
   const Suite suite = read_suite(arguments);
   if (arguments.dry_run) {
@@ -184,7 +178,11 @@ void run_run(Session& session, RunArguments arguments) {
   if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
   add_tables(tables, json);
   print_result(session, summary.end, with_notes("md", tables_text(tables), notes), json);
+  suggest_next(session, summary.end == RunEnd::kComplete ? fmt::format("duet report {} --replays 3", arguments.output)
+                                                         : fmt::format("{}", fmt::join(session.argv, " ")));
 }
+
+namespace {
 
 // Three options of one question.
 void add_until_decided(CLI::App& command, RunArguments& arguments) {
@@ -257,7 +255,7 @@ void add_run(CLI::App& app, Session& session) {
   command->add_flag("--dry-run", arguments->dry_run,
                     "print the resolved suite, its hash and the programs that it would start; run nothing");
   add_allow_programs(*command, arguments->allow_programs);
-  command->callback([&session, arguments] { run_run(session, *arguments); });
+  command->callback([&session, arguments] { run_suite_command(session, *arguments); });
 }
 
 }  // namespace duet::cli

@@ -71,6 +71,7 @@ void run_synth(const Session& session, SynthArguments arguments) {
   });
   progress.finish();
   print(session, fmt::format("{} clips in {}", total, arguments.output), {{"clips", written}});
+  suggest_next(session, fmt::format("duet retarget {} -o paired", arguments.output));
 }
 
 }  // namespace
