@@ -158,7 +158,8 @@ footer{max-width:1360px;margin:40px auto 30px;padding:0 28px;color:var(--soft);f
 .ranked .plotcell{grid-column:1/4;grid-row:2}
 .ranked td:nth-child(n+5){grid-row:3;font-size:12px}
 .ranked td:nth-child(5)::before{content:"null "}.ranked td:nth-child(6)::before{content:"fell "}.ranked td:nth-child(7){display:none}
-.ranked td:nth-child(8){grid-column:3}
+.ranked td:nth-child(5){grid-column:1/3}.ranked td:nth-child(6){grid-column:1/3;grid-row:4}
+.ranked td:last-child{grid-column:3;grid-row:4}
 .ranked .axis{width:100%;height:auto}.answer .first{font-size:18px}nav ul{gap:12px}}
 @media print{nav,.filter,.finder{display:none}.tall{max-height:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
 main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}

@@ -200,8 +200,8 @@ TEST_F(Replay, NamesTheCardThatIsMissing) {
               AllOf(HasSubstr("expected the robot card of digest feedbeef, which no card of this machine has"),
                     HasSubstr("--card names one")));
   ReplayChoice choice;
-  choice.card = "t1";
-  EXPECT_THAT(thrown_message<InputError>([&] { content(other, choice); }), HasSubstr("joints of 't1', found 29"));
+  choice.card = "g1_27dof";
+  EXPECT_THAT(thrown_message<InputError>([&] { content(other, choice); }), HasSubstr("expected the 27 joints of"));
 }
 
 TEST_F(Replay, HoldsStatesToATenthOfAMillimetre) {
@@ -288,8 +288,8 @@ TEST_F(Replay, RecordingsOfAnybodyAreShownToo) {
   ASSERT_EQ(mine.scenes.size(), 1U);
   EXPECT_FALSE(mine.scenes[0].tracks[0].kept.has_value());
   EXPECT_EQ(mine.scenes[0].tracks[0].name, "mine");
-  EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "mine.npz"}, "t1"); }),
-              HasSubstr("joints of 't1', found 29"));
+  EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "mine.npz"}, "g1_27dof"); }),
+              HasSubstr("expected the 27 joints of"));
 }
 
 TEST_F(Replay, TheCommandSaysWhatItCannotRead) {

@@ -10,7 +10,8 @@ export function el<K extends keyof HTMLElementTagNameMap>(
 }
 
 export function button(text: string, label: string, act: () => void, key = ''): HTMLButtonElement {
-  const made = el('button', {type: 'button', 'aria-label': label, title: key ? `${label} (${key})` : label}, text);
+  const made = el('button', {type: 'button', title: key ? `${label} (${key})` : label}, text);
+  if (!/[a-z]/i.test(text)) made.setAttribute('aria-label', label);  // words speak for themselves
   made.addEventListener('click', act);
   return made;
 }

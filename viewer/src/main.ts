@@ -52,7 +52,7 @@ class Page {
   private readonly slider = el('input', {type: 'range', class: 'slider', min: '0', max: '1', step: '0.02', 'aria-label': 'Time'});
   private readonly clock = el('output', {class: 'clock'});
   private readonly play = button('▶', 'Play or pause', () => this.setPlaying(!this.playing), 'space');
-  private readonly speedButton = button('1×', 'Speed', () => this.slower(), 'S');
+  private readonly speedButton = button('1×', 'Speed 1×', () => this.slower(), 'S');
   private readonly gridButton = button('Side by side', 'Ghosts or side by side', () => this.toggle('grid'), 'G');
   private readonly referenceButton = button('Reference', 'Show the reference that the controller follows', () => this.toggle('reference'), 'R');
   private readonly holdButton = button('Hold peaks', 'Keep the largest force on each part of the partner', () => this.toggle('hold'), 'H');
@@ -195,6 +195,8 @@ class Page {
     const track = this.scene.tracks[this.focus]!, frame = frameAt(track, this.seconds);
     const text = `${(this.seconds - this.range[0]).toFixed(2)} s, frame ${frame}`;
     this.clock.textContent = text;
+    this.app.dataset.frame = String(frame);
+    this.app.dataset.force = track.forces[frame]?.toFixed(1) ?? '';
     this.slider.setAttribute('aria-valuetext', `${text}, ${phaseAt(track, frame)}`);
     this.strips.move(this.seconds);
     this.dirty = true;
@@ -224,9 +226,14 @@ class Page {
     this.dirty = true;
   }
 
+  private showSpeed(): void {
+    this.speedButton.textContent = `${this.speed}×`;
+    this.speedButton.setAttribute('aria-label', `Speed ${this.speed}×`);
+  }
+
   private slower(): void {
     this.speed = SPEEDS[(SPEEDS.indexOf(this.speed) + 1) % SPEEDS.length]!;
-    this.speedButton.textContent = `${this.speed}×`;
+    this.showSpeed();
     this.save();
   }
 
@@ -258,7 +265,7 @@ class Page {
     this.grid = state.grid ?? this.grid;
     this.reference = state.reference ?? this.reference;
     if (state.speed) this.speed = state.speed;
-    this.speedButton.textContent = `${this.speed}×`;
+    this.showSpeed();
     if (state.camera) {
       const [yaw, pitch, distance, x, y, z] = state.camera as [number, number, number, number, number, number];
       Object.assign(this.camera, {yaw, pitch, distance, target: [x, y, z]});
@@ -424,8 +431,6 @@ class Page {
       label.style.top = `${100 * y}%`;
       return label;
     }));
-    this.app.dataset.force = this.scene.tracks[this.focus]!.forces[this.actors[this.focus]!.frame]?.toFixed(1) ?? '';
-    this.app.dataset.frame = String(this.actors[this.focus]!.frame);
   }
 
   private drawGhosts(width: number, height: number, labels: [number, number, string, string][]): void {

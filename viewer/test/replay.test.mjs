@@ -42,7 +42,7 @@ test('the picture is not empty', async () => {
 
 test('playing draws pictures and moves the clock', async () => {
   const {page} = await ready();
-  await page.getByRole('button', {name: 'All tracks', exact: true}).click();
+  await page.getByRole('button', {name: 'all', exact: true}).click();
   await page.keyboard.press('Home');
   await page.getByRole('button', {name: 'Play or pause'}).click();
   const before = await page.locator('.clock').textContent();
