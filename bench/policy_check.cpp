@@ -45,9 +45,10 @@ std::vector<PolicyInput> inputs_of(const PolicyDescriptor& descriptor) {
   return {observation};
 }
 
-ShownChannel shown_channel(const PolicyChannel& channel, int frames, int joints, const Observation& observation,
+ShownChannel shown_channel(const Channel& channel, int frames, int joints, const Observation& observation,
                            ChannelValues& values) {
-  ShownChannel result{std::string(to_string(channel.kind)), channel_size(channel, joints)};
+  ShownChannel result{channel_name(channel.kind, ChannelFormat::kPolicy),
+                      channel_size(channel, {.joints = joints, .actions = 0})};
   std::vector<float> numbers(static_cast<std::size_t>(result.size));
   std::vector<float> all;
   for (int frame = kHistoryFrames - frames; frame < kHistoryFrames; ++frame) {
@@ -68,7 +69,7 @@ std::vector<ShownInput> shown_inputs(const PolicyDescriptor& descriptor, const s
   std::vector<ShownInput> inputs;
   for (const PolicyInput& input : inputs_of(descriptor)) {
     ShownInput& to = inputs.emplace_back(ShownInput{input.name, input.frames, {}});
-    for (const PolicyChannel& channel : input.channels)
+    for (const Channel& channel : input.channels)
       to.channels.push_back(shown_channel(channel, input.frames, static_cast<int>(joints.size()), observation, values));
   }
   return inputs;

@@ -9,9 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/controllers/channel.h"
-#include "duet/io/frame_history.h"
-#include "duet/io/layout.h"
+#include "duet/io/observation.h"
 
 namespace duet {
 
@@ -32,26 +30,6 @@ struct OtherJoint {
   std::string name;
   int line = 0;
   double kp = 0.0, kd = 0.0;
-};
-
-struct ChannelGroup {
-  std::string name;
-  int line = 0;
-  std::vector<Channel> channels;
-};
-
-// Groups side by side, now or over the last frames (oldest first).
-struct InputPart {
-  int line = 0;
-  std::vector<int> groups;
-  HistoryRule history{};
-};
-
-struct DescriptorInput {
-  std::string name;  // of the network's input; "" for its only one
-  int line = 0;
-  std::vector<InputPart> parts;  // none where it is a state
-  std::string state;             // the output of the tick before that it is given, zeros at the start; "" otherwise
 };
 
 // What may be commanded of one direction.
@@ -78,20 +56,18 @@ struct Descriptor {
   bool waist_locked = false;  // unless the option says otherwise
   std::vector<DescriptorJoint> joints;
   std::vector<OtherJoint> other_joints;
-  std::vector<ChannelGroup> groups;
-  std::vector<DescriptorInput> inputs;
+  ObservationLayout observation;
   std::string output;  // of the network; "" for its only one
   int output_line = 0;
   double action_clip = std::numeric_limits<double>::infinity();  // of the output's size, before its scale
   std::optional<VelocityInterface> command;
 
   [[nodiscard]] int actions() const;  // joints with an action
-  [[nodiscard]] int group_size(const ChannelGroup& group) const;
-  [[nodiscard]] int part_size(const InputPart& part) const;  // of one frame
-  [[nodiscard]] int input_size(const DescriptorInput& input) const;
-  [[nodiscard]] std::vector<LayoutBlock> layout(const DescriptorInput& input) const;
-  // "frame: command_velocity 0..2, command_height 3, ...; 6 frames of 76": how input_size comes about.
-  [[nodiscard]] std::string input_layout(const DescriptorInput& input) const;
+  [[nodiscard]] ChannelWidths widths() const { return {.joints = 0, .actions = actions()}; }
+  [[nodiscard]] int input_size(const ObservationInput& input) const;
+  [[nodiscard]] std::vector<LayoutBlock> layout(const ObservationInput& input) const;
+  // "command_velocity 0..2, command_height 3, ... (6 frames of 76)": how input_size comes about.
+  [[nodiscard]] std::string input_layout(const ObservationInput& input) const;
 };
 
 // Throws InputError("FILE:LINE: ...") as YamlSection does.

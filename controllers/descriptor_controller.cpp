@@ -34,7 +34,7 @@ std::vector<int> yaw_rates(const Channel& channel) {
 }
 
 bool shows_yaw_rate(const Descriptor& descriptor) {
-  for (const ChannelGroup& group : descriptor.groups)
+  for (const ChannelGroup& group : descriptor.observation.groups)
     for (const Channel& channel : group.channels)
       if (!yaw_rates(channel).empty()) return true;
   return false;
@@ -43,7 +43,7 @@ bool shows_yaw_rate(const Descriptor& descriptor) {
 void set_yaw_scale(Channel& channel, double scale) {
   const std::vector<int> places = yaw_rates(channel);
   if (places.empty()) return;
-  if (channel.scale.size() == 1) channel.scale.assign(channel_size(channel, 0), channel.scale[0]);
+  if (channel.scale.size() == 1) channel.scale.assign(channel_size(channel, {}), channel.scale[0]);
   for (const int place : places) channel.scale[place] = scale;
 }
 
@@ -52,7 +52,7 @@ Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& option
   if (text.empty()) return descriptor;
   const std::optional<double> scale = parse_number(text);
   require(scale.has_value(), fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
-  for (ChannelGroup& group : descriptor.groups)
+  for (ChannelGroup& group : descriptor.observation.groups)
     for (Channel& channel : group.channels) set_yaw_scale(channel, *scale);
   return descriptor;
 }
@@ -196,8 +196,8 @@ class DescriptorController final : public Controller {
   }
 
   void bind_inputs(const Descriptor& descriptor) {
-    for (size_t i = 0; i < descriptor.inputs.size(); ++i) {
-      const DescriptorInput& input = descriptor.inputs[i];
+    for (size_t i = 0; i < descriptor.observation.inputs.size(); ++i) {
+      const ObservationInput& input = descriptor.observation.inputs[i];
       if (input.state.empty())
         network_.bind_input(input.name, input.line, observer_.input(static_cast<int>(i)), descriptor.layout(input));
       else

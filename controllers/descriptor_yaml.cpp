@@ -180,7 +180,7 @@ class Reader {
         root_.fail(group.line, fmt::format("expected each group once, found '{}' again", group.name));
       for (const YAML::Node& channel : entry.second) group.channels.push_back(read_channel(channel));
       group_names_.push_back(group.name);
-      out_.groups.push_back(std::move(group));
+      out_.observation.groups.push_back(std::move(group));
     }
   }
 
@@ -193,7 +193,8 @@ class Reader {
     channel.kind = kind_of(s);
     for (const char* key : kChannelKeys)
       if (s.has(key) && !takes_key(channel.kind, key))
-        s.fail(s.line(key), fmt::format("expected no key '{}' in a {}, found one", key, to_string(channel.kind)));
+        s.fail(s.line(key), fmt::format("expected no key '{}' in a {}, found one", key,
+                                        channel_name(channel.kind, ChannelFormat::kController)));
     if (s.has("clip")) channel.clip = positive(s, "clip", s.number("clip"));
     if (s.has("offset")) channel.offset = s.vector3("offset");
     channel.clipped = s.flag_or("clipped", false);
@@ -205,7 +206,7 @@ class Reader {
 
   static ChannelKind kind_of(const YamlSection& s) {
     try {
-      return channel_kind(s.text("channel"));
+      return channel_kind(s.text("channel"), ChannelFormat::kController);
     } catch (const std::invalid_argument& error) {
       s.fail(s.line("channel"), error.what());
     }
@@ -261,17 +262,18 @@ class Reader {
   // What is shown of a command to stand needs to be told which command is one.
   void check_stand_channels() const {
     if (out_.command && out_.command->stands_below) return;
-    for (const ChannelGroup& group : out_.groups)
+    for (const ChannelGroup& group : out_.observation.groups)
       for (const Channel& channel : group.channels)
         if (channel.kind == ChannelKind::kCommandStand || !channel.gait.standing.empty())
           root_.fail(channel.line,
                      fmt::format("channel '{}'{}: expected the key 'stands_below' in 'command', found none",
-                                 to_string(channel.kind), channel.gait.standing.empty() ? "" : " with 'standing'"));
+                                 channel_name(channel.kind, ChannelFormat::kController),
+                                 channel.gait.standing.empty() ? "" : " with 'standing'"));
   }
 
   void read_scale_of(const YamlSection& s, Channel& channel) const {
     channel.scale = numbers(s, "scale", {1.0});
-    const int size = channel_size(channel, out_.actions());
+    const int size = channel_size(channel, out_.widths());
     const int given = static_cast<int>(channel.scale.size());
     if (given != 1 && given != size)
       s.fail(s.line("scale"), fmt::format("'scale': expected 1 or {} numbers, found {}", size, given));
@@ -280,16 +282,17 @@ class Reader {
   void read_inputs() {
     for (const YAML::Node& node : root_.items("inputs")) {
       const YamlSection s(file_, node, label("input", node, "name"), {"name", "parts", "state"});
-      DescriptorInput input{.name = s.has("name") ? s.text("name") : "", .line = s.line(), .parts = {}, .state = {}};
+      ObservationInput input{.name = s.has("name") ? s.text("name") : "", .line = s.line(), .parts = {}, .state = {}};
       for (const YAML::Node& part : s.items("parts")) input.parts.push_back(read_part(part));
       if (s.has("state")) input.state = s.text("state");
       if (!input.parts.empty() && !input.state.empty())
         s.fail(s.line("state"), "expected 'parts' or 'state', found both");
       if (input.parts.empty() && input.state.empty())
         s.fail(s.line("parts"), "'parts': expected at least one, found none");
-      out_.inputs.push_back(std::move(input));
+      out_.observation.inputs.push_back(std::move(input));
     }
-    if (out_.inputs.empty()) root_.fail(root_.line("inputs"), "'inputs': expected at least one, found none");
+    if (out_.observation.inputs.empty())
+      root_.fail(root_.line("inputs"), "'inputs': expected at least one, found none");
   }
 
   InputPart read_part(const YAML::Node& node) const {

@@ -13,14 +13,15 @@ bool is_anchor(const Channel& channel) {
   return channel.kind == ChannelKind::kAnchorPositionError || channel.kind == ChannelKind::kAnchorOrientationError;
 }
 
-void append(const Eigen::Vector3d& v, std::vector<double>& out) { out.insert(out.end(), {v.x(), v.y(), v.z()}); }
-
-void append(const Channel& channel, const Eigen::Vector3d& v, std::vector<double>& out) {
-  if (channel.axes.empty()) return append(v, out);
-  for (const int axis : channel.axes) out.push_back(v[axis]);
+void write_axes(const Channel& channel, const Eigen::Vector3d& v, ChannelWriter& out) {
+  if (channel.axes.empty()) return out(v);
+  for (const int axis : channel.axes) out(v[axis]);
 }
 
-void append(const Eigen::Vector2d& v, std::vector<double>& out) { out.insert(out.end(), {v.x(), v.y()}); }
+void write_waves(const Channel& channel, const Senses& senses, double (*wave)(double), ChannelWriter& out) {
+  for (size_t i = 0; i < channel.gait.phases.size(); ++i)
+    out(wave(gait_angle(channel.gait, i, senses.tick, senses.gate)));
+}
 
 // Of a point fixed to the base, in its axes.
 Eigen::Vector3d point_velocity(const RobotState& state, const Eigen::Vector3d& p_BF) {
@@ -33,7 +34,7 @@ Eigen::Vector3d root_velocity(const Senses& senses) {
 }
 
 bool is_sensed(const Channel& channel) {
-  return channel.kind == ChannelKind::kBaseAngularVelocity || channel.kind == ChannelKind::kProjectedGravity;
+  return channel.kind == ChannelKind::kBaseAngularVelocity || channel.kind == ChannelKind::kGravity;
 }
 
 // Where the gyro of a channel sits: in the frame that it names, else in the card's; -1: in the base, with its axes.
@@ -42,6 +43,15 @@ int sensor_frame(const Channel& channel, const RobotModel& robot) {
   const int frame = channel.frame.empty() ? robot.roles.imu_frame : robot.frame_index(channel.frame);
   const RobotFrame& found = robot.frames[frame];
   return found.link == 0 && found.X_LF.R.isApprox(Eigen::Quaterniond::Identity(), 0.0) ? -1 : frame;
+}
+
+// With the index of each channel's frame.
+ObservationLayout bound_layout(const ObservationLayout& layout, const RobotModel& robot) {
+  ObservationLayout bound = layout;
+  for (ChannelGroup& group : bound.groups)
+    for (Channel& channel : group.channels)
+      channel.frame_index = is_anchor(channel) ? robot.frame_index(channel.frame) : sensor_frame(channel, robot);
+  return bound;
 }
 
 }  // namespace
@@ -69,172 +79,118 @@ Observer::Observer(const Descriptor& descriptor, std::shared_ptr<const RobotMode
       neutral_(descriptor.joints.size()),
       action_clip_(descriptor.action_clip),
       kinematics_(*robot_),
-      reference_kinematics_(*robot_) {
+      reference_kinematics_(*robot_),
+      writer_(bound_layout(descriptor.observation, *robot_), descriptor.widths()) {
   for (Eigen::Index j = 0; j < neutral_.size(); ++j) neutral_[j] = descriptor.joints[j].neutral;
-  size_t widest = 0, longest = 0;
-  for (const ChannelGroup& group : descriptor.groups) {
-    Group& made = groups_.emplace_back();
-    made.values.resize(descriptor.group_size(group));
-    widest = std::max(widest, made.values.size());
+  for (const ChannelGroup& group : descriptor.observation.groups)
     for (const Channel& channel : group.channels) {
-      const int frame = is_anchor(channel) ? robot_->frame_index(channel.frame) : sensor_frame(channel, *robot_);
-      made.channels.push_back({channel, frame});
       anchored_ |= is_anchor(channel);
-      placed_ |= frame >= 0;
+      placed_ |= is_anchor(channel) || sensor_frame(channel, *robot_) >= 0;
     }
-  }
-  for (const DescriptorInput& input : descriptor.inputs) {
-    Input& made = inputs_.emplace_back();
-    made.values.resize(descriptor.input_size(input));
-    for (const InputPart& part : input.parts) {
-      const int size = descriptor.part_size(part);
-      longest = std::max(longest, static_cast<size_t>(size));
-      made.parts.push_back({part.groups, FrameHistory(size, part.history)});
-    }
-  }
-  scratch_.reserve(widest);
-  frame_.reserve(longest);
-}
-
-void Observer::reset() {
-  for (Input& input : inputs_)
-    for (Part& part : input.parts) part.history.reset();
 }
 
 void Observer::update(const Senses& senses) {
   if (placed_) kinematics_.update(senses.state.X_WB, senses.state.q);
   if (anchored_) reference_kinematics_.update(senses.reference.X_WB, senses.reference.q);
-  for (Group& group : groups_) fill_group(group, senses);
-  for (Input& input : inputs_) {
-    std::span<float> rest = input.values;
-    for (Part& part : input.parts) {
-      const auto size = static_cast<size_t>(part.history.size());
-      fill_part(part, rest.first(size));
-      rest = rest.subspan(size);
-    }
-  }
+  writer_.update([&](const Channel& channel, ChannelWriter& out) { show(channel, senses, out); });
 }
 
-void Observer::fill_group(Group& group, const Senses& senses) {
-  size_t place = 0;
-  for (const BoundChannel& bound : group.channels) {
-    scratch_.clear();
-    fill_channel(bound, senses, scratch_);
-    const Channel& channel = bound.spec;
-    for (size_t i = 0; i < scratch_.size(); ++i) {
-      const double scaled = scratch_[i] * channel.scale[channel.scale.size() == 1 ? 0 : i];
-      group.values[place++] = static_cast<float>(std::clamp(scaled, -channel.clip, channel.clip));
-    }
-  }
-}
-
-void Observer::fill_channel(const BoundChannel& bound, const Senses& senses, std::vector<double>& out) const {
-  const Channel& channel = bound.spec;
+void Observer::show(const Channel& channel, const Senses& senses, ChannelWriter& out) const {
   const RobotState& state = senses.state;
   const Reference& reference = senses.reference;
   switch (channel.kind) {
     case ChannelKind::kBaseLinearVelocity:
-      return append(channel, point_velocity(state, channel.offset), out);
+      return write_axes(channel, point_velocity(state, channel.offset), out);
     case ChannelKind::kBaseAngularVelocity:
-      return append(channel, sensor_rate(bound, state), out);
-    case ChannelKind::kProjectedGravity:
-      return append(channel, sensor_rotation(bound, state).conjugate() * -Eigen::Vector3d::UnitZ(), out);
+      return write_axes(channel, sensor_rate(channel, state), out);
+    case ChannelKind::kGravity:
+      return write_axes(channel, sensor_rotation(channel, state).conjugate() * -Eigen::Vector3d::UnitZ(), out);
     case ChannelKind::kRollPitch:
-      return append(roll_pitch_of(state.X_WB.R), out);
+      return out(roll_pitch_of(state.X_WB.R));
     case ChannelKind::kCommandVelocity:
-      return append(channel, {senses.command.forward, senses.command.lateral, senses.command.yaw_rate}, out);
+      return write_axes(channel, {senses.command.forward, senses.command.lateral, senses.command.yaw_rate}, out);
     case ChannelKind::kCommandHeight:
-      return out.push_back(senses.command.height);
+      return out(senses.command.height);
     case ChannelKind::kCommandStand:
-      return out.push_back(senses.gate.stands() ? 0.0 : 1.0);
+      return out(senses.gate.stands() ? 0.0 : 1.0);
     case ChannelKind::kPreviousAction: {
       const double bound = channel.clipped ? action_clip_ : std::numeric_limits<double>::infinity();
-      for (const float action : senses.action) out.push_back(std::clamp<double>(action, -bound, bound));
+      for (const float action : senses.action) out(std::clamp<double>(action, -bound, bound));
       return;
     }
     case ChannelKind::kReferenceRootVelocity:
-      return append(channel, root_velocity(senses), out);
+      return write_axes(channel, root_velocity(senses), out);
     case ChannelKind::kReferenceHeight:
-      return out.push_back(reference.X_WB.p.z());
+      return out(reference.X_WB.p.z());
     case ChannelKind::kReferenceRollPitch:
-      return append(roll_pitch_of(reference.X_WB.R), out);
+      return out(roll_pitch_of(reference.X_WB.R));
     case ChannelKind::kReferenceYawRate:
-      return out.push_back(senses.rates.w_WB_B().z());
+      return out(senses.rates.w_WB_B().z());
     case ChannelKind::kReferenceFrames:
-      return fill_frames(channel, senses, out);
+      return show_frames(channel, senses, out);
     case ChannelKind::kAnchorPositionError:
     case ChannelKind::kAnchorOrientationError:
-      return fill_anchor(bound, out);
+      return show_anchor(channel, out);
     case ChannelKind::kGaitSine:
-      for (size_t i = 0; i < channel.gait.phases.size(); ++i)
-        out.push_back(std::sin(gait_angle(channel.gait, i, senses.tick, senses.gate)));
-      return;
+      return write_waves(channel, senses, std::sin, out);
     case ChannelKind::kGaitCosine:
-      for (size_t i = 0; i < channel.gait.phases.size(); ++i)
-        out.push_back(std::cos(gait_angle(channel.gait, i, senses.tick, senses.gate)));
-      return;
+      return write_waves(channel, senses, std::cos, out);
     case ChannelKind::kTick:
-      return out.push_back(static_cast<double>(senses.tick));
+      return out(static_cast<double>(senses.tick));
     case ChannelKind::kConstant:
-      out.insert(out.end(), channel.values.begin(), channel.values.end());
+      for (const double value : channel.values) out(value);
       return;
     default:
-      return fill_joints(channel, senses, out);
+      return show_joints(channel, senses, out);
   }
 }
 
-void Observer::fill_joints(const Channel& channel, const Senses& senses, std::vector<double>& out) const {
+void Observer::show_joints(const Channel& channel, const Senses& senses, ChannelWriter& out) const {
   for (size_t k = 0; k < channel.joints.size(); ++k) {
     const int j = channel.joints[k];
     const int r = joints_[j];
     if (channel.kind == ChannelKind::kJointPosition)
-      out.push_back(senses.state.q[r] - neutral_[j]);
+      out(senses.state.q[r] - neutral_[j]);
     else if (channel.kind == ChannelKind::kJointVelocity)
-      out.push_back(channel.zeroed[k] ? 0.0 : senses.state.v[r]);
-    else if (channel.kind == ChannelKind::kReferenceJointPosition)
-      out.push_back(senses.reference.q[r]);
+      out(channel.zeroed[k] ? 0.0 : senses.state.v[r]);
+    else if (channel.kind == ChannelKind::kReferenceJointAngle)
+      out(senses.reference.q[r]);
     else
-      out.push_back(senses.rates.qd()[r]);
+      out(senses.rates.qd()[r]);
   }
 }
 
 // A controller is given the reference of the present tick alone: what comes after it is taken to go on as it is (the
 // same pose of the joints, the same velocities, roll, pitch and height).
-void Observer::fill_frames(const Channel& channel, const Senses& senses, std::vector<double>& out) const {
+void Observer::show_frames(const Channel& channel, const Senses& senses, ChannelWriter& out) const {
   for (size_t step = 0; step < channel.steps.size(); ++step) {
-    out.push_back(senses.reference.X_WB.p.z());
-    append(roll_pitch_of(senses.reference.X_WB.R), out);
-    append(root_velocity(senses), out);
-    out.push_back(senses.rates.w_WB_B().z());
-    for (const int j : channel.joints) out.push_back(senses.reference.q[joints_[j]]);
+    out(senses.reference.X_WB.p.z());
+    out(roll_pitch_of(senses.reference.X_WB.R));
+    out(root_velocity(senses));
+    out(senses.rates.w_WB_B().z());
+    for (const int j : channel.joints) out(senses.reference.q[joints_[j]]);
   }
 }
 
-void Observer::fill_anchor(const BoundChannel& bound, std::vector<double>& out) const {
-  const Pose error = kinematics_.frame_pose(bound.frame).inverse() * reference_kinematics_.frame_pose(bound.frame);
-  if (bound.spec.kind == ChannelKind::kAnchorPositionError) return append(error.p, out);
+void Observer::show_anchor(const Channel& channel, ChannelWriter& out) const {
+  const int frame = channel.frame_index;
+  const Pose error = kinematics_.frame_pose(frame).inverse() * reference_kinematics_.frame_pose(frame);
+  if (channel.kind == ChannelKind::kAnchorPositionError) return out(error.p);
   const Eigen::Matrix3d R = error.R.toRotationMatrix();
-  for (int row = 0; row < 3; ++row) out.insert(out.end(), {R(row, 0), R(row, 1)});
+  for (int row = 0; row < 3; ++row) out(R.row(row).head<2>());
 }
 
-Eigen::Quaterniond Observer::sensor_rotation(const BoundChannel& bound, const RobotState& state) const {
-  return bound.frame < 0 ? state.X_WB.R : kinematics_.frame_pose(bound.frame).R;
+Eigen::Quaterniond Observer::sensor_rotation(const Channel& channel, const RobotState& state) const {
+  return channel.frame_index < 0 ? state.X_WB.R : kinematics_.frame_pose(channel.frame_index).R;
 }
 
 // The base's rate and those of the hinges between it and the frame.
-Eigen::Vector3d Observer::sensor_rate(const BoundChannel& bound, const RobotState& state) const {
-  if (bound.frame < 0) return state.w_WB_B;
+Eigen::Vector3d Observer::sensor_rate(const Channel& channel, const RobotState& state) const {
+  if (channel.frame_index < 0) return state.w_WB_B;
   Eigen::Vector3d w_WF = state.X_WB.R * state.w_WB_B;
-  for (int link = robot_->frames[bound.frame].link; link > 0; link = robot_->links[link].parent)
+  for (int link = robot_->frames[channel.frame_index].link; link > 0; link = robot_->links[link].parent)
     w_WF += state.v[link - 1] * (kinematics_.R_WL(link) * robot_->links[link].axis);
-  return kinematics_.frame_pose(bound.frame).R.conjugate() * w_WF;
-}
-
-void Observer::fill_part(Part& part, std::span<float> out) {
-  frame_.clear();
-  for (const int group : part.groups)
-    frame_.insert(frame_.end(), groups_[group].values.begin(), groups_[group].values.end());
-  part.history.add(frame_, out);
+  return kinematics_.frame_pose(channel.frame_index).R.conjugate() * w_WF;
 }
 
 }  // namespace duet

@@ -1,5 +1,5 @@
-// Builds a network's inputs from what a controller senses, as an IO descriptor says: channels, scales, histories.
-// Nothing allocates after construction.
+// The numbers that the channels of an IO descriptor show of what a controller senses. Nothing allocates after
+// construction.
 #pragma once
 
 #include <memory>
@@ -10,6 +10,7 @@
 #include "duet/controllers/descriptor.h"
 #include "duet/controllers/root_conversion.h"
 #include "duet/core/robot_state.h"
+#include "duet/io/observation.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
@@ -50,37 +51,18 @@ class Observer {
   // that the robot lacks.
   Observer(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::vector<int> robot_joints);
 
-  void reset();
+  void reset() { writer_.reset(); }
   void update(const Senses& senses);
-  // Numbers of the input in the order of Descriptor::inputs, after the last update.
-  [[nodiscard]] std::span<const float> input(int index) const { return inputs_[index].values; }
+  // Numbers of the input in the order of the descriptor's, after the last update.
+  [[nodiscard]] std::span<const float> input(int index) const { return writer_.input(index); }
 
  private:
-  struct BoundChannel {
-    Channel spec;
-    int frame = -1;  // the anchor's or the gyro's, in the robot; -1: the base
-  };
-  struct Group {
-    std::vector<BoundChannel> channels;
-    std::vector<float> values;
-  };
-  struct Part {
-    std::vector<int> groups;
-    FrameHistory history;
-  };
-  struct Input {
-    std::vector<Part> parts;
-    std::vector<float> values;
-  };
-
-  void fill_group(Group& group, const Senses& senses);
-  void fill_channel(const BoundChannel& bound, const Senses& senses, std::vector<double>& out) const;
-  void fill_joints(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
-  void fill_frames(const Channel& channel, const Senses& senses, std::vector<double>& out) const;
-  void fill_anchor(const BoundChannel& bound, std::vector<double>& out) const;
-  Eigen::Quaterniond sensor_rotation(const BoundChannel& bound, const RobotState& state) const;  // R_WF
-  Eigen::Vector3d sensor_rate(const BoundChannel& bound, const RobotState& state) const;         // w_WF_F [rad/s]
-  void fill_part(Part& part, std::span<float> out);
+  void show(const Channel& channel, const Senses& senses, ChannelWriter& out) const;
+  void show_joints(const Channel& channel, const Senses& senses, ChannelWriter& out) const;
+  void show_frames(const Channel& channel, const Senses& senses, ChannelWriter& out) const;
+  void show_anchor(const Channel& channel, ChannelWriter& out) const;
+  [[nodiscard]] Eigen::Quaterniond sensor_rotation(const Channel& channel, const RobotState& state) const;  // R_WF
+  [[nodiscard]] Eigen::Vector3d sensor_rate(const Channel& channel, const RobotState& state) const;  // w_WF_F [rad/s]
 
   std::shared_ptr<const RobotModel> robot_;  // the kinematics' model
   std::vector<int> joints_;
@@ -88,10 +70,7 @@ class Observer {
   double action_clip_;
   bool anchored_ = false, placed_ = false;  // whether poses of the reference's, of the robot's links are needed
   Kinematics kinematics_, reference_kinematics_;
-  std::vector<Group> groups_;
-  std::vector<Input> inputs_;
-  std::vector<double> scratch_;  // one channel before scaling
-  std::vector<float> frame_;     // one frame of a part
+  ObservationWriter writer_;
 };
 
 // Angles of R_WB = Rz(yaw) Ry(pitch) Rx(roll) [rad].

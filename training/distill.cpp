@@ -36,7 +36,7 @@ void disturb(WbcSensors& sensors, const SensorNoise& noise, Random& random) {
 
 struct Distillation::Worker {
   struct Student {
-    WbcHistory history;
+    WbcObserver observer;
     WbcSensors sensors;
     bool begins = true;
   };
@@ -113,7 +113,7 @@ Distillation::Distillation(const std::shared_ptr<const RobotModel>& robot, const
       worker.environments.emplace_back(robot, task, state_.seed + 7000003ULL * static_cast<std::uint64_t>(state_.round),
                                        t * each + i);
       worker.environments.back().skip_to(worker.random.below(task.episode_ticks));
-      worker.students.push_back({WbcHistory(layout), {}, true});
+      worker.students.push_back({WbcObserver(WbcKind::kStudent, layout.joints()), {}, true});
     }
     worker.clean.resize(layout.oracle(), each);
     worker.critic.resize(worker.environments[0].critic_size(), each);
@@ -169,10 +169,9 @@ void Distillation::collect(int thread, bool teacher_acts, int first) {
       environment.observe(column(worker.clean, i), column(worker.critic, i));
       student.sensors = environment.sensors();
       disturb(student.sensors, options_.noise, worker.random);
-      if (student.begins) student.history.fill(student.sensors, environment.action());
+      if (student.begins) student.observer.reset();
       student.begins = false;
-      write_student(student.sensors, environment.action(), student.history, column(worker.seen, i));
-      student.history.add(student.sensors, environment.action());
+      std::ranges::copy(student.observer.update(student.sensors, environment.action()), column(worker.seen, i).begin());
     }
     worker.moments.update(worker.seen);
     worker.teacher_input = worker.clean;

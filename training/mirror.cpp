@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "duet/controllers/wbc_sim/observation.h"
 #include "duet/core/require.h"
 #include "duet/robots/roles.h"
 
@@ -14,6 +15,22 @@ Mirror vector_mirror() { return {.from = {0, 1, 2}, .sign = {1.0F, -1.0F, 1.0F}}
 Mirror axial_mirror() { return {.from = {0, 1, 2}, .sign = {-1.0F, 1.0F, -1.0F}}; }  // an angular velocity
 Mirror columns_mirror() {                                                            // two columns of a rotation
   return {.from = {0, 1, 2, 3, 4, 5}, .sign = {1.0F, -1.0F, 1.0F, -1.0F, 1.0F, -1.0F}};
+}
+
+// Of one channel of WBC-Sim's; `joints`: of all that has a number for each joint.
+Mirror mirror_of(ChannelKind kind, const Mirror& joints) {
+  switch (kind) {
+    case ChannelKind::kBaseAngularVelocity:
+      return axial_mirror();
+    case ChannelKind::kBaseLinearVelocity:
+    case ChannelKind::kGravity:
+    case ChannelKind::kRootPositionError:
+      return vector_mirror();
+    case ChannelKind::kRootOrientationError:
+      return columns_mirror();
+    default:
+      return joints;
+  }
 }
 
 void add(Mirror& mirror, const Mirror& block) { mirror.append(block, mirror.size()); }
@@ -43,16 +60,8 @@ Mirror mirror_joints(const RobotModel& robot) {
 Mirror mirror_actor(const RobotModel& robot) {
   const Mirror joints = mirror_joints(robot);
   Mirror mirror;
-  add(mirror, joints);            // q
-  add(mirror, joints);            // v
-  add(mirror, axial_mirror());    // w
-  add(mirror, vector_mirror());   // base velocity
-  add(mirror, vector_mirror());   // gravity
-  add(mirror, joints);            // action
-  add(mirror, joints);            // q_ref
-  add(mirror, joints);            // v_ref
-  add(mirror, vector_mirror());   // root error
-  add(mirror, columns_mirror());  // root turn
+  for (const ChannelGroup& group : wbc_observation(WbcKind::kOracle).groups)
+    for (const Channel& channel : group.channels) add(mirror, mirror_of(channel.kind, joints));
   return mirror;
 }
 

@@ -22,14 +22,9 @@ static_assert(kTickRate == 50.0);
 
 std::string name_of(WbcKind kind) { return kind == WbcKind::kOracle ? "oracle" : "student"; }
 
-int input_size(WbcKind kind, const WbcLayout& layout) {
-  return kind == WbcKind::kOracle ? layout.oracle() : layout.student();
-}
-
 nlohmann::json channels_of(WbcKind kind, int joints) {
-  const WbcLayout layout(joints);
   nlohmann::json json = nlohmann::json::array();
-  for (const ChannelSpan& channel : kind == WbcKind::kOracle ? layout.oracle_channels() : layout.student_channels())
+  for (const LayoutEntry& channel : WbcLayout(joints).channels(kind))
     json.push_back({{"name", channel.name}, {"size", channel.size}});
   return json;
 }
@@ -158,7 +153,7 @@ const Eigen::VectorXf& WbcPolicy::act(std::span<const float> observation) {
 }
 
 void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type) {
-  require(network.mlp.inputs() == input_size(network.kind, WbcLayout(network.mlp.outputs())) &&
+  require(network.mlp.inputs() == WbcLayout(network.mlp.outputs()).size(network.kind) &&
               network.mean.size() == network.mlp.inputs() && network.deviation.size() == network.mlp.inputs(),
           fmt::format("save_wbc_network: {} inputs and a normaliser of {} for {} joints", network.mlp.inputs(),
                       network.mean.size(), network.mlp.outputs()));
@@ -211,7 +206,7 @@ WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   network.robot = robot.name;
   network.joints = robot.joint_names();
   network.mlp = read_mlp(tensors, "mlp", path);
-  const int inputs = input_size(network.kind, WbcLayout(robot.dof()));
+  const int inputs = WbcLayout(robot.dof()).size(network.kind);
   if (network.mlp.inputs() != inputs || network.mlp.outputs() != robot.dof())
     throw InputError(fmt::format("{}: a network of {} inputs and {} outputs, expected {} and {}", path,
                                  network.mlp.inputs(), network.mlp.outputs(), inputs, robot.dof()));

@@ -19,8 +19,6 @@ inline constexpr float kNormalClip = 5.0F;    // of a normalised input
 inline constexpr double kActionBound = 4.0;   // of an action, in both directions
 inline constexpr double kGoldenError = 1e-4;  // of an output at load
 
-enum class WbcKind { kOracle, kStudent };  // 163-D with base velocity; 1090-D with history
-
 struct WbcNetwork {
   WbcKind kind = WbcKind::kStudent;
   std::string robot;                // name of the card

@@ -1,21 +1,70 @@
 #include "duet/controllers/wbc_sim/observation.h"
 
-#include <algorithm>
-
 namespace duet {
 namespace {
 
-class Writer {
- public:
-  explicit Writer(std::span<float> out) : to_(out.data()) {}
-  template <typename Vector>
-  void operator()(const Vector& values) {
-    for (Eigen::Index i = 0; i < values.size(); ++i) *to_++ = static_cast<float>(values[i]);
-  }
+using Kinds = std::vector<ChannelKind>;
 
- private:
-  float* to_;
-};
+ChannelGroup group_of(const Kinds& kinds) {
+  ChannelGroup group;
+  for (const ChannelKind kind : kinds) group.channels.push_back({.kind = kind});
+  return group;
+}
+
+ObservationInput input_of(std::vector<InputPart> parts) {
+  return {.name = "", .line = 0, .parts = std::move(parts), .state = ""};
+}
+
+const Kinds& reference_kinds() {
+  static const Kinds kinds = {ChannelKind::kReferenceJointPosition, ChannelKind::kReferenceJointVelocity,
+                              ChannelKind::kRootPositionError, ChannelKind::kRootOrientationError};
+  return kinds;
+}
+
+ObservationLayout oracle_layout() {
+  const Kinds body = {ChannelKind::kJointPosition,      ChannelKind::kJointVelocity, ChannelKind::kBaseAngularVelocity,
+                      ChannelKind::kBaseLinearVelocity, ChannelKind::kGravity,       ChannelKind::kPreviousAction};
+  return {.groups = {group_of(body), group_of(reference_kinds())}, .inputs = {input_of({{.groups = {0, 1}}})}};
+}
+
+ObservationLayout student_layout() {
+  const Kinds frame = {ChannelKind::kJointPosition, ChannelKind::kJointVelocity, ChannelKind::kBaseAngularVelocity,
+                       ChannelKind::kGravity, ChannelKind::kPreviousAction};
+  const HistoryRule past = {.frames = kWbcHistory, .current = false, .starts_full = true};
+  return {.groups = {group_of(frame), group_of(reference_kinds())},
+          .inputs = {input_of({{.groups = {0, 1}}, {.groups = {0}, .history = past}})}};
+}
+
+void show_sensors(ChannelKind kind, const WbcSensors& sensors, const Eigen::VectorXf& action, ChannelWriter& out) {
+  switch (kind) {
+    case ChannelKind::kJointPosition:
+      return out(sensors.q);
+    case ChannelKind::kJointVelocity:
+      return out(sensors.v);
+    case ChannelKind::kBaseAngularVelocity:
+      return out(sensors.w);
+    case ChannelKind::kBaseLinearVelocity:
+      return out(sensors.velocity_B);
+    case ChannelKind::kGravity:
+      return out(sensors.gravity);
+    case ChannelKind::kPreviousAction:
+      return out(action);
+    case ChannelKind::kReferenceJointPosition:
+      return out(sensors.q_ref);
+    case ChannelKind::kReferenceJointVelocity:
+      return out(sensors.v_ref);
+    case ChannelKind::kRootPositionError:
+      return out(sensors.root_error);
+    case ChannelKind::kRootOrientationError:
+      return out(sensors.root_turn);
+    default:
+      throw std::logic_error("wbc_sim: a channel that it does not show");
+  }
+}
+
+auto shown(const WbcSensors& sensors, const Eigen::VectorXf& action) {
+  return [&](const Channel& channel, ChannelWriter& out) { show_sensors(channel.kind, sensors, action, out); };
+}
 
 Eigen::Matrix<double, 6, 1> two_columns(const Eigen::Matrix3d& R) {
   Eigen::Matrix<double, 6, 1> columns;
@@ -23,42 +72,28 @@ Eigen::Matrix<double, 6, 1> two_columns(const Eigen::Matrix3d& R) {
   return columns;
 }
 
-void write_frame(const WbcSensors& sensors, const Eigen::VectorXf& action, Writer& write) {
-  write(sensors.q);
-  write(sensors.v);
-  write(sensors.w);
-  write(sensors.gravity);
-  write(action);
-}
-
-void write_reference(const WbcSensors& sensors, Writer& write) {
-  write(sensors.q_ref);
-  write(sensors.v_ref);
-  write(sensors.root_error);
-  write(sensors.root_turn);
-}
-
 }  // namespace
 
-std::vector<ChannelSpan> WbcLayout::oracle_channels() const {
-  return {{"joint_position", n_},
-          {"joint_velocity", n_},
-          {"base_angular_velocity", 3},
-          {"base_linear_velocity", 3},
-          {"gravity", 3},
-          {"previous_action", n_},
-          {"reference_joint_position", n_},
-          {"reference_joint_velocity", n_},
-          {"root_position_error", 3},
-          {"root_orientation_error", 6}};
+const ObservationLayout& wbc_observation(WbcKind kind) {
+  static const ObservationLayout oracle = oracle_layout(), student = student_layout();
+  return kind == WbcKind::kOracle ? oracle : student;
 }
 
-std::vector<ChannelSpan> WbcLayout::student_channels() const {
-  return {{"joint_position", n_},           {"joint_velocity", n_},
-          {"base_angular_velocity", 3},     {"gravity", 3},
-          {"previous_action", n_},          {"reference_joint_position", n_},
-          {"reference_joint_velocity", n_}, {"root_position_error", 3},
-          {"root_orientation_error", 6},    {"history", kWbcHistory * frame()}};
+int WbcLayout::size(WbcKind kind) const {
+  const ObservationLayout& layout = wbc_observation(kind);
+  return layout.input_size(layout.inputs[0], widths());
+}
+
+std::vector<LayoutEntry> WbcLayout::channels(WbcKind kind) const {
+  const ObservationLayout& layout = wbc_observation(kind);
+  std::vector<LayoutEntry> channels;
+  for (const LayoutBlock& block : layout.blocks(layout.inputs[0], widths(), ChannelFormat::kNetwork)) {
+    if (block.frames > 1)
+      channels.push_back({"history", block.frames * block.frame_size()});
+    else
+      channels.insert(channels.end(), block.entries.begin(), block.entries.end());
+  }
+  return channels;
 }
 
 void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors& sensors) {
@@ -77,38 +112,24 @@ void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors
   sensors.root_turn = two_columns(R_BW * tracker.root().R.toRotationMatrix());
 }
 
+std::span<const float> WbcObserver::update(const WbcSensors& sensors, const Eigen::VectorXf& action) {
+  writer_.update(shown(sensors, action));
+  return writer_.input(0);
+}
+
 void write_oracle(const WbcSensors& sensors, const Eigen::VectorXf& action, std::span<float> out) {
-  Writer write(out);
-  write(sensors.q);
-  write(sensors.v);
-  write(sensors.w);
-  write(sensors.velocity_B);
-  write(sensors.gravity);
-  write(action);
-  write_reference(sensors, write);
-}
-
-void WbcHistory::fill(const WbcSensors& sensors, const Eigen::VectorXf& action) {
-  for (int i = 0; i < kWbcHistory; ++i) add(sensors, action);
-}
-
-void WbcHistory::add(const WbcSensors& sensors, const Eigen::VectorXf& action) {
-  std::copy(frames_.begin() + size_, frames_.end(), frames_.begin());
-  Writer write({frames_.data() + frames_.size() - size_, static_cast<size_t>(size_)});
-  write_frame(sensors, action, write);
-}
-
-void write_student(const WbcSensors& sensors, const Eigen::VectorXf& action, const WbcHistory& history,
-                   std::span<float> out) {
-  Writer write(out);
-  write_frame(sensors, action, write);
-  write_reference(sensors, write);
-  std::copy(history.values().begin(), history.values().end(), out.end() - history.values().size());
+  std::span<float> rest = out;
+  const ChannelWidths widths = WbcLayout(static_cast<int>(sensors.q.size())).widths();
+  for (const ChannelGroup& group : wbc_observation(WbcKind::kOracle).groups) {
+    const auto size = static_cast<std::size_t>(channels_size(group.channels, widths));
+    write_channels(group.channels, shown(sensors, action), rest.first(size));
+    rest = rest.subspan(size);
+  }
 }
 
 void write_bodies(const Kinematics& actual, const Pose& X_WRef, const std::vector<int>& links, std::span<float> out) {
   const Eigen::Matrix3d R_RefW = X_WRef.R.toRotationMatrix().transpose();
-  Writer write(out);
+  ChannelWriter write(out);
   for (const int link : links) {
     write(Eigen::Vector3d(R_RefW * (actual.p_WL(link) - X_WRef.p)));
     write(two_columns(R_RefW * actual.R_WL(link)));

@@ -9,33 +9,37 @@
 #include <vector>
 
 #include "duet/controllers/wbc_sim/tracker.h"
+#include "duet/io/observation.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
 
-struct ChannelSpan {
-  std::string name;
-  int size = 0;
-};
-
 inline constexpr int kWbcHistory = 10;
+
+enum class WbcKind { kOracle, kStudent };  // 163-D with base velocity; 1090-D with history
 
 // Sizes for a robot of n joints, and what is where. n = 29: frame 93, oracle 163, student 1090, critic 361.
 class WbcLayout {
  public:
   explicit WbcLayout(int joints) : n_(joints) {}
   [[nodiscard]] int joints() const { return n_; }
-  [[nodiscard]] int frame() const { return 3 * n_ + 6; }      // q, v, w, g, a: what the history keeps
-  [[nodiscard]] int reference() const { return 2 * n_ + 9; }  // q_ref, v_ref, root position 3, orientation 6
-  [[nodiscard]] int oracle() const { return frame() + 3 + reference(); }
-  [[nodiscard]] int student() const { return frame() + reference() + kWbcHistory * frame(); }
+  [[nodiscard]] ChannelWidths widths() const { return {.joints = n_, .actions = n_}; }
+  [[nodiscard]] int size(WbcKind kind) const;
+  [[nodiscard]] int oracle() const { return size(WbcKind::kOracle); }
+  [[nodiscard]] int student() const { return size(WbcKind::kStudent); }
   [[nodiscard]] int critic(int bodies) const { return oracle() + 9 * bodies; }
-  [[nodiscard]] std::vector<ChannelSpan> oracle_channels() const;
-  [[nodiscard]] std::vector<ChannelSpan> student_channels() const;
+  // As a network's header has them; what the student is shown of the past is one entry, "history".
+  [[nodiscard]] std::vector<LayoutEntry> channels(WbcKind kind) const;
 
  private:
   int n_;
 };
+
+// One input. Of the oracle: joint position and velocity, base angular and linear velocity, gravity, action, then the
+// reference's joint position and velocity, root position error, root orientation error. Of the student: a frame (joint
+// position and velocity, base angular velocity, gravity, action), the same of the reference, and the ten frames before,
+// oldest first, the first of an episode standing for those before it.
+const ObservationLayout& wbc_observation(WbcKind kind);
 
 // What is read from sensors and from u_t; noise is added here (Table S3) before it is written.
 struct WbcSensors {
@@ -51,25 +55,20 @@ struct WbcSensors {
 // No allocation after the first call.
 void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors& sensors);
 
-// Order: q, v, w, velocity_B, gravity, action, q_ref, v_ref, root_error, root_turn.
-void write_oracle(const WbcSensors& sensors, const Eigen::VectorXf& action, std::span<float> out);
-
-// The last ten frames (q, v, w, gravity, action), oldest first, without the current one.
-class WbcHistory {
+// What a network is shown, tick by tick. No allocation after construction.
+class WbcObserver {
  public:
-  explicit WbcHistory(const WbcLayout& layout) : size_(layout.frame()), frames_(kWbcHistory * layout.frame(), 0.0F) {}
-  void fill(const WbcSensors& sensors, const Eigen::VectorXf& action);  // an episode begins: this stands for all ten
-  void add(const WbcSensors& sensors, const Eigen::VectorXf& action);
-  [[nodiscard]] std::span<const float> values() const { return frames_; }
+  WbcObserver(WbcKind kind, int joints) : writer_(wbc_observation(kind), WbcLayout(joints).widths()) {}
+  void reset() { writer_.reset(); }
+  // Valid until the next update.
+  std::span<const float> update(const WbcSensors& sensors, const Eigen::VectorXf& action);
 
  private:
-  int size_;  // of a frame
-  std::vector<float> frames_;
+  ObservationWriter writer_;
 };
 
-// Order: q, v, w, gravity, action, q_ref, v_ref, root_error, root_turn, history.
-void write_student(const WbcSensors& sensors, const Eigen::VectorXf& action, const WbcHistory& history,
-                   std::span<float> out);
+// The oracle's, which has no past.
+void write_oracle(const WbcSensors& sensors, const Eigen::VectorXf& action, std::span<float> out);
 
 // Position and orientation (first two columns) of the links that the critic sees, the card's bodies (of the G1: 22),
 // from the root's reference, in its frame. Appended to the oracle's observation.

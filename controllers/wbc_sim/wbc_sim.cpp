@@ -16,9 +16,7 @@ class WbcSim final : public Controller {
         network_(std::move(network)),
         policy_(*network_),
         tracker_(robot_),
-        layout_(robot_->dof()),
-        history_(layout_),
-        observation_(network_->mlp.inputs()) {
+        observer_(network_->kind, robot_->dof()) {
     action_.setZero(robot_->dof());
   }
 
@@ -26,6 +24,7 @@ class WbcSim final : public Controller {
 
   void reset(const RobotState&) override {
     action_.setZero();
+    observer_.reset();
     started_ = false;
   }
 
@@ -35,22 +34,12 @@ class WbcSim final : public Controller {
     else
       tracker_.reset(reference);
     read_sensors(state, tracker_, sensors_);
-    if (network_->kind == WbcKind::kOracle)
-      write_oracle(sensors_, action_, observation_);
-    else
-      observe_as_student();
     started_ = true;
-    action_ = policy_.act(observation_);
+    action_ = policy_.act(observer_.update(sensors_, action_));
     fill(command);
   }
 
  private:
-  void observe_as_student() {
-    if (!started_) history_.fill(sensors_, action_);
-    write_student(sensors_, action_, history_, observation_);
-    history_.add(sensors_, action_);
-  }
-
   void fill(JointCommand& command) const {
     command.q_target.resize(robot_->dof());
     for (int i = 0; i < robot_->dof(); ++i)
@@ -65,10 +54,8 @@ class WbcSim final : public Controller {
   std::shared_ptr<const WbcNetwork> network_;  // shared: many episodes run one network
   WbcPolicy policy_;
   WbcTracker tracker_;
-  WbcLayout layout_;
-  WbcHistory history_;
+  WbcObserver observer_;
   WbcSensors sensors_;
-  std::vector<float> observation_;
   Eigen::VectorXf action_;
   bool started_ = false;
 };

@@ -9,6 +9,7 @@
 
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
+#include "duet/policies/frame_channels.h"
 
 namespace duet {
 namespace {
@@ -39,20 +40,31 @@ void write_harmonics(double angle, float* out) {
   }
 }
 
-void write_frame(const ObservationFrame& frame, const Pose& X_EW, const Eigen::VectorXd& neutral,
-                 Eigen::Ref<Eigen::Matrix<float, kFrameSize, 1>> out) {
-  const RobotState& robot = frame.robot;
-  const Pose X_EB = X_EW * robot.X_WB;
-  const Eigen::Matrix3d R_BW = robot.X_WB.R.conjugate().toRotationMatrix();
-  const Eigen::Matrix3d R_EW = X_EW.R.toRotationMatrix();
-  const Eigen::Matrix<double, 3, kSmplJoints> joints = R_EW * (frame.partner.colwise() - frame.partner.col(0));
-  out << (X_EW * Eigen::Vector3d(frame.partner.col(0))).cast<float>(), joints.reshaped().cast<float>(),
-      (R_BW * robot.v_WB).cast<float>(), robot.w_WB_B.cast<float>(), (-R_BW.col(2)).cast<float>(),
-      (robot.q - neutral).cast<float>(), robot.v.cast<float>(), X_EB.p.cast<float>(), wxyz_of(X_EB.R).cast<float>();
+const std::vector<Channel>& dstar_channels() {
+  static const std::vector<Channel> channels = frame_channels(ChannelKind::kJointPosition);
+  return channels;
 }
 
-void add_axes(const std::string& name, std::vector<std::string>& names) {
-  for (const char* axis : {".x", ".y", ".z"}) names.push_back(name + axis);
+void add_parts(const std::string& name, std::initializer_list<const char*> parts, std::vector<std::string>& names) {
+  for (const char* part : parts) names.push_back(name + part);
+}
+
+void add_names(ChannelKind kind, const RobotModel& robot, std::vector<std::string>& names) {
+  const std::string name = channel_name(kind, ChannelFormat::kNetwork);
+  switch (kind) {
+    case ChannelKind::kPartnerJoints:
+      for (const std::string_view joint : kSmplNames)
+        add_parts(fmt::format("{}.{}", name, joint), {".x", ".y", ".z"}, names);
+      return;
+    case ChannelKind::kJointPosition:
+    case ChannelKind::kJointVelocity:
+      for (const std::string& joint : robot.joint_names()) names.push_back(fmt::format("{}.{}", name, joint));
+      return;
+    case ChannelKind::kRootOrientation:
+      return add_parts(name, {".w", ".x", ".y", ".z"}, names);
+    default:
+      return add_parts(name, {".x", ".y", ".z"}, names);
+  }
 }
 
 }  // namespace
@@ -60,13 +72,7 @@ void add_axes(const std::string& name, std::vector<std::string>& names) {
 std::vector<std::string> channel_names(const RobotModel& robot) {
   std::vector<std::string> names;
   names.reserve(kFrameSize);
-  add_axes("partner_root", names);
-  for (const std::string_view joint : kSmplNames) add_axes(fmt::format("partner_joint.{}", joint), names);
-  for (const char* channel : {"base_linear_velocity", "base_angular_velocity", "gravity"}) add_axes(channel, names);
-  for (const std::string& joint : robot.joint_names()) names.push_back("joint_position." + joint);
-  for (const std::string& joint : robot.joint_names()) names.push_back("joint_velocity." + joint);
-  add_axes("root_translation", names);
-  for (const char* part : {".w", ".x", ".y", ".z"}) names.push_back(std::string("root_orientation") + part);
+  for (const Channel& channel : dstar_channels()) add_names(channel.kind, robot, names);
   return names;
 }
 
@@ -89,9 +95,12 @@ void FeatureMaker::make(const Observation& observation, std::span<const Observat
                         DstarFeatures& features) {
   const ObservationFrame& now = observation.now();
   const Pose X_WE = ego_frame(now.robot), X_EW = X_WE.inverse();
+  const auto write = [&](const ObservationFrame& frame, float* out) {
+    write_frame(dstar_channels(), FrameSenses::in_ego(frame, *robot_, {}, X_EW), {out, kFrameSize});
+  };
   for (int i = 0; i < kHistoryFrames; ++i) {
-    write_frame(observation.history[i], X_EW, robot_->neutral, features.frames.col(i));
-    write_frame(past[i], X_EW, robot_->neutral, features.past.col(i));
+    write(observation.history[i], features.frames.col(i).data());
+    write(past[i], features.past.col(i).data());
   }
 
   kinematics_.update(now.robot.X_WB, now.robot.q);

@@ -16,21 +16,17 @@ namespace duet {
 // line, a joint that one of the two lacks.
 std::vector<int> bind_joints(const PolicyDescriptor& descriptor, const RobotModel& robot);
 
-// The channels of to_vector in its order: 149 numbers for 29 joints.
-std::vector<PolicyChannel> frame_channels();
-
 class ChannelValues {
  public:
   ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, const PolicyDescriptor& descriptor);
   // `language`: the prompt's embedding, where a channel shows it.
   void reset(const EpisodeContext& context, std::vector<float> language);
   // Of the observation's frame `frame` (0 the oldest) and of its tick. `out` has channel_size numbers. No allocation.
-  void write(const PolicyChannel& channel, const Observation& observation, int frame, std::span<float> out);
+  void write(const Channel& channel, const Observation& observation, int frame, std::span<float> out);
 
  private:
-  void write_plain(PolicyChannelKind kind, const Observation& observation, int frame, std::span<float> out);
-  void write_of_frame(PolicyChannelKind kind, const ObservationFrame& frame, const Pose& X_FW, std::span<float> out);
-  void write_of_joints(PolicyChannelKind kind, const RobotState& robot, std::span<float> out) const;
+  void write_plain(ChannelKind kind, const Observation& observation, int frame, std::span<float> out);
+  [[nodiscard]] FrameSenses senses_of(const Observation& observation, int frame) const;
 
   std::shared_ptr<const RobotModel> robot_;
   std::vector<int> joints_;

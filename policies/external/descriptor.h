@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/policies/frame_channels.h"
 #include "duet/policies/policy.h"
 
 namespace duet {
@@ -15,13 +16,6 @@ inline constexpr int kPlanNumbersBeforeJoints = 7;  // of an anchor: root positi
 
 enum class PolicyKind { kOnnx, kProcess };
 
-// What positions and orientations of an observation refer to.
-enum class PolicyFrame {
-  kWorld,  // W; the robot's root since the episode's start: to_vector (policies/policy.h)
-  kEgo,    // E: on the ground below the robot's root as it is now, x along its heading; joints of the partner from its
-           // root (policies/dstar/features.h)
-};
-
 // What the root of an anchor refers to.
 enum class PlanFrame {
   kWorld,
@@ -29,37 +23,12 @@ enum class PlanFrame {
   kDisplacement,  // position from the robot's root now, axes and orientation of W
 };
 
-enum class PolicyChannelKind {
-  kPartnerRoot,          // 3 [m]
-  kPartnerJoints,        // 72: SMPL-24 joints [m]
-  kBaseLinearVelocity,   // 3: in the axes of the base [m/s]
-  kBaseAngularVelocity,  // 3: in the axes of the base [rad/s]
-  kGravity,              // 3: its direction in the axes of the base
-  kJointPositions,       // [rad]
-  kJointOffsets,         // joint_positions from the card's neutral pose [rad]
-  kJointVelocities,      // [rad/s]
-  kRootOffset,           // 3 [m]
-  kRootOrientation,      // 4: quaternion wxyz, w >= 0
-  kLanguage,             // 768: the prompt's embedding
-  kTask,                 // a number for each of the descriptor's tasks: 1 for the episode's, else 0
-  kTime,                 // 1: since the episode's start [s]
-  kNoise,                // `size` standard normal numbers, drawn anew at each call
-};
-
-struct PolicyChannel {
-  PolicyChannelKind kind = PolicyChannelKind::kPartnerRoot;
-  int line = 0;  // in the descriptor's file
-  int size = 0;  // of kTask (the descriptor's tasks) and kNoise; others know their own
-  // Shown is (value - offset) * scale; one number for all or one each.
-  std::vector<double> offset = {0.0}, scale = {1.0};
-};
-
 struct PolicyInput {
   std::string name;  // of the network's input; "" for its only one
   int line = 0;
   int frames = 1;  // of the history, the current one last
   bool newest_first = false;
-  std::vector<PolicyChannel> channels;
+  std::vector<Channel> channels;
 };
 
 struct PlanFormat {
@@ -98,14 +67,8 @@ struct PolicyDescriptor {
   [[nodiscard]] std::string folder() const;  // the descriptor's; never empty
 };
 
-std::string_view to_string(PolicyChannelKind kind);
 std::string_view to_string(PolicyFrame frame);
 std::string_view to_string(PlanFrame frame);
-// Numbers that a channel shows of a robot with `joints` joints.
-int channel_size(const PolicyChannel& channel, int joints);
-// Whether it differs between the frames of a history.
-bool is_of_a_frame(PolicyChannelKind kind);
-
 // Throws InputError("FILE:LINE: ...") as YamlSection does.
 PolicyDescriptor parse_policy_descriptor(const std::string& text, const std::string& file);
 PolicyDescriptor read_policy_descriptor(const std::string& path);

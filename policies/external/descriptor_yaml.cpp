@@ -17,14 +17,6 @@ constexpr const char* kSchema = "duet.policy/1";
 constexpr int kMostAnchors = 1000, kMostTicks = 500;
 constexpr int kMostNoise = 1000000;
 
-std::vector<std::string> all_channels() {
-  std::vector<std::string> names;
-  names.reserve(static_cast<std::size_t>(PolicyChannelKind::kNoise) + 1);
-  for (int kind = 0; kind <= static_cast<int>(PolicyChannelKind::kNoise); ++kind)
-    names.emplace_back(to_string(static_cast<PolicyChannelKind>(kind)));
-  return names;
-}
-
 std::string text_or(const YamlSection& section, const char* key, const std::string& fallback) {
   return section.has(key) ? section.text(key) : fallback;
 }
@@ -170,50 +162,53 @@ class Reader {
     input.newest_first = choice(s, "order", "oldest_first", {"oldest_first", "newest_first"}) == 1;
     for (const YAML::Node& channel : s.items("channels")) input.channels.push_back(read_channel(s, channel));
     if (input.channels.empty()) s.fail(s.line("channels"), "'channels': expected at least one, found none");
-    for (const PolicyChannel& channel : input.channels)
+    for (const Channel& channel : input.channels)
       if (input.frames > 1 && !is_of_a_frame(channel.kind))
         s.fail(channel.line, fmt::format("channel '{}': expected in an input of 1 frame, found in one of {}",
-                                         to_string(channel.kind), input.frames));
+                                         name_of(channel), input.frames));
     return input;
   }
 
   // A name, or a mapping with the key `channel` and what is said of it.
-  [[nodiscard]] PolicyChannel read_channel(const YamlSection& input, const YAML::Node& node) const {
-    PolicyChannel channel{.line = std::max(node.Mark().line, 0) + 1};
+  [[nodiscard]] Channel read_channel(const YamlSection& input, const YAML::Node& node) const {
+    Channel channel{.line = std::max(node.Mark().line, 0) + 1};
     if (node.IsScalar()) {
       channel.kind = kind_of(input, channel.line, node.Scalar());
-      if (channel.kind == PolicyChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
+      if (channel.kind == ChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
       refuse_noise_without_size(input, channel);
       return channel;
     }
     const YamlSection s(out_.file, node, "channel", {"channel", "size", "offset", "scale"});
     channel.kind = kind_of(s, s.line("channel"), s.text("channel"));
-    if (s.has("size") && channel.kind != PolicyChannelKind::kNoise)
-      s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", to_string(channel.kind)));
-    if (channel.kind == PolicyChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
+    if (s.has("size") && channel.kind != ChannelKind::kNoise)
+      s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", name_of(channel)));
+    if (channel.kind == ChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
     if (s.has("size")) channel.size = whole_or(s, "size", 0, 1, kMostNoise);
     refuse_noise_without_size(s, channel);
-    channel.offset = numbers_for(s, "offset", 0.0, channel);
+    channel.shift = numbers_for(s, "offset", 0.0, channel);
     channel.scale = numbers_for(s, "scale", 1.0, channel);
     return channel;
   }
 
-  static PolicyChannelKind kind_of(const YamlSection& s, int line, const std::string& name) {
-    const std::vector<std::string> known = all_channels();
-    const auto it = std::ranges::find(known, name);
-    if (it == known.end()) s.fail(line, unknown_name_message("channel", name, known));
-    return static_cast<PolicyChannelKind>(it - known.begin());
+  static std::string name_of(const Channel& channel) { return channel_name(channel.kind, ChannelFormat::kPolicy); }
+
+  static ChannelKind kind_of(const YamlSection& s, int line, const std::string& name) {
+    try {
+      return channel_kind(name, ChannelFormat::kPolicy);
+    } catch (const std::invalid_argument& error) {
+      s.fail(line, error.what());
+    }
   }
 
-  static void refuse_noise_without_size(const YamlSection& s, const PolicyChannel& channel) {
-    if (channel.kind == PolicyChannelKind::kNoise && channel.size == 0)
+  static void refuse_noise_without_size(const YamlSection& s, const Channel& channel) {
+    if (channel.kind == ChannelKind::kNoise && channel.size == 0)
       s.fail(channel.line, "channel 'noise': expected {channel: noise, size: NUMBER}, found no size");
   }
 
   [[nodiscard]] std::vector<double> numbers_for(const YamlSection& s, const char* key, double fallback,
-                                                const PolicyChannel& channel) const {
+                                                const Channel& channel) const {
     std::vector<double> values = numbers_or(s, key, fallback);
-    const int size = channel_size(channel, static_cast<int>(out_.joints.size()));
+    const int size = channel_size(channel, {.joints = static_cast<int>(out_.joints.size()), .actions = 0});
     if (values.size() != 1 && static_cast<int>(values.size()) != size)
       s.fail(s.line(key), fmt::format("'{}': expected 1 or {} numbers, found {}", key, size, values.size()));
     return values;

@@ -95,9 +95,10 @@ PolicyMessage parse_plan(const Json& json) {
 Json channels_json(int joints) {
   Json channels = Json::array();
   int first = 0;
-  for (const PolicyChannel& channel : frame_channels()) {
-    const int size = channel_size(channel, joints);
-    channels.push_back({{"name", to_string(channel.kind)}, {"first", first}, {"size", size}});
+  for (const Channel& channel : frame_channels()) {
+    const int size = channel_size(channel, {.joints = joints, .actions = 0});
+    channels.push_back(
+        {{"name", channel_name(channel.kind, ChannelFormat::kPolicy)}, {"first", first}, {"size", size}});
     first += size;
   }
   return channels;

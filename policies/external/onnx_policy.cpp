@@ -10,10 +10,13 @@
 namespace duet {
 namespace {
 
+ChannelWidths widths_of(int joints) { return {.joints = joints, .actions = 0}; }
+
 std::vector<LayoutBlock> layout_of(const PolicyInput& input, int joints) {
   LayoutBlock block{.entries = {}, .frames = input.frames};
-  for (const PolicyChannel& channel : input.channels)
-    block.entries.push_back({std::string(to_string(channel.kind)), channel_size(channel, joints)});
+  for (const Channel& channel : input.channels)
+    block.entries.push_back(
+        {channel_name(channel.kind, ChannelFormat::kPolicy), channel_size(channel, widths_of(joints))});
   return {block};
 }
 
@@ -68,8 +71,8 @@ class OnnxPolicy final : public Policy {
     std::span<float> rest(buffer);
     for (int i = 0; i < input.frames; ++i) {
       const int frame = input.newest_first ? newest - i : newest - input.frames + 1 + i;
-      for (const PolicyChannel& channel : input.channels) {
-        const std::size_t size = channel_size(channel, joints_);
+      for (const Channel& channel : input.channels) {
+        const std::size_t size = channel_size(channel, widths_of(joints_));
         values_.write(channel, observation, frame, rest.first(size));
         rest = rest.subspan(size);
       }
@@ -113,8 +116,8 @@ class OnnxPolicy final : public Policy {
 
 bool shows_language(const PolicyDescriptor& descriptor) {
   for (const PolicyInput& input : descriptor.inputs)
-    for (const PolicyChannel& channel : input.channels)
-      if (channel.kind == PolicyChannelKind::kLanguage) return true;
+    for (const Channel& channel : input.channels)
+      if (channel.kind == ChannelKind::kLanguage) return true;
   return false;
 }
 

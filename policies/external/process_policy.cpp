@@ -194,8 +194,8 @@ class ProcessPolicy final : public Policy {
     const int frames = static_cast<int>(observation.history.size()), joints = static_cast<int>(joint_names_.size());
     numbers_.clear();
     for (int frame = 0; frame < frames; ++frame)
-      for (const PolicyChannel& channel : channels_) {
-        const std::size_t size = channel_size(channel, joints), first = numbers_.size();
+      for (const Channel& channel : channels_) {
+        const std::size_t size = channel_size(channel, {.joints = joints, .actions = 0}), first = numbers_.size();
         numbers_.resize(first + size);
         values_.write(channel, observation, frame, std::span(numbers_).subspan(first));
       }
@@ -229,7 +229,7 @@ class ProcessPolicy final : public Policy {
 
   PolicyDescriptor descriptor_;
   std::vector<std::string> joint_names_;  // in the descriptor's order
-  std::vector<PolicyChannel> channels_;
+  std::vector<Channel> channels_;
   ChannelValues values_;
   PlanDecoder decoder_;
   std::vector<float> numbers_;  // of an observation

@@ -31,14 +31,14 @@ Channel channel_of(ChannelKind kind) {
 // HOMIE's joints, shown these channels alone.
 Descriptor showing(const std::vector<Channel>& channels, const std::optional<StandBounds>& stands_below = {}) {
   Descriptor descriptor = load_descriptor("homie");
-  descriptor.groups = {{.name = "frame", .line = 1, .channels = channels}};
-  descriptor.inputs = {{.name = "", .line = 1, .parts = {{.line = 1, .groups = {0}}}, .state = {}}};
+  descriptor.observation.groups = {{.name = "frame", .line = 1, .channels = channels}};
+  descriptor.observation.inputs = {{.name = "", .line = 1, .parts = {{.line = 1, .groups = {0}}}, .state = {}}};
   descriptor.command->stands_below = stands_below;
   return descriptor;
 }
 
 Layout layout_of(const Descriptor& descriptor, const ControllerOptions& options) {
-  return {descriptor, {{"x", descriptor.input_size(descriptor.inputs[0])}}, {{"y", 12}}, options};
+  return {descriptor, {{"x", descriptor.input_size(descriptor.observation.inputs[0])}}, {{"y", 12}}, options};
 }
 
 TEST(CommandAxes, AreShownInTheirOrder) {
@@ -189,8 +189,8 @@ TEST(ActionAround, IsEachJointsOwn) {
 
 Descriptor with_state(const std::string& output) {
   Descriptor descriptor = load_descriptor("rl_gym");
-  descriptor.inputs[0].name = "x";
-  descriptor.inputs.push_back({.name = "h", .line = 60, .parts = {}, .state = output});
+  descriptor.observation.inputs[0].name = "x";
+  descriptor.observation.inputs.push_back({.name = "h", .line = 60, .parts = {}, .state = output});
   descriptor.output = "y";
   return descriptor;
 }
@@ -224,7 +224,7 @@ TEST(StateInput, ThatDoesNotFitItsOutputIsRefused) {
 
 // The frame's rate by the difference of its poses a moment apart.
 TEST(GyroFrame, ShowsTheRateAndTheGravityOfThatFrame) {
-  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kProjectedGravity);
+  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kGravity);
   for (const char* name : {"torso_link", "left_ankle_roll_link", "head_link"}) {
     gyro.frame = gravity.frame = name;
     Layout l = layout_of(showing({gyro, gravity}), {{"command", "0,0,0"}});
@@ -245,7 +245,7 @@ TEST(GyroFrame, ShowsTheRateAndTheGravityOfThatFrame) {
 }
 
 TEST(GyroFrame, OfTheBaseIsTheBaseToTheBit) {
-  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kProjectedGravity);
+  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kGravity);
   Layout plain = layout_of(showing({gyro, gravity}), {{"command", "0,0,0"}});
   gyro.frame = gravity.frame = "pelvis";
   Layout framed = layout_of(showing({gyro, gravity}), {{"command", "0,0,0"}});
@@ -256,7 +256,7 @@ TEST(GyroFrame, OfTheBaseIsTheBaseToTheBit) {
 
 // The card says where the gyro sits, unless the channel does.
 TEST(GyroFrame, IsTheCardsWhereTheChannelNamesNone) {
-  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kProjectedGravity);
+  Channel gyro = channel_of(ChannelKind::kBaseAngularVelocity), gravity = channel_of(ChannelKind::kGravity);
   const auto shown = [&](const std::string& of_card, const std::string& of_channel) {
     gyro.frame = gravity.frame = of_channel;
     const Descriptor descriptor = showing({gyro, gravity});

@@ -51,12 +51,12 @@ TEST(IoDescriptor, IsReadAsWritten) {
   EXPECT_EQ(d.actions(), 1);
   EXPECT_EQ(d.joints[1].effort, 5.0);
   EXPECT_FALSE(d.joints[1].action.has_value());
-  EXPECT_EQ(d.groups[0].channels[0].joints, (std::vector<int>{1, 0}));
-  EXPECT_EQ(d.groups[0].channels[1].clip, 4.0);
-  EXPECT_TRUE(d.inputs[0].parts[0].history.starts_full);
-  EXPECT_EQ(d.input_size(d.inputs[0]), 3 * 6 + 5);
+  EXPECT_EQ(d.observation.groups[0].channels[0].joints, (std::vector<int>{1, 0}));
+  EXPECT_EQ(d.observation.groups[0].channels[1].clip, 4.0);
+  EXPECT_TRUE(d.observation.inputs[0].parts[0].history.starts_full);
+  EXPECT_EQ(d.input_size(d.observation.inputs[0]), 3 * 6 + 5);
   EXPECT_EQ(
-      d.input_layout(d.inputs[0]),
+      d.input_layout(d.observation.inputs[0]),
       "previous_action 0, joint_position 1..2, base_angular_velocity 3..5 (3 frames of 6); joint_position 18..19, "
       "base_angular_velocity 20..22");
   EXPECT_FALSE(d.walks);
@@ -113,8 +113,8 @@ constexpr const char* kWalking =
 TEST(IoDescriptor, ACommandIsShownByItsAxesInTheirOrder) {
   const Descriptor d = parse_descriptor(
       changed("{channel: previous_action}", "{channel: command_velocity, axes: [2, 0], scale: [0.25, 2]}"), "x.yaml");
-  EXPECT_EQ(d.groups[1].channels[0].axes, (std::vector<int>{2, 0}));
-  EXPECT_EQ(d.group_size(d.groups[1]), 2);
+  EXPECT_EQ(d.observation.groups[1].channels[0].axes, (std::vector<int>{2, 0}));
+  EXPECT_EQ(channels_size(d.observation.groups[1].channels, d.widths()), 2);
   EXPECT_THAT(message(changed("{channel: previous_action}", "{channel: command_velocity, axes: [3]}")),
               HasSubstr("x.yaml:15: channel 'command_velocity': 'axes': expected a whole number in [0, 2], found 3"));
   EXPECT_THAT(message(changed("{channel: previous_action}", "{channel: command_velocity, axes: []}")),
@@ -129,7 +129,7 @@ TEST(IoDescriptor, AChannelOfStandingNeedsToKnowWhichCommandIsOne) {
   const std::string gated = with("{channel: gait_sine, frequency_hz: 1, standing: [3]}");
   EXPECT_THAT(message(gated), HasSubstr("x.yaml:15: IO descriptor: channel 'gait_sine' with 'standing': expected"));
   const Descriptor d = parse_descriptor(gated + kWalking, "x.yaml");
-  EXPECT_EQ(d.groups[1].channels[0].gait.standing, std::vector<double>{3.0});
+  EXPECT_EQ(d.observation.groups[1].channels[0].gait.standing, std::vector<double>{3.0});
   ASSERT_TRUE(d.command->stands_below.has_value());
   EXPECT_EQ(d.command->stands_below->speed, 0.1);
   EXPECT_EQ(d.command->stands_below->yaw_rate, 0.2);
@@ -177,8 +177,8 @@ TEST(IoDescriptor, AnActionIsAroundWhatItsJointOrElseAllJointsSay) {
 
 TEST(IoDescriptor, AnInputIsMadeOfPartsOrIsAState) {
   const Descriptor d = parse_descriptor(std::string(kSmall) + "  - {name: h, state: next_h}\n", "x.yaml");
-  EXPECT_EQ(d.inputs[1].state, "next_h");
-  EXPECT_TRUE(d.inputs[1].parts.empty());
+  EXPECT_EQ(d.observation.inputs[1].state, "next_h");
+  EXPECT_TRUE(d.observation.inputs[1].parts.empty());
   EXPECT_THAT(message(std::string(kSmall) + "  - {name: h, state: next_h, parts: [{groups: [first]}]}\n"),
               HasSubstr("x.yaml:21: input 'h': expected 'parts' or 'state', found both"));
   EXPECT_THAT(message(std::string(kSmall) + "  - {name: h}\n"),

@@ -19,7 +19,7 @@ std::string constant_network(const Descriptor& descriptor, const std::vector<flo
   test::OnnxWriter writer;
   std::vector<std::string> names;
   std::int64_t size = 0;
-  for (const DescriptorInput& input : descriptor.inputs) {
+  for (const ObservationInput& input : descriptor.observation.inputs) {
     names.push_back(input.name.empty() ? "x" : input.name);
     const std::int64_t numbers = descriptor.input_size(input) + more;
     writer.input(names.back(), {1, numbers});

@@ -40,7 +40,7 @@ Vector6 leg_angles(const LegChain& leg, const Eigen::VectorXd& q) {
 // A network of random weights that does little: enough for all but the quality.
 WbcNetwork small_network(WbcKind kind) {
   const WbcLayout layout(g1()->dof());
-  const int inputs = kind == WbcKind::kOracle ? layout.oracle() : layout.student();
+  const int inputs = layout.size(kind);
   Random random(5, 6);
   WbcNetwork network;
   network.kind = kind;
@@ -189,62 +189,6 @@ TEST(WbcTracker, ALowerRootBendsTheKnees) {
   EXPECT_EQ(tracker.root().p.z(), g1()->bounds_of_root().lowest);
   EXPECT_GT(tracker.q()[g1()->joint_index("left_knee_joint")],
             g1()->neutral[g1()->joint_index("left_knee_joint")] + 0.2);
-}
-
-TEST(WbcLayout, SizesAreThePrintedTotals) {
-  const WbcLayout layout(29);
-  EXPECT_EQ(layout.oracle(), 163);
-  EXPECT_EQ(layout.student(), 1090);
-  EXPECT_EQ(layout.critic(22), 361);
-  EXPECT_EQ(g1()->roles.bodies.size(), 22U);
-  int sum = 0;
-  for (const ChannelSpan& channel : layout.student_channels()) sum += channel.size;
-  EXPECT_EQ(sum, 1090);
-}
-
-TEST(WbcObservation, EveryChannelIsAtItsPlace) {
-  WbcTracker tracker(g1());
-  RobotState state = g1()->standing_state();
-  state.q[3] += 0.5;
-  state.v[4] = 2.0;
-  state.w_WB_B = {1.0, 2.0, 3.0};
-  state.v_WB = {4.0, 5.0, 6.0};
-  Eigen::VectorXf action = Eigen::VectorXf::Zero(29);
-  action[7] = 0.25F;
-  tracker.reset(standing_reference(0.1, -0.2));
-  WbcSensors sensors;
-  read_sensors(state, tracker, sensors);
-  std::vector<float> o(163);
-  write_oracle(sensors, action, o);
-  EXPECT_FLOAT_EQ(o[3], 0.5F);
-  EXPECT_FLOAT_EQ(o[29 + 4], 2.0F);
-  EXPECT_FLOAT_EQ(o[58 + 1], 2.0F);
-  EXPECT_FLOAT_EQ(o[61 + 2], 6.0F);
-  EXPECT_FLOAT_EQ(o[64 + 2], -1.0F);
-  EXPECT_FLOAT_EQ(o[67 + 7], 0.25F);
-  EXPECT_NEAR(o[154], 0.1F, 1e-6);
-  EXPECT_NEAR(o[155], -0.2F, 1e-6);
-  EXPECT_FLOAT_EQ(o[157], 1.0F);  // first column of the identity
-  EXPECT_FLOAT_EQ(o[161], 1.0F);  // second column
-}
-
-TEST(WbcObservation, HistoryIsOldestFirstWithoutTheCurrentFrame) {
-  const WbcLayout layout(29);
-  WbcHistory history(layout);
-  WbcTracker tracker(g1());
-  tracker.reset(standing_reference());
-  WbcSensors sensors;
-  read_sensors(g1()->standing_state(), tracker, sensors);
-  Eigen::VectorXf action = Eigen::VectorXf::Zero(29);
-  history.fill(sensors, action);
-  for (int i = 1; i <= 3; ++i) {
-    action[0] = static_cast<float>(i);
-    history.add(sensors, action);
-  }
-  const int at = 29 + 29 + 3 + 3;
-  EXPECT_EQ(history.values()[9 * 93 + at], 3.0F);
-  EXPECT_EQ(history.values()[7 * 93 + at], 1.0F);
-  EXPECT_EQ(history.values()[6 * 93 + at], 0.0F);
 }
 
 TEST(WbcNetwork, IsTheSameAfterSavingAndLoading) {

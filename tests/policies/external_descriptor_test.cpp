@@ -47,8 +47,8 @@ TEST(PolicyDescriptor, SaysWhatANetworkIsShownAndWhatItsOutputMeans) {
   ASSERT_EQ(read.inputs.size(), 2U);
   EXPECT_EQ(read.inputs[0].frames, 12);
   EXPECT_TRUE(read.inputs[0].newest_first);
-  EXPECT_EQ(read.inputs[0].channels[1].kind, PolicyChannelKind::kJointPositions);
-  EXPECT_EQ(read.inputs[0].channels[1].offset, (std::vector<double>{1, 2}));
+  EXPECT_EQ(read.inputs[0].channels[1].kind, ChannelKind::kJointAngle);
+  EXPECT_EQ(read.inputs[0].channels[1].shift, (std::vector<double>{1, 2}));
   EXPECT_EQ(read.inputs[1].channels[0].size, 180);
   EXPECT_EQ(read.output.anchors, 3);
   EXPECT_EQ(read.output.ticks_per_anchor, 5);
@@ -111,11 +111,11 @@ TEST(PolicyDescriptor, RefusesWhatItDoesNotUnderstand) {
 TEST(PolicyDescriptor, KnowsTheSixTasksOfTheSupplementUnlessItSaysOthers) {
   const PolicyDescriptor six = parse_policy_descriptor(replaced(kNetwork, "noise, size: 180", "task"), "mine.yaml");
   EXPECT_EQ(six.tasks, std::vector<Task>(kPaperTasks.begin(), kPaperTasks.end()));
-  EXPECT_EQ(channel_size(six.inputs[1].channels[0], 2), 6);
+  EXPECT_EQ(channel_size(six.inputs[1].channels[0], {.joints = 2, .actions = 0}), 6);
   const PolicyDescriptor two = parse_policy_descriptor(
       replaced(kNetwork, "noise, size: 180", "task") + "tasks: [wave, high-five]\n", "mine.yaml");
   EXPECT_EQ(two.tasks, (std::vector<Task>{Task::kWave, Task::kHighFive}));
-  EXPECT_EQ(channel_size(two.inputs[1].channels[0], 2), 2);
+  EXPECT_EQ(channel_size(two.inputs[1].channels[0], {.joints = 2, .actions = 0}), 2);
 
   EXPECT_THAT(refusal(kProcess + "tasks: [wafe]\n"),
               HasSubstr("mine.yaml:6: policy descriptor: 'tasks': unknown task 'wafe': did you mean 'wave'?"));

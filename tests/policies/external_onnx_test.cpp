@@ -148,7 +148,7 @@ TEST(OnnxPolicy, RootsComeBackFromEveryFrame) {
   }
 }
 
-std::vector<float> shown(PolicyFrame frame, const std::vector<PolicyChannel>& channels, const MovingHistory& history,
+std::vector<float> shown(PolicyFrame frame, const std::vector<Channel>& channels, const MovingHistory& history,
                          int index, std::vector<int> joints) {
   const int count = static_cast<int>(joints.size());
   PolicyDescriptor of_the_frame;
@@ -156,8 +156,8 @@ std::vector<float> shown(PolicyFrame frame, const std::vector<PolicyChannel>& ch
   ChannelValues values(g1(), std::move(joints), of_the_frame);
   values.reset(test::episode({.X_WB = {Eigen::Quaterniond::Identity(), {0.1, 0.2, 0.3}}, .q = {}, .v = {}}), {});
   std::vector<float> numbers;
-  for (const PolicyChannel& channel : channels) {
-    std::vector<float> part(channel_size(channel, count));
+  for (const Channel& channel : channels) {
+    std::vector<float> part(channel_size(channel, {.joints = count, .actions = 0}));
     values.write(channel, history.at(100), index, part);
     numbers.insert(numbers.end(), part.begin(), part.end());
   }
@@ -182,13 +182,11 @@ TEST(PolicyChannels, OfTheRobotAreThoseOfDstar) {
   for (int i = 0; i < 29; ++i) joints[i] = i;
   DstarFeatures features;
   FeatureMaker(g1()).make(history.at(0), features);
-  std::vector<PolicyChannel> channels = frame_channels();
-  for (PolicyChannel& channel : channels)
-    if (channel.kind == PolicyChannelKind::kJointPositions) channel.kind = PolicyChannelKind::kJointOffsets;
+  const std::vector<Channel> channels = frame_channels(ChannelKind::kJointPosition);
   for (const int i : {0, 5, 11}) {
     const std::vector<float> numbers = shown(PolicyFrame::kEgo, channels, history, i, joints);
     ASSERT_EQ(static_cast<int>(numbers.size()), kFrameSize);
-    for (int k = 0; k < kFrameSize; ++k) EXPECT_NEAR(numbers[k], features.frames(k, i), kFloat) << k;
+    for (int k = 0; k < kFrameSize; ++k) EXPECT_EQ(numbers[k], features.frames(k, i)) << k;
   }
 }
 
@@ -196,10 +194,9 @@ TEST(PolicyChannels, AreInTheDescriptorsOrderScaledAndOffset) {
   const MovingHistory history(6);
   std::vector<int> joints(29);
   for (int i = 0; i < 29; ++i) joints[i] = 28 - i;
-  const std::vector<PolicyChannel> channels = {
-      {.kind = PolicyChannelKind::kJointVelocities, .offset = {1.0}, .scale = {0.5}},
-      {.kind = PolicyChannelKind::kTask, .size = 6},
-      {.kind = PolicyChannelKind::kTime}};
+  const std::vector<Channel> channels = {{.kind = ChannelKind::kJointVelocity, .scale = {0.5}, .shift = {1.0}},
+                                         {.kind = ChannelKind::kTask, .size = 6},
+                                         {.kind = ChannelKind::kTime}};
   const std::vector<float> numbers = shown(PolicyFrame::kWorld, channels, history, 3, joints);
   const Eigen::VectorXd& v = history.at(0).history[3].robot.v;
   for (int j = 0; j < 29; ++j) EXPECT_NEAR(numbers[j], 0.5 * (v[28 - j] - 1.0), kFloat);

@@ -1,0 +1,113 @@
+// The channels of which observations are made, declared once: what each shows, how many numbers it has, and what it is
+// called in the three formats that name it. Plain data.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/io/gait_clock.h"
+
+namespace duet {
+
+// Where channels are named. A channel that a format does not name cannot be shown there.
+enum class ChannelFormat {
+  kController,  // an IO descriptor (docs/file-formats.md)
+  kPolicy,      // a policy descriptor (docs/adding-a-policy.md) and messages to a program
+  kNetwork,     // headers of duet's own networks: WBC-Sim, D-STAR (docs/dstar-format.md)
+};
+
+// What they show stands in the table (io/channel.cpp) and in docs/reference/channels.md.
+enum class ChannelKind {
+  kPartnerRoot,
+  kPartnerJoints,
+  kBaseLinearVelocity,
+  kBaseAngularVelocity,
+  kGravity,
+  kRollPitch,
+  kCommandVelocity,
+  kCommandHeight,
+  kCommandStand,
+  kJointAngle,
+  kJointPosition,  // from the default or the neutral pose
+  kJointVelocity,
+  kRootOffset,
+  kRootOrientation,
+  kPreviousAction,
+  kReferenceRootVelocity,
+  kReferenceHeight,
+  kReferenceRollPitch,
+  kReferenceYawRate,
+  kReferenceJointAngle,
+  kReferenceJointPosition,  // from the neutral pose
+  kReferenceJointVelocity,
+  kReferenceFrames,
+  kRootPositionError,
+  kRootOrientationError,
+  kAnchorPositionError,
+  kAnchorOrientationError,
+  kGaitSine,
+  kGaitCosine,
+  kTick,
+  kConstant,
+  kLanguage,
+  kTask,
+  kTime,
+  kNoise,
+};
+
+inline constexpr int kPromptNumbers = 768;  // of a prompt's embedding (supplement A.2.4)
+
+struct Channel {
+  ChannelKind kind = ChannelKind::kConstant;
+  int line = 0;                                           // in the descriptor's file
+  std::vector<double> scale = {1.0};                      // one for all or one each
+  std::vector<double> shift = {0.0};                      // of a policy: shown is (value - shift) * scale; likewise
+  double clip = std::numeric_limits<double>::infinity();  // bound of the scaled value's size
+  std::vector<int> joints = {};                           // of the descriptor's list, in the channel's order
+  std::vector<bool> zeroed = {};                          // per entry of `joints`: shown as 0
+  std::vector<int> axes = {};                             // components of a vector that are shown
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();       // p_BF of the point whose velocity is shown [m]
+  bool clipped = false;                                   // previous_action: after the action's clip
+  std::string frame = {};                                 // of the robot: the anchor; of a gyro: "" is the base
+  int frame_index = -1;                                   // of `frame` in the robot, once it is bound; -1: the base
+  GaitClock gait = {};                                    // of a clock
+  std::vector<int> steps = {};                            // ticks ahead of the reference's frames, >= 1
+  std::vector<double> values = {};                        // of a constant
+  int size = 0;                                           // of kTask (the tasks) and kNoise; others know their own
+};
+
+// How many numbers a network has where a channel does not say: of joints and of its own output.
+struct ChannelWidths {
+  int joints = 0;
+  int actions = 0;
+};
+
+// A channel for a person: of `duet list channels` and the reference page. "" where a format does not name it.
+struct ChannelRow {
+  ChannelKind kind;
+  const char* controller;
+  const char* policy;
+  const char* network;
+  std::string_view keys;  // of an IO descriptor, each between spaces; beside `channel`, `scale` and `clip`
+  int size;               // 0: it depends on what is given
+  const char* numbers;    // size and unit
+  const char* meaning;
+};
+// In the order of ChannelKind.
+const std::vector<ChannelRow>& channel_table();
+
+// "" where the format does not name it.
+std::string channel_name(ChannelKind kind, ChannelFormat format);
+std::vector<std::string> channel_names(ChannelFormat format);
+// Throws std::invalid_argument with the nearest and all known names.
+ChannelKind channel_kind(std::string_view name, ChannelFormat format);
+// The keys of an IO descriptor that belong to the kind, and whether one does.
+std::vector<std::string> channel_keys(ChannelKind kind);
+bool takes_key(ChannelKind kind, std::string_view key);
+// Numbers that it shows.
+int channel_size(const Channel& channel, const ChannelWidths& widths);
+
+}  // namespace duet

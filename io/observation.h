@@ -1,0 +1,136 @@
+// How channels make up what a network is shown: side by side in groups, groups now or over the last frames in parts,
+// parts one after another in an input. One owner, not thread-safe; nothing allocates after construction.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <limits>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "duet/io/channel.h"
+#include "duet/io/frame_history.h"
+#include "duet/io/layout.h"
+
+namespace duet {
+
+struct ChannelGroup {
+  std::string name;
+  int line = 0;
+  std::vector<Channel> channels;
+};
+
+// Groups side by side, now or over the last frames (oldest first).
+struct InputPart {
+  int line = 0;
+  std::vector<int> groups;
+  HistoryRule history{};
+};
+
+struct ObservationInput {
+  std::string name;  // of the network's input; "" for its only one
+  int line = 0;
+  std::vector<InputPart> parts;  // none where it is a state
+  std::string state;             // the output of the tick before that it is given, zeros at the start; "" otherwise
+};
+
+struct ObservationLayout {
+  std::vector<ChannelGroup> groups = {};
+  std::vector<ObservationInput> inputs = {};
+
+  [[nodiscard]] int part_size(const InputPart& part, const ChannelWidths& widths) const;  // of one frame
+  [[nodiscard]] int input_size(const ObservationInput& input, const ChannelWidths& widths) const;
+  // `format`: whose names the channels have.
+  [[nodiscard]] std::vector<LayoutBlock> blocks(const ObservationInput& input, const ChannelWidths& widths,
+                                                ChannelFormat format) const;
+};
+
+int channels_size(std::span<const Channel> channels, const ChannelWidths& widths);
+
+// Takes the numbers of channels one after another, scales and bounds them, and keeps them as float.
+class ChannelWriter {
+ public:
+  explicit ChannelWriter(std::span<float> out) : out_(out) {}
+  // What follows is this channel's: with its scale, within its clip. Before the first: as it is.
+  void begin(const Channel& channel) {
+    scale_ = channel.scale;
+    clip_ = channel.clip;
+    plain_ = scale_.size() == 1 && scale_[0] == 1.0 && clip_ == std::numeric_limits<double>::infinity();
+    first_ = written_;
+  }
+  void operator()(double value) {
+    claim(1);
+    put(value);
+  }
+  template <typename Derived>
+  void operator()(const Eigen::DenseBase<Derived>& values) {
+    claim(static_cast<std::size_t>(values.size()));
+    for (Eigen::Index i = 0; i < values.size(); ++i) put(static_cast<double>(values.derived().coeff(i)));
+  }
+  [[nodiscard]] bool is_full() const { return written_ == out_.size(); }
+
+ private:
+  void claim(std::size_t count) const {
+    if (written_ + count > out_.size()) throw std::logic_error("observation: a channel shows more than its size");
+  }
+  void put(double value) {
+    if (!plain_) value = std::clamp(value * scale_[scale_.size() == 1 ? 0 : written_ - first_], -clip_, clip_);
+    out_[written_++] = static_cast<float>(value);
+  }
+
+  std::span<float> out_;
+  std::span<const double> scale_;
+  double clip_ = 0.0;
+  bool plain_ = true;
+  std::size_t written_ = 0, first_ = 0;
+};
+
+// `show(channel, writer)` gives the numbers of each channel; `out` has channels_size of them.
+template <typename Show>
+void write_channels(std::span<const Channel> channels, const Show& show, std::span<float> out) {
+  ChannelWriter writer(out);
+  for (const Channel& channel : channels) {
+    writer.begin(channel);
+    show(channel, writer);
+  }
+  if (!writer.is_full()) throw std::logic_error("observation: a channel shows less than its size");
+}
+
+// The inputs of a layout, tick by tick.
+class ObservationWriter {
+ public:
+  ObservationWriter(const ObservationLayout& layout, const ChannelWidths& widths);
+
+  void reset();
+  // As write_channels, of every group; then histories go on by a frame.
+  template <typename Show>
+  void update(const Show& show) {
+    for (Group& group : groups_) write_channels(group.channels, show, group.values);
+    fill_inputs();
+  }
+  // Numbers of the input in the order of ObservationLayout::inputs, after the last update.
+  [[nodiscard]] std::span<const float> input(int index) const { return inputs_[index].values; }
+
+ private:
+  struct Group {
+    std::vector<Channel> channels;
+    std::vector<float> values;
+  };
+  struct Part {
+    std::vector<int> groups;
+    FrameHistory history;
+  };
+  struct Input {
+    std::vector<Part> parts;
+    std::vector<float> values;
+  };
+  void fill_inputs();
+
+  std::vector<Group> groups_;
+  std::vector<Input> inputs_;
+  std::vector<float> frame_;  // one frame of a part
+};
+
+}  // namespace duet
