@@ -13,7 +13,7 @@
 #include "duet/controllers/root_conversion.h"
 #include "duet/core/clock.h"
 #include "duet/core/names.h"
-#include "duet/core/number.h"
+#include "duet/core/option.h"
 #include "duet/core/require.h"
 #include "duet/io/bound_network.h"
 #include "duet/io/joint_binding.h"
@@ -47,22 +47,67 @@ void set_yaw_scale(Channel& channel, double scale) {
   for (const int place : places) channel.scale[place] = scale;
 }
 
-Descriptor with_yaw_scale(Descriptor descriptor, const ControllerOptions& options) {
-  const std::string text = option_or(options, "yaw_scale");
-  if (text.empty()) return descriptor;
-  const std::optional<double> scale = parse_number(text);
-  require(scale.has_value(), fmt::format("option 'yaw_scale': expected a number, found '{}'", text));
+enum class WaistMode { kFree, kLocked };
+
+// What a suite may set of a descriptor's controller; the network's file is found by find_network (published.h).
+struct DescriptorOptions {
+  std::string network, engine = "duet";
+  WaistMode waist = WaistMode::kFree;
+  RootConversionLaw conversion = RootConversionLaw::kAdopted;
+  std::string command = {};  // of parse_velocity_command; "": of the reference's root
+  std::optional<double> yaw_scale = {};
+};
+
+Field<DescriptorOptions> command_field() {
+  constexpr const char* kForms = "\"vx,vy,wz\" or \"vx,vy,wz,height\"";
+  return field<DescriptorOptions>(
+      {.name = "command", .meaning = "[m/s, m/s, rad/s, m] instead of what is made of the reference's root"}, kForms,
+      [](const DescriptorOptions& options) { return options.command; },
+      [kForms](DescriptorOptions& options, const std::string& text) -> std::string {
+        try {
+          if (!text.empty()) static_cast<void>(parse_velocity_command(text, 0.0));
+        } catch (const std::invalid_argument&) {
+          return kForms;
+        }
+        options.command = text;
+        return "";
+      });
+}
+
+FieldTable<DescriptorOptions> option_table(const Descriptor& descriptor) {
+  using O = DescriptorOptions;
+  FieldTable<O> table = {field<O>({.name = "network", .meaning = "path of the network's file"}, &O::network),
+                         field<O>({.name = "engine", .meaning = "what evaluates the network"}, &O::engine),
+                         field<O>({.name = "waist",
+                                   .meaning = "locked: waist roll and pitch are held at 0 where the robot has them",
+                                   .choices = {"free", "locked"}},
+                                  &O::waist)};
+  if (descriptor.command) {
+    table.push_back(field<O>({.name = "conversion",
+                              .meaning = "of the reference's root to a velocity (A.4.3)",
+                              .choices = root_conversion_names()},
+                             &O::conversion));
+    table.push_back(command_field());
+  }
+  if (shows_yaw_rate(descriptor))
+    table.push_back(
+        field<O>({.name = "yaw_scale", .meaning = "scale of the commanded yaw rate instead of the descriptor's"},
+                 &O::yaw_scale));
+  return table;
+}
+
+DescriptorOptions defaults_of(const Descriptor& descriptor) {
+  DescriptorOptions defaults;
+  defaults.network = descriptor.network;
+  defaults.waist = descriptor.waist_locked ? WaistMode::kLocked : WaistMode::kFree;
+  return defaults;
+}
+
+Descriptor with_yaw_scale(Descriptor descriptor, const std::optional<double>& scale) {
+  if (!scale) return descriptor;
   for (ChannelGroup& group : descriptor.observation.groups)
     for (Channel& channel : group.channels) set_yaw_scale(channel, *scale);
   return descriptor;
-}
-
-bool waist_is_locked(const Descriptor& descriptor, const ControllerOptions& options) {
-  const std::string text = option_or(options, "waist", descriptor.waist_locked ? "locked" : "free");
-  const std::vector<std::string> known = {"free", "locked"};
-  if (text != "free" && text != "locked")
-    throw std::invalid_argument(unknown_name_message("value of the option 'waist'", text, known));
-  return text == "locked";
 }
 
 template <typename Joint>
@@ -85,13 +130,13 @@ class DescriptorController final : public Controller {
  public:
   DescriptorController(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot,
                        std::unique_ptr<Network> network, const std::string& network_path,
-                       const ControllerOptions& options)
+                       const DescriptorOptions& options)
       : robot_(std::move(robot)),
         name_(descriptor.name),
         clip_(static_cast<float>(descriptor.action_clip)),
-        joints_(bind_joints(descriptor, *robot_, waist_is_locked(descriptor, options))),
+        joints_(bind_joints(descriptor, *robot_, options.waist == WaistMode::kLocked)),
         network_(std::move(network), descriptor.file, network_path),
-        observer_(with_yaw_scale(descriptor, options), robot_, first_joints(descriptor.joints.size())),
+        observer_(with_yaw_scale(descriptor, options.yaw_scale), robot_, first_joints(descriptor.joints.size())),
         rates_(robot_->dof(), kTick),
         action_(descriptor.actions()),
         gains_(robot_->default_command(robot_->neutral)) {
@@ -214,14 +259,12 @@ class DescriptorController final : public Controller {
                                    network_.place(descriptor.output_line), port.name, descriptor.actions(), port.size));
   }
 
-  void bind_command(const VelocityInterface& interface, const ControllerOptions& options) {
+  void bind_command(const VelocityInterface& interface, const DescriptorOptions& options) {
     gate_ = StandGate(interface.stands_below);
-    const std::string fixed = option_or(options, "command");
-    const RootConversionLaw law = root_conversion_law(option_or(options, "conversion", "adopted"));
-    if (fixed.empty())
-      conversion_.emplace(law, interface);
+    if (options.command.empty())
+      conversion_.emplace(options.conversion, interface);
     else
-      command_ = parse_velocity_command(fixed, interface.height.upper);
+      command_ = parse_velocity_command(options.command, interface.height.upper);
   }
 
   std::shared_ptr<const RobotModel> robot_;
@@ -243,23 +286,11 @@ class DescriptorController final : public Controller {
 }  // namespace
 
 ControllerInfo descriptor_info(const Descriptor& descriptor) {
-  ControllerInfo info{.name = descriptor.name,
-                      .about = fmt::format("{} (licence: {})", descriptor.about, descriptor.licence),
-                      .robot = descriptor.robot,
-                      .walks = descriptor.walks,
-                      .options = {}};
-  info.options = {{"network", descriptor.network, "path of the network's file"},
-                  {"engine", "duet", "what evaluates the network"},
-                  {"waist", descriptor.waist_locked ? "locked" : "free",
-                   "free; or locked: waist roll and pitch are held at 0 where the robot has them"}};
-  if (descriptor.command) {
-    info.options.push_back(
-        {"conversion", "adopted", "of the reference's root to a velocity: printed, adopted or direct (A.4.3)"});
-    info.options.push_back({"command", "", "\"vx,vy,wz\" or \"vx,vy,wz,height\" instead of the reference's root"});
-  }
-  if (shows_yaw_rate(descriptor))
-    info.options.push_back({"yaw_scale", "", "scale of the commanded yaw rate instead of the descriptor's"});
-  return info;
+  return {.name = descriptor.name,
+          .about = fmt::format("{} (licence: {})", descriptor.about, descriptor.licence),
+          .robot = descriptor.robot,
+          .walks = descriptor.walks,
+          .options = option_list<ControllerOption>(option_table(descriptor), defaults_of(descriptor))};
 }
 
 std::unique_ptr<Controller> make_descriptor_controller(const Descriptor& descriptor,
@@ -269,8 +300,9 @@ std::unique_ptr<Controller> make_descriptor_controller(const Descriptor& descrip
                                                        const ControllerOptions& options) {
   require(robot != nullptr && network != nullptr,
           fmt::format("controller '{}': expected a robot and a network, found none", descriptor.name));
-  return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path,
-                                                options);
+  const DescriptorOptions read =
+      read_options("controller", descriptor.name, option_table(descriptor), options, defaults_of(descriptor));
+  return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path, read);
 }
 
 }  // namespace duet

@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "duet/core/option.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/core/skeleton.h"
@@ -144,17 +145,30 @@ std::shared_ptr<const RetrievalLibrary> load_retrieval_library(const std::string
   return library;
 }
 
-PolicyInfo retrieval_info(const std::string& name) {
-  return {name,
-          "The plan of the most similar moment of the demonstrations (nearest neighbour)",
-          {{"library", "policies/dstar/retrieval.safetensors", "file of windows, made by `duet train retrieval`"}}};
+namespace {
+
+struct RetrievalOptions {
+  std::string library;  // "": the one that ships
+};
+
+const FieldTable<RetrievalOptions>& retrieval_options() {
+  static const FieldTable<RetrievalOptions> table = {field<RetrievalOptions>(
+      {.name = "library", .meaning = "file of windows, made by `duet train retrieval`"}, &RetrievalOptions::library)};
+  return table;
 }
 
-LoadedFiles retrieval_files(const std::string&, const PolicyOptions& options) {
+}  // namespace
+
+PolicyInfo retrieval_info(const std::string& name) {
+  return {name, "The plan of the most similar moment of the demonstrations (nearest neighbour)",
+          option_list<PolicyOption>(retrieval_options(), {.library = "policies/dstar/retrieval.safetensors"})};
+}
+
+LoadedFiles retrieval_files(const std::string& name, const PolicyOptions& given) {
   const char* what = "library of 'retrieval' (option `library`)";
-  const auto given = options.find("library");
-  return {{"library", given != options.end() ? first_existing(what, {given->second})
-                                             : share_file(what, "policies/dstar/retrieval.safetensors")}};
+  const RetrievalOptions options = read_options("policy", name, retrieval_options(), given);
+  return {{"library", options.library.empty() ? share_file(what, "policies/dstar/retrieval.safetensors")
+                                              : first_existing(what, {options.library})}};
 }
 
 PolicyMaker retrieval_maker(const std::string& name, std::shared_ptr<const RobotModel> robot,

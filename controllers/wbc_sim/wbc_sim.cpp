@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "duet/core/names.h"
+#include "duet/core/option.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 
@@ -60,6 +60,17 @@ class WbcSim final : public Controller {
   bool started_ = false;
 };
 
+struct WbcSimOptions {
+  std::string network = "student";
+};
+
+const FieldTable<WbcSimOptions>& wbc_sim_options() {
+  static const FieldTable<WbcSimOptions> table = {field<WbcSimOptions>(
+      {.name = "network", .meaning = "student, oracle (sees the base velocity), or the path of a network"},
+      &WbcSimOptions::network)};
+  return table;
+}
+
 }  // namespace
 
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
@@ -69,17 +80,15 @@ std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotM
 }
 
 std::string wbc_sim_network_path(const ControllerOptions& options) {
-  std::string network = option_or(options, "network", "student");
+  std::string network = read_options("controller", "wbc_sim", wbc_sim_options(), options).network;
   if (network != "student" && network != "oracle") return network;
   return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
 }
 
 ControllerInfo wbc_sim_info() {
   return {"wbc_sim",
-          "WBC-Sim of the supplement, trained by `duet train wbc`: stands, steps and tracks the whole reference",
-          "g1",
-          true,
-          {{"network", "student", "student, oracle (sees the base velocity), or the path of a network"}}};
+          "WBC-Sim of the supplement, trained by `duet train wbc`: stands, steps and tracks the whole reference", "g1",
+          true, option_list<ControllerOption>(wbc_sim_options())};
 }
 
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,

@@ -7,8 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "duet/core/names.h"
-#include "duet/core/number.h"
+#include "duet/core/option.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -93,40 +92,52 @@ class DstarPolicy final : public Policy {
   bool drawn_ = false;
 };
 
-std::string network_path(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option_or(options, "network");
-  if (!given.empty()) return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {given});
+// What a suite may set; "" where the one that ships, or the one that is built in, is meant.
+struct DstarOptions {
+  std::string network, language;
+  DstarSampling sampling;
+};
+
+const FieldTable<DstarOptions>& dstar_options() {
+  using O = DstarOptions;
+  static const FieldTable<O> table = {
+      duet::field<O>({.name = "network", .meaning = "path of a network; the one that ships where none is given"},
+                     &O::network),
+      duet::field<O>({.name = "language", .meaning = "path of an NPZ table of prompts and their embeddings"},
+                     &O::language),
+      duet::field<O>(
+          {.name = "noise",
+           .meaning = "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan",
+           .choices = {"episode", "call"}},
+          [](auto& o) -> auto& { return o.sampling.noise; }),
+      duet::field<O>(
+          {.name = "temperature",
+           .meaning = "deviation of x_T, 0 (the most likely plan) to 1 (plans as they are distributed)",
+           .range = {0.0, 1.0}},
+          [](auto& o) -> auto& { return o.sampling.temperature; })};
+  return table;
+}
+
+DstarOptions read_dstar_options(const std::string& name, const PolicyOptions& options) {
+  return read_options("policy", name, dstar_options(), options);
+}
+
+std::string network_path(const std::string& name, const DstarOptions& options) {
+  if (!options.network.empty())
+    return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {options.network});
   return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
                     fmt::format("policies/dstar/{}.safetensors", name));
 }
 
 // "" for the encoder that is built in.
-std::string language_path(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option_or(options, "language");
-  if (given.empty()) return "";
-  return first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {given});
+std::string language_path(const std::string& name, const DstarOptions& options) {
+  if (options.language.empty()) return "";
+  return first_existing(fmt::format("language table of policy '{}' (option 'language')", name), {options.language});
 }
 
-std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const PolicyOptions& options) {
+std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, const DstarOptions& options) {
   const std::string path = language_path(name, options);
   return path.empty() ? built_in_language() : load_language_table(path);
-}
-
-NoiseMode noise_of(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option_or(options, "noise");
-  if (given.empty() || given == "episode") return NoiseMode::kEpisode;
-  const std::vector<std::string> known = {"episode", "call"};
-  require(given == "call", fmt::format("policy '{}': {}", name, unknown_name_message("noise", given, known)));
-  return NoiseMode::kCall;
-}
-
-double temperature_of(const std::string& name, const PolicyOptions& options) {
-  const std::string given = option_or(options, "temperature");
-  if (given.empty()) return DstarSampling{}.temperature;
-  const std::optional<double> value = parse_number(given);
-  require(value && *value >= 0.0 && *value <= 1.0,
-          fmt::format("policy '{}': temperature: expected a number from 0 to 1, found '{}'", name, given));
-  return *value;
 }
 
 void check_language(const std::string& name, const DstarNetwork& network, const LanguageEncoder* language) {
@@ -158,26 +169,27 @@ PolicyInfo dstar_info(const std::string& name) {
   return {name,
           baseline ? "Diffusion Policy: D-STAR's head on one stream of frames and the command, without its reasoning"
                    : "D-STAR of the supplement: phase attention, spatial reasoning and language, by diffusion",
-          {{"network", name, "path of a network; the one that ships where none is given"},
-           {"language", std::string(kBuiltInLanguage), "path of an NPZ table of prompts and their embeddings"},
-           {"noise", "episode", "where temperature is not 0, x_T is drawn once an episode; call: anew for each plan"},
-           {"temperature", "0", "deviation of x_T, 0 (the most likely plan) to 1 (plans as they are distributed)"}}};
+          option_list<PolicyOption>(dstar_options(),
+                                    {.network = name, .language = std::string(kBuiltInLanguage), .sampling = {}})};
 }
 
-LoadedFiles dstar_files(const std::string& name, const PolicyOptions& options) {
+LoadedFiles dstar_files(const std::string& name, const PolicyOptions& given) {
+  const DstarOptions options = read_dstar_options(name, given);
   LoadedFiles files = {{"network", network_path(name, options)}};
   if (const std::string language = language_path(name, options); !language.empty())
     files.push_back({"language", language});
   return files;
 }
 
-PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& options) {
+PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& given) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
-  const DstarSampling sampling{noise_of(name, options), temperature_of(name, options)};
+  const DstarOptions options = read_dstar_options(name, given);
   const std::shared_ptr<const LanguageEncoder> language = language_of(name, options);
   const std::shared_ptr<const DstarNetwork> network = load_dstar_network(network_path(name, options), *robot);
   check_language(name, *network, language.get());
-  return [=, robot = std::move(robot)] { return make_dstar_policy(name, robot, network, language, sampling); };
+  return [=, robot = std::move(robot), sampling = options.sampling] {
+    return make_dstar_policy(name, robot, network, language, sampling);
+  };
 }
 
 }  // namespace duet

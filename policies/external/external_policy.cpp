@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <filesystem>
+#include <optional>
 #include <set>
 
-#include "duet/core/names.h"
+#include "duet/core/option.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/nn/load_network.h"
@@ -20,28 +20,60 @@
 namespace duet {
 namespace {
 
-int milliseconds_of(const PolicyDescriptor& descriptor, const PolicyOptions& options, const char* name, int fallback) {
-  const auto it = options.find(name);
-  if (it == options.end()) return fallback;
-  int value = 0;
-  const char* end = it->second.data() + it->second.size();
-  const auto [rest, error] = std::from_chars(it->second.data(), end, value);
-  require(error == std::errc() && rest == end && value >= 1 && value <= kMostMilliseconds,
-          fmt::format("policy '{}': {}: expected a whole number in [1, {}], found '{}'", descriptor.name, name,
-                      kMostMilliseconds, it->second));
-  return value;
+// What a suite may set of a network; "" where it is the descriptor's, or built in.
+struct OnnxOptions {
+  std::string network, engine = "duet", language;
+};
+
+const FieldTable<OnnxOptions>& onnx_options() {
+  using O = OnnxOptions;
+  static const FieldTable<O> table = {
+      field<O>({.name = "network", .meaning = "path of the network's file"}, &O::network),
+      field<O>({.name = "engine", .meaning = "what evaluates the network"}, &O::engine),
+      field<O>({.name = "language", .meaning = "NPZ table of prompts and embeddings instead of the built-in encoder"},
+               &O::language)};
+  return table;
 }
 
-std::shared_ptr<const LanguageEncoder> language_of(const PolicyDescriptor& descriptor, const PolicyOptions& options) {
+struct ProcessOptions {
+  std::optional<int> deadline_ms;
+  int hang_ms = 0, start_ms = 0;
+};
+
+const FieldTable<ProcessOptions>& process_options() {
+  using O = ProcessOptions;
+  constexpr FieldRange kWait = {1.0, kMostMilliseconds};
+  static const FieldTable<O> table = {
+      field<O>({.name = "deadline_ms",
+                .meaning = "for a plan; later it is left out; none: duet waits",
+                .unit = "ms",
+                .range = kWait},
+               &O::deadline_ms),
+      field<O>({.name = "hang_ms",
+                .meaning = "for a plan without a deadline; then it is dead",
+                .unit = "ms",
+                .range = kWait},
+               &O::hang_ms),
+      field<O>({.name = "start_ms", .meaning = "for the answers to hello and reset", .unit = "ms", .range = kWait},
+               &O::start_ms)};
+  return table;
+}
+
+ProcessOptions waits_of(const PolicyDescriptor& descriptor) {
+  return {.deadline_ms = descriptor.deadline_ms == 0 ? std::nullopt : std::optional<int>(descriptor.deadline_ms),
+          .hang_ms = descriptor.hang_ms,
+          .start_ms = descriptor.start_ms};
+}
+
+std::shared_ptr<const LanguageEncoder> language_of(const PolicyDescriptor& descriptor, const OnnxOptions& options) {
   if (!shows_language(descriptor)) return nullptr;
-  const std::string table = option_or(options, "language");
-  return table.empty() ? built_in_language() : load_language_table(table);
+  return options.language.empty() ? built_in_language() : load_language_table(options.language);
 }
 
-std::string network_path(const PolicyDescriptor& descriptor, const PolicyOptions& options) {
+std::string network_path(const PolicyDescriptor& descriptor, const OnnxOptions& options) {
   const std::string beside = (std::filesystem::path(descriptor.folder()) / descriptor.network).string();
   return first_existing(fmt::format("network of the policy '{}'", descriptor.name),
-                        {option_or(options, "network", beside)});
+                        {options.network.empty() ? beside : options.network});
 }
 
 // A word of the command that is a path below the descriptor's folder; another one is the machine's.
@@ -70,10 +102,10 @@ std::set<std::string> command_files(const PolicyDescriptor& descriptor) {
 }
 
 PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr<const RobotModel>& robot,
-                       const PolicyOptions& options) {
+                       const PolicyOptions& given) {
+  const OnnxOptions options = read_options("policy", descriptor.name, onnx_options(), given);
   const std::string path = network_path(descriptor, options);
-  const std::string engine = option_or(options, "engine", "duet");
-  const auto make = [=, language = language_of(descriptor, options)] {
+  const auto make = [=, engine = options.engine, language = language_of(descriptor, options)] {
     return make_onnx_policy(descriptor, robot, load_network(path, engine), path, language);
   };
   static_cast<void>(make());  // what cannot be made is refused now, not in every episode
@@ -81,10 +113,11 @@ PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr
 }
 
 PolicyMaker process_maker(PolicyDescriptor descriptor, const std::shared_ptr<const RobotModel>& robot,
-                          const PolicyOptions& options) {
-  descriptor.deadline_ms = milliseconds_of(descriptor, options, "deadline_ms", descriptor.deadline_ms);
-  descriptor.hang_ms = milliseconds_of(descriptor, options, "hang_ms", descriptor.hang_ms);
-  descriptor.start_ms = milliseconds_of(descriptor, options, "start_ms", descriptor.start_ms);
+                          const PolicyOptions& given) {
+  const ProcessOptions waits = read_options("policy", descriptor.name, process_options(), given, waits_of(descriptor));
+  descriptor.deadline_ms = waits.deadline_ms.value_or(0);
+  descriptor.hang_ms = waits.hang_ms;
+  descriptor.start_ms = waits.start_ms;
   static_cast<void>(PlanDecoder(descriptor, robot, bind_joints(descriptor, *robot)));
   if (!descriptor.command.empty()) static_cast<void>(find_program(descriptor.command[0], descriptor.folder()));
   return [=] { return make_process_policy(descriptor, robot); };
@@ -92,28 +125,25 @@ PolicyMaker process_maker(PolicyDescriptor descriptor, const std::shared_ptr<con
 
 }  // namespace
 
-PolicyInfo external_info(const std::string& name) {
-  const PolicyDescriptor descriptor = read_policy_descriptor(name);
-  PolicyInfo info{.name = descriptor.name, .about = descriptor.about, .options = {}};
-  if (descriptor.kind == PolicyKind::kOnnx)
-    info.options = {{"network", descriptor.network, "path of the network's file"},
-                    {"engine", "duet", "what evaluates the network"},
-                    {"language", "", "NPZ table of prompts and embeddings instead of the built-in encoder"}};
-  else
-    info.options = {{"deadline_ms", descriptor.deadline_ms == 0 ? "" : std::to_string(descriptor.deadline_ms),
-                     "for a plan; later it is left out; none: duet waits"},
-                    {"hang_ms", std::to_string(descriptor.hang_ms), "for a plan without a deadline; then it is dead"},
-                    {"start_ms", std::to_string(descriptor.start_ms), "for the answers to hello and reset"}};
-  return info;
+std::vector<PolicyOption> external_options(const PolicyDescriptor& descriptor) {
+  if (descriptor.kind == PolicyKind::kProcess)
+    return option_list<PolicyOption>(process_options(), waits_of(descriptor));
+  return option_list<PolicyOption>(onnx_options(), {.network = descriptor.network, .language = ""});
 }
 
-LoadedFiles external_files(const std::string& name, const PolicyOptions& options) {
+PolicyInfo external_info(const std::string& name) {
+  const PolicyDescriptor descriptor = read_policy_descriptor(name);
+  return {.name = descriptor.name, .about = descriptor.about, .options = external_options(descriptor)};
+}
+
+LoadedFiles external_files(const std::string& name, const PolicyOptions& given) {
   const PolicyDescriptor descriptor = read_policy_descriptor(name);
   LoadedFiles files = {{"descriptor", name}};
-  if (descriptor.kind == PolicyKind::kOnnx)
+  if (descriptor.kind == PolicyKind::kOnnx) {
+    const OnnxOptions options = read_options("policy", descriptor.name, onnx_options(), given);
     for (LoadedFile& file : network_files(network_path(descriptor, options))) files.push_back(std::move(file));
-  if (const std::string language = option_or(options, "language"); !language.empty())
-    files.push_back({"language", language});
+    if (!options.language.empty()) files.push_back({"language", options.language});
+  }
   for (const std::string& file : command_files(descriptor))
     files.push_back({"command " + file, (std::filesystem::path(descriptor.folder()) / file).string()});
   return files;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "duet/core/loaded_file.h"
+#include "duet/policies/external/descriptor.h"
 #include "duet/policies/policy.h"
 
 namespace duet {
@@ -12,6 +13,7 @@ namespace duet {
 // `name`: the path of a descriptor. Options of a network: `network`, `engine`, `language`; of a process: `deadline_ms`,
 // `hang_ms`, `start_ms`. Both throw InputError for a descriptor that is broken.
 PolicyInfo external_info(const std::string& name);
+std::vector<PolicyOption> external_options(const PolicyDescriptor& descriptor);
 // Throws InputError too for joints that are not the robot's and a network of other inputs or outputs,
 // std::invalid_argument for an option's value, MissingError where the network or the program is not there. Each policy
 // that it makes has its own network or process.

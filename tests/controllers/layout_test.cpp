@@ -441,11 +441,11 @@ TEST(Layouts, RefuseOptionsValuesTheyDoNotKnow) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([] {
                 Layout("homie", 456, 12, {{"waist", "stiff"}});
               }),
-              HasSubstr("option 'waist'"));
+              HasSubstr("controller 'homie': unknown waist 'stiff'. Known: free, locked"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] {
                 Layout("homie", 456, 12, {{"yaw_scale", "fast"}});
               }),
-              HasSubstr("expected a number, found 'fast'"));
+              HasSubstr("yaw_scale: expected a finite number, found 'fast'"));
 }
 
 }  // namespace

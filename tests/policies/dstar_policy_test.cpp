@@ -201,7 +201,7 @@ TEST(DstarPolicy, RefusesWhatItCannotRun) {
   };
   EXPECT_THAT(refusal({{"noise", "cal"}}), StartsWith("policy 'dstar': unknown noise 'cal': did you mean 'call'?"));
   EXPECT_EQ(refusal({{"temperature", "1.5"}}),
-            "policy 'dstar': temperature: expected a number from 0 to 1, found '1.5'");
+            "policy 'dstar': temperature: expected a number from 0, at most 1, found 1.5");
   EXPECT_THAT(refusal({{"netwrok", "x"}}), HasSubstr("'network'"));
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("dstar", nullptr); }),
             "policy 'dstar' needs a robot");

@@ -37,7 +37,7 @@ TEST_F(ProcessPolicyTest, OptionsSetItsTimes) {
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] {
               policy_maker(folder_ / "policy.yaml", g1(), {{"deadline_ms", "soon"}});
             }),
-            "policy 'mine': deadline_ms: expected a whole number in [1, 600000], found 'soon'");
+            "policy 'mine': deadline_ms: expected a whole number, 1 to 600000, found 'soon'");
   EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(0).fallback, "");
   EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(1).fallback, "60000");
   EXPECT_EQ(policy_info(folder_ / "policy.yaml").options.at(2).fallback, "120000");
