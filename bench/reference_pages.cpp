@@ -4,9 +4,11 @@
 
 #include <utility>
 
+#include "duet/bench/option_sections.h"
 #include "duet/bench/suite_keys.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/io/channel.h"
 #include "duet/retarget/options.h"
 #include "duet/rollout/perturbation_kinds.h"
 
@@ -68,8 +70,84 @@ std::string pair_page() {
   return text;
 }
 
-constexpr PageMaker kPages[] = {
-    {"suite-keys", suite_page}, {"perturbations", perturbation_page}, {"pair-options", pair_page}};
+std::string channel_page() {
+  std::string text =
+      head("Channels", "channels",
+           "What networks and programs are shown, by the names that IO descriptors "
+           "([file-formats.md](../file-formats.md#io-descriptor)), policy descriptors "
+           "([adding-a-policy.md](../adding-a-policy.md)) and the headers of duet's own networks have for it. Keys: of "
+           "an IO descriptor, beside `channel`, `scale` and `clip`.") +
+      "| IO descriptor | policy | network | numbers | keys | meaning |\n|---|---|---|---|---|---|\n";
+  for (const ChannelRow& row : channel_table()) {
+    std::string keys;
+    for (const std::string& key : channel_keys(row.kind)) keys += (keys.empty() ? "" : ", ") + code(key);
+    text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", code(row.controller), code(row.policy), code(row.network),
+                        row.numbers, keys.empty() ? "-" : keys, row.meaning);
+  }
+  return text;
+}
+
+std::string option_page(const std::string& title, const std::string& name, const std::string& about,
+                        const std::vector<OptionSection>& sections) {
+  std::string text = head(title, name, about);
+  for (const OptionSection& section : sections) {
+    text += fmt::format("## {}\n\n| option | default | value | meaning |\n|---|---|---|---|\n", section.name);
+    for (const FieldRow& row : section.rows)
+      text += fmt::format("| `{}` | {} | {} | {} |\n", row.name, code(row.fallback), row.values,
+                          row.meaning.empty() ? "-" : row.meaning);
+    text += '\n';
+  }
+  text.pop_back();
+  return text;
+}
+
+std::string controller_options_page() {
+  return option_page(
+      "Options of controllers", "controller-options",
+      "For the key `options` in a suite's `controllers`, as `{name: locked, use: homie, options: {waist: locked}}`. "
+      "Controllers that are not here have none.",
+      controller_option_sections());
+}
+
+std::string policy_options_page() {
+  return option_page("Options of policies", "policy-options",
+                     "For the key `options` in a suite's `policies`, as `{name: firm, use: dstar, options: "
+                     "{temperature: 0.5}}`. Policies "
+                     "that are not here have none.",
+                     policy_option_sections());
+}
+
+std::string engine_options_page() {
+  return option_page(
+      "Options of engines", "engine-options",
+      "For an engine profile ([file-formats.md](../file-formats.md#engine-profile)), of the engines that "
+      "are there.",
+      engine_option_sections());
+}
+
+std::string synth_options_page() {
+  return option_page("Options of synthesis", "synth-options",
+                     "For `duet synth`, as `--height-a 1.7`. What has no default is drawn "
+                     "([synthesis.md](../synthesis.md)).",
+                     synth_option_sections());
+}
+
+std::string train_options_page() {
+  return option_page("Options of training", "train-options",
+                     "For `duet train wbc`, and for `duet train dstar`, its variants and `retrieval`; as "
+                     "`--round-clips 120`.",
+                     train_option_sections());
+}
+
+constexpr PageMaker kPages[] = {{"suite-keys", suite_page},
+                                {"perturbations", perturbation_page},
+                                {"pair-options", pair_page},
+                                {"channels", channel_page},
+                                {"controller-options", controller_options_page},
+                                {"policy-options", policy_options_page},
+                                {"engine-options", engine_options_page},
+                                {"synth-options", synth_options_page},
+                                {"train-options", train_options_page}};
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 #include "duet/backends/factory.h"
 #include "duet/bench/benchmarks/benchmark.h"
 #include "duet/bench/cli/command.h"
+#include "duet/bench/option_sections.h"
 #include "duet/bench/profile.h"
 #include "duet/bench/reference_pages.h"
 #include "duet/bench/shipped_suites.h"
@@ -18,6 +19,7 @@
 #include "duet/core/require.h"
 #include "duet/datasets/curation.h"
 #include "duet/formats/robot_motion_format.h"
+#include "duet/io/channel.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/detector_catalogue.h"
@@ -107,20 +109,6 @@ std::vector<Listed> list_profiles() {
   return list;
 }
 
-std::vector<Listed> list_engine_options() {
-  std::vector<Listed> list;
-  for (const EngineInfo& engine : engines()) {
-    if (!engine.available) continue;
-    for (const EngineOption& option : engine_module(engine.name).options) {
-      const std::string values = option.choices.empty() ? fmt::format("{:g} to {:g}", option.low, option.high)
-                                                        : fmt::format("{}", fmt::join(option.choices, ", "));
-      list.push_back(
-          {engine.name + "." + option.name, fmt::format("default {} ({}): {}", option.value, values, option.meaning)});
-    }
-  }
-  return list;
-}
-
 std::vector<Listed> list_metrics() {
   std::vector<Listed> list;
   for (const MetricInfo& metric : metric_catalogue()) {
@@ -163,12 +151,29 @@ std::vector<Listed> list_joint_layouts() {
 }
 
 // "force (60): a number above 0, at most 5000 N; at the centre of mass", and the same for machines.
-std::string field_line(const FieldRow& row) {
+template <typename Row>
+std::string field_line(const Row& row) {
   return fmt::format("{}{}: {}{}{}", row.name, row.fallback.empty() ? "" : fmt::format(" ({})", row.fallback),
                      row.values, row.meaning.empty() ? "" : "; ", row.meaning);
 }
-nlohmann::json field_json(const FieldRow& row) {
+template <typename Row>
+nlohmann::json field_json(const Row& row) {
   return {{"name", row.name}, {"default", row.fallback}, {"values", row.values}, {"meaning", row.meaning}};
+}
+
+// "mujoco.iterations": of whom, and the option.
+template <std::vector<OptionSection> sections()>
+std::vector<Listed> list_options() {
+  std::vector<Listed> list;
+  for (const OptionSection& section : sections())
+    for (const FieldRow& row : section.rows)
+      list.push_back(
+          {section.name + "." + row.name,
+           fmt::format("{} ({}): {}", row.fallback.empty() ? "no default" : "default " + row.fallback, row.values,
+                       row.meaning),
+           {},
+           {{"of", section.name}, {"default", row.fallback}, {"values", row.values}, {"meaning", row.meaning}}});
+  return list;
 }
 
 std::vector<Listed> list_pair_options() {
@@ -188,6 +193,24 @@ std::vector<Listed> list_suite_keys() {
                                   row.values, row.meaning),
                       {},
                       field_json(row)});
+  return list;
+}
+
+std::vector<Listed> list_channels() {
+  std::vector<Listed> list;
+  for (const ChannelRow& row : channel_table()) {
+    Listed entry{*row.controller != '\0' ? row.controller : (*row.policy != '\0' ? row.policy : row.network),
+                 fmt::format("{}; {}", row.numbers, row.meaning)};
+    for (const auto& [format, name] :
+         {std::pair{"IO descriptor", row.controller}, {"policy", row.policy}, {"network", row.network}})
+      if (*name != '\0') entry.options.push_back(fmt::format("{}: {}", format, name));
+    entry.more = {{"controller", row.controller},
+                  {"policy", row.policy},
+                  {"network", row.network},
+                  {"keys", channel_keys(row.kind)},
+                  {"numbers", row.numbers}};
+    list.push_back(std::move(entry));
+  }
   return list;
 }
 
@@ -291,16 +314,21 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
       {"tasks", list_tasks},
       {"detectors", list_detectors},
       {"engines", list_engines},
-      {"engine-options", list_engine_options},
+      {"engine-options", list_options<engine_option_sections>},
       {"profiles", list_profiles},
       {"controllers", list_controllers},
+      {"controller-options", list_options<controller_option_sections>},
+      {"channels", list_channels},
       {"suites", list_suites},
       {"suite-keys", list_suite_keys},
       {"perturbations", list_perturbations},
       {"policies", list_policies},
+      {"policy-options", list_options<policy_option_sections>},
       {"metrics", list_metrics},
       {"readings", list_readings},
       {"pair-options", list_pair_options},
+      {"synth-options", list_options<synth_option_sections>},
+      {"train-options", list_options<train_option_sections>},
       {"people-formats", list_people_formats},
       {"joint-layouts", list_joint_layouts},
       {"curation-criteria", list_curation_criteria},

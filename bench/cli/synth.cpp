@@ -2,11 +2,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
-#include "duet/bench/suite_names.h"
+#include "duet/bench/cli/field_options.h"
+#include "duet/bench/synth_options.h"
 #include "duet/core/digest.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -20,7 +20,6 @@ struct SynthArguments {
   std::string task;
   int count = 1;
   std::string output;
-  std::string side, like = "rehearsed", outcome;
   bool as_tracked = false;
   int threads = default_threads();
   SynthesisOptions options;
@@ -31,22 +30,7 @@ std::vector<Task> chosen_tasks(const std::string& name) {
   return {parse_task(name)};
 }
 
-ActOutcome parse_outcome(const std::string& name) {
-  const auto& known = kActOutcomeNames;
-  const auto* const found = std::ranges::find(known, name);
-  require(found != known.end(),
-          fmt::format("--outcome: expected {}, {} or {}, found '{}'", known[0], known[1], known[2], name));
-  return static_cast<ActOutcome>(found - known.begin());
-}
-
 void run_synth(const Session& session, SynthArguments arguments) {
-  if (!arguments.side.empty()) {
-    require(arguments.side == "left" || arguments.side == "right",
-            fmt::format("--side: expected left or right, found '{}'", arguments.side));
-    arguments.options.side = arguments.side == "left" ? Side::kLeft : Side::kRight;
-  }
-  arguments.options.like = likeness_of("--like", arguments.like);
-  if (!arguments.outcome.empty()) arguments.options.outcome = parse_outcome(arguments.outcome);
   constexpr int kMost = 100000;
   require(arguments.count >= 1 && arguments.count <= kMost,
           fmt::format("--count: expected 1 to {} clips of each task, found {}", kMost, arguments.count));
@@ -87,32 +71,10 @@ void add_synth(CLI::App& app, Session& session) {
       ->required();
   command->add_option("-o,--output", arguments->output, "folder for the clips (NPZ)")->required();
   command->add_option("-n,--count", arguments->count, "clips of each task")->capture_default_str();
-  command->add_option("--seed", arguments->options.seed, "of everything that is drawn")->capture_default_str();
-  command->add_option("--first", arguments->options.index, "index of the first clip")->capture_default_str();
   add_threads(command, arguments->threads);
-  const auto fixed = [&](const std::string& name, std::optional<double>& value, const std::string& what) {
-    command->add_option_function<double>(
-        name, [&value](double v) { value = v; }, what + " (default: drawn)");
-  };
-  fixed("--height-a", arguments->options.height_a, "height of person A [m]");
-  fixed("--height-b", arguments->options.height_b, "height of person B [m]");
-  fixed("--distance", arguments->options.distance, "distance at the start [m]");
-  fixed("--angle", arguments->options.angle, "angle at which B stands off A's path [rad]");
-  fixed("--target-height", arguments->options.target_height, "height of the contact or gesture [m]");
-  fixed("--speed", arguments->options.speed, "walking speed [m/s]");
-  fixed("--style", arguments->options.style, "0 restrained to 1 expansive");
-  fixed("--duration", arguments->options.duration, "of the whole clip [s]");
-  command
-      ->add_option("--like", arguments->like,
-                   "rehearsed: long acts of two who come from three metres; people: short acts of two who stand "
-                   "close, cropped as recordings are")
-      ->capture_default_str();
-  fixed("--before", arguments->options.before, "like people: standing before anything moves [s]");
-  fixed("--after", arguments->options.after, "like people: standing after everything [s]");
-  command->add_option("--outcome", arguments->outcome, "like people: complete, hesitant or aborted (default: drawn)");
+  add_fields(*command, synthesis_fields(), arguments->options);
   command->add_flag("--tracked", arguments->as_tracked,
                     "as a depth camera would have it: 15 Hz, centimetres of noise, arms lost");
-  command->add_option("--side", arguments->side, "hand of the act: left or right (default: drawn)");
   command->callback([&session, arguments] { run_synth(session, *arguments); });
 }
 

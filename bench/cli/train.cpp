@@ -5,7 +5,9 @@
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/field_options.h"
 #include "duet/bench/interrupt.h"
+#include "duet/bench/train_options.h"
 #include "duet/bench/training_motions.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -16,8 +18,7 @@ namespace duet::cli {
 namespace {
 
 struct WbcArguments {
-  WbcRun run;
-  std::string stage = "all", card;
+  WbcTraining training;
   bool smoke = false;
 };
 
@@ -90,16 +91,17 @@ std::vector<WbcRun> smoke_runs(const WbcRun& run) {
 }
 
 std::vector<WbcRun> runs_of(const WbcArguments& arguments) {
-  if (arguments.smoke) return smoke_runs(arguments.run);
-  if (arguments.stage == "all") return wbc_runs(arguments.run);
-  WbcRun run = arguments.run;
-  run.stage = arguments.stage;
+  WbcRun run = arguments.training.run;
+  run.threads = arguments.training.threads.value_or(dividing_threads());
+  if (arguments.smoke) return smoke_runs(run);
+  if (arguments.training.stage == "all") return wbc_runs(run);
+  run.stage = arguments.training.stage;
   return {run};
 }
 
 void train(Session& session, WbcArguments& arguments) {
   catch_interrupts();
-  const auto robot = load_shared_robot(arguments.card);
+  const auto robot = load_shared_robot(arguments.training.card);
   std::vector<WbcRun> runs = runs_of(arguments);
   nlohmann::json json = nlohmann::json::array();
   for (WbcRun& run : runs) {
@@ -137,25 +139,12 @@ void add_train(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("train", "Train a controller or a policy of this project");
   command->require_subcommand(1);
   auto arguments = std::make_shared<WbcArguments>();
-  arguments->run.folder = "runs/wbc";
-  arguments->run.threads = dividing_threads();
   CLI::App* wbc =
       add_command(*command, session, "wbc",
                   "WBC-Sim (supplement A.3.2): an oracle by PPO in stages, then a student by distillation.\n"
                   "Killed or stopped, the same command goes on from the last checkpoint",
                   "duet train wbc --smoke -o runs/wbc-smoke");
-  wbc->add_option(
-         "--stage", arguments->stage,
-         "stand, walk, student, or all three in turn; or, before student, brace (pushes) and interact (clips, too)")
-      ->capture_default_str();
-  wbc->add_option("-o,--output", arguments->run.folder, "folder: one subfolder per stage")->capture_default_str();
-  wbc->add_option("--from", arguments->run.from,
-                  "checkpoint, or the network of an oracle, to begin with (default: the stage before in the folder)");
-  wbc->add_option("--steps", arguments->run.steps, "of the environment, in all (default: the stage's)");
-  wbc->add_option("--seed", arguments->run.seed, "of weights, commands and noise")->capture_default_str();
-  wbc->add_option("--threads", arguments->run.threads, "the result depends on it")->capture_default_str();
-  wbc->add_option("--environments", arguments->run.environments, "a multiple of the threads")->capture_default_str();
-  wbc->add_option("--card", arguments->card, "robot card by name or path (default: the G1)");
+  add_fields(*wbc, wbc_training_fields(), arguments->training);
   wbc->add_flag("--smoke", arguments->smoke,
                 "a small stand and student stage in minutes; fails (exit 1) where the return does not rise");
   wbc->callback([&session, arguments] { train(session, *arguments); });

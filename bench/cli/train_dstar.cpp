@@ -1,22 +1,18 @@
 // duet train dstar | dp | <ablation>: the learnt policies, and the split of clips that they never see.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <cmath>
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/field_options.h"
 #include "duet/bench/demonstrations.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/shipped_suites.h"
-#include "duet/bench/suite_names.h"
+#include "duet/bench/train_options.h"
 #include "duet/core/file.h"
-#include "duet/core/names.h"
-#include "duet/core/number.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/core/text.h"
 #include "duet/policies/dstar/network.h"
 #include "duet/training/dstar/retrieval.h"
 #include "duet/training/dstar/trainer.h"
@@ -26,17 +22,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct DstarArguments {
-  DstarRun run;
-  DemonstrationOptions data;
-  std::string config, language, split, from, start = "approach";
-  int rounds = 2, round_clips = 120;
+struct DstarArguments : PolicyTraining {
   bool smoke = false;
 };
 
 constexpr const char* kRetrieval = "retrieval";
 constexpr int kLibraryWindows = 6000;
-constexpr int kMostClips = 100000;
 constexpr int kValidationPerTask = 6, kGoldenWindows = 8;
 constexpr double kAgreement = 1e-4;  // between libtorch's plans and those of inference
 
@@ -118,10 +109,10 @@ void make_small(DstarArguments& arguments) {
   run.patience = 0;
 }
 
-void read_start(DstarArguments& arguments) {
-  const std::vector<std::string> known = {"approach", "sim_to_real"};
-  if (arguments.start == known[0]) return;
-  require(arguments.start == known[1], unknown_name_message("start of demonstrations", arguments.start, known));
+// What the machine and the other options leave open.
+void settle(DstarArguments& arguments) {
+  arguments.run.threads = arguments.data.threads = arguments.threads.value_or(default_threads());
+  if (arguments.start == TrainingStart::kApproach) return;
   arguments.data.start = StartMode::kSimToReal;
   arguments.data.starts = 1;  // they are all the same
 }
@@ -182,7 +173,7 @@ void make_library(Session& session, DstarArguments& arguments, const std::string
 
 void train_or_stop(Session& session, DstarArguments& arguments, const std::string& name) {
   catch_interrupts();
-  read_start(arguments);
+  settle(arguments);
   try {
     name == kRetrieval ? make_library(session, arguments, name) : train(session, arguments, name);
   } catch (const Stopped&) {
@@ -191,74 +182,15 @@ void train_or_stop(Session& session, DstarArguments& arguments, const std::strin
   }
 }
 
-// "people:400": the manner and how many clips of each task.
-std::vector<DemonstrationClips> clips_of(const std::vector<std::string>& kinds) {
-  std::vector<DemonstrationClips> clips;
-  for (const std::string& kind : kinds) {
-    const auto colon = kind.find(':');
-    const std::optional<double> count =
-        colon == std::string::npos ? std::nullopt : parse_number(kind.substr(colon + 1));
-    if (!count || *count < 1.0 || *count > kMostClips || *count != std::floor(*count))
-      throw std::invalid_argument(fmt::format(
-          "--clips: expected a manner, ':' and 1 to {} clips, as in people:400, found '{}'", kMostClips, shown(kind)));
-    clips.push_back({likeness_of("--clips", kind.substr(0, colon)), static_cast<int>(*count)});
-  }
-  return clips;
-}
-
-std::string text_of(const std::vector<DemonstrationClips>& clips) {
-  std::vector<std::string> kinds;
-  kinds.reserve(clips.size());
-  for (const auto& [like, per_task] : clips)
-    kinds.push_back(fmt::format("{}:{}", name_of(likeness_names(), like), per_task));
-  return fmt::format("{}", fmt::join(kinds, " "));
-}
-
 void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
   auto arguments = std::make_shared<DstarArguments>();
-  arguments->run.folder = "runs/policies";
-  arguments->run.threads = arguments->data.threads = default_threads();
   const std::string about =
       name == "dstar" ? "D-STAR (supplement A.2, A.3.1): demonstrations made here, then supervised training.\n"
                         "Killed or stopped, the same command goes on from the last checkpoint"
                       : fmt::format("The variant '{}' of D-STAR, on the same demonstrations", name);
   CLI::App* command =
       add_command(train_command, session, name, about, fmt::format("duet train {} --smoke -o runs/smoke", name));
-  DstarRun& run = arguments->run;
-  command->add_option("-o,--output", run.folder, "folder: demonstrations in data/, one subfolder per policy")
-      ->capture_default_str();
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--clips", [arguments](const std::vector<std::string>& kinds) { arguments->data.clips = clips_of(kinds); },
-          "synthesised clips of each task by whose way people have (docs/synthesis.md): rehearsed:N, people:N or both")
-      ->default_str(text_of(arguments->data.clips));
-  command->add_option("--mode", arguments->data.pair_mode, "of retargeting: paper, grounded or best")
-      ->capture_default_str();
-  command->add_option("--starts", arguments->data.starts, "starts of each clip")->capture_default_str();
-  command
-      ->add_option("--start", arguments->start,
-                   "how the robot comes: approach (A.4.4) or sim_to_real (Algorithm 7, before it meets the real robot)")
-      ->capture_default_str();
-  command->add_option("--followed", arguments->data.followed, "clips of each task that the robot follows in the engine")
-      ->capture_default_str();
-  command->add_option("--engine", arguments->data.engine, "that they are followed in; '' for none")
-      ->capture_default_str();
-  command
-      ->add_option("--rounds", arguments->rounds,
-                   "times that the policy so far acts in the engine and what it meets is added to the demonstrations")
-      ->capture_default_str();
-  command->add_option("--round-clips", arguments->round_clips, "clips of each task on which it then acts")
-      ->capture_default_str();
-  command->add_option("--steps", run.steps, "of Adam")->capture_default_str();
-  command->add_option("--batch", run.batch, "windows, a multiple of the threads")->capture_default_str();
-  command->add_option("--rate", run.rate, "of Adam")->capture_default_str();
-  command->add_option("--seed", run.seed, "of weights, windows and noise")->capture_default_str();
-  command->add_option("--threads", run.threads, "the result depends on it")->capture_default_str();
-  command->add_option("--from", arguments->from, "network to begin with (fine-tuning); default: new weights");
-  command->add_option("--device", run.device, "auto (the GPU if libtorch has one), cpu, cuda")->capture_default_str();
-  command->add_option("--config", arguments->config, "JSON of the network's shape (default: the one that ships)");
-  command->add_option("--language", arguments->language, "NPZ of prompts and embeddings (default: built in)");
-  command->add_option("--split", arguments->split, "test split that may not be learnt (default: the one that ships)");
+  add_fields<PolicyTraining>(*command, policy_training_fields(), *arguments, "clips");
   command->add_flag("--smoke", arguments->smoke,
                     "a small training in minutes; fails (exit 1) where the validation loss does not fall");
   command->callback([&session, arguments, name] { train_or_stop(session, *arguments, name); });

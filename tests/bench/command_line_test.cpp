@@ -122,7 +122,8 @@ TEST(CommandLine, ClipsOfATrainingAreAMannerAndACount) {
   const std::string expected = "--clips: expected a manner, ':' and 1 to 100000 clips, as in people:400, found ";
   for (const char* kind : {"people", "people:0", "people:-3", "people:2.5", "people:x", "people:100001"})
     EXPECT_THAT(refusal(kind), HasSubstr(expected + "'" + kind + "'"));
-  EXPECT_THAT(refusal("persons:3"), HasSubstr("--clips: expected rehearsed or people, found 'persons'"));
+  EXPECT_THAT(refusal("persons:3"),
+              HasSubstr("--clips: expected rehearsed or people before the ':', found 'persons:3'"));
 }
 
 TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
@@ -265,7 +266,7 @@ TEST(CommandLine, BadInputIsOneSentenceAndTwo) {
            {"run " + (folder / "nowhere.yaml") + " -o x", "nowhere.yaml"},
            {"report " + (folder / "nowhere"), "nowhere"},
            {"synth hugg -o x", "did you mean 'hug'"},
-           {"synth hug --side up -o x", "left or right"},
+           {"synth hug --side up -o x", "--side 'up'"},
            {"retarget x.npz --option kernel=v9 -o x", "v9"},
            {"bench pairr", "pair"}}) {
     const Answer answer = duet_program(bad.arguments + " -q");
