@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <optional>
 
@@ -14,6 +13,8 @@
 #include "duet/core/zip.h"
 #include "duet/motion/people/body_people.h"
 #include "duet/motion/people/clip_files.h"
+#include "duet/motion/people/inter_x_actions.h"
+#include "duet/motion/people/people_files.h"
 
 namespace duet {
 namespace {
@@ -21,21 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kInterXSmplxRate = 120.0;
-constexpr std::string_view kInterXLicence = "Inter-X: non-commercial research";
 constexpr int kFoldersUp = 3;  // from a clip's folder to the data set's own, at most
-
-struct InterXAction {
-  int number;
-  std::string_view label;
-  std::string_view task;
-};
-// The six of its 40 actions that are tasks of duet (action_setting.txt counts from 0).
-constexpr std::array<InterXAction, 6> kInterXTasks = {{{0, "Hug", "hug"},
-                                                       {1, "Handshake", "handshake"},
-                                                       {2, "Wave", "wave"},
-                                                       {16, "High-five", "high_five"},
-                                                       {24, "Bend", "bend"},
-                                                       {39, "Fly kiss", "fly_kiss"}}};
 
 bool is_first_person(const std::string& name) { return name == "P1.npz"; }
 
@@ -81,28 +68,13 @@ BodyMotion read_inter_x_person(const std::string& path) {
   return motion;
 }
 
-// "G001T000A018R005" -> 18.
-std::optional<int> action_number(const std::string& clip) {
-  const std::size_t at = clip.find('A');
-  if (at == std::string::npos || clip.size() < at + 4) return std::nullopt;
-  int number = 0;
-  for (std::size_t i = at + 1; i < at + 4; ++i) {
-    if (clip[i] < '0' || clip[i] > '9') return std::nullopt;
-    number = 10 * number + (clip[i] - '0');
-  }
-  return number;
-}
-
+// An action that is no task of duet is a label all the same: nobody looks for a task in it.
 void find_task(const std::string& clip, RawPeople& raw) {
-  const std::optional<int> number = action_number(clip);
-  if (!number) return;
-  raw.source["action"] = fmt::format("A{:03}", *number);
-  for (const InterXAction& action : kInterXTasks)
-    if (action.number == *number) {
-      raw.task = parse_task(action.task);
-      raw.evidence.push_back(
-          fmt::format("task: {} (action A{:03} '{}' of the clip's name)", action.task, *number, action.label));
-    }
+  const std::optional<std::string> action = inter_x_action(clip);
+  if (!action) return;
+  raw.source["label"] = *action;
+  raw.task = task_of_label(*action);
+  raw.evidence.push_back(fmt::format("action: '{}' (of the clip's name)", *action));
 }
 
 std::string find_order_file(const std::string& file) {
@@ -148,8 +120,7 @@ RawPeople read_inter_x_smplx(const ClipPlace& place, const PeopleOptions& option
   raw.up = Axis::kPlusY;
   raw.metres_per_unit = 1.0;
   raw.evidence.emplace_back("layout: Inter-X, SMPL-X parameters: y up, metres, 120 Hz");
-  find_task(place.id, raw);
-  find_reactor(place.id, place.files[0], raw);
+  note_inter_x_clip(place.id, place.files[0], raw);
   add_people(raw,
              {.format = "inter-x",
               .licence = kInterXLicence,
@@ -159,6 +130,11 @@ RawPeople read_inter_x_smplx(const ClipPlace& place, const PeopleOptions& option
 }
 
 }  // namespace
+
+void note_inter_x_clip(const std::string& clip, const std::string& file, RawPeople& raw) {
+  find_task(clip, raw);
+  find_reactor(clip, file, raw);
+}
 
 const PeopleFormat& inter_x_format() {
   static const PeopleFormat format{.name = "inter-x",

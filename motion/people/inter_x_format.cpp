@@ -12,6 +12,7 @@
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
+#include "duet/motion/people/inter_x_actions.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/people/people_readers.h"
 
@@ -23,61 +24,7 @@ namespace fs = std::filesystem;
 constexpr double kInterXRate = 120.0;
 constexpr int kInterXDepth = 3;  // data set, skeletons, clip
 
-constexpr std::array<const char*, 40> kInterXActions = {"Hug",
-                                                        "Handshake",
-                                                        "Wave",
-                                                        "Grab",
-                                                        "Hit",
-                                                        "Kick",
-                                                        "Posing",
-                                                        "Push",
-                                                        "Pull",
-                                                        "Sit on leg",
-                                                        "Slap",
-                                                        "Pat on back",
-                                                        "Point finger at",
-                                                        "Walk towards",
-                                                        "Knock over",
-                                                        "Step on foot",
-                                                        "High-five",
-                                                        "Chase",
-                                                        "Whisper in ear",
-                                                        "Support with hand",
-                                                        "Rock-paper-scissors",
-                                                        "Dance",
-                                                        "Link arms",
-                                                        "Shoulder to shoulder",
-                                                        "Bend",
-                                                        "Carry on back",
-                                                        "Massaging shoulder",
-                                                        "Massaging leg",
-                                                        "Hand wrestling",
-                                                        "Chat",
-                                                        "Pat on cheek",
-                                                        "Thumb up",
-                                                        "Touch head",
-                                                        "Imitate",
-                                                        "Kiss on cheek",
-                                                        "Help up",
-                                                        "Cover mouth",
-                                                        "Look back",
-                                                        "Block",
-                                                        "Fly kiss"};
-
 bool is_inter_x_clip(const std::string& folder) { return is_file(folder + "/P1.npy") && is_file(folder + "/P2.npy"); }
-
-// Which of 40 actions a clip of that name is: three digits after the 'A'.
-std::optional<std::string> action_of(const std::string& name) {
-  const std::size_t at = name.find('A');
-  if (name.size() != 16 || name[0] != 'G' || at != 8) return std::nullopt;
-  int number = 0;
-  for (std::size_t i = 9; i < 12; ++i) {
-    if (name[i] < '0' || name[i] > '9') return std::nullopt;
-    number = 10 * number + (name[i] - '0');
-  }
-  if (number >= static_cast<int>(kInterXActions.size())) return std::nullopt;
-  return kInterXActions[static_cast<std::size_t>(number)];
-}
 
 // The nearest folder above a clip that has `name`; "" where none of three has.
 std::string beside_clips(const std::string& clip, const std::string& name) {
@@ -155,7 +102,7 @@ RawPeople read_inter_x(const ClipPlace& place, const PeopleOptions& /*options*/)
   people.up = Axis::kPlusY;
   people.metres_per_unit = 1.0;
   people.source = {{"format", "inter-x-skeleton"}, {"file_a", place.files[0]}, {"file_b", place.files[1]}};
-  if (const auto action = action_of(place.id)) {
+  if (const auto action = inter_x_action(place.id)) {
     people.source["label"] = *action;
     people.task = task_of_label(*action);
     people.evidence.push_back(fmt::format("action: '{}' (of the clip's name)", *action));

@@ -40,9 +40,7 @@ void NumberTable::fail(const std::string& fault) const { throw InputError(what +
 std::string NumberTable::found() const { return shape_text(shape); }
 
 NumberTable table_of(const Npz& npz, const std::string& key) {
-  const NpyArray& array = npz.array(key);
-  const std::string what = fmt::format("'{}': array '{}'", npz.name(), shown(key));
-  return checked({.what = what, .shape = array.shape, .values = doubles(array, what)});
+  return table_of(npz.array(key), fmt::format("'{}': array '{}'", npz.name(), shown(key)));
 }
 
 NumberTable table_of(const Pickle& pickle, const PickleNode& node, const std::string& what) {
@@ -57,11 +55,14 @@ NumberTable table_of(const TorchFile& file, const PickleNode& node, const std::s
                   .values = tensor_values(file, node, what)});
 }
 
+NumberTable table_of(const NpyArray& array, const std::string& what) {
+  return checked({.what = what, .shape = array.shape, .values = doubles(array, what)});
+}
+
 NumberTable npy_table(std::string_view bytes, const std::string& name) {
   const std::string what = fmt::format("'{}'", name);
   try {
-    const NpyArray array = parse_npy(bytes);
-    return checked({.what = what, .shape = array.shape, .values = doubles(array, what)});
+    return table_of(parse_npy(bytes), what);
   } catch (const InputError& error) {
     if (std::string_view(error.what()).starts_with(what)) throw;
     throw InputError(fmt::format("{}: {}", what, error.what()));

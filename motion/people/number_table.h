@@ -27,6 +27,7 @@ struct NumberTable {
 NumberTable table_of(const Npz& npz, const std::string& key);
 NumberTable table_of(const Pickle& pickle, const PickleNode& node, const std::string& what);
 NumberTable table_of(const TorchFile& file, const PickleNode& node, const std::string& what);
+NumberTable table_of(const NpyArray& array, const std::string& what);
 NumberTable npy_table(std::string_view bytes, const std::string& name);
 
 // The table where it is of shape (T, ...) with rows of one of these sizes (whatever their own shape), T of at least 1

@@ -11,19 +11,13 @@
 #include "duet/motion/people/amass.h"
 #include "duet/motion/people/gvhmr.h"
 #include "duet/motion/people/inter_x.h"
+#include "duet/motion/people/inter_x_h5.h"
 #include "duet/motion/people/interhuman_raw.h"
 #include "duet/motion/people/motion_rows.h"
-#include "duet/motion/people/people_files.h"
 #include "duet/motion/people/people_readers.h"
 #include "duet/motion/people/video_tracks.h"
 
 namespace duet {
-
-namespace {
-
-constexpr std::string_view kHdf5Begin = "\x89HDF\r\n\x1a\n";
-
-}  // namespace
 
 // The order is that of recognition: formats that are known by names of files and folders come before those that any
 // table of positions may be.
@@ -31,6 +25,7 @@ std::span<const PeopleFormat> people_formats() {
   static const std::vector<PeopleFormat> table = {
       inter_x_skeleton_format(),
       inter_x_format(),
+      inter_x_h5_format(),
       interhuman_raw_format(),
       interhuman_processed_format(),
       core4d_format(),
@@ -63,12 +58,6 @@ const PeopleFormat& find_people_format(std::span<const std::string> paths, std::
   for (const PeopleFormat& format : people_formats())
     if (name.empty() ? format.recognises(paths) : format.name == name) return format;
   if (!name.empty()) throw std::invalid_argument(unknown_name_message("format of people", name, people_format_names()));
-  for (const std::string& path : paths)
-    if (is_file(path) && first_bytes(path, kHdf5Begin.size()) == kHdf5Begin)
-      throw InputError(
-          fmt::format("'{}': an HDF5 file, which is not read; expected Inter-X's .h5 as one P1.npz and P2.npz a clip: "
-                      "docs/file-formats.md, \"Inter-X in HDF5\", has the lines of Python that write them",
-                      shown(path)));
   std::vector<std::string> looked_for;
   for (const PeopleFormat& format : people_formats())
     looked_for.push_back(fmt::format("{} ({})", format.name, format.what));

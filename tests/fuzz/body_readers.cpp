@@ -1,4 +1,8 @@
 // Containers of other programs (joblib, torch.save, NumPy's objects), and two people as parameters of body models.
+#include <algorithm>
+
+#include "duet/core/file.h"
+#include "duet/core/hdf5.h"
 #include "duet/core/joblib.h"
 #include "duet/core/npy_objects.h"
 #include "duet/core/pickle_machine.h"
@@ -7,6 +11,7 @@
 #include "duet/motion/people/body_model.h"
 #include "duet/motion/people/gvhmr.h"
 #include "duet/motion/people/inter_x.h"
+#include "duet/motion/people/inter_x_h5.h"
 #include "duet/motion/people/interhuman_raw.h"
 #include "duet/motion/people/motion_rows.h"
 #include "duet/motion/people/video_tracks.h"
@@ -36,6 +41,26 @@ std::string inter_x_sample(unsigned seed) {
 void read_inter_x_file(std::string_view bytes) {
   static const Npz sample = test::inter_x_npz(fuzz_body(0.3));
   read_people(inter_x_format(), "P1.npz", archive_of(sample, bytes));
+}
+
+std::string inter_x_h5_sample(unsigned /*seed*/) {
+  return test::inter_x_h5("G001T000A001R000", fuzz_body(0.3), fuzz_body(1.2));
+}
+void read_inter_x_h5_file(std::string_view bytes) {
+  const std::vector<std::string> paths = {scratch_file("train.h5", bytes)};
+  for (const ClipPlace& place : inter_x_h5_format().find(paths, {})) (void)inter_x_h5_format().read(place, {});
+}
+
+// What HDF5's own library wrote: filters, chunks, both kinds of headers.
+std::string hdf5_sample(unsigned seed) {
+  return read_file(std::string(DUET_SOURCE_DIR "/tests/core/hdf5/library") + (seed % 2 == 0 ? "" : "_18") + ".h5");
+}
+void read_hdf5_file(std::string_view bytes) {
+  Hdf5File file(scratch_file("a.h5", bytes));
+  for (const char* name : {"plain", "double_big", "chunks", "deflated", "all_filters", "compact"}) {
+    const std::vector<std::string> names = file.names();
+    if (std::find(names.begin(), names.end(), name) != names.end()) (void)file.array(name);
+  }
 }
 
 std::string amass_sample(unsigned seed) {
@@ -123,6 +148,8 @@ std::vector<Reader> body_readers() {
           {"object_npy", object_npy_sample, read_object_npy},
           {"body_model", body_model_sample, read_body_model},
           {"inter_x", inter_x_sample, read_inter_x_file},
+          {"inter_x_h5", inter_x_h5_sample, read_inter_x_h5_file},
+          {"hdf5", hdf5_sample, read_hdf5_file},
           {"interhuman_raw", interhuman_sample, read_interhuman_file},
           {"amass", amass_sample, read_amass_file},
           {"motion_x", motion_x_sample, read_motion_x_file},

@@ -7,6 +7,7 @@
 #include "duet/motion/people/amass.h"
 #include "duet/motion/people/body_model.h"
 #include "duet/motion/people/inter_x.h"
+#include "duet/motion/people/inter_x_h5.h"
 #include "duet/motion/people/interhuman_raw.h"
 #include "duet/motion/people/source_clip.h"
 #include "duet/motion/people/video_tracks.h"
@@ -57,7 +58,7 @@ TEST(InterX, AFolderGivesEachClipWithItsActionAndReactor) {
   EXPECT_FALSE(whisper.reactor.has_value());
   EXPECT_THAT(whisper.evidence, Contains(HasSubstr("interaction_order.pkl does not name 'G001T000A018R005'")));
   EXPECT_EQ(inter_x_format().read(clips[2], {}).reactor, Person::kB);
-  EXPECT_EQ(whisper.source.at("action"), "A018");
+  EXPECT_EQ(whisper.source.at("label"), "Whisper in ear");
 }
 
 TEST(InterX, AnOrderThatIsNoneIsRefused) {
@@ -97,6 +98,53 @@ TEST(InterX, BecomesAClip) {
   const Eigen::Vector3d line = (clip.b.joints.at(0, kPelvis) - clip.a.joints.at(0, kPelvis)).normalized();
   EXPECT_GT(forward.dot(line), 0.999);
   EXPECT_GT((clip.a.rotations[kPelvis] * Eigen::Vector3d::UnitZ()).z(), 0.999);
+}
+
+TEST(InterXH5, EachArrayIsAClipWithItsSplitActionAndReactor) {
+  const ScratchFolder folder;
+  const BodyParameters body = test::body_parameters(3, 1.0);
+  const auto array = [&](const std::string& name) {
+    return test::Hdf5TestArray{.name = name, .shape = {3, 56, 6}, .values = test::inter_x_h5_values(body, body)};
+  };
+  write_file(folder / "motions/train.h5",
+             test::Hdf5Writer::bytes({array("G001T000A018R005"), array("G001T000A001R000")}));
+  write_file(folder / "motions/test.h5", test::Hdf5Writer::bytes({array("G009T001A000R003")}));
+  write_file(folder / "annots/interaction_order.pkl",
+             test::PickleWriter().raw("}").text("G001T000A001R000").integer(1).raw("s.").str());
+  const Files paths = {folder / "motions"};
+  ASSERT_TRUE(inter_x_h5_format().recognises(paths));
+  const std::vector<ClipPlace> clips = inter_x_h5_format().find(paths, {});
+  ASSERT_EQ(clips.size(), 3U);
+  EXPECT_EQ(clips[1].id, "G001T000A001R000");
+  const RawPeople hug = inter_x_h5_format().read(clips[0], {}), handshake = inter_x_h5_format().read(clips[1], {});
+  EXPECT_EQ(hug.task, Task::kHug);
+  EXPECT_EQ(hug.source.at("split"), "test");
+  EXPECT_EQ(handshake.task, Task::kHandshake);
+  EXPECT_EQ(handshake.reactor, Person::kA);
+  EXPECT_EQ(handshake.source.at("split"), "train");
+  EXPECT_EQ(inter_x_h5_format().read(clips[2], {}).source.at("label"), "Whisper in ear");
+}
+
+TEST(InterXH5, ArraysOfOtherShapesAreRefusedAndTheOthersGoOn) {
+  const ScratchFolder folder;
+  const BodyParameters body = test::body_parameters(3, 1.0);
+  const std::vector<double> values = test::inter_x_h5_values(body, body);
+  write_file(folder / "test.h5", test::Hdf5Writer::bytes({{.name = "a", .shape = {3, 56, 6}, .values = values},
+                                                          {.name = "b", .shape = {3, 6, 56}, .values = values},
+                                                          {.name = "c", .shape = {0, 56, 6}, .values = {}},
+                                                          {.name = "d", .shape = {18, 56}, .values = values}}));
+  const std::vector<ClipPlace> clips = inter_x_h5_format().find(Files{folder / "test.h5"}, {});
+  ASSERT_EQ(clips.size(), 4U);
+  EXPECT_EQ(inter_x_h5_format().read(clips[0], {}).joints[1].frames(), 3);
+  const auto refusal = [&](std::size_t clip) {
+    return thrown_message<InputError>([&] { (void)inter_x_h5_format().read(clips[clip], {}); });
+  };
+  EXPECT_THAT(refusal(1), HasSubstr("test.h5': clip 'b': expected shape (T, 56, 6), found (3, 6, 56)"));
+  EXPECT_THAT(refusal(2), HasSubstr("clip 'c': expected shape (T, 56, 6), found (0, 56, 6)"));
+  EXPECT_THAT(refusal(3), HasSubstr("clip 'd': expected shape (T, 56, 6), found (18, 56)"));
+  write_file(folder / "empty.h5", test::Hdf5Writer::bytes({}));
+  EXPECT_THAT(thrown_message<InputError>([&] { (void)inter_x_h5_format().find(Files{folder / "empty.h5"}, {}); }),
+              HasSubstr("empty.h5': expected HDF5 files with an array (T, 56, 6) a clip, found none"));
 }
 
 // ---- the others ------------------------------------------------------------

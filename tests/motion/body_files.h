@@ -11,6 +11,7 @@
 #include "duet/core/npz.h"
 #include "duet/core/skeleton.h"
 #include "duet/motion/people/body_kinematics.h"
+#include "tests/core/hdf5_bytes.h"
 #include "tests/core/pickle_bytes.h"
 #include "tests/core/torch_bytes.h"
 
@@ -119,6 +120,25 @@ inline Npz inter_x_npz(const BodyParameters& body, bool flat = false) {
   npz.set("betas", body.betas, {1, 10});
   npz.set_text("gender", "neutral");
   return npz;
+}
+
+// One array of Inter-X in HDF5, hands and face as at rest.
+inline std::vector<double> inter_x_h5_values(const BodyParameters& a, const BodyParameters& b) {
+  std::vector<double> values(static_cast<std::size_t>(a.frames) * 56 * 6);
+  for (int t = 0; t < a.frames; ++t)
+    for (const auto& [first, body] : {std::pair{0, &a}, std::pair{3, &b}})
+      for (int i = 0; i < 3; ++i) {
+        double* const frame = &values[static_cast<std::size_t>(t) * 56 * 6];
+        frame[first + i] = body->root[3 * t + i];
+        frame[55 * 6 + first + i] = body->translation[3 * t + i];
+        for (int j = 0; j < 21; ++j) frame[(1 + j) * 6 + first + i] = body->body[63 * t + 3 * j + i];
+      }
+  return values;
+}
+
+inline std::string inter_x_h5(const std::string& clip, const BodyParameters& a, const BodyParameters& b) {
+  return Hdf5Writer::bytes(
+      {{.name = clip, .shape = {static_cast<std::uint64_t>(a.frames), 56, 6}, .values = inter_x_h5_values(a, b)}});
 }
 
 inline std::string interhuman_pickle(const BodyParameters& a, const BodyParameters& b, int protocol = 4,

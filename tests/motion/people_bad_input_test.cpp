@@ -273,13 +273,14 @@ TEST(PeopleBadInput, OptionsThatBvhFilesHaveNoUseForAreRefused) {
   EXPECT_THAT(message(), HasSubstr("that option does not apply"));
 }
 
-TEST(PeopleBadInput, Hdf5IsRefusedWithWhatToDo) {
+TEST(PeopleBadInput, ABrokenHdf5FileIsRefusedByName) {
   const ScratchFolder folder;
   write_file(folder / "test.h5", "\x89HDF\r\n\x1a\n and the rest");
   const std::vector<std::string> paths = {folder / "test.h5"};
-  const std::string sentence = thrown_message<InputError>([&] { (void)find_people_format(paths, ""); });
-  EXPECT_THAT(sentence, HasSubstr("test.h5': an HDF5 file, which is not read"));
-  EXPECT_THAT(sentence, HasSubstr("Inter-X in HDF5"));
+  const PeopleFormat& format = find_people_format(paths, "");
+  EXPECT_EQ(format.name, "inter-x-h5");
+  EXPECT_THAT(thrown_message<InputError>([&] { (void)format.find(paths, {}); }),
+              HasSubstr("test.h5': expected an HDF5 file, found 21 bytes"));
 }
 
 }  // namespace
