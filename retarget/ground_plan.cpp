@@ -18,7 +18,6 @@ constexpr double kStandingBand = 0.05;   // a person's pelvis this little below 
 constexpr double kStepHeight = 0.03;     // a swinging sole clears the floor by this at least [m]
 constexpr double kEase = 8.0;            // frames in which a swing leaves the straight line
 constexpr double kLeastStepTime = 0.24;  // [s]
-constexpr double kStepSpeed = 1.2;       // mean, of a step [m/s]
 constexpr double kLeastSide = 0.07;      // of a sole from the middle, so that the feet do not meet [m]
 constexpr double kMostSide = 0.25;
 constexpr double kMostFootTurn = 0.6;  // of a sole against the base [rad]
@@ -189,12 +188,12 @@ std::vector<Standing> find_standing(const GroundPlan& plan, const LegPose& legs,
 double eased(double s) { return s * s * (3.0 - 2.0 * s); }
 
 // Two stances with too little time for the step between them give up frames for it.
-void make_time(std::vector<Standing>& all) {
+void make_time(double step_speed, std::vector<Standing>& all) {
   for (std::size_t i = 1; i < all.size(); ++i) {
     Standing& before = all[i - 1];
     Standing& after = all[i];
     const double step = (after.p - before.p).norm();
-    const double wanted = kRate * std::max(kLeastStepTime, step / kStepSpeed);
+    const double wanted = kRate * std::max(kLeastStepTime, step / step_speed);
     while (after.begin - before.end < wanted) {
       const bool first = before.end - before.begin > 3, second = after.end - after.begin > 3;
       if (!first && !second) break;
@@ -226,10 +225,10 @@ void swing(int begin, int end, const Standing* from, const Standing* to, Eigen::
   }
 }
 
-void place_soles(const LegPose& legs, const FootStance& person, GroundPlan& plan) {
+void place_soles(const LegPose& legs, const FootStance& person, double step_speed, GroundPlan& plan) {
   for (int side = 0; side < 2; ++side) {
     std::vector<Standing> all = find_standing(plan, legs, side, person.stands[side]);
-    make_time(all);
+    make_time(step_speed, all);
     std::vector<char>& stands = plan.stance.stands[side];
     const int frames = static_cast<int>(plan.yaw.size());
     stands.assign(frames, 0);
@@ -307,12 +306,12 @@ FootStance stance_of(const HumanMotion& source) {
 }  // namespace
 
 GroundPlan plan_ground(const RobotModel& robot, const LegPose& legs, const HumanMotion& source, const PairTree& tree,
-                       const PointTracks& reshaped, double smoothing) {
+                       const PointTracks& reshaped, const GroundPlanOptions& options) {
   GroundPlan plan;
-  const double sigma = smoothing * kRate;
+  const double sigma = options.smoothing * kRate;
   plan_base(robot, source, reshaped, sigma, plan);
   follow_feet(legs, tree, reshaped, sigma, plan);
-  place_soles(legs, stance_of(source), plan);
+  place_soles(legs, stance_of(source), options.step_speed, plan);
   lower_base(legs, sigma, plan);
   reach_swings(legs, plan);
   return plan;

@@ -22,8 +22,13 @@ struct GroundPlan {
   FootStance stance;                     // of the robot: the person's, but for frames that its legs cannot reach
 };
 
-// `reshaped` (T, 16, 3) with `tree`; `smoothing` is the standard deviation of the base's smoothing [s] at 50 Hz.
+struct GroundPlanOptions {
+  double smoothing = 0.2;   // standard deviation of the base's smoothing [s]
+  double step_speed = 1.2;  // at most, mean over a step of a foot; slower ones take time from the stances [m/s]
+};
+
+// `reshaped` (T, 16, 3) with `tree`, at 50 Hz.
 GroundPlan plan_ground(const RobotModel& robot, const LegPose& legs, const HumanMotion& source, const PairTree& tree,
-                       const PointTracks& reshaped, double smoothing);
+                       const PointTracks& reshaped, const GroundPlanOptions& options);
 
 }  // namespace duet

@@ -74,6 +74,7 @@ void add_weights(FieldTable<Options>& table) {
   weight("w-collision", "of the depth of spheres of the two bodies in each other; 0 as printed",
          &PairWeights::collision);
   weight("w-object", "of the distances to a carried object, as a share of w-con; 0: no object", &PairWeights::object);
+  weight("w-hand", "of a hand as a keypoint of contact; a keypoint-list has weights of its own", &PairWeights::hand);
 }
 
 void add_schedule(FieldTable<Options>& table) {
@@ -114,10 +115,13 @@ FieldTable<Options> make_table() {
            choice("kernel", {"auto", "scalar", "v2", "v3", "v4"},
                   "double reference (scalar) or float lanes: x86-64-v2, AVX2, AVX-512", &Options::kernel),
            choice("optimizer", {"adam", "lbfgs"}, "Adam in two stages, or L-BFGS", &Options::optimizer),
-           amount("lbfgs-iterations", "of L-BFGS, all with the weights of stage 2", &Options::lbfgs_iterations),
+           amount("lbfgs-iterations", "of L-BFGS, the first eight with the weights of stage 1",
+                  &Options::lbfgs_iterations),
            flag("ground", "the robot stands: soles where the person's feet do", &Options::ground),
            amount("root-smoothing", "standard deviation of the base's smoothing, where ground is on",
                   &Options::root_smoothing, "s"),
+           amount("step-speed", "of a foot that steps, in the mean, at most; where ground is on", &Options::step_speed,
+                  "m/s"),
            field<Options>(words("smpl", "SMPL shape basis (NPZ); where there is none bone lengths are scaled"),
                           &Options::smpl_path)})
     table.push_back(std::move(more));
@@ -146,10 +150,12 @@ PairOptions pair_options_of(PairMode mode) {
   options.contact_blocks = ContactBlocks::kCrossAndHuman;
   options.weights.bone = 5.0;
   options.weights.partner = 0.2;
-  options.weights.collision = 10.0;
+  options.weights.collision = 30.0;
+  options.weights.hand = 3.0;
+  options.step_speed = 1.8;
   if (mode != PairMode::kBest) return options;
   options.optimizer = Optimizer::kLbfgs;
-  options.lbfgs_iterations = 60;
+  options.lbfgs_iterations = 80;
   return options;
 }
 
@@ -179,6 +185,7 @@ void validate(const PairOptions& options) {
   require(
       !options.ground || options.root_translation != RootTranslation::kPerFrame,
       "pair options: root=per-frame would lift a robot that stands on the ground; expected constant-offset or fixed");
+  require(!options.ground || options.step_speed > 0.0, "pair options: step-speed is 0; expected a speed above 0");
   require(options.optimizer == Optimizer::kAdam || options.lbfgs_iterations > 0,
           "pair options: lbfgs-iterations is 0; expected at least one iteration");
   require(options.schedule.stage1_iterations + options.schedule.stage2_iterations > 0,

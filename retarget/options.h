@@ -23,6 +23,7 @@ struct PairWeights {  // supplement A.1.2, stage 1
   double partner = 0.0;    // L_temp of the partner's offsets, as a share of `temp`
   double collision = 0.0;  // depth of spheres of the two bodies in each other
   double object = 1.0;     // of distances from a carried object, as a share of `con`; 0 leaves the object out
+  double hand = 1.0;       // of a hand as a keypoint of contact, where none are listed
 };
 
 struct PairSchedule {
@@ -67,6 +68,7 @@ struct PairOptions {
   // (retarget/ground_plan.h).
   bool ground = false;
   double root_smoothing = 0.2;  // standard deviation of the base's smoothing, where `ground` is on [s]
+  double step_speed = 1.2;      // at most, mean over a step of a foot, where `ground` is on [m/s]
   std::string smpl_path;        // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
 };
 

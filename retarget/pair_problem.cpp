@@ -39,6 +39,11 @@ Eigen::MatrixXd original_distances(const PointTracks& source, const PointTracks&
 
 // The robot stands: its base and soles are planned, the rest is a chain above the base, and the reshaped person hangs
 // on the planned base.
+void weigh_hands(double weight, PairChain& chain) {
+  for (int k = 0; k < chain.keys(); ++k)
+    if (chain.key_smpl[k] == kLeftHand || chain.key_smpl[k] == kRightHand) chain.key_weight[k] = weight;
+}
+
 void stand_on_ground(const RobotModel& robot, const HumanMotion& source, const HumanMotion& partner,
                      const PairTree& tree, const PairOptions& options, PairProblem& problem) {
   UprightChain upright = make_upright_chain(robot, problem.chain);
@@ -47,7 +52,8 @@ void stand_on_ground(const RobotModel& robot, const HumanMotion& source, const H
   problem.robot_joint = upright.robot_joint;
   problem.upright = true;
   problem.reshaped = problem.targets;
-  problem.plan = plan_ground(robot, LegPose(robot), source, tree, problem.targets, options.root_smoothing);
+  problem.plan = plan_ground(robot, LegPose(robot), source, tree, problem.targets,
+                             {.smoothing = options.root_smoothing, .step_speed = options.step_speed});
   problem.yaw = problem.plan.yaw;
   problem.root = problem.plan.base;
   const Eigen::Vector3d p_BPelvis = pelvis_in_base(robot, robot.neutral).p;
@@ -67,6 +73,7 @@ PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& rob
                       source.frames()));
   PairProblem problem;
   problem.chain = make_chain(robot, options.keypoints, options.keypoint_list);
+  if (options.keypoint_list.empty()) weigh_hands(options.weights.hand, problem.chain);
   const PairTree tree = make_pair_tree(robot);
   problem.targets = reshape(source, tree, target_lengths(problem.chain, tree, options),
                             height_scale(robot, problem.chain, tree, source));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "duet/motion/foot_contact.h"
+#include "duet/motion/synthesis.h"
 #include "duet/retarget/leg_pose.h"
 #include "duet/retarget/pair.h"
 #include "duet/retarget/pair_solver.h"
@@ -270,6 +271,52 @@ TEST(PairOptionsModes, ModeComesFirstWhereverItStands) {
                 make_pair_options({{"mode", "floating"}});
               }),
               HasSubstr("paper, grounded, best"));
+}
+
+TEST(PairOnGround, HandsWeighAsAskedUnlessKeypointsAreListed) {
+  const InteractionClip clip = test::random_clip(10, 1);
+  const auto hand_weights = [&](const std::vector<std::pair<std::string, std::string>>& choices) {
+    const PairChain chain = make_pair_problem(clip, test::g1(), make_pair_options(choices)).chain;
+    std::vector<double> hands;
+    for (int k = 0; k < chain.keys(); ++k) {
+      if (chain.key_smpl[k] == kLeftHand || chain.key_smpl[k] == kRightHand)
+        hands.push_back(chain.key_weight[k]);
+      else
+        EXPECT_EQ(chain.key_weight[k], 1.0);
+    }
+    return hands;
+  };
+  EXPECT_THAT(hand_weights({{"mode", "paper"}}), testing::ElementsAre(1.0, 1.0));
+  EXPECT_THAT(hand_weights({{"mode", "best"}}), testing::ElementsAre(3.0, 3.0));
+  EXPECT_THAT(hand_weights({{"mode", "paper"}, {"w-hand", "0.5"}}), testing::ElementsAre(0.5, 0.5));
+  EXPECT_THAT(hand_weights({{"mode", "best"}, {"keypoint-list", "head,left_hand,right_hand"}}),
+              testing::ElementsAre(1.0, 1.0));
+  EXPECT_THAT(hand_weights({{"mode", "best"}, {"keypoints", "seven"}}), testing::IsEmpty());
+}
+
+// People who walk: the robot's feet stand the longer, the quicker they may step, and never while the person's swings.
+TEST(PairOnGround, AQuickerStepTakesLessFromTheStances) {
+  SynthesisOptions synthesis;
+  synthesis.seed = 777;
+  const InteractionClip clip = synthesize(Task::kHandshake, synthesis);
+  const FootStance person = find_stance(clip.reactor_motion());
+  int before = 0;
+  for (const char* speed : {"0.8", "1.2", "1.8"}) {
+    const PairOptions options = make_pair_options({{"mode", "best"}, {"step-speed", speed}});
+    const FootStance robot = make_pair_problem(clip, test::g1(), options).plan.stance;
+    int frames = 0;
+    for (int side = 0; side < 2; ++side)
+      for (int t = 0; t < clip.frames(); ++t) {
+        EXPECT_LE(robot.stands[side][t], person.stands[side][t]) << speed << " " << t;
+        frames += robot.stands[side][t];
+      }
+    EXPECT_GT(frames, before) << speed;
+    before = frames;
+  }
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] {
+                validate(make_pair_options({{"mode", "best"}, {"step-speed", "0"}}));
+              }),
+              HasSubstr("step-speed is 0; expected a speed above 0"));
 }
 
 // A foot that rests, jumps by a camera's noise, steps and rests again.

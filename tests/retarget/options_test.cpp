@@ -40,6 +40,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"w-partner", "0.7"},
                                                                    {"w-collision", "3"},
                                                                    {"w-object", "0.5"},
+                                                                   {"w-hand", "2"},
                                                                    {"stage1-iterations", "7"},
                                                                    {"stage1-rate", "0.125"},
                                                                    {"stage2-iterations", "0"},
@@ -60,6 +61,7 @@ TEST(PairOptions, TextFormsRoundTrip) {
                                                                    {"lbfgs-iterations", "7"},
                                                                    {"ground", "off"},
                                                                    {"root-smoothing", "0.3"},
+                                                                   {"step-speed", "0.9"},
                                                                    {"smpl", "a path.npz"}};
   PairOptions options;
   ASSERT_EQ(values.size(), pair_option_names().size());
