@@ -257,6 +257,22 @@ void count(DatasetSummary& summary, const DatasetEntry& entry, bool from_before)
   summary.from_before += from_before;
 }
 
+// Digests of files that hold many clips are taken once: Inter-X has 9,000 clips in one file of gigabytes.
+class SourceDigests {
+ public:
+  std::string of(const ClipPlace& place, const std::string& file) {
+    if (place.entry.empty()) return sha256_file(file);
+    const std::lock_guard hold(mutex_);  // who waits needs the same file, or another such
+    std::string& digest = containers_[file];
+    if (digest.empty()) digest = sha256_file(file);
+    return digest;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::string, std::string> containers_;
+};
+
 // What all threads share.
 class DatasetWork {
  public:
@@ -303,7 +319,8 @@ class DatasetWork {
     DatasetEntry entry{.clip = place.id};
     try {
       for (const std::string& file : place.files)
-        entry.sources.push_back({.file = std::filesystem::path(file).filename().string(), .sha256 = sha256_file(file)});
+        entry.sources.push_back(
+            {.file = std::filesystem::path(file).filename().string(), .sha256 = digests_.of(place, file)});
     } catch (const InputError&) {
       entry.sources.clear();  // the reader says what is wrong with it
     }
@@ -328,6 +345,7 @@ class DatasetWork {
   std::vector<ClipPlace> places_;
   DatasetFolder folder_;
   const DatasetEvents& events_;
+  SourceDigests digests_;
   std::mutex mutex_;
   DatasetSummary summary_;
 };
