@@ -36,12 +36,16 @@ std::string arming_refusal(const ArmingFacts& facts) {
   if (facts.dry_run) return "this is a dry run: nothing here can command the robot";
   if (!facts.asked_to_arm) return "nobody asked to arm: expected 'duet hw arm'";
   if (std::string refusal = permission_refusal(facts); !refusal.empty()) return refusal;
+  if (std::string refusal = executor_refusal(facts.executor, facts.odometry, facts.twin); !refusal.empty())
+    return refusal;
   if (!facts.twin && !facts.contact_limits.verified())
     return fmt::format("contact limits '{}': nobody has checked them against the standard ('verified_by' is empty)",
                        facts.contact_limits.name);
   if (!facts.log_is_open) return "the log cannot be written";
   if (facts.free_log_bytes < kLeastLogBytes)
     return fmt::format("the disk of the log has {:.2f} GB left, expected at least 1", 1e-9 * facts.free_log_bytes);
+  if (!facts.executor_complaint.empty())
+    return fmt::format("executor '{}': {}", executor_name(facts.executor), facts.executor_complaint);
   return operator_refusal(facts);
 }
 

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "duet/hardware/executor.h"
 #include "duet/hardware/safety_signal.h"
 #include "duet/metrics/contact_limits.h"
 
@@ -20,8 +21,11 @@ struct MotionPermission {
 
 struct ArmingFacts {
   MotionPermission permission;
-  bool twin = false;          // a twin on this machine, not a robot
-  bool asked_to_arm = false;  // on the command line
+  bool twin = false;  // a twin on this machine, not a robot
+  ExecutorKind executor = ExecutorKind::kTwin;
+  OdometrySource odometry = OdometrySource::kNone;
+  std::string executor_complaint;  // what is wrong with it; empty: nothing
+  bool asked_to_arm = false;       // on the command line
   bool dry_run = false;
   ContactLimits contact_limits;
   std::string shown_nonce, typed_nonce;

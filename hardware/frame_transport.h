@@ -4,6 +4,7 @@
 
 #include "duet/controllers/root_conversion.h"
 #include "duet/hardware/low_level_frame.h"
+#include "duet/hardware/safety_machine.h"
 
 namespace duet {
 
@@ -26,7 +27,10 @@ class FrameTransport {
 class VelocitySink {
  public:
   virtual ~VelocitySink() = default;
+  // Once a tick, after the frame of that tick.
   virtual void send(const VelocityCommand& velocity) = 0;
+  // Once a tick, before it.
+  virtual void enter(SafetyState) {}
 };
 
 }  // namespace duet

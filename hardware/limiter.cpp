@@ -121,13 +121,18 @@ void Limiter::tick(const MotionCommand* received, const LimiterInput& input, Lim
   write(input, state, out, counts);
 }
 
+std::optional<ClampReason> Limiter::refusal(const MotionCommand& command, const LimiterState& state) const {
+  if (command.q.size() != setup_.robot->dof()) return ClampReason::kSize;
+  if (!std::isfinite(command.stamp) || !is_finite(command.root) || !command.q.allFinite())
+    return ClampReason::kNotFinite;
+  if (state.has_good && command.stamp <= state.good.stamp) return ClampReason::kStamp;
+  return std::nullopt;
+}
+
 // A command with one bad number is no command: the last good one stands.
 void Limiter::admit(const MotionCommand* received, LimiterState& state, ClampCounts& counts) const {
   if (received == nullptr) return;
-  if (received->q.size() != setup_.robot->dof()) return count(counts, ClampReason::kSize);
-  if (!std::isfinite(received->stamp) || !is_finite(received->root) || !received->q.allFinite())
-    return count(counts, ClampReason::kNotFinite);
-  if (state.has_good && received->stamp <= state.good.stamp) return count(counts, ClampReason::kStamp);
+  if (const std::optional<ClampReason> refused = refusal(*received, state)) return count(counts, *refused);
   state.good = *received;
   state.has_good = true;
 }

@@ -78,6 +78,8 @@ class Limiter {
   // The same in place, from finite angles of the right number; no allocation. The newest stamp is kept.
   void restart(const Eigen::VectorXd& q, LimiterState& state) const;
 
+  // Why tick() would not take the command: of another size, not finite, not newer than the last good one.
+  [[nodiscard]] std::optional<ClampReason> refusal(const MotionCommand& command, const LimiterState& state) const;
   // Takes a newly received command (null: none came), or refuses it as a whole; then one step of the outputs towards
   // the last good one. `state` is finite and of the robot's size.
   void tick(const MotionCommand* received, const LimiterInput& input, LimiterState& state, LimitedCommand& out,

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -23,17 +25,34 @@ Json human_json(const HumanBody& human) {
   return list;
 }
 
-HumanBody human_of(const Json& json) {
+HumanCapsule capsule_of(const Json& c, const std::string& name) {
+  HumanCapsule capsule{.name = c.at(0),
+                       .region = c.at(1),
+                       .joint_a = c.at(2),
+                       .joint_b = c.at(3),
+                       .radius = c.at(4),
+                       .begin = c.at(5),
+                       .end = c.at(6)};
+  for (const int joint : {capsule.joint_a, capsule.joint_b})
+    if (joint < 0 || joint >= kSmplJoints)
+      throw InputError(fmt::format("{}: capsule '{}': expected joints 0 to {}, found {}", name, shown(capsule.name),
+                                   kSmplJoints - 1, joint));
+  return capsule;
+}
+
+HumanBody human_of(const Json& json, const std::string& name) {
   HumanBody human;
-  for (const Json& c : json)
-    human.capsules.push_back({.name = c.at(0),
-                              .region = c.at(1),
-                              .joint_a = c.at(2),
-                              .joint_b = c.at(3),
-                              .radius = c.at(4),
-                              .begin = c.at(5),
-                              .end = c.at(6)});
+  for (const Json& c : json) human.capsules.push_back(capsule_of(c, name));
   return human;
+}
+
+// That of a card that ships here, by its name alone: a log does not say which files are read.
+std::shared_ptr<const RobotModel> robot_of(const std::string& robot, const std::string& name) {
+  try {
+    if (robot.find_first_of("/.") == std::string::npos) return load_shared_robot(robot);
+  } catch (const MissingError&) {
+  }
+  throw InputError(fmt::format("{}: expected the name of a robot that ships, found '{}'", name, shown(robot)));
 }
 
 Json contact_json(const ContactLimits& limits) {
@@ -62,7 +81,7 @@ ContactLimits contact_of(const Json& json) {
 
 LimiterSetup setup_of(const Json& json, const std::string& name) {
   LimiterSetup setup;
-  setup.robot = load_shared_robot(json.at("robot").get<std::string>());
+  setup.robot = robot_of(json.at("robot").get<std::string>(), name);
   if (setup.robot->digest != json.at("robot_digest").get<std::string>())
     throw InputError(
         fmt::format("{}: made for another robot '{}' than the one whose card is here", name, setup.robot->name));
@@ -74,7 +93,7 @@ LimiterSetup setup_of(const Json& json, const std::string& name) {
   setup.executed.kd = vector_of(json.at("kd"));
   setup.dt = json.at("dt");
   setup.person = json.at("person");
-  setup.human = human_of(json.at("human"));
+  setup.human = human_of(json.at("human"), name);
   setup.contact_limits = contact_of(json.at("contact_limits"));
   for (const Json& touch : json.at("touches")) setup.touches.push_back({touch.at(0), touch.at(1)});
   return setup;

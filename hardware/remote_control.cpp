@@ -8,7 +8,7 @@ namespace {
 
 // Places in the 40 bytes; the first two are a head that is never 0.
 constexpr int kKeysAt = 2, kLxAt = 4, kRxAt = 8, kRyAt = 12, kLyAt = 20;
-constexpr std::uint8_t kHead[2] = {0x55, 0x51};
+constexpr std::uint8_t kHeadBytes[2] = {0x55, 0x51};
 
 template <typename T>
 T value_at(std::span<const std::uint8_t, kRemoteBytes> bytes, int at) {
@@ -40,7 +40,7 @@ RemoteControl read_remote(std::span<const std::uint8_t, kRemoteBytes> bytes) {
 void write_remote(const RemoteControl& remote, std::span<std::uint8_t, kRemoteBytes> bytes) {
   std::ranges::fill(bytes, std::uint8_t{0});
   if (!remote.heard) return;
-  std::ranges::copy(kHead, bytes.begin());
+  std::ranges::copy(kHeadBytes, bytes.begin());
   put_at(bytes, kKeysAt, remote.keys);
   put_at(bytes, kLxAt, remote.lx);
   put_at(bytes, kLyAt, remote.ly);

@@ -6,6 +6,7 @@
 
 #include "duet/hardware/arming.h"
 #include "duet/hardware/dds_place.h"
+#include "duet/hardware/lcm_channel.h"
 #include "duet/hardware/robot_guard.h"
 
 namespace duet {
@@ -17,6 +18,11 @@ struct RobotConfig {
   HardwareLimits limits;
   std::vector<TouchPair> touches;
   std::string contact_limits;  // path of the table; empty: the one that ships
+  ExecutorKind executor = ExecutorKind::kTwin;
+  OdometrySource odometry = OdometrySource::kTwin;
+  LcmPlace lcm;  // of HOMIE's processes
+  Pose X_BC;     // of the camera on the base: what a person's joints come in
+  bool has_camera = false;
 
   [[nodiscard]] DdsPlace place() const { return {permission.domain, permission.interface}; }
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "duet/core/require.h"
 
@@ -74,9 +75,10 @@ void RobotGuard::receive(const PlannerMessage& message, double now) {
     count(status_.clamps, ClampReason::kSize);
     return;
   }
+  // What the limiter refuses does not keep the planner alive: the last good command grows old.
+  if (!limiter_.refusal(message.command, limiter_state_)) next_.planner_at = now;
   planner_ = message;
   any_planner_ = planner_is_new_ = true;
-  next_.planner_at = now;
 }
 
 // A pose that is not finite, or in which somebody jumped, is dropped: the one before grows old.
@@ -106,6 +108,11 @@ void RobotGuard::receive(const OdometrySample& sample) {
   }
   odometry_ = sample;
   next_.odometry_at = sample.at;
+}
+
+void RobotGuard::receive(const BatteryReading& battery, double now) {
+  battery_ = battery;
+  battery_at_ = now;
 }
 
 void RobotGuard::arm() { armed_ = !setup_.dry_run; }
@@ -164,6 +171,9 @@ void RobotGuard::read_operator(double now) {
 
 void RobotGuard::check_robot() {
   next_.health = reading_.health;
+  if (setup_.has_battery)
+    next_.health.charge =
+        next_.now - battery_at_ <= kBatteryAge ? battery_.charge : std::numeric_limits<double>::quiet_NaN();
   next_.health.mode_is_expected =
       !reading_.any || (reading_.mode_pr == kPitchRollMode && reading_.mode_machine == setup_.mode_machine);
   const RobotModel& robot = *setup_.limiter.robot;
@@ -242,6 +252,7 @@ void RobotGuard::restart_limiter(bool planned) {
 
 void RobotGuard::send() {
   status_.sent = false;
+  velocity_.enter(safety_.state);
   const SafetyOrder& order = status_.order;
   if (!order.writes || setup_.dry_run) {
     if (transport_.has_writer()) transport_.close_writer();

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "duet/hardware/arming.h"
+#include "duet/hardware/battery.h"
 #include "duet/hardware/contact_watch.h"
 #include "duet/hardware/frame_transport.h"
 #include "duet/hardware/limiter.h"
@@ -21,6 +22,9 @@ struct GuardSetup {
   int mode_machine = 5;  // that the robot has to report
   JointCommand stance;   // of the joints that the limiter does not move: targets and gains
   bool dry_run = true;
+  ExecutorKind executor = ExecutorKind::kTwin;      // for the log
+  OdometrySource odometry = OdometrySource::kTwin;  // for the log
+  bool has_battery = false;                         // its charge is reported, and an unknown one holds
 };
 
 // What a planner sends. `sequence` rises; an older or repeated message is dropped.
@@ -66,6 +70,9 @@ class RobotGuard {
   void receive(const PlannerMessage& message, double now);
   void receive(const PersonMessage& message, double now);
   void receive(const OdometrySample& sample);
+  void receive(const BatteryReading& battery, double now);
+  // Who executes the commands was heard of at `at`.
+  void executor_heard(double at) { next_.executor_at = at; }
   // The operator has armed: arming_refusal() was empty. Ignored in a dry run.
   void arm();
   // As the stop key does, at the next tick.
@@ -100,6 +107,8 @@ class RobotGuard {
   PersonMessage person_;
   double person_speed_ = 0.0;
   OdometrySample odometry_;
+  BatteryReading battery_;
+  double battery_at_ = kNever;
   RobotReading reading_;
   std::vector<AxisState> stance_;  // of all joints, on the way to the stance
   JointCommand joints_;

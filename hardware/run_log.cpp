@@ -151,7 +151,13 @@ void read_record(const TickRecord& r, LimiterInput& input, HumanJoints& person, 
 
 RunLog::RunLog(const std::string& path, const GuardSetup& setup) : writer_(path), ring_(kSlots) {
   for (const McapChannel& channel : kChannels) writer_.add(channel);
-  const nlohmann::json json = {{"duet", duet_version()}, {"limiter", limiter_setup_json(setup.limiter)}};
+  const LimiterSetup& limiter = setup.limiter;
+  const nlohmann::json json = {
+      {"duet", duet_version()},
+      {"limiter", limiter_setup_json(limiter)},
+      {"odometry", kOdometryNames[static_cast<std::size_t>(setup.odometry)]},
+      {"executor", executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints),
+                                          *limiter.robot)}};
   if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(json.dump())) || !writer_.flush())
     throw StorageError(fmt::format("cannot write '{}'", path));
   thread_ = std::thread([this] { write_slots(); });
@@ -225,7 +231,12 @@ LogReplay replay_log(const std::string& path) {
       const nlohmann::json json = nlohmann::json::parse(text, nullptr, false);
       if (!json.is_object() || !json.contains("limiter"))
         throw InputError(fmt::format("{}: expected the setup of a limiter, found none", path));
-      limiter.emplace(parse_limiter_setup(json["limiter"], path));
+      const LimiterSetup setup = parse_limiter_setup(json["limiter"], path);
+      try {
+        limiter.emplace(setup);
+      } catch (const std::invalid_argument& error) {
+        throw InputError(fmt::format("{}: {}", path, error.what()));
+      }
     } else if (channel.message_encoding == kTickEncoding) {
       if (!limiter || message.data.size() != sizeof(TickRecord))
         throw InputError(

@@ -6,10 +6,10 @@ namespace duet {
 namespace {
 
 constexpr std::array<std::string_view, kStopCauses> kCauseNames = {
-    "none",           "state_age",  "bad_states",  "planner_age",  "person_age",  "odometry_age",
-    "odometry_jump",  "remote_age", "dead_man",    "loop_late",    "clock",       "tilt",
-    "joint_speed",    "gyro",       "temperature", "charge",       "motor_error", "mode",
-    "foreign_writer", "stop_key",   "lapsed",      "held_too_long"};
+    "none",           "state_age",  "bad_states",  "planner_age",   "person_age",  "odometry_age",
+    "odometry_jump",  "remote_age", "dead_man",    "loop_late",     "clock",       "tilt",
+    "joint_speed",    "gyro",       "temperature", "charge",        "motor_error", "mode",
+    "foreign_writer", "stop_key",   "lapsed",      "held_too_long", "executor_age"};
 
 StopLevel above(double value, double hold, double damp) {
   // Written so that a value that is not a number is the worst.
@@ -89,6 +89,8 @@ Assessment assess(const SafetyRules& rules, const SafetyInput& input, const BadS
   assess_robot(rules, input, bad, all);
   worsen(all, level_of(input.now - input.remote_at, rules.remote), StopCause::kRemoteAge);
   worsen(all, hold_if(input.foreign_writer), StopCause::kForeignWriter);
+  if (rules.executor_answers)
+    worsen(all, level_of(input.now - input.executor_at, rules.executor), StopCause::kExecutorAge);
   worsen(all, damp_if(input.stop_key), StopCause::kStopKey);
   if (moving) assess_motion(rules, input, all);
   return all;

@@ -34,8 +34,9 @@ enum class StopCause {
   kStopKey,
   kLapsed,       // armed for too long without anything to do
   kHeldTooLong,  // a planner that stayed away, after a hold
+  kExecutorAge,  // nothing from who executes the commands
 };
-inline constexpr std::size_t kStopCauses = 22;
+inline constexpr std::size_t kStopCauses = 23;
 std::string_view stop_cause_name(StopCause cause);  // "state_age", ...
 
 inline constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -52,6 +53,7 @@ struct SafetyRules {
   AgeLimits person{0.1, 0.25};
   AgeLimits odometry{0.05, 0.15};
   AgeLimits remote{0.1, 0.2, 3.0};
+  AgeLimits executor{0.3, 0.6};                         // read where `executor_answers`
   AgeLimits loop{0.005, 0.040, 0.100};                  // by which a tick comes late
   int hold_bad_states = 3, damp_bad_states = 10;        // within
   double hold_bad_time = 0.050, damp_bad_time = 0.100;  // [s]
@@ -60,14 +62,15 @@ struct SafetyRules {
   double joint_speed = 10.0, gyro = 6.0;                // [rad/s]
   double hold_casing = 75.0, damp_casing = 85.0;        // [degrees C]
   double hold_winding = 100.0, damp_winding = 120.0;
-  double charge = 20.0;        // [%]
-  double late_share = 0.5;     // of speeds when the planner begins to be late; 0 at its hold
-  double ready_time = 2.0;     // for which everything has to be well before arming [s]
-  double armed_time = 60.0;    // idle, until it lapses [s]
-  double hold_time = 2.0;      // in which a late planner may come back [s]
-  double damp_time = 5.0;      // [s]
-  bool person_present = true;  // a person's pose is needed
-  bool walks = true;           // odometry is needed
+  double charge = 20.0;           // [%]
+  double late_share = 0.5;        // of speeds when the planner begins to be late; 0 at its hold
+  double ready_time = 2.0;        // for which everything has to be well before arming [s]
+  double armed_time = 60.0;       // idle, until it lapses [s]
+  double hold_time = 2.0;         // in which a late planner may come back [s]
+  double damp_time = 5.0;         // [s]
+  bool person_present = true;     // a person's pose is needed
+  bool walks = true;              // odometry is needed
+  bool executor_answers = false;  // who executes the commands is heard of, and has to be
 };
 
 // What the robot reports of itself.
@@ -76,7 +79,7 @@ struct RobotHealth {
   double joint_speed = 0.0;            // largest size [rad/s]
   double gyro = 0.0;                   // size [rad/s]
   double casing = 0.0, winding = 0.0;  // hottest motor [degrees C]
-  double charge = 100.0;               // [%]
+  double charge = 100.0;               // [%]; NaN: not known, which holds
   bool motor_error = false;
   bool mode_is_expected = true;  // mode_pr, mode_machine
   bool joints_in_range = true;
@@ -89,6 +92,7 @@ struct SafetyInput {
   double state_at = kNever;  // last good state of the robot
   int bad_states = 0;        // since the last tick
   double planner_at = kNever, person_at = kNever, odometry_at = kNever, remote_at = kNever;
+  double executor_at = kNever;
   double odometry_step = 0.0;   // largest between two samples since the last tick [m]
   double dead_man_at = kNever;  // last time that the operator was seen to hold it
   RobotHealth health;

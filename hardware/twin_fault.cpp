@@ -14,8 +14,8 @@
 namespace duet {
 namespace {
 
-constexpr std::array<std::string_view, 10> kFaultNames = {"drop", "delay", "flip",        "freeze",   "nan",
-                                                          "hot",  "tilt",  "remote_lost", "dead_man", "mode"};
+constexpr std::array<std::string_view, 11> kFaultNames = {"drop", "delay",       "flip",     "freeze", "nan",   "hot",
+                                                          "tilt", "remote_lost", "dead_man", "mode",   "charge"};
 
 [[noreturn]] void refuse(const std::string& text) {
   throw std::invalid_argument(fmt::format(
@@ -64,6 +64,8 @@ void FaultyTwin::set_condition(double time) {
   const TwinFault* tilt = active(TwinFaultKind::kTilt, time);
   twin_.condition.winding = hot != nullptr ? hot->value : TwinCondition{}.winding;
   twin_.condition.roll = tilt != nullptr ? tilt->value : 0.0;
+  const TwinFault* charge = active(TwinFaultKind::kCharge, time);
+  twin_.condition.charge = charge != nullptr ? charge->value : TwinCondition{}.charge;
   twin_.condition.mode_machine_offset = active(TwinFaultKind::kMode, time) != nullptr ? 1 : 0;
   twin_.remote.heard = active(TwinFaultKind::kRemoteLost, time) == nullptr;
   if (active(TwinFaultKind::kDeadMan, time) != nullptr)

@@ -10,12 +10,12 @@
 
 namespace duet {
 
-enum class TwinFaultKind { kDrop, kDelay, kFlip, kFreeze, kNan, kHot, kTilt, kRemoteLost, kDeadMan, kMode };
+enum class TwinFaultKind { kDrop, kDelay, kFlip, kFreeze, kNan, kHot, kTilt, kRemoteLost, kDeadMan, kMode, kCharge };
 
 struct TwinFault {
   TwinFaultKind kind = TwinFaultKind::kDrop;
   double begin = 0.0, end = 0.0;  // of the twin's time [s]
-  double value = 0.0;             // drop, flip: of states [%]; delay [ms]; hot [degrees C]; tilt [rad]; else unused
+  double value = 0.0;  // drop, flip: of states [%]; delay [ms]; hot [degrees C]; tilt [rad]; charge [%]; else unused
 };
 
 std::vector<std::string> twin_fault_names();

@@ -32,6 +32,7 @@ struct TwinCondition {
   double roll = 0.0;                     // of the base [rad]
   double joint_speed = 0.0;              // added to a joint's reported speed [rad/s]
   double gyro = 0.0;                     // added to the reported rate [rad/s]
+  double charge = 90.0;                  // of the battery [%]
   bool motor_error = false;
   int mode_pr = 0;
   int mode_machine_offset = 0;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "duet/bench/benchmarks/hardware.h"
+#include "duet/bench/benchmarks/hardware_wire.h"
 #include "duet/bench/benchmarks/parts.h"
 #include "duet/motion/synthesis.h"
 
@@ -19,6 +20,7 @@ const std::vector<Benchmark>& benchmarks() {
     add_runner_benchmarks(all);
     add_wbc_benchmarks(all);
     add_hardware_benchmarks(all);
+    add_wire_benchmark(all);
     return all;
   }();
   return list;

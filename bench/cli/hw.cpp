@@ -9,10 +9,12 @@
 #include <optional>
 #include <random>
 
+#include "duet/bench/cli/hw_partner.h"
 #include "duet/core/require.h"
-#include "duet/hardware/dds/dds_wire.h"
+#include "duet/hardware/dds/robot_side.h"
 #include "duet/hardware/guard_loop.h"
 #include "duet/hardware/guard_message.h"
+#include "duet/hardware/person_input.h"
 #include "duet/hardware/robot_config.h"
 #include "duet/hardware/run_log.h"
 
@@ -25,7 +27,8 @@ constexpr const char* kNotSafetyRated =
 volatile std::sig_atomic_t asked_to_end = 0;
 
 struct HardwareArguments {
-  std::string config, socket = "duet-guard.socket", log, command = "0,0,0";
+  std::string config, socket = "duet-guard.socket", log, command = "0,0,0", person_socket = "duet-person.socket",
+                      pose_socket = "duet-pose.socket";
   double seconds = 5.0;
   int velocity_port = 0;
 };
@@ -78,6 +81,19 @@ std::string status_text(const GuardStatus& status, double seconds) {
       status.input.foreign_writer ? "yes" : "none", clamp_text(status.clamps));
 }
 
+RobotSideOptions side_options(const HardwareArguments& arguments, bool commands) {
+  RobotSideOptions options;
+  options.commands = commands;
+  options.velocity_port = arguments.velocity_port;
+  options.pose_socket = arguments.pose_socket;
+  return options;
+}
+
+std::optional<PersonInput> person_input(const RobotConfig& config, const HardwareArguments& arguments) {
+  if (!config.has_camera) return std::nullopt;
+  return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.X_BC);
+}
+
 void listen_for(Session& session, const HardwareArguments& arguments, bool with_planner) {
   const RobotConfig config = read_robot_config(arguments.config);
   note(session,
@@ -85,17 +101,19 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
                    arguments.seconds,
                    with_planner ? fmt::format("takes a planner's commands at '{}' and limits them", arguments.socket)
                                 : "reads only"));
-  const std::unique_ptr<RobotWire> wire = open_robot_wire(config.place());
-  NoVelocity nobody;
+  RobotSide side(config, side_options(arguments, false));
   const GuardSetup setup = guard_setup(config, true);
-  RobotGuard guard(setup, *wire, nobody);
+  RobotGuard guard(setup, side.connection(), side.executor());
+  std::optional<PersonInput> person = person_input(config, arguments);
   std::optional<DatagramSocket> planner;
   if (with_planner) planner.emplace(DatagramSocket::at_path(arguments.socket));
   std::unique_ptr<RunLog> log;
   if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
   end_on_signals();
   const double begin = monotonic_seconds();
-  run_guard(guard, *wire, planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
+  run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
+    side.connection().poll(now, guard);
+    if (person) person->poll(now, guard);
     if (log) log->add(guard);
     return asked_to_end == 0 && now - begin < arguments.seconds;
   });
@@ -116,6 +134,8 @@ ArmingFacts facts_for(const RobotConfig& config, const GuardSetup& setup, const 
   ArmingFacts facts;
   facts.permission = config.permission;
   facts.twin = config.twin;
+  facts.executor = config.executor;
+  facts.odometry = config.odometry;
   facts.asked_to_arm = true;
   facts.contact_limits = setup.limiter.contact_limits;
   facts.log_is_open = log.good();
@@ -129,10 +149,11 @@ ArmingFacts facts_for(const RobotConfig& config, const GuardSetup& setup, const 
 // Follows the guard until it has stopped for good; says each change of state.
 class ArmedRun {
  public:
-  ArmedRun(Session& session, RobotGuard& guard, RunLog& log, ArmingFacts facts)
-      : session_(session), guard_(guard), log_(log), facts_(std::move(facts)) {}
+  ArmedRun(Session& session, RobotGuard& guard, RobotSide& side, RunLog& log, ArmingFacts facts)
+      : session_(session), guard_(guard), side_(side), log_(log), facts_(std::move(facts)) {}
 
   bool go_on(double now) {
+    side_.connection().poll(now, guard_);
     log_.add(guard_);
     const GuardStatus& status = guard_.status();
     const SafetyState state = status.safety.state;
@@ -154,6 +175,7 @@ class ArmedRun {
     facts_.now = now;
     facts_.remote_key_held = now - status.input.dead_man_at < 0.1;
     facts_.reported_mode_machine = guard_.reading().mode_machine;
+    facts_.executor_complaint = side_.executor().complaint();
     refusal_ = arming_refusal(facts_);
     if (!refusal_.empty()) return;
     guard_.arm();
@@ -162,6 +184,7 @@ class ArmedRun {
 
   Session& session_;
   RobotGuard& guard_;
+  RobotSide& side_;
   RunLog& log_;
   ArmingFacts facts_;
   SafetyState last_ = SafetyState::kOffline;
@@ -169,31 +192,36 @@ class ArmedRun {
   std::string refusal_;
 };
 
+std::string executed_text(const RobotConfig& config, const GuardSetup& setup) {
+  const RobotModel& robot = *setup.limiter.robot;
+  return executed_channels_text(executed_channels(config.executor, robot, setup.limiter.executed.joints), robot);
+}
+
 void run_arm(Session& session, const HardwareArguments& arguments) {
   const RobotConfig config = read_robot_config(arguments.config);
-  if (!config.twin)
-    throw MissingError(
-        "arming a robot needs an executor for it (HOMIE's processes, the maker's service), and this build has none: a "
-        "twin can be armed, a robot can be listened to ('hw check', 'hw dry-run')");
   const GuardSetup setup = guard_setup(config, false);
   RunLog log(arguments.log, setup);
   ArmingFacts facts = facts_for(config, setup, arguments, log);
   note(session,
        fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A while R1 is "
-                   "held, logs to '{}'. Ctrl-C damps it.\ntype '{}' within {} s to arm:",
-                   kNotSafetyRated, where(config), arguments.socket, arguments.log, facts.shown_nonce, kNonceTime));
+                   "held, logs to '{}'. Ctrl-C damps it.\n{}\ntype '{}' within {} s to arm:",
+                   kNotSafetyRated, where(config), arguments.socket, arguments.log, executed_text(config, setup),
+                   facts.shown_nonce, kNonceTime));
   std::getline(std::cin, facts.typed_nonce);
   facts.now = monotonic_seconds();
   facts.reported_mode_machine = config.permission.mode_machine;  // not heard yet: asked again when it is
   facts.remote_key_held = true;
   if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
   DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
-  const std::unique_ptr<RobotWire> wire = open_robot_wire(config.place());
-  LcmVelocity velocity(DatagramSocket::to_port(static_cast<std::uint16_t>(arguments.velocity_port)));
-  RobotGuard guard(setup, *wire, velocity);
-  ArmedRun run(session, guard, log, facts);
+  RobotSide side(config, side_options(arguments, true));
+  RobotGuard guard(setup, side.connection(), side.executor());
+  std::optional<PersonInput> person = person_input(config, arguments);
+  ArmedRun run(session, guard, side, log, facts);
   end_on_signals();
-  run_guard(guard, *wire, &planner, setup.limiter.dt, [&](double now) { return run.go_on(now); });
+  run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
+    if (person) person->poll(now, guard);
+    return run.go_on(now);
+  });
   if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
   print(session,
         fmt::format("{}; log '{}', {} ticks left out", safety_state_name(guard.status().safety.state), arguments.log,
@@ -288,9 +316,8 @@ void add_hardware(CLI::App& app, Session& session) {
                           "the whole guard with a planner, but without a writer: nothing can reach the robot",
                           "duet hw dry-run examples/hardware/twin.yaml --seconds 20",
                           [](Session& s, const HardwareArguments& a) { listen_for(s, a, true); });
-  CLI::App* arm =
-      add_one(*hardware, session, arguments, "arm", "guard it: the process that alone may write to it (a twin)",
-              "duet hw arm examples/hardware/twin.yaml --log run.mcap --velocity-port 15001", run_arm);
+  CLI::App* arm = add_one(*hardware, session, arguments, "arm", "guard it: the process that alone commands it",
+                          "duet hw arm examples/hardware/twin.yaml --log run.mcap --velocity-port 15001", run_arm);
   CLI::App* plan = add_one(*hardware, session, arguments, "run", "ask the guard for a velocity, for a time",
                            "duet hw run --command 0.2,0,0 --seconds 5", run_plan);
   CLI::App* stop =
@@ -300,9 +327,18 @@ void add_hardware(CLI::App& app, Session& session) {
   for (CLI::App* lasts : {check, dry, plan}) add_seconds(lasts, *arguments);
   for (CLI::App* logs : {check, dry}) logs->add_option("--log", arguments->log, "log to make (MCAP)");
   arm->add_option("--log", arguments->log, "log to make (MCAP)")->required();
-  arm->add_option("--velocity-port", arguments->velocity_port, "UDP port of 127.0.0.1 that takes velocities")
-      ->required()
+  arm->add_option("--velocity-port", arguments->velocity_port,
+                  "UDP port of 127.0.0.1 that takes a twin's velocities (executor 'twin')")
       ->check(CLI::Range(1, 65535));
+  for (CLI::App* sees : {check, dry, arm}) {
+    sees->add_option("--person-socket", arguments->person_socket,
+                     "local socket where a camera's estimator sends (configuration with 'camera')")
+        ->capture_default_str();
+    sees->add_option("--pose-socket", arguments->pose_socket,
+                     "local socket where a tracker sends the base's pose (odometry 'external')")
+        ->capture_default_str();
+  }
+  add_play_partner(*hardware, session);
   plan->add_option("--command", arguments->command, "\"vx,vy,wz\" [m/s, m/s, rad/s]")->capture_default_str();
 }
 

@@ -1,14 +1,14 @@
 #include "duet/hardware/dds/dds_wire.h"
 
-#include <dds/dds.h>
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <cstring>
 #include <span>
 
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
+#include "duet/hardware/dds/dds_participant.h"
 #include "g1.h"
 
 namespace duet {
@@ -17,107 +17,13 @@ namespace {
 using CommandSample = unitree_hg_msg_dds__LowCmd_;
 using StateSample = unitree_hg_msg_dds__LowState_;
 using OdometryMessage = unitree_go_msg_dds__SportModeState_;
+using BatteryMessage = unitree_hg_msg_dds__BmsState_;
 static_assert(sizeof(CommandSample) == sizeof(LowCommandFrame) && sizeof(StateSample) == sizeof(LowStateFrame));
 
 constexpr const char* kCommandTopic = "rt/lowcmd";
 constexpr const char* kStateTopic = "rt/lowstate";
 constexpr const char* kOdometryTopic = "rt/odommodestate";
-constexpr int kMostWriters = 64;
-
-dds_entity_t checked(dds_entity_t entity, const char* what) {
-  if (entity >= 0) return entity;
-  throw std::runtime_error(fmt::format("DDS: {}: {}", what, dds_strretcode(-entity)));
-}
-
-std::string configuration(const DdsPlace& place) {
-  return fmt::format(
-      "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"{}\"{}/></Interfaces></General>"
-      "</Domain></CycloneDDS>",
-      place.interface, place.interface == "lo" ? " multicast=\"false\"" : "");
-}
-
-// The participant, and the domain that it configured itself. Deleting them deletes everything that hangs on them.
-class Participant {
- public:
-  explicit Participant(const DdsPlace& place) {
-    check_place(place);
-    // In one process a domain has one configuration: where this process has made it before, it stands.
-    domain_ = dds_create_domain(static_cast<dds_domainid_t>(place.domain), configuration(place).c_str());
-    if (domain_ < 0 && domain_ != DDS_RETCODE_PRECONDITION_NOT_MET) checked(domain_, "cannot make the domain");
-    participant_ = dds_create_participant(static_cast<dds_domainid_t>(place.domain), nullptr, nullptr);
-    if (participant_ < 0) {
-      if (domain_ > 0) dds_delete(domain_);
-      checked(participant_, fmt::format("cannot use interface '{}'", place.interface).c_str());
-    }
-  }
-  ~Participant() {
-    dds_delete(participant_);
-    if (domain_ > 0) dds_delete(domain_);
-  }
-  Participant(const Participant&) = delete;
-  Participant& operator=(const Participant&) = delete;
-
-  dds_entity_t reader(const dds_topic_descriptor_t& type, const char* name) {
-    return endpoint(type, name, DDS_RELIABILITY_BEST_EFFORT, true);
-  }
-  dds_entity_t writer(const dds_topic_descriptor_t& type, const char* name) {
-    return endpoint(type, name, DDS_RELIABILITY_RELIABLE, false);
-  }
-  [[nodiscard]] dds_entity_t entity() const { return participant_; }
-
- private:
-  dds_entity_t endpoint(const dds_topic_descriptor_t& type, const char* name, dds_reliability_kind_t reliability,
-                        bool reads) {
-    const dds_entity_t topic = checked(dds_create_topic(participant_, &type, name, nullptr, nullptr), name);
-    dds_qos_t* qos = dds_create_qos();
-    dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
-    dds_qset_history(qos, DDS_HISTORY_KEEP_LAST, 1);
-    dds_qset_reliability(qos, reliability, DDS_MSECS(1));
-    const dds_entity_t made = reads ? dds_create_reader(participant_, topic, qos, nullptr)
-                                    : dds_create_writer(participant_, topic, qos, nullptr);
-    dds_delete_qos(qos);
-    return checked(made, name);
-  }
-
-  dds_entity_t domain_ = 0, participant_ = 0;
-};
-
-// The newest sample, into memory of our own. Padding is inside the checksums: it is 0 unless something else came.
-template <typename Sample>
-bool take_sample(dds_entity_t reader, Sample& sample) {
-  std::memset(&sample, 0, sizeof(sample));
-  void* place = &sample;
-  dds_sample_info_t info;
-  return dds_take(reader, &place, &info, 1, 1) > 0 && info.valid_data;
-}
-
-// Those who write a topic now, but the participant itself.
-class WriterCount {
- public:
-  explicit WriterCount(const Participant& participant)
-      : reader_(checked(dds_create_reader(participant.entity(), DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr),
-                        "cannot see who writes")) {
-    checked(dds_get_guid(participant.entity(), &self_), "cannot see who we are");
-  }
-  int of(const char* topic) {
-    std::array<void*, kMostWriters> samples{};
-    std::array<dds_sample_info_t, kMostWriters> infos;
-    const int found = dds_read(reader_, samples.data(), infos.data(), kMostWriters, kMostWriters);
-    int writers = 0;
-    for (int k = 0; k < found; ++k) {
-      if (!infos[k].valid_data || infos[k].instance_state != DDS_IST_ALIVE) continue;
-      const auto* endpoint = static_cast<const dds_builtintopic_endpoint_t*>(samples[k]);
-      const bool own = std::memcmp(endpoint->participant_key.v, self_.v, sizeof(self_.v)) == 0;
-      writers += !own && std::strcmp(endpoint->topic_name, topic) == 0 ? 1 : 0;
-    }
-    if (found > 0) dds_return_loan(reader_, samples.data(), found);
-    return writers;
-  }
-
- private:
-  dds_entity_t reader_;
-  dds_guid_t self_{};
-};
+constexpr const char* kBatteryTopic = "rt/lf/bmsstate";
 
 class DdsRobotWire final : public RobotWire {
  public:
@@ -125,6 +31,7 @@ class DdsRobotWire final : public RobotWire {
       : participant_(place),
         states_(participant_.reader(unitree_hg_msg_dds__LowState__desc, kStateTopic)),
         odometry_(participant_.reader(unitree_go_msg_dds__SportModeState__desc, kOdometryTopic)),
+        battery_(participant_.reader(unitree_hg_msg_dds__BmsState__desc, kBatteryTopic)),
         others_(participant_) {}
 
   bool take(LowStateFrame& frame) override {
@@ -146,6 +53,13 @@ class DdsRobotWire final : public RobotWire {
     if (sample.valid) sample.X_WB.R.normalize();
     return true;
   }
+  bool take(BatteryReading& reading) override {
+    BatteryMessage message;
+    if (!take_sample(battery_, message)) return false;
+    reading.charge = message.soc;
+    return true;
+  }
+  bool wait(double most) override { return states_wait_.wait(states_, most); }
   int foreign_writers() override { return others_.of(kCommandTopic); }
   void open_writer() override {
     if (writer_ == 0) writer_ = participant_.writer(unitree_hg_msg_dds__LowCmd__desc, kCommandTopic);
@@ -161,8 +75,9 @@ class DdsRobotWire final : public RobotWire {
 
  private:
   Participant participant_;
-  dds_entity_t states_, odometry_, writer_ = 0;
+  dds_entity_t states_, odometry_, battery_, writer_ = 0;
   WriterCount others_;
+  DataWait states_wait_{participant_.entity()};
 };
 
 class DdsTwinWire final : public TwinWire {
@@ -172,6 +87,7 @@ class DdsTwinWire final : public TwinWire {
         commands_(participant_.reader(unitree_hg_msg_dds__LowCmd__desc, kCommandTopic)),
         states_(participant_.writer(unitree_hg_msg_dds__LowState__desc, kStateTopic)),
         odometry_(participant_.writer(unitree_go_msg_dds__SportModeState__desc, kOdometryTopic)),
+        battery_(participant_.writer(unitree_hg_msg_dds__BmsState__desc, kBatteryTopic)),
         others_(participant_) {}
 
   bool take(LowCommandFrame& frame) override {
@@ -191,12 +107,19 @@ class DdsTwinWire final : public TwinWire {
     }
     (void)dds_write(odometry_, &message);
   }
+  void write(const BatteryReading& reading) override {
+    BatteryMessage message{};
+    message.soc = static_cast<std::uint8_t>(reading.charge > 0.0 ? std::min(reading.charge, 100.0) : 0.0);
+    (void)dds_write(battery_, &message);
+  }
   int command_writers() override { return others_.of(kCommandTopic); }
+  bool wait(double most) override { return commands_wait_.wait(commands_, most); }
 
  private:
   Participant participant_;
-  dds_entity_t commands_, states_, odometry_;
+  dds_entity_t commands_, states_, odometry_, battery_;
   WriterCount others_;
+  DataWait commands_wait_{participant_.entity()};
 };
 
 }  // namespace
@@ -215,7 +138,8 @@ std::string dds_type_digest(const std::string& type) {
        {&unitree_hg_msg_dds__MotorCmd__desc, &unitree_hg_msg_dds__LowCmd__desc, &unitree_hg_msg_dds__IMUState__desc,
         &unitree_hg_msg_dds__MotorState__desc, &unitree_hg_msg_dds__LowState__desc, &unitree_go_msg_dds__IMUState__desc,
         &unitree_go_msg_dds__PathPoint__desc, &unitree_go_msg_dds__TimeSpec__desc,
-        &unitree_go_msg_dds__SportModeState__desc}) {
+        &unitree_go_msg_dds__SportModeState__desc, &unitree_hg_msg_dds__BmsState__desc,
+        &unitree_api_msg_dds__Request__desc, &unitree_api_msg_dds__Response__desc}) {
     if (type != known->m_typename) continue;
     Sha256 digest;
     digest.update(std::as_bytes(std::span(known->type_information.data, known->type_information.sz)));

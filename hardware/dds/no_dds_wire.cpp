@@ -1,5 +1,6 @@
 // A build without DDS: everything else of the room is there.
 #include "duet/core/require.h"
+#include "duet/hardware/dds/dds_sport.h"
 #include "duet/hardware/dds/dds_wire.h"
 
 namespace duet {
@@ -14,6 +15,8 @@ namespace {
 bool has_dds() { return false; }
 std::unique_ptr<RobotWire> open_robot_wire(const DdsPlace&) { refuse(); }
 std::unique_ptr<TwinWire> open_twin_wire(const DdsPlace&) { refuse(); }
+std::unique_ptr<SportWire> open_sport_wire(const DdsPlace&) { refuse(); }
+std::unique_ptr<SportServiceWire> open_sport_service(const DdsPlace&) { refuse(); }
 std::string dds_type_digest(const std::string&) { refuse(); }
 
 }  // namespace duet

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <thread>
@@ -29,7 +30,7 @@ struct TwinArguments {
   std::vector<std::string> faults;
   double seconds = 0.0;
   std::uint16_t velocity_port = 0;
-  bool operated = false;
+  bool operated = false, presses = false;
 };
 
 // The operator of a demonstration: holds the dead-man switch, stands the robot up once it is damped, then runs it.
@@ -59,6 +60,16 @@ class ScriptedOperator {
   RemoteKey pressed_ = RemoteKey::kStart;
   bool stood_ = false, ran_ = false;
 };
+
+// The same by the clock alone, for programs that command the motors before anybody has armed: R1 held, start and A in
+// turn.
+void press_in_turn(double time, TwinModel& twin) {
+  const auto bit = [](RemoteKey key) { return static_cast<std::uint16_t>(1u << static_cast<int>(key)); };
+  const double second = std::floor(time);
+  const bool pressed = time - second < kPressed;
+  const RemoteKey key = static_cast<long>(second) % 2 == 0 ? RemoteKey::kStart : RemoteKey::kA;
+  twin.remote.keys = static_cast<std::uint16_t>(bit(RemoteKey::kR1) | (pressed ? bit(key) : 0));
+}
 
 void take_velocity(DatagramSocket& socket, TwinModel& twin) {
   LcmBuffer buffer;
@@ -92,13 +103,17 @@ TwinTotals run(const TwinArguments& arguments, TwinModel& twin, DatagramSocket& 
     while (wire->take(command)) twin.obey(command);
     take_velocity(velocity, twin);
     if (arguments.operated) scripted.tick(time, twin);
+    if (arguments.presses) press_in_turn(time, twin);
     twin.step(kPeriod);
     if (faulty.next_state(time, state)) {
       wire->write(state);
       ++totals.states;
     }
     wire->write(twin.odometry(time));
-    if (tick % kWritersEvery == 0) totals.most_writers = std::max(totals.most_writers, wire->command_writers());
+    if (tick % kWritersEvery == 0) {
+      totals.most_writers = std::max(totals.most_writers, wire->command_writers());
+      wire->write(BatteryReading{.charge = twin.condition.charge});
+    }
     next += std::chrono::microseconds(2000);
     std::this_thread::sleep_until(next);
   }
@@ -123,6 +138,7 @@ int main(int argc, char** argv) {
   app.add_option("--fault", arguments.faults, "KIND@BEGIN:END=VALUE, for example drop@3:5=100")
       ->allow_extra_args(false);
   app.add_flag("--operated", arguments.operated, "an operator holds the dead-man switch, stands it up and runs it");
+  app.add_flag("--presses", arguments.presses, "an operator holds the dead-man switch and presses start and A in turn");
   CLI11_PARSE(app, argc, argv);
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });

@@ -10,6 +10,8 @@ using ::testing::HasSubstr;
 ArmingFacts everything_there() {
   ArmingFacts facts;
   facts.permission = {.allow_motion = true, .robot = "E21-1", .interface = "eth1", .domain = 0, .mode_machine = 5};
+  facts.executor = ExecutorKind::kHomieLcm;
+  facts.odometry = OdometrySource::kLegs;
   facts.asked_to_arm = true;
   facts.contact_limits.name = "iso_ts_15066";
   facts.contact_limits.verified_by = "somebody";
@@ -34,6 +36,8 @@ TEST(Arming, IsAllowedWhereEverythingIsThere) { EXPECT_EQ(arming_refusal(everyth
 TEST(Arming, OfATwinNeedsNoSignatureButItsOwnDomains) {
   ArmingFacts facts = everything_there();
   facts.twin = true;
+  facts.executor = ExecutorKind::kTwin;
+  facts.odometry = OdometrySource::kTwin;
   facts.permission.domain = 123;
   facts.permission.interface = "lo";
   facts.contact_limits.verified_by = "";
@@ -70,6 +74,26 @@ TEST(Arming, NeedsTheRobotThatIsConfigured) {
 TEST(Arming, OfARobotNeedsContactLimitsThatSomebodySigned) {
   EXPECT_THAT(refusal([](ArmingFacts& f) { f.contact_limits.verified_by = ""; }),
               HasSubstr("nobody has checked them against the standard"));
+}
+
+TEST(Arming, OfARobotNeedsAnExecutorAndOdometryOfARobot) {
+  EXPECT_THAT(refusal([](ArmingFacts& f) { f.executor = ExecutorKind::kTwin; }),
+              HasSubstr("executor 'twin' is a twin's"));
+  EXPECT_THAT(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kTwin; }), HasSubstr("odometry 'twin'"));
+  EXPECT_THAT(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kNone; }),
+              HasSubstr("without measured odometry nothing walks"));
+  EXPECT_THAT(refusal([](ArmingFacts& f) { f.odometry = OdometrySource::kVendor; }),
+              HasSubstr("only while the maker's own walking runs"));
+  EXPECT_EQ(refusal([](ArmingFacts& f) {
+              f.executor = ExecutorKind::kSport;
+              f.odometry = OdometrySource::kVendor;
+            }),
+            "");
+}
+
+TEST(Arming, NeedsAnExecutorThatIsWell) {
+  EXPECT_EQ(refusal([](ArmingFacts& f) { f.executor_complaint = "it is silent"; }),
+            "executor 'homie-lcm': it is silent");
 }
 
 TEST(Arming, NeedsALogThatCanBeWritten) {

@@ -46,13 +46,25 @@ TEST(HwCommand, RefusesAConfigurationThatIsWrong) {
   EXPECT_THAT(answer.err, HasSubstr("expected the name of one (not 'auto')"));
 }
 
-TEST(HwCommand, ARobotCannotBeArmedInThisBuild) {
+// Everything is there but what only a person can give: the signature, and before it an executor of a robot.
+TEST(HwCommand, ARobotIsNotArmedWithoutAnExecutorOdometryAndSignedLimits) {
   const test::ScratchFolder folder;
-  write_file(folder / "robot.yaml", config_of("interface: lo\nallow_motion: true\n"));
-  const Answer answer =
-      duet_program("hw arm " + (folder / "robot.yaml") + " --velocity-port 15001 --log " + (folder / "run.mcap"));
-  EXPECT_EQ(answer.code, 4);
-  EXPECT_THAT(answer.err, HasSubstr("arming a robot needs an executor"));
+  const auto refusal = [&](const std::string& name, const std::string& more) {
+    write_file(
+        folder / (name + ".yaml"),
+        "schema: duet.robot/1\nrobot: x\nmode_machine: 5\ndomain: 99\ninterface: lo\nallow_motion: true\n" + more);
+    const Answer answer =
+        duet_program("hw arm " + (folder / (name + ".yaml")) + " --log " + (folder / (name + ".mcap")));
+    EXPECT_EQ(answer.code, 2) << answer.err;
+    return answer.err;
+  };
+  EXPECT_THAT(refusal("twin", ""), HasSubstr("not armed: executor 'twin' is a twin's"));
+  EXPECT_THAT(refusal("blind", "executor: homie-lcm\n"), HasSubstr("without measured odometry nothing walks"));
+  EXPECT_THAT(refusal("vendor", "executor: homie-lcm\nodometry: vendor\n"),
+              HasSubstr("only while the maker's own walking runs"));
+  const std::string unsigned_limits = refusal("unsigned", "executor: sport\nodometry: vendor\n");
+  EXPECT_THAT(unsigned_limits, HasSubstr("nobody has checked them against the standard"));
+  EXPECT_THAT(unsigned_limits, HasSubstr("this is not HOMIE"));
 }
 
 TEST(HwCommand, AWrongWordArmsNothing) {

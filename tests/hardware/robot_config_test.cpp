@@ -52,6 +52,64 @@ TEST(RobotConfig, WithoutAWordMotionIsNotAllowedAndSomebodyIsNear) {
   EXPECT_FALSE(config.twin);
 }
 
+TEST(RobotConfig, AWordOfExecutorOdometryAndCameraIsTaken) {
+  const std::string more =
+      "executor: homie-lcm\nodometry: legs\nlcm: {interface: eth1, port: 7668, hops: 1, group: 239.255.76.68}\n"
+      "camera: {position: [0.1, 0, 0.5], quat_wxyz: [0.5, -0.5, 0.5, -0.5]}\n";
+  const RobotConfig config = parse_robot_config(kTwin + more, "twin.yaml");
+  EXPECT_EQ(config.executor, ExecutorKind::kHomieLcm);
+  EXPECT_EQ(config.odometry, OdometrySource::kLegs);
+  EXPECT_EQ(config.lcm.interface, "eth1");
+  EXPECT_EQ(config.lcm.port, 7668);
+  EXPECT_EQ(config.lcm.hops, 1);
+  EXPECT_EQ(config.lcm.group, "239.255.76.68");
+  ASSERT_TRUE(config.has_camera);
+  EXPECT_EQ(config.X_BC.p.z(), 0.5);
+  EXPECT_LE((config.X_BC.R * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitX()).norm(), 1e-12);  // looks ahead
+  const GuardSetup setup = guard_setup(config, false);
+  EXPECT_TRUE(setup.rules.executor_answers && setup.has_battery);
+  EXPECT_FALSE(guard_setup(config, true).rules.executor_answers);
+}
+
+TEST(RobotConfig, ARobotHasNoOdometryUntilItIsNamed) {
+  const RobotConfig robot =
+      parse_robot_config("schema: duet.robot/1\nrobot: x\ninterface: eth0\ndomain: 0\nmode_machine: 5\n", "robot.yaml");
+  EXPECT_EQ(robot.odometry, OdometrySource::kNone);
+  EXPECT_EQ(parse_robot_config(kTwin, "twin.yaml").odometry, OdometrySource::kTwin);
+}
+
+TEST(RobotConfig, OfTheExamplesAreTwins) {
+  for (const char* name : {"homie", "sport", "camera"}) {
+    const RobotConfig config = read_robot_config(std::string(DUET_SOURCE_DIR) + "/examples/hardware/" + name + ".yaml");
+    EXPECT_TRUE(config.twin) << name;
+    EXPECT_EQ(executor_refusal(config.executor, config.odometry, true), "") << name;
+  }
+}
+
+std::string refusal_of_more(const std::string& more) {
+  return test::thrown_message<InputError>([&] { (void)parse_robot_config(kTwin + more, "twin.yaml"); });
+}
+
+TEST(RobotConfig, NamesWhatIsWrongWithExecutorAndCamera) {
+  EXPECT_THAT(refusal("domain: 150", "domain: 150.5"), HasSubstr("'domain': expected a whole number, found 150.5"));
+  EXPECT_THAT(refusal("mode_machine: 5", "mode_machine: 1e300"), HasSubstr("'mode_machine': expected a whole number"));
+  EXPECT_THAT(refusal_of_more("executor: homie\n"),
+              HasSubstr("'executor': expected twin, homie-lcm, sport, found 'homie'"));
+  EXPECT_THAT(refusal_of_more("odometry: gps\n"), HasSubstr("'odometry': expected none, legs, external, vendor, twin"));
+  EXPECT_THAT(refusal_of_more("lcm: {port: 70000}\n"), HasSubstr("'port': expected 1 to 65535, found 70000"));
+  EXPECT_THAT(refusal_of_more("lcm: {hops: 0.5}\n"), HasSubstr("'hops': expected 0 to 255, found 0.5"));
+  EXPECT_THAT(refusal_of_more("camera: {position: [0, 0, 3], quat_wxyz: [1, 0, 0, 0]}\n"),
+              HasSubstr("expected at most 2 m from the base, found 3"));
+  EXPECT_THAT(refusal_of_more("camera: {position: [0, 0, 1], quat_wxyz: [1, 0, 0]}\n"),
+              HasSubstr("expected a unit quaternion"));
+  EXPECT_THAT(refusal_of_more("camera: {position: [0, 0, 1], quat_wxyz: [1, 1, 0, 0]}\n"),
+              HasSubstr("expected a unit quaternion"));
+  EXPECT_THAT(refusal_of_more("camera: {position: [0, 0, 1], quat_wxyz: [1, x, 0, 0]}\n"),
+              HasSubstr("expected 4 numbers"));
+  EXPECT_THAT(refusal_of_more("camera: {position: [0, 0, 1], quat_wxyz: [.nan, 0, 0, 0]}\n"),
+              HasSubstr("expected a unit quaternion"));
+}
+
 TEST(RobotConfig, NamesWhatIsWrong) {
   EXPECT_THAT(refusal("duet.robot/1", "duet.robot/2"), HasSubstr("twin.yaml:1: robot: 'schema': expected"));
   EXPECT_THAT(refusal("domain: 150", "domain: 0"), HasSubstr("twin: expected a domain from 100 to 199 on 'lo'"));

@@ -1,0 +1,64 @@
+#include "duet/hardware/dds/robot_side.h"
+
+#include "duet/core/require.h"
+#include "duet/hardware/homie_executor.h"
+#include "duet/hardware/leg_odometry.h"
+
+namespace duet {
+namespace {
+
+// Of the low-level commands of a robot that this executor steers: HOMIE's controller; of the maker's walking it is not
+// known.
+int expected_writers(ExecutorKind kind) {
+  constexpr int kAny = 1000;
+  if (kind == ExecutorKind::kSport) return kAny;
+  return kind == ExecutorKind::kHomieLcm ? 1 : 0;
+}
+
+}  // namespace
+
+RobotSide::RobotSide(const RobotConfig& config, const RobotSideOptions& options)
+    : wire_(open_robot_wire(config.place())) {
+  make_odometry(config, options);
+  make_executor(config, options);
+  connection_ = std::make_unique<RobotConnection>(*wire_, *executor_, odometry_.get());
+}
+
+void RobotSide::make_odometry(const RobotConfig& config, const RobotSideOptions& options) {
+  switch (config.odometry) {
+    case OdometrySource::kNone:
+      break;
+    case OdometrySource::kLegs:
+      odometry_ = std::make_unique<LegOdometry>(load_shared_robot());
+      break;
+    case OdometrySource::kExternal:
+      odometry_ = std::make_unique<ExternalOdometry>(DatagramSocket::at_path(options.pose_socket));
+      break;
+    case OdometrySource::kVendor:
+    case OdometrySource::kTwin:
+      odometry_ = std::make_unique<WireOdometry>(*wire_);
+      break;
+  }
+}
+
+void RobotSide::make_executor(const RobotConfig& config, const RobotSideOptions& options) {
+  const ExecutorKind kind = options.commands ? config.executor : ExecutorKind::kTwin;
+  if (kind == ExecutorKind::kHomieLcm) {
+    executor_ = std::make_unique<HomieExecutor>(config.lcm, config.limits.height, options.period);
+  } else if (kind == ExecutorKind::kSport) {
+    sport_ = open_sport_wire(config.place());
+    executor_ = std::make_unique<SportExecutor>(*sport_, options.period);
+  } else {
+    require(!options.commands || options.velocity_port > 0,
+            "executor 'twin': expected a port that takes its velocities (--velocity-port), found none");
+    if (options.commands)
+      velocity_ =
+          std::make_unique<LcmVelocity>(DatagramSocket::to_port(static_cast<std::uint16_t>(options.velocity_port)));
+    else
+      velocity_ = std::make_unique<NoVelocity>();
+    const int expected = options.commands ? 0 : expected_writers(config.executor);
+    executor_ = std::make_unique<TwinExecutor>(*wire_, *velocity_, expected);
+  }
+}
+
+}  // namespace duet

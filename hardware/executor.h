@@ -1,0 +1,66 @@
+// Who executes the guard's commands on a robot, and which channels of a 36-D reference reach it at all. A log names
+// them: what was not executed cannot be scored as if it had been. docs/hardware.md, "Executors".
+#pragma once
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/hardware/frame_transport.h"
+#include "duet/hardware/odometry.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+enum class ExecutorKind {
+  kTwin,      // the guard's own frames to a twin
+  kHomieLcm,  // HOMIE's processes, over LCM
+  kSport,     // the maker's walking, over DDS: not HOMIE
+};
+inline constexpr std::array<std::string_view, 3> kExecutorNames = {"twin", "homie-lcm", "sport"};
+std::string_view executor_name(ExecutorKind kind);
+// Throws std::invalid_argument with the known names.
+ExecutorKind executor_kind(const std::string& name);
+
+struct ExecutedChannels {
+  ExecutorKind kind = ExecutorKind::kTwin;
+  std::string_view legs;       // who moves them
+  std::string_view stop;       // what a damping of the guard does, for the operator
+  bool homie = false;          // its walking is HOMIE's
+  bool height = false;         // of the pelvis, as told
+  std::vector<int> joints;     // as told, by the card
+  std::vector<bool> executed;  // of the reference: x, y, z, quaternion w, x, y, z, then the joints of the card. x, y
+                               // and the turn are executed as a velocity.
+};
+// `joints`: those that a limiter lets through (ExecutedJoints).
+ExecutedChannels executed_channels(ExecutorKind kind, const RobotModel& robot, const std::vector<int>& joints);
+nlohmann::json executed_channels_json(const ExecutedChannels& channels, const RobotModel& robot);
+// One sentence for the screen: what is executed and what is not.
+std::string executed_channels_text(const ExecutedChannels& channels, const RobotModel& robot);
+
+// Why this executor with this odometry cannot be a robot's, or a twin's; empty where it can.
+std::string executor_refusal(ExecutorKind kind, OdometrySource odometry, bool twin);
+
+// The way of the guard's commands to the robot. Every message is made from the guard's limited frame and velocity. One
+// owner, one thread.
+class Executor : public VelocitySink {
+ public:
+  // Takes what it has sent us. Called once a tick, from LISTEN on.
+  virtual void poll(double now) = 0;
+  // When it was last heard of and well; kNever: never. Of an executor that does not answer: unused.
+  [[nodiscard]] virtual double heard_at() const = 0;
+  [[nodiscard]] virtual bool answers() const = 0;
+  // What is wrong with it, for the screen; empty where nothing is.
+  [[nodiscard]] virtual std::string complaint() const = 0;
+
+  // How many others command the robot, beside whom this executor steers. `command_writers`: on the low-level topic.
+  virtual int foreign_writers(int command_writers) = 0;
+  virtual void open() = 0;
+  virtual void close() = 0;
+  [[nodiscard]] virtual bool is_open() const = 0;
+  virtual bool write(const LowCommandFrame& frame) = 0;
+};
+
+}  // namespace duet

@@ -1,0 +1,57 @@
+// The sources of odometry, one behind the other's back: the maker's topic (or a twin's), a tracker in the room over a
+// local socket, the robot's own legs (hardware/leg_odometry.h). docs/hardware.md, "Odometry". One owner, one thread.
+#pragma once
+
+#include "duet/hardware/datagram_socket.h"
+#include "duet/hardware/low_level_frame.h"
+#include "duet/hardware/odometry.h"
+#include "duet/hardware/robot_wire.h"
+
+namespace duet {
+
+class OdometryReader {
+ public:
+  virtual ~OdometryReader() = default;
+  // A state of the robot as it came, whole or not.
+  virtual void see(const LowStateFrame&) {}
+  // The newest sample; false where none has come since. `at` is left to who takes it.
+  virtual bool take(OdometrySample& sample) = 0;
+};
+
+class WireOdometry final : public OdometryReader {
+ public:
+  explicit WireOdometry(RobotWire& wire) : wire_(wire) {}
+  bool take(OdometrySample& sample) override { return wire_.take(sample); }
+
+ private:
+  RobotWire& wire_;
+};
+
+// What a tracker sends: the pose of the base in the frame that it measures in, and its velocity in that frame.
+struct ExternalPose {
+  std::uint64_t sequence = 0;  // rises; an older or repeated one is dropped
+  Pose X_WB;
+  Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  // [m/s]
+  bool valid = false;                              // it sees the robot
+};
+inline constexpr std::size_t kExternalPoseBytes = 104;
+using ExternalPoseBuffer = std::array<std::byte, kExternalPoseBytes>;
+void encode(const ExternalPose& pose, ExternalPoseBuffer& buffer);
+// False for anything else than such a message with finite numbers and a unit quaternion (to 1 %).
+bool decode(std::span<const std::byte> datagram, ExternalPose& pose);
+
+class ExternalOdometry final : public OdometryReader {
+ public:
+  explicit ExternalOdometry(DatagramSocket socket) : socket_(std::move(socket)) {}
+  bool take(OdometrySample& sample) override;
+  [[nodiscard]] long refused() const { return refused_; }
+  [[nodiscard]] long old() const { return old_; }
+
+ private:
+  DatagramSocket socket_;
+  std::uint64_t last_ = 0;
+  bool any_ = false;
+  long refused_ = 0, old_ = 0;
+};
+
+}  // namespace duet

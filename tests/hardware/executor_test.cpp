@@ -1,0 +1,140 @@
+#include "duet/hardware/executor.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/hardware/robot_connection.h"
+#include "tests/hardware/guarded_twin.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+ExecutedChannels channels_of(ExecutorKind kind) {
+  return executed_channels(kind, *test::g1(), test::arms_of(*test::g1()).joints);
+}
+
+TEST(Executor, IsKnownByItsName) {
+  for (std::size_t k = 0; k < kExecutorNames.size(); ++k) {
+    const auto kind = static_cast<ExecutorKind>(k);
+    EXPECT_EQ(executor_kind(std::string(executor_name(kind))), kind);
+  }
+  EXPECT_EQ(test::thrown_message<std::invalid_argument>([] { (void)executor_kind("homie"); }),
+            "executor: expected twin, homie-lcm, sport, found 'homie'");
+}
+
+// Of the 36 channels of a reference: place and turn as a velocity, height where HOMIE takes it, 14 arm joints.
+TEST(Executor, NamesTheChannelsThatItExecutes) {
+  for (const ExecutorKind kind : {ExecutorKind::kTwin, ExecutorKind::kHomieLcm, ExecutorKind::kSport}) {
+    const ExecutedChannels channels = channels_of(kind);
+    const bool homie = kind == ExecutorKind::kHomieLcm;
+    ASSERT_EQ(channels.executed.size(), 36u);
+    EXPECT_EQ(std::ranges::count(channels.executed, true), homie ? 19 : 18);
+    EXPECT_EQ(channels.homie, homie);
+    EXPECT_EQ(channels.executed[2], homie);
+    for (int j = 0; j < 15; ++j) EXPECT_FALSE(channels.executed[7 + static_cast<std::size_t>(j)]) << j;
+    for (int j = 15; j < 29; ++j) EXPECT_TRUE(channels.executed[7 + static_cast<std::size_t>(j)]) << j;
+  }
+}
+
+TEST(Executor, SaysWhatItDoesNotExecuteAndWhatDampingDoes) {
+  const std::string sport = executed_channels_text(channels_of(ExecutorKind::kSport), *test::g1());
+  EXPECT_THAT(sport, HasSubstr("this is not HOMIE"));
+  EXPECT_THAT(sport, HasSubstr("waist_yaw_joint"));
+  const std::string homie = executed_channels_text(channels_of(ExecutorKind::kHomieLcm), *test::g1());
+  EXPECT_THAT(homie, HasSubstr("nothing here can damp them"));
+  EXPECT_THAT(homie, HasSubstr("L2 with B"));
+  const nlohmann::json json = executed_channels_json(channels_of(ExecutorKind::kSport), *test::g1());
+  EXPECT_FALSE(json["homie"]);
+  EXPECT_EQ(json["joints"].size(), 14u);
+  EXPECT_EQ(json["executed"].size(), 36u);
+}
+
+// One link with everything in memory: what the guard reads is the source's odometry, what it writes is the executor's.
+class MemoryWire final : public RobotWire {
+ public:
+  bool take(LowStateFrame& frame) override {
+    if (!has_state) return false;
+    frame = state;
+    has_state = false;
+    return true;
+  }
+  bool take(OdometrySample& sample) override {
+    sample.valid = true;
+    return true;
+  }
+  bool take(BatteryReading& reading) override {
+    reading.charge = charge;
+    return true;
+  }
+  int foreign_writers() override { return writers; }
+  void open_writer() override { open = true; }
+  void close_writer() override { open = false; }
+  [[nodiscard]] bool has_writer() const override { return open; }
+  bool write(const LowCommandFrame&) override { return ++written > 0; }
+
+  LowStateFrame state{};
+  bool has_state = false, open = false;
+  int writers = 0;
+  long written = 0;
+  double charge = 50.0;
+};
+
+class CountedVelocity final : public VelocitySink {
+ public:
+  void send(const VelocityCommand&) override { ++sent; }
+  long sent = 0;
+};
+
+class SeenOdometry final : public OdometryReader {
+ public:
+  void see(const LowStateFrame&) override { ++seen; }
+  bool take(OdometrySample& sample) override {
+    sample.X_WB.p.x() = 7.0;
+    return true;
+  }
+  long seen = 0;
+};
+
+TEST(RobotConnection, PassesEachThingToTheOneWhoseItIs) {
+  MemoryWire wire;
+  CountedVelocity velocity;
+  TwinExecutor executor(wire, velocity, 1);
+  SeenOdometry odometry;
+  RobotConnection link(wire, executor, &odometry);
+  LowStateFrame frame;
+  EXPECT_FALSE(link.take(frame));
+  wire.has_state = true;
+  EXPECT_TRUE(link.take(frame));
+  EXPECT_EQ(odometry.seen, 1);
+  OdometrySample sample;
+  EXPECT_TRUE(link.take(sample));
+  EXPECT_EQ(sample.X_WB.p.x(), 7.0);
+  wire.writers = 2;
+  EXPECT_EQ(link.foreign_writers(), 1);  // one was expected
+  link.open_writer();
+  EXPECT_TRUE(wire.open && link.has_writer());
+  EXPECT_TRUE(link.write({}));
+  link.close_writer();
+  EXPECT_FALSE(wire.open);
+  RobotConnection blind(wire, executor, nullptr);
+  EXPECT_FALSE(blind.take(sample));
+}
+
+TEST(RobotConnection, TellsTheGuardOfTheBattery) {
+  MemoryWire wire;
+  CountedVelocity velocity;
+  TwinExecutor executor(wire, velocity);
+  RobotConnection link(wire, executor, nullptr);
+  GuardSetup setup = test::twin_guard();
+  setup.has_battery = true;
+  RobotGuard guard(setup, link, executor);
+  wire.charge = 12.0;
+  link.poll(1.0, guard);
+  guard.tick(1.0);
+  EXPECT_EQ(guard.status().input.health.charge, 12.0);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,139 @@
+#include "duet/hardware/leg_odometry.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "duet/core/require.h"
+#include "duet/hardware/frame_checksum.h"
+#include "duet/hardware/twin_model.h"
+#include "duet/robots/dynamics.h"
+#include "tests/hardware/limited_robot.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+constexpr double kStep = 0.002;
+constexpr double kRounding = 1e-9;
+
+// Stands on its left sole, which lies flat and still, and moves its leg above it; the right one is lifted.
+RobotState standing_on_the_left(double time) {
+  const RobotModel& robot = *test::g1();
+  RobotState state = robot.standing_state();
+  const std::vector<int>& left = robot.roles.legs[0];
+  const std::vector<int>& right = robot.roles.legs[1];
+  for (std::size_t k = 0; k < left.size(); ++k)
+    state.q[left[k]] += 0.15 * std::sin(2.0 * time + static_cast<double>(k)) - 0.15 * std::sin(static_cast<double>(k));
+  state.q[right[0]] -= 0.8;
+  state.q[right[3]] += 1.0;
+  Kinematics kinematics(robot);
+  kinematics.update({}, state.q);
+  const int foot = robot.shapes[robot.feet[0]].link;
+  state.X_WB = kinematics.X_WL(foot).inverse();  // the foot is at the origin of W, level
+  return state;
+}
+
+// With the speeds that belong to it, by central differences.
+RobotState moving_on_the_left(double time) {
+  constexpr double kHalf = 1e-5;
+  RobotState state = standing_on_the_left(time);
+  const RobotState before = standing_on_the_left(time - kHalf), after = standing_on_the_left(time + kHalf);
+  state.v = (after.q - before.q) / (2.0 * kHalf);
+  state.v_WB = (after.X_WB.p - before.X_WB.p) / (2.0 * kHalf);
+  const Eigen::AngleAxisd turn(before.X_WB.R.conjugate() * after.X_WB.R);
+  state.w_WB_B = turn.angle() / (2.0 * kHalf) * turn.axis();
+  return state;
+}
+
+const Eigen::Vector3d kRest(0.0, 0.0, kGravity);
+
+Eigen::Vector3d force_at(double time) {
+  constexpr double kHalf = 1e-4;
+  const Eigen::Vector3d a_W =
+      (moving_on_the_left(time + kHalf).v_WB - moving_on_the_left(time - kHalf).v_WB) / (2.0 * kHalf);
+  return standing_on_the_left(time).X_WB.R.conjugate() * (a_W + kRest);
+}
+
+// Over a sole that stands, the base is where the chain says; the speeds between two states are taken as straight.
+TEST(LegOdometry, OverAStandingFootTheBaseIsWhereTheChainSays) {
+  LegOdometry odometry(test::g1());
+  const Eigen::Vector3d begin = standing_on_the_left(0.0).X_WB.p;
+  constexpr double kStraight =
+      1e-4;  // dt^2 / 12 of the change of an acceleration below 5 m/s^3, and the pull's lag [m]
+  double farthest = 0.0;
+  for (int k = 0; k <= 1500; ++k) {
+    const RobotState state = moving_on_the_left(kStep * k);
+    odometry.update(state, force_at(kStep * k));
+    const Eigen::Vector2d moved = (state.X_WB.p - begin).head<2>();
+    farthest = std::max(farthest, moved.norm());
+    ASSERT_LE((odometry.sample().X_WB.p.head<2>() - moved).norm(), kStraight) << k;
+  }
+  EXPECT_GT(farthest, 0.05);
+}
+
+// Without the accelerometer's help the sole alone brings the speed back: a stumble is not kept.
+TEST(LegOdometry, ASpeedThatIsWrongComesBack) {
+  LegOdometry odometry(test::g1());
+  const RobotState state = test::g1()->standing_state();
+  odometry.update(state, kRest);
+  for (int k = 0; k < 50; ++k) odometry.update(state, kRest + Eigen::Vector3d(10.0, 0.0, 0.0));
+  EXPECT_GT(odometry.sample().v_WB.x(), 0.1);
+  for (int k = 0; k < 1000; ++k) odometry.update(state, kRest);
+  EXPECT_LT(odometry.sample().v_WB.norm(), 0.01);
+}
+
+TEST(LegOdometry, ItsFirstSpeedIsThatOfTheBase) {
+  for (const double time : {0.0, 0.3, 0.9, 1.7}) {
+    LegOdometry odometry(test::g1());
+    const RobotState state = moving_on_the_left(time);
+    odometry.update(state, kRest);
+    EXPECT_LE((odometry.sample().v_WB - state.v_WB).norm(), 1e-6) << time;  // h^2 of the differences and rounding / h
+    EXPECT_GT(state.v_WB.norm(), 0.01) << time;
+  }
+}
+
+TEST(LegOdometry, ItsHeightIsThatOverTheLowestSole) {
+  LegOdometry odometry(test::g1());
+  RobotState state = test::g1()->standing_state();
+  state.X_WB.p.z() = 7.0;  // which nobody measures
+  odometry.update(state, kRest);
+  EXPECT_NEAR(odometry.sample().X_WB.p.z(), test::g1()->standing_height, 1e-9);
+}
+
+TEST(LegOdometry, ARobotThatStandsStillStaysWhereItIs) {
+  LegOdometry odometry(test::g1());
+  const RobotState state = test::g1()->standing_state();
+  for (int k = 0; k < 1000; ++k) odometry.update(state, kRest);
+  EXPECT_LE(odometry.sample().X_WB.p.head<2>().norm(), kRounding);
+  EXPECT_LE(odometry.sample().v_WB.norm(), kRounding);
+}
+
+TEST(LegOdometry, TakesWholeNewStatesAlone) {
+  LegOdometry odometry(test::g1());
+  TwinModel twin(test::g1(), {});
+  LowStateFrame frame;
+  twin.write_state(frame);
+  OdometrySample sample;
+  EXPECT_FALSE(odometry.take(sample));
+  LowStateFrame bad = frame;
+  bad.motor[3].q += 0.1f;
+  odometry.see(bad);
+  EXPECT_FALSE(odometry.take(sample));
+  odometry.see(frame);
+  EXPECT_TRUE(odometry.take(sample));
+  EXPECT_TRUE(sample.valid);
+  EXPECT_FALSE(odometry.take(sample));
+  odometry.see(frame);  // the same tick again
+  EXPECT_FALSE(odometry.take(sample));
+}
+
+TEST(LegOdometry, NeedsSoles) {
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(nullptr); }),
+              ::testing::HasSubstr("leg odometry: expected a robot with soles, found none"));
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { LegOdometry odometry(test::g1(), 0.0); }),
+              ::testing::HasSubstr("expected a period above 0 s, found 0"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,210 @@
+// The maker's walking as the executor, with a stand-in for its service in memory.
+#include "duet/hardware/sport_executor.h"
+
+#include <gmock/gmock.h>
+
+#include <deque>
+#include <limits>
+
+#include "duet/hardware/frame_checksum.h"
+#include "duet/hardware/sport_stand_in.h"
+#include "tests/hardware/guarded_twin.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kDt = 0.002;
+
+class MemorySport final : public SportWire {
+ public:
+  explicit MemorySport(SportStandIn& service) : service_(service) {}
+  bool take(RpcResponse& response) override {
+    if (waiting_.empty()) return false;
+    response = waiting_.front();
+    waiting_.pop_front();
+    return true;
+  }
+  bool request(const RpcRequest& request) override {
+    requests.push_back(request);
+    if (alive) waiting_.push_back(service_.answer(request, now));
+    return true;
+  }
+  int arm_writers() override { return others; }
+  void open_arms() override { open = true; }
+  void close_arms() override { open = false; }
+  bool write_arms(const LowCommandFrame& frame) override {
+    EXPECT_TRUE(open);
+    frames.push_back(frame);
+    service_.obey_arms(frame);
+    return true;
+  }
+  [[nodiscard]] long asked(SportCall call) const {
+    return std::ranges::count_if(requests, [call](const RpcRequest& r) { return r.call == call; });
+  }
+
+  double now = 0.0;
+  int others = 0;
+  bool open = false, alive = true;
+  std::vector<RpcRequest> requests;
+  std::vector<LowCommandFrame> frames;
+
+ private:
+  SportStandIn& service_;
+  std::deque<RpcResponse> waiting_;
+};
+
+JointCommand neutral_stance() { return test::g1()->default_command(test::g1()->neutral); }
+
+LowCommandFrame targets(float q) {
+  LowCommandFrame frame{};
+  frame.mode_machine = 5;
+  for (int j = 0; j < kG1Motors; ++j) frame.motor[j] = {1, q, 0.0f, 0.0f, 60.0f, 1.5f, 0};
+  return frame;
+}
+
+struct SportTrial {
+  void tick(const LowCommandFrame& frame, const VelocityCommand& velocity, SafetyState state) {
+    wire.now += kDt;
+    executor.enter(state);
+    executor.write(frame);
+    executor.send(velocity);
+    executor.poll(wire.now);
+  }
+  void run_for(double seconds, const LowCommandFrame& frame, const VelocityCommand& velocity, SafetyState state) {
+    for (double left = seconds; left > 0.5 * kDt; left -= kDt) tick(frame, velocity, state);
+  }
+
+  SportStandIn service{neutral_stance()};
+  MemorySport wire{service};
+  SportExecutor executor{wire, kDt};
+};
+
+TEST(SportExecutor, AsksNothingButItsStateBeforeItIsOpened) {
+  SportTrial trial;
+  trial.run_for(1.0, targets(0.1f), {0.2, 0.0, 0.0, 0.74}, SafetyState::kReady);
+  EXPECT_EQ(trial.wire.asked(SportCall::kGetFsm), static_cast<long>(trial.wire.requests.size()));
+  EXPECT_NEAR(static_cast<double>(trial.wire.requests.size()), 10.0, 1.0);
+  EXPECT_TRUE(trial.wire.frames.empty());
+  EXPECT_NEAR(trial.executor.heard_at(), trial.wire.now, 0.15);
+  EXPECT_EQ(trial.executor.complaint(), "");
+}
+
+TEST(SportExecutor, AVelocityEndsByItselfWhenNobodyRenewsIt) {
+  SportTrial trial;
+  trial.executor.open();
+  trial.run_for(1.0, targets(0.1f), {0.2, 0.0, -0.1, 0.74}, SafetyState::kRun);
+  EXPECT_NEAR(static_cast<double>(trial.wire.asked(SportCall::kSetVelocity)), 10.0, 1.0);
+  EXPECT_NEAR(trial.service.velocity(trial.wire.now).forward, 0.2, 1e-4);
+  EXPECT_NEAR(trial.service.velocity(trial.wire.now).yaw_rate, -0.1, 1e-4);
+  EXPECT_EQ(trial.service.velocity(trial.wire.now + 0.31).forward, 0.0);  // the guard has died
+}
+
+TEST(SportExecutor, ComingToRestIsToldAtOnce) {
+  SportTrial trial;
+  trial.executor.open();
+  trial.run_for(0.5, targets(0.1f), {0.2, 0.0, 0.0, 0.74}, SafetyState::kRun);
+  trial.tick(targets(0.1f), {0.0, 0.0, 0.0, 0.74}, SafetyState::kHold);
+  EXPECT_EQ(trial.service.velocity(trial.wire.now).forward, 0.0);
+}
+
+TEST(SportExecutor, ArmsAloneAreToldFiftyTimesASecondAndTheirWeightRisesSlowly) {
+  SportTrial trial;
+  trial.executor.open();
+  trial.run_for(1.0, targets(0.1f), {}, SafetyState::kStand);
+  EXPECT_NEAR(static_cast<double>(trial.wire.frames.size()), 50.0, 1.0);
+  const LowCommandFrame& last = trial.wire.frames.back();
+  EXPECT_NEAR(last.motor[29].q, 0.2, 0.01);
+  EXPECT_EQ(last.crc, checksum_of(last));
+  for (int j = 0; j < 15; ++j) EXPECT_EQ(last.motor[j].mode, 0) << j;  // neither legs nor waist
+  for (int j = 15; j < kG1Motors; ++j) EXPECT_FLOAT_EQ(last.motor[j].q, 0.1f) << j;
+  trial.run_for(5.0, targets(0.1f), {}, SafetyState::kRun);
+  EXPECT_EQ(trial.executor.arm_weight(), 1.0);
+  EXPECT_EQ(trial.service.refused(), 0);
+}
+
+TEST(SportExecutor, DampingAsksTheServiceToDampUntilItDoes) {
+  SportTrial trial;
+  trial.executor.open();
+  LowCommandFrame damping{};
+  trial.run_for(1.0, damping, {}, SafetyState::kArmed);
+  trial.run_for(1.0, damping, {}, SafetyState::kDamp);
+  EXPECT_EQ(trial.service.fsm(), kFsmStart);  // nothing has moved: its balance is left alone
+  trial.run_for(5.5, targets(0.1f), {}, SafetyState::kRun);
+  trial.run_for(0.5, damping, {}, SafetyState::kDamp);
+  EXPECT_EQ(trial.service.fsm(), kFsmDamp);
+  const long asked = trial.wire.asked(SportCall::kSetFsm);
+  trial.run_for(4.7, damping, {}, SafetyState::kDamp);
+  EXPECT_EQ(trial.wire.asked(SportCall::kSetFsm), asked);
+  EXPECT_NEAR(trial.executor.arm_weight(), 0.0, 1e-9);  // gone with the five seconds of damping
+  EXPECT_THAT(trial.executor.complaint(), HasSubstr("in state 1, expected 500, 501 or 801 (walking)"));
+}
+
+TEST(SportExecutor, SaysThatTheServiceIsSilentOrRefuses) {
+  SportTrial trial;
+  trial.wire.alive = false;
+  trial.executor.poll(1.0);
+  EXPECT_EQ(trial.executor.heard_at(), kNever);
+  EXPECT_EQ(trial.executor.complaint(), "the maker's service 'sport' does not answer");
+  EXPECT_EQ(trial.executor.foreign_writers(3), 0);  // the low-level topic is the maker's
+  trial.wire.others = 1;
+  EXPECT_EQ(trial.executor.foreign_writers(0), 1);
+}
+
+TEST(SportExecutor, ClosingStopsAndLeavesTheArms) {
+  SportTrial trial;
+  trial.executor.open();
+  trial.run_for(0.5, targets(0.1f), {0.2, 0.0, 0.0, 0.74}, SafetyState::kRun);
+  trial.executor.close();
+  EXPECT_EQ(trial.service.velocity(trial.wire.now).forward, 0.0);
+  EXPECT_FALSE(trial.wire.open);
+}
+
+TEST(SportStandIn, RefusesFramesAndCallsThatAreWrong) {
+  SportStandIn service(neutral_stance());
+  LowCommandFrame frame = targets(0.1f);
+  service.obey_arms(frame);
+  EXPECT_EQ(service.refused(), 1);  // no checksum
+  RpcRequest request = velocity_request(7, {0.1, 0.0, 0.0, 0.0}, 0.3);
+  request.parameter[0] = '[';
+  EXPECT_NE(service.answer(request, 0.0).code, 0);
+  request.call = static_cast<SportCall>(1234);
+  EXPECT_NE(service.answer(request, 0.0).code, 0);
+  EXPECT_EQ(service.answer(read_request(9, SportCall::kGetFsm), 0.0).id, 9);
+}
+
+TEST(SportRpc, WritesTheParametersThatTheMakersClientWrites) {
+  EXPECT_STREQ(velocity_request(1, {0.2, -0.1, 0.05, 0.74}, 0.3).parameter.data(),
+               R"({"velocity":[0.2000,-0.1000,0.0500],"duration":0.30})");
+  EXPECT_STREQ(fsm_request(2, 1).parameter.data(), R"({"data":1})");
+  EXPECT_STREQ(read_request(3, SportCall::kGetFsm).parameter.data(), "");
+}
+
+TEST(SportRpc, NoVelocityLastsLongerThanHalfASecondAndNoneIsNotANumber) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  for (const double asked : {-1.0, 0.0, 0.2, 864000.0, nan, inf}) {
+    const auto order =
+        order_of(SportCall::kSetVelocity, velocity_request(1, {nan, inf, 1e30, 0.0}, asked).parameter.data());
+    ASSERT_TRUE(order) << asked;
+    EXPECT_GE(order->duration, 0.1) << asked;
+    EXPECT_LE(order->duration, 0.5) << asked;
+    EXPECT_EQ(order->velocity.forward, 0.0);
+    EXPECT_EQ(order->velocity.yaw_rate, 10.0);
+  }
+}
+
+TEST(SportRpc, ReadsAnswersAndNothingElse) {
+  EXPECT_EQ(fsm_of(R"({"data":500})"), 500);
+  for (const char* wrong :
+       {"", "500", "[]", "{}", R"({"data":"500"})", R"({"data":1e99})", R"({"data":0.5})", "{\"data\":"})
+    EXPECT_FALSE(fsm_of(wrong)) << wrong;
+  EXPECT_FALSE(fsm_of(std::string(5000, ' ') + R"({"data":1})"));
+  for (const char* wrong : {"", R"({"velocity":[1,2],"duration":1})", R"({"velocity":[1,2,"x"],"duration":1})",
+                            R"({"velocity":[1,2,3]})", R"({"velocity":{},"duration":1})"})
+    EXPECT_FALSE(order_of(SportCall::kSetVelocity, wrong)) << wrong;
+  EXPECT_FALSE(order_of(SportCall::kGetFsm, R"({"data":1})"));
+}
+
+}  // namespace
+}  // namespace duet
