@@ -188,7 +188,7 @@ bool RunDirectory::is_finished() {
   return info.plan && std::cmp_greater_equal(keys_.size(), info.plan->asked);
 }
 
-Run load_run(const std::string& path) {
+Run load_run_head(const std::string& path) {
   if (!is_run(path)) throw InputError(fmt::format("'{}' is not a run directory (no run.json)", path));
   check_published(path);
   Run run;
@@ -197,6 +197,11 @@ Run load_run(const std::string& path) {
   const std::string environment = beside(path, "env.json");
   run.info.environment = parse_json(read_text(environment), environment);
   run.info.suite_yaml = read_text(beside(path, "suite.yaml"));
+  return run;
+}
+
+Run load_run(const std::string& path) {
+  Run run = load_run_head(path);
   bool torn = false;
   RunRows rows = read_run_rows(beside(path, "episodes.jsonl"), run.info, &torn);
   run.dropped_lines = torn ? 1 : 0;

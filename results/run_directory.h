@@ -81,6 +81,9 @@ struct Run {
 // is not what was published (results/published.h).
 Run load_run(const std::string& path);
 
+// The same without its rows, which are not looked at.
+Run load_run_head(const std::string& path);
+
 // Whether episodes are missing that were asked for.
 bool is_partial(const Run& run);
 // "76 of 400 episodes: partial"; "100 of 400 episodes: the part that was asked for"; empty for a whole run and for one

@@ -70,13 +70,15 @@ RunPart of_own_policies(RunPart part, const RunInfo& info) {
 
 // What of the most incomplete run is missing is missing of them all; how many episodes the parts have together is known
 // when the suite is planned again.
-std::optional<RunPlan> plan_of(const std::vector<Run>& runs, std::size_t rows) {
+std::optional<RunPlan> plan_of(const std::vector<Run>& runs, const std::vector<std::int64_t>& rows_of_each,
+                               std::int64_t rows) {
   RunPlan plan;
   std::int64_t missing = 0, not_asked = 0;
-  for (const Run& run : runs) {
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Run& run = runs[i];
     if (!run.info.plan) return std::nullopt;
     const RunPlan& own = *run.info.plan;
-    missing = std::max(missing, own.asked - static_cast<std::int64_t>(run.rows.size()));
+    missing = std::max(missing, own.asked - rows_of_each[i]);
     not_asked = std::max(not_asked, own.episodes - own.asked);
     for (const RunPart& part : own.parts)
       plan.parts = with_part(std::move(plan.parts), of_own_policies(part, run.info));
@@ -84,7 +86,7 @@ std::optional<RunPlan> plan_of(const std::vector<Run>& runs, std::size_t rows) {
   std::ranges::sort(plan.parts, {}, [](const RunPart& part) {
     return std::tie(part.engines, part.controllers, part.policies, part.tasks, part.perturbations);
   });
-  plan.asked = static_cast<std::int64_t>(rows) + missing;
+  plan.asked = rows + missing;
   plan.episodes = plan.asked + not_asked;
   return plan;
 }
@@ -150,8 +152,21 @@ RunUnion unite(const std::vector<Run>& runs) {
   for (auto& [key, origin] : rows) result.run.rows.push_back(std::move(origin.row));
   std::ranges::sort(result.run.rows,
                     [](const EpisodeRow& a, const EpisodeRow& b) { return place_of(a) < place_of(b); });
-  result.run.info.plan = plan_of(runs, result.run.rows.size());
+  std::vector<std::int64_t> rows_of_each;
+  for (const Run& run : runs) rows_of_each.push_back(static_cast<std::int64_t>(run.rows.size()));
+  result.run.info.plan = plan_of(runs, rows_of_each, static_cast<std::int64_t>(result.run.rows.size()));
   return result;
+}
+
+nlohmann::json united_environment(const std::vector<Run>& runs) { return environments_of(runs); }
+
+RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t>& rows_of_each, std::int64_t rows) {
+  require(!runs.empty() && runs.size() == rows_of_each.size(), "expected a run at least, and its number of rows");
+  require_one_suite(runs);
+  require_one_digest(runs);
+  RunInfo info = info_of(runs);
+  info.plan = plan_of(runs, rows_of_each, rows);
+  return info;
 }
 
 Run united(const std::vector<Run>& runs) {

@@ -2,6 +2,7 @@
 // by key; an episode that several runs have, as the null arm's, is there once. The order of the runs does not matter.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,14 @@ struct RunUnion {
 // controller or engine profile of two digests under one name.
 RunUnion unite(const std::vector<Run>& runs);
 
-// The same where a conflict is an error: throws InputError with the first and how many there are.
+// What run.json says of them together, from what each says, how many rows each has and how many there are in all.
+// Throws InputError for runs of different suites and for a policy or controller of two digests under one name.
+RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t>& rows_of_each, std::int64_t rows);
+
+// The environments of all, each once, the first by its text with the others in `others`.
+nlohmann::json united_environment(const std::vector<Run>& runs);
+
+// unite() where a conflict is an error: throws InputError with the first and how many there are.
 Run united(const std::vector<Run>& runs);
 
 }  // namespace duet

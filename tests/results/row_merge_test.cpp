@@ -1,0 +1,190 @@
+// A merge is a set union: order, grouping and repetition of its sources do not matter, however little memory it has.
+#include "duet/results/row_merge.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "duet/core/file.h"
+#include "duet/core/random.h"
+#include "duet/results/json_fields.h"
+#include "tests/results/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RowMerge : public testing::Test {
+ protected:
+  // A file of rows; a name for the source.
+  RowSource source(const std::string& name, const std::vector<EpisodeRow>& rows, const std::string& node = "") const {
+    std::string text;
+    for (const EpisodeRow& row : rows) text += dumped(to_json(row)) + "\n";
+    write_file(folder_ / name, text);
+    return {.path = folder_ / name, .from = name, .run = 0, .shard = -1, .node = node};
+  }
+  std::string merged(const std::vector<RowSource>& sources, std::size_t entries = 150'000) const {
+    result_ = merge_rows(sources, test::tiny_run(), folder_ / "merged", {.entries = entries});
+    return result_.violations == 0 ? read_file(folder_ / "merged") : "(differences)";
+  }
+  std::string refusal(const std::vector<RowSource>& sources) const {
+    return test::thrown_message<InputError>([&] { merged(sources); });
+  }
+
+  test::ScratchFolder folder_;
+  mutable MergedRows result_;
+};
+
+EpisodeRow row_number(int number) {
+  EpisodeRow row = test::engine_episode(number % 2 == 0 ? "mujoco" : "ode", "replay", number, number % 3 == 0);
+  row.metrics["jpe"] = 0.1 * number;
+  return row;
+}
+
+// The same episode as some machine ran it: another time, and now and then an error.
+EpisodeRow as_run(int number, Random& random) {
+  EpisodeRow row = row_number(number);
+  row.started_at = "2026-01-02T03:04:0" + std::to_string(random.below(3)) + "Z";
+  row.wall_s = 0.5 * random.below(4);
+  if (!random.chance(0.2)) return row;
+  row.outcome = Outcome::kError;
+  row.success = false;
+  row.message = "killed its worker " + std::to_string(random.below(3)) + " times";
+  row.metrics.clear();
+  return row;
+}
+
+std::vector<EpisodeRow> some_rows(Random& random) {
+  std::vector<EpisodeRow> rows;
+  for (int i = random.below(12); i > 0; --i) rows.push_back(as_run(random.below(10), random));
+  return rows;
+}
+
+TEST_F(RowMerge, IsAssociativeCommutativeAndIdempotent) {
+  for (std::uint64_t seed = 0; seed < 15; ++seed) {
+    Random random(seed, 1);
+    const RowSource a = source("a", some_rows(random)), b = source("b", some_rows(random));
+    const RowSource c = source("c", some_rows(random));
+    const std::string all = merged({a, b, c});
+    std::vector<RowSource> order = {a, b, c};
+    const auto by_path = [](const RowSource& x, const RowSource& y) { return x.path < y.path; };
+    do {
+      EXPECT_EQ(merged(order, 1 + static_cast<std::size_t>(random.below(5))), all) << seed;
+    } while (std::next_permutation(order.begin(), order.end(), by_path));
+    write_file(folder_ / "ab", merged({a, b}, 2));
+    write_file(folder_ / "bc", merged({b, c}, 2));
+    write_file(folder_ / "abc", all);
+    const auto file = [&](const char* name) {
+      return RowSource{.path = folder_ / name, .from = name, .run = 0, .shard = -1, .node = {}};
+    };
+    EXPECT_EQ(merged({file("ab"), c}), all) << seed;
+    EXPECT_EQ(merged({a, file("bc")}), all) << seed;
+    EXPECT_EQ(merged({file("abc")}), all) << seed;
+    EXPECT_EQ(merged({file("abc"), a, file("abc")}, 3), all) << seed;
+  }
+}
+
+TEST_F(RowMerge, HasEachEpisodeOnceAndAnErrorOnlyWhereNothingElseIs) {
+  for (std::uint64_t seed = 100; seed < 120; ++seed) {
+    Random random(seed, 1);
+    const std::vector<EpisodeRow> first = some_rows(random), second = some_rows(random);
+    std::map<std::string, bool> is_error;
+    for (const auto* rows : {&first, &second})
+      for (const EpisodeRow& row : *rows) {
+        const auto [known, is_new] = is_error.try_emplace(row.key, true);
+        known->second = known->second && row.outcome == Outcome::kError;
+      }
+    const std::string text = merged({source("a", first), source("b", second)}, 4);
+    std::map<std::string, bool> found;
+    for (std::size_t begin = 0, end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+      const EpisodeRow row = row_from_json(parse_json(text.substr(begin, end - begin), "row"));
+      EXPECT_TRUE(found.try_emplace(row.key, row.outcome == Outcome::kError).second);
+    }
+    EXPECT_EQ(found, is_error) << seed;
+    EXPECT_EQ(result_.rows, std::ssize(is_error));
+    EXPECT_EQ(result_.rows + result_.folded + result_.superseded, std::ssize(first) + std::ssize(second));
+  }
+}
+
+TEST_F(RowMerge, RowsThatDifferAreToldNodeByNodeAndNothingIsWritten) {
+  EpisodeRow changed = row_number(2);
+  changed.fell = true;
+  const RowSource one = source("one", {row_number(1), row_number(2)}, "n1");
+  const RowSource two = source("two", {row_number(1), changed}, "n2");
+  EXPECT_EQ(merged({one, two}), "(differences)");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged"));
+  EXPECT_EQ(result_.violations, 1);
+  ASSERT_EQ(result_.conflicts.size(), 1U);
+  EXPECT_THAT(result_.conflicts.front(), HasSubstr("is not the same in 'one' and 'two': fell: false, true"));
+  ASSERT_EQ(result_.agreement.size(), 1U);
+  EXPECT_EQ(result_.agreement.begin()->first, NodePair("n1", "n2"));
+  EXPECT_EQ(result_.agreement.begin()->second.compared, 2);
+  EXPECT_EQ(result_.agreement.begin()->second.different, 1);
+}
+
+TEST_F(RowMerge, RowsWrittenInTwoWaysAreEqual) {
+  const RowSource one = source("one", {row_number(1)});
+  std::string text = read_file(one.path);
+  text.replace(text.find("\"fell\":false"), 12, "\"fell\": false");
+  write_file(folder_ / "two", text);
+  merged({one, {.path = folder_ / "two", .from = "two", .run = 0, .shard = -1, .node = {}}});
+  EXPECT_EQ(result_.violations, 0);
+  EXPECT_EQ(result_.folded, 1);
+}
+
+TEST_F(RowMerge, ATornLastLineIsLeftOut) {
+  const RowSource one = source("one", {row_number(1)});
+  test::append_text(one.path, dumped(to_json(row_number(2))).substr(0, 200));
+  const std::string text = merged({one});
+  EXPECT_EQ(std::ranges::count(text, '\n'), 1);
+  EXPECT_EQ(result_.torn, 1);
+  EXPECT_EQ(result_.rows, 1);
+}
+
+TEST_F(RowMerge, AFileThatIsNotThereHasNoRows) {
+  merged({{.path = folder_ / "nothing", .from = "nothing", .run = 0, .shard = -1, .node = {}}});
+  EXPECT_EQ(result_.rows, 0);
+  EXPECT_EQ(read_file(folder_ / "merged"), "");
+}
+
+TEST_F(RowMerge, CountsByRunShardAndNode) {
+  RowSource one = source("one", {row_number(1), row_number(2)}, "n1");
+  RowSource two = source("two", {row_number(2), row_number(3)}, "n2");
+  one.shard = 0;
+  two.run = two.shard = 1;
+  merged({one, two});
+  EXPECT_EQ(result_.of_run, (std::map<int, std::int64_t>{{0, 2}, {1, 2}}));
+  EXPECT_EQ(result_.of_shard, (std::map<int, std::int64_t>{{0, 2}, {1, 2}}));
+  EXPECT_EQ(result_.of_node, (std::map<std::string, std::int64_t>{{"n1", 2}, {"n2", 1}}));
+}
+
+TEST_F(RowMerge, RefusesRowsThatDoNotBelongThere) {
+  const RowSource good = source("good", {row_number(1)});
+  write_file(folder_ / "broken", "{\"schema\":5}\n");
+  EXPECT_THAT(refusal({good, {.path = folder_ / "broken", .from = "b", .run = 0, .shard = -1, .node = {}}}),
+              HasSubstr("broken:1: episode row: expected"));
+  EpisodeRow foreign = row_number(2);
+  foreign.suite_hash = "feedfeed";
+  foreign.key = episode_key(foreign);
+  EXPECT_THAT(refusal({source("foreign", {foreign})}), HasSubstr("the row is of suite"));
+  EpisodeRow renamed = row_number(2);
+  renamed.policy_digest = std::string(64, 'a');
+  renamed.key = episode_key(renamed);
+  EXPECT_THAT(refusal({good, source("renamed", {renamed})}), HasSubstr("one name stands for one policy"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "merged"));
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "."), {}), 4);  // the sources, nothing else
+}
+
+TEST_F(RowMerge, AFolderThatCannotBeWrittenIsAStorageError) {
+  const RowSource good = source("good", {row_number(1)});
+  EXPECT_THAT(
+      test::thrown_message<StorageError>([&] { merge_rows({good}, test::tiny_run(), folder_ / "no/such/merged"); }),
+      HasSubstr("cannot write '"));
+}
+
+}  // namespace
+}  // namespace duet
