@@ -106,8 +106,6 @@ EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
 
 }  // namespace
 
-namespace {
-
 EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
                          const std::string& trajectory_folder, const std::function<bool()>& stop_asked) {
   const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
@@ -119,6 +117,8 @@ EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunI
   return run_episode(spec, suite, identity, robot, trajectory_folder, policy.make, stop_asked);
 }
 
+namespace {
+
 // For people: what profile_digest is of. The suite says less, and another machine's engines may add other defaults.
 std::string settings_here(const Suite& suite) {
   std::string text;
@@ -127,6 +127,25 @@ std::string settings_here(const Suite& suite) {
       text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
   return text;
 }
+
+}  // namespace
+
+RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentity& identity,
+                     const std::vector<std::string>& argv, const nlohmann::json& certificate) {
+  return {.suite = suite.name,
+          .suite_version = suite.version,
+          .suite_hash = identity.suite_hash,
+          .suite_yaml = resolved_yaml(kept.suite) + settings_here(suite),
+          .argv = argv,
+          .created_at = utc_now(),
+          .environment = capture_environment(),
+          .policies = identity.policies,
+          .controllers = identity.controllers,
+          .certificate = certificate,
+          .plan = {}};
+}
+
+namespace {
 
 // Places in the plan of those that are asked for and not in the folder yet; counts those that are.
 std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPart& part, const RunDirectory& run,
@@ -271,17 +290,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   summary.absent_controllers = bodies.absent();
   summary.absent_policies = bodies.absent_policies();
   const KeptSuite kept = kept_suite(suite, directory);
-  const RunInfo info{.suite = suite.name,
-                     .suite_version = suite.version,
-                     .suite_hash = identity.suite_hash,
-                     .suite_yaml = resolved_yaml(kept.suite) + settings_here(suite),
-                     .argv = options.argv,
-                     .created_at = utc_now(),
-                     .environment = capture_environment(),
-                     .policies = identity.policies,
-                     .controllers = identity.controllers,
-                     .certificate = options.certificate,
-                     .plan = {}};
+  const RunInfo info = new_run_info(suite, kept, identity, options.argv, options.certificate);
   require_names_of(directory, suite);
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors);
   keep_inputs(kept, directory);

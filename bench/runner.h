@@ -13,6 +13,7 @@
 #include "duet/bench/episode.h"
 #include "duet/bench/progress.h"
 #include "duet/bench/run_episode.h"
+#include "duet/bench/run_inputs.h"
 #include "duet/bench/run_work.h"
 #include "duet/bench/stop_sign.h"
 #include "duet/bench/suite.h"
@@ -48,5 +49,13 @@ struct RunSummary {
 // (suite, clips, run directory, a full disk; a decision for a suite of walking commands), MissingError (none of its
 // engines, of its policies or, but for playback, of its controllers is there), std::invalid_argument.
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
+
+// What the folder of a new run says of it, but for its plan.
+RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentity& identity,
+                     const std::vector<std::string>& argv, const nlohmann::json& certificate);
+
+// run_episode with the actors of `bodies`; a row with `unsupported` where this machine lacks one of them.
+EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
+                         const std::string& trajectory_folder, const std::function<bool()>& stop_asked);
 
 }  // namespace duet

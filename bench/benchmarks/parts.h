@@ -16,6 +16,7 @@ void add_backend_benchmarks(std::vector<Benchmark>& list);
 void add_nn_benchmarks(std::vector<Benchmark>& list);
 void add_policy_benchmarks(std::vector<Benchmark>& list);
 void add_runner_benchmarks(std::vector<Benchmark>& list);
+void add_scale_benchmarks(std::vector<Benchmark>& list);
 void add_wbc_benchmarks(std::vector<Benchmark>& list);
 
 // A figure with the least or the largest value that it is to reach.

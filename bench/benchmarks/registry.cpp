@@ -18,6 +18,7 @@ const std::vector<Benchmark>& benchmarks() {
     add_nn_benchmarks(all);
     add_policy_benchmarks(all);
     add_runner_benchmarks(all);
+    add_scale_benchmarks(all);
     add_wbc_benchmarks(all);
     add_hardware_benchmarks(all);
     add_wire_benchmark(all);

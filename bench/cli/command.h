@@ -77,6 +77,10 @@ void add_compare(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
 void add_policy_check(CLI::App& app, Session& session);  // `policy check`
+void add_plan(CLI::App& app, Session& session);
+void add_work(CLI::App& app, Session& session);
+void add_submit(CLI::App& app, Session& session);
+void add_status(CLI::App& app, Session& session);
 void add_merge(CLI::App& app, Session& session);
 void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);

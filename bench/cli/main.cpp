@@ -93,6 +93,10 @@ int main(int argc, char** argv) {
   add_run(app, session);
   add_report(app, session);
   add_policy_check(app, session);
+  add_plan(app, session);
+  add_work(app, session);
+  add_submit(app, session);
+  add_status(app, session);
   add_merge(app, session);
   add_publish(app, session);
   add_compare(app, session);

@@ -9,67 +9,18 @@
 #include "duet/bench/cli/run_command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/cli/tables.h"
-#include "duet/bench/clips.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/runner.h"
-#include "duet/bench/shipped_suites.h"
-#include "duet/bench/suite_actors.h"
 #include "duet/bench/trust.h"
 #include "duet/core/file.h"
-#include "duet/core/names.h"
 #include "duet/core/number.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/metrics/contact_limits.h"
 #include "duet/results/leaderboard_rows.h"
 
 namespace duet::cli {
 namespace {
-
-// Clips given on the command line take the place of the suite's; a task without clips is left out.
-void use_clips(const std::vector<std::string>& paths, Suite& suite) {
-  if (paths.empty()) return;
-  require(suite.references.empty(), "--clips: the suite has a `reference` and no clips");
-  if (suite.clips.synth_per_task > 0) suite.clips = {.files = {}, .pad = suite.clips.pad, .roles = suite.clips.roles};
-  suite.clips.given = false;
-  suite.clips.files.clear();
-  for (const std::string& file : find_clip_files(paths))
-    suite.clips.files.push_back(std::filesystem::absolute(file).string());
-}
-
-// Of a controller or a policy; a name that is neither is refused with both.
-void set_network(Suite& suite, const std::string& actor, const std::string& path) {
-  const std::vector<std::string> policies = policy_names_of(suite);
-  std::vector<std::string> known = controller_names_of(suite);
-  if (std::find(known.begin(), known.end(), actor) != known.end()) {
-    set_controller_option(suite, actor, "network", path);
-  } else if (std::find(policies.begin(), policies.end(), actor) != policies.end()) {
-    set_policy_option(suite, actor, "network", path);
-  } else {
-    known.insert(known.end(), policies.begin(), policies.end());
-    throw std::invalid_argument(unknown_name_message("controller or policy", actor, known));
-  }
-}
-
-Suite read_suite(const RunArguments& arguments) {
-  Overrides overrides;
-  for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));
-  if (!arguments.start.empty()) overrides.emplace_back("start", arguments.start);
-  if (!arguments.partner.empty()) overrides.emplace_back("partner", arguments.partner);
-  if (!arguments.profile.empty()) overrides.emplace_back("profile", arguments.profile);
-  Suite suite = load_suite(suite_file(arguments.suite), overrides);
-  suite.allow_programs = arguments.allow_programs;
-  use_clips(arguments.clips, suite);
-  require_clips(suite);
-  for (const std::string& text : arguments.networks) {
-    const auto [actor, path] = split_assignment(text);
-    set_network(suite, actor, std::filesystem::absolute(path).lexically_normal().string());
-  }
-  // A table that is broken is told before the first episode.
-  if (!suite.contact_limits.empty()) static_cast<void>(load_contact_limits(suite.contact_limits));
-  return suite;
-}
 
 int exit_code(RunEnd end) {
   return end == RunEnd::kComplete ? kExitOk : end == RunEnd::kInterrupted ? kExitInterrupted : kExitResumable;
@@ -144,7 +95,7 @@ void print_plan(const Session& session, const Suite& suite) {
 
 void run_suite_command(Session& session, RunArguments arguments) {
   catch_interrupts();
-  const Suite suite = read_suite(arguments);
+  const Suite suite = suite_of(arguments.suite);
   if (arguments.dry_run) {
     print_plan(session, suite);
     return;
@@ -225,19 +176,9 @@ void add_run(CLI::App& app, Session& session) {
   auto arguments = std::make_shared<RunArguments>();
   arguments->options.threads = default_threads();
   RunOptions& options = arguments->options;
-  command
-      ->add_option("suite", arguments->suite, "suite file (YAML), or the name of one that ships (`duet list suites`)")
-      ->required();
+  add_suite_options(*command, arguments->suite);
   command->add_option("-o,--output", arguments->output,
                       "run directory; an unfinished run of the same suite is resumed");
-  command->add_option("--clips", arguments->clips,
-                      "clips or paired motions (NPZ, folders), or a data set's people, in the place of the suite's");
-  command->add_option("-s,--set", arguments->overrides, "key=value, dotted: overrides the suite (repeatable)");
-  command->add_option("--network", arguments->networks,
-                      "NAME=PATH: the network of one of the suite's controllers or policies (repeatable)");
-  command->add_option("--start", arguments->start, "auto, clip, approach, act or sim_to_real: where episodes begin");
-  command->add_option("--partner", arguments->partner, "none, ghost or solid");
-  command->add_option("--profile", arguments->profile, "engine profile: parity, fast, accurate or a file");
   command->add_option("--certificate", arguments->certificate,
                       "parity certificate of `duet validate`, kept with the results");
   command->add_option("--engines", options.engines, "only these")->delimiter(',');
@@ -254,7 +195,6 @@ void add_run(CLI::App& app, Session& session) {
   command->add_flag("--retry-errors", options.retry_errors, "run episodes again that ended with an error");
   command->add_flag("--dry-run", arguments->dry_run,
                     "print the resolved suite, its hash and the programs that it would start; run nothing");
-  add_allow_programs(*command, arguments->allow_programs);
   command->callback([&session, arguments] { run_suite_command(session, *arguments); });
 }
 

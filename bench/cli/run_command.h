@@ -2,17 +2,17 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/suite_arguments.h"
 #include "duet/bench/runner.h"
 
 namespace duet::cli {
 
 struct RunArguments {
-  std::string suite, output, start, partner, profile, certificate;
-  std::vector<std::string> overrides, clips, networks;
-  bool dry_run = false, allow_programs = false;
+  SuiteArguments suite;
+  std::string output, certificate;
+  bool dry_run = false;
   double min_effect = 5.0;  // [points]
   RunOptions options;
 };

@@ -22,7 +22,7 @@ void add_walk(CLI::App& app, Session& session) {
                                   "  duet walk wbc_sim vmc --velocity 0.4,0,0 --engines mujoco,ode");
   auto arguments = std::make_shared<RunArguments>();
   auto walk = std::make_shared<WalkArguments>();
-  arguments->suite = "walk";
+  arguments->suite.suite = "walk";
   arguments->output = "runs/walk";
   arguments->options.threads = default_threads();
   command->add_option("controllers", arguments->options.controllers, "only these (default: all of the suite)");
@@ -34,12 +34,12 @@ void add_walk(CLI::App& app, Session& session) {
       ->check(CLI::Range(1.0, 600.0))
       ->needs(command->get_option("--velocity"));
   command->add_option("--engines", arguments->options.engines, "only these")->delimiter(',');
-  command->add_option("--network", arguments->networks, "NAME=PATH: the network of a controller (repeatable)");
+  command->add_option("--network", arguments->suite.networks, "NAME=PATH: the network of a controller (repeatable)");
   command->add_option("-o,--output", arguments->output, "run directory")->capture_default_str();
   add_threads(command, arguments->options.threads);
   command->callback([&session, arguments, walk] {
     if (!walk->velocity.empty())
-      arguments->overrides.push_back(
+      arguments->suite.overrides.push_back(
           fmt::format("reference={{velocity: [{}]{}}}", fmt::join(walk->velocity, ", "),
                       walk->seconds > 0.0 ? fmt::format(", seconds: {}", walk->seconds) : ""));
     run_suite_command(session, *arguments);

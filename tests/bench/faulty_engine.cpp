@@ -1,5 +1,6 @@
 // An engine that fails: a module like any other, built for tests/bench/fault_test.cpp. It plays the reference back, and
 // at half a second it does what its option `fault` says.
+#include <csignal>
 #include <stdexcept>
 
 #include "duet/backends/engine_module.h"
@@ -8,7 +9,8 @@
 namespace duet {
 namespace {
 
-const EngineOption kOptions[] = {choice_option("fault", {"throw", "diverge", "none"}, "what happens at 0.5 s")};
+const EngineOption kOptions[] = {
+    choice_option("fault", {"throw", "diverge", "crash", "vanish", "none"}, "what happens at 0.5 s")};
 
 class FaultyBackend final : public PhysicsBackend {
  public:
@@ -22,6 +24,8 @@ class FaultyBackend final : public PhysicsBackend {
   void do_kick(const Eigen::Vector3d&) override {}
   Outcome advance(const JointCommand&) override {
     if (time() < 0.5) return Outcome::kOk;
+    if (fault_ == "crash") std::raise(SIGSEGV);
+    if (fault_ == "vanish") std::raise(SIGKILL);
     if (fault_ == "throw") throw std::runtime_error("faulty: an error of the engine itself");
     return fault_ == "diverge" ? Outcome::kDiverged : Outcome::kOk;
   }

@@ -2,6 +2,9 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/bench/certificate.h"
+#include "duet/bench/cluster/attempt.h"
+#include "duet/bench/cluster/shard_plan.h"
+#include "duet/bench/cluster/training_jobs.h"
 #include "duet/bench/episode.h"
 #include "duet/bench/profile.h"
 #include "duet/bench/suite.h"
@@ -91,13 +94,50 @@ std::string certificate_sample(unsigned /*seed*/) {
 
 void read_certificate(std::string_view bytes) { (void)load_certificate(scratch_file("fuzz.json", bytes)); }
 
+constexpr const char* kPlan = R"({"schema": "duet.plan/1", "kind": "episodes", "program": {"duet": "aa", "ode": "bb"},
+ "suite_hash": "cc", "episodes": 4, "costs": {"ode/vmc": 0.25},
+ "clips": [{"task": "wave", "id": "wave-000", "file": "clips/000000.npz", "sha256": "dd"}],
+ "shards": [{"name": "ode", "begin": 0, "end": 2, "cost_s": 1.5, "keys": "ee"},
+            {"name": "ode", "begin": 2, "end": 4, "cost_s": 1.5, "keys": "ff"}]}
+)";
+constexpr const char* kTrainingPlan = R"({"schema": "duet.plan/1", "kind": "trainings", "program": {"duet": "aa"},
+ "suite_hash": "", "episodes": 1, "costs": {}, "clips": [],
+ "shards": [{"name": "plain-1", "begin": 0, "end": 1, "cost_s": 600, "arguments": ["train", "wbc", "--seed", "1"]}]}
+)";
+
+std::string plan_sample(unsigned seed) { return seed / 64 % 2 == 0 ? kPlan : kTrainingPlan; }
+
+void read_plan(std::string_view bytes) {
+  (void)scratch_file("plan.json", bytes);
+  (void)read_shard_plan(scratch_folder());
+}
+
+std::string journal_sample(unsigned seed) {
+  std::string text =
+      "{\"schema\":\"duet.attempt/1\",\"shard\":3,\"node\":\"n1\",\"pid\":4711,\"plan\":\"aa\",\"started_at\":"
+      "\"2026-01-02T03:04:05Z\",\"environment\":{\"machine\":\"m\"}}\nbegan k1\ndid k1 ok 0.250\nbegan k2\n";
+  return text + (seed / 64 % 2 == 0 ? "ended stopped\n" : "\ncrashed k2 SIGSEGV\n");
+}
+
+void read_journal(std::string_view bytes) { (void)parse_journal(bytes, "fuzz.log"); }
+
+std::string trainings_sample(unsigned /*seed*/) {
+  return "schema: duet.trainings/1\ntrain: wbc\narguments: [--steps, '64']\narms: {plain: [], other: [--card, g1]}\n"
+         "seeds: [1, 2]\nminutes: 30\n";
+}
+
+void read_trainings(std::string_view bytes) { (void)parse_trainings(std::string(bytes), "fuzz.yaml"); }
+
 }  // namespace
 
 std::vector<Reader> bench_readers() {
   return {{"suite", suite_sample, read_suite},
           {"engine_profile", profile_sample, read_profile_file},
           {"contact_limits", limits_sample, read_limits},
-          {"certificate", certificate_sample, read_certificate}};
+          {"certificate", certificate_sample, read_certificate},
+          {"shard_plan", plan_sample, read_plan},
+          {"attempt_journal", journal_sample, read_journal},
+          {"trainings", trainings_sample, read_trainings}};
 }
 
 }  // namespace duet::fuzz

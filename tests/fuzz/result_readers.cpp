@@ -5,6 +5,7 @@
 #include "duet/core/digest.h"
 #include "duet/results/golden.h"
 #include "duet/results/published.h"
+#include "duet/results/row_scan.h"
 #include "duet/results/run_directory.h"
 #include "duet/results/training_curves.h"
 #include "tests/fuzz/reader.h"
@@ -77,12 +78,19 @@ std::string curves_sample(unsigned /*seed*/) { return "steps,return,loss\n0,1,0.
 
 void read_curves(std::string_view bytes) { (void)parse_curves(bytes, "fuzz.csv"); }
 
+std::string row_sample(unsigned seed) {
+  return to_json(test::episode("replay", "hug", static_cast<int>(seed), true)).dump();
+}
+
+void scan_one_row(std::string_view bytes) { (void)scan_row(bytes); }
+
 }  // namespace
 
 std::vector<Reader> result_readers() {
   return {{"run_directory", run_sample, read_run},
           {"manifest", manifest_sample, read_manifest},
           {"golden", golden_sample, read_golden},
+          {"row_scan", row_sample, scan_one_row},
           {"training_curves", curves_sample, read_curves}};
 }
 

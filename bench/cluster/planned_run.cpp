@@ -1,0 +1,118 @@
+#include "duet/bench/cluster/planned_run.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <set>
+#include <utility>
+
+#include "duet/bench/run_inputs.h"
+#include "duet/core/digest.h"
+#include "duet/core/require.h"
+#include "duet/core/task.h"
+#include "duet/results/name_digests.h"
+
+namespace duet {
+namespace {
+
+// Plan and program first: what follows takes seconds.
+ShardPlan checked_plan(const std::string& path, const Suite& suite) {
+  ShardPlan plan = read_shard_plan(path);
+  require_same_program(plan.program, program_digests(suite.engines), path);
+  return plan;
+}
+
+Suite suite_of_head(const Run& head, bool allow_programs) {
+  Suite suite = suite_of_run(head);
+  suite.allow_programs = allow_programs;
+  return suite;
+}
+
+// Clips as far as they are known without their files.
+std::vector<PairedMotion> outlines(const ShardPlan& plan, const Suite& suite) {
+  std::vector<PairedMotion> clips(suite.references.empty() ? plan.clips.size() : suite.references.size());
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    clips[i].clip_id = suite.references.empty() ? plan.clips[i].id : suite.references[i].name;
+    if (suite.references.empty()) clips[i].task = parse_task(plan.clips[i].task);
+  }
+  return clips;
+}
+
+Bodies with_outlines(Bodies bodies, const ShardPlan& plan, const Suite& suite) {
+  bodies.take_clips(outlines(plan, suite));
+  return bodies;
+}
+
+void require_same_digests(const char* kind, const std::map<std::string, std::string>& planned,
+                          const std::map<std::string, std::string>& here, const std::string& path) {
+  for (const auto& [name, digest] : planned) {
+    const auto found = here.find(name);
+    const std::string other = found == here.end() ? "" : found->second;
+    if (other != digest)
+      throw InputError(
+          fmt::format("'{}' was planned with {} '{}' {}, this machine has {}: rows of two of one name are "
+                      "not one run",
+                      path, kind, name, short_digest(digest), short_digest(other)));
+  }
+}
+
+void require_planned_identity(const RunInfo& info, const RunIdentity& here, const std::string& path) {
+  if (info.suite_hash != here.suite_hash)
+    throw InputError(fmt::format("'{}' was planned with suite {}, which on this machine is {:.12}", path,
+                                 suite_label(info), here.suite_hash));
+  require_same_digests("policy", info.policies, here.policies, path);
+  require_same_digests("controller", info.controllers, here.controllers, path);
+}
+
+}  // namespace
+
+PlannedRun::PlannedRun(std::string path, bool allow_programs)
+    : head_(load_run_head(path)),
+      plan_(checked_plan(path, parse_suite(head_.info.suite_yaml, path + "/suite.yaml"))),
+      suite_(suite_of_head(head_, allow_programs)),
+      identity_(identity_of(suite_)),
+      bodies_(with_outlines(Bodies(suite_), plan_, suite_)),
+      episodes_(suite_, bodies_) {
+  require_planned_identity(head_.info, identity_, path);
+  if (episodes_.size() != plan_.episodes)
+    throw InputError(fmt::format("{}/plan.json: expected {} episodes, as its suite has, found {}", path,
+                                 episodes_.size(), plan_.episodes));
+}
+
+std::string PlannedRun::key_at(std::int64_t place) const {
+  const EpisodeSpec spec = episodes_.at(place);
+  return row_for(spec, suite_, identity_, *bodies_.robot(spec.controller)).key;
+}
+
+void PlannedRun::load_clips(std::int64_t begin, std::int64_t end) {
+  if (!suite_.references.empty()) return;
+  std::set<std::size_t> needed;
+  for (std::int64_t place = begin; place < end; ++place) {
+    const EpisodeSpec spec = episodes_.at(place);
+    const PairedMotion* const base = bodies_.clips(spec.controller).data();
+    for (const PairedMotion* clip : {spec.clip, spec.seen})
+      if (clip != nullptr) needed.insert(static_cast<std::size_t>(clip - base));
+  }
+  std::vector<PairedMotion> clips = outlines(plan_, suite_);
+  for (const std::size_t i : needed) {
+    const PlannedClip& clip = plan_.clips.at(i);
+    const std::string file = (std::filesystem::path(path()) / clip.file).string();
+    if (const std::string found = sha256_file(file); found != clip.sha256)
+      throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: it is not the clip that was planned with", file,
+                                   clip.sha256, found));
+    clips[i] = load_paired_motion(file);
+  }
+  bodies_.take_clips(std::move(clips));
+}
+
+std::string keys_digest(const EpisodePlan& episodes, std::int64_t begin, std::int64_t end, const Suite& suite,
+                        const RunIdentity& identity, const Bodies& bodies) {
+  Sha256 digest;
+  for (std::int64_t place = begin; place < end; ++place) {
+    const EpisodeSpec spec = episodes.at(place);
+    digest.update(row_for(spec, suite, identity, *bodies.robot(spec.controller)).key + "\n");
+  }
+  return digest.hex();
+}
+
+}  // namespace duet

@@ -1,0 +1,196 @@
+#include "duet/bench/cluster/work_shard.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+#include <mutex>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "duet/bench/cluster/attempt.h"
+#include "duet/bench/cluster/crash_note.h"
+#include "duet/bench/cluster/planned_run.h"
+#include "duet/bench/cluster/training_jobs.h"
+#include "duet/bench/run_work.h"
+#include "duet/bench/runner.h"
+#include "duet/core/file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/results/merge_files.h"
+#include "duet/results/row_scan.h"
+
+namespace duet {
+namespace {
+
+// What earlier attempts at a shard leave to do.
+struct ShardHistory {
+  std::set<std::string> done, errors;                       // keys with a row; errors: with no other one
+  std::map<std::string, std::vector<std::string>> crashes;  // key -> signals
+  std::map<std::string, int> losses;
+};
+
+void add_rows(const std::string& file, const std::string& suite_hash, ShardHistory& history) {
+  LineFile lines(file);
+  while (const auto line = lines.next()) {
+    try {
+      const EpisodeRow row = scan_row(*line).row;
+      if (row.suite_hash != suite_hash)
+        throw InputError(fmt::format("a row of suite hash {:.12}, expected {:.12}", row.suite_hash, suite_hash));
+      (row.outcome == Outcome::kError ? history.errors : history.done).insert(row.key);
+    } catch (const InputError& error) {
+      throw InputError(
+          fmt::format("{}:{}: {}; remove the file, and its episodes run again", file, lines.line(), error.what()));
+    }
+  }
+}
+
+ShardHistory history_of(const PlannedRun& run, std::int64_t shard) {
+  ShardHistory history;
+  const std::int64_t now = file_system_time(run.path());
+  for (const AttemptRecord& attempt : read_attempts(run.path(), shard)) {
+    add_rows(attempt.rows_file, run.info().suite_hash, history);
+    for (const AttemptRecord::Crash& crash : attempt.crashes) history.crashes[crash.key].push_back(crash.signal);
+    const bool lost = attempt.end.empty() && attempt.crashes.empty() && !may_be_alive(attempt, now, kSilence);
+    for (const std::string& key : attempt.open) history.losses[key] += lost ? 1 : 0;
+  }
+  return history;
+}
+
+// Why no worker is to try again; empty where one is.
+std::string poison_of(const std::string& key, const ShardHistory& history) {
+  if (const auto crashes = history.crashes.find(key);
+      crashes != history.crashes.end() && std::ssize(crashes->second) >= kMostCrashes)
+    return fmt::format("killed its worker {} times: {}", crashes->second.size(), fmt::join(crashes->second, ", "));
+  if (const auto losses = history.losses.find(key); losses != history.losses.end() && losses->second >= kMostLosses)
+    return fmt::format("{} workers were killed while they were at it (SIGKILL, as where memory is short)",
+                       losses->second);
+  return "";
+}
+
+class ShardWorker {
+ public:
+  ShardWorker(const std::string& path, std::int64_t number, const WorkOptions& options, const StopSign& stop)
+      : run_(path, options.allow_programs),
+        number_(number),
+        shard_(shard_of(run_.plan(), number)),
+        options_(options),
+        stop_(stop) {
+    if (keys_digest(run_.episodes(), shard_.begin, shard_.end, run_.suite(), run_.identity(), run_.bodies()) !=
+        shard_.keys)
+      throw InputError(
+          fmt::format("{}/plan.json: shard {}: the keys of its episodes are not those of the plan", path, number));
+    history_ = history_of(run_, number);
+    if (run_.suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
+  }
+
+  WorkSummary work(Progress& progress) {
+    const std::vector<std::int64_t> places = missing_places();
+    if (places.empty()) return std::move(summary_);
+    run_.load_clips(places.front(), places.back() + 1);
+    AttemptWriter attempt(run_.path(), new_attempt(number_, shard_plan_digest(run_.path())));
+    note_crashes_in(attempt.descriptor());
+    try {
+      roll_out(places, attempt, progress);
+    } catch (...) {
+      note_crashes_in(-1);
+      say_end(attempt, "storage");
+      throw;
+    }
+    note_crashes_in(-1);
+    if (summary_.already_there + summary_.run < summary_.planned) summary_.end = stop_.end();
+    say_end(attempt, summary_.end == RunEnd::kComplete ? "complete" : "stopped");
+    return std::move(summary_);
+  }
+
+ private:
+  std::vector<std::int64_t> missing_places() {
+    std::vector<std::int64_t> places;
+    summary_.planned = shard_.episodes();
+    for (std::int64_t place = shard_.begin; place < shard_.end; ++place) {
+      const std::string key = run_.key_at(place);
+      const bool there = history_.done.contains(key) || (!options_.retry_errors && history_.errors.contains(key));
+      if (there) ++summary_.already_there;
+      if (!there) places.push_back(place);
+    }
+    return places;
+  }
+
+  void roll_out(const std::vector<std::int64_t>& places, AttemptWriter& attempt, Progress& progress) {
+    progress.start(fmt::format("shard {} ({})", number_, shard_.name), static_cast<int>(places.size()), "episodes");
+    parallel_for_each(static_cast<int>(places.size()), options_.threads, [&](int i) {
+      if (stop_.asked()) return;
+      take(places[static_cast<std::size_t>(i)], attempt);
+      progress.advance();
+    });
+    progress.finish();
+  }
+
+  void take(std::int64_t place, AttemptWriter& attempt) {
+    const std::string key = run_.key_at(place);
+    const std::string poison = options_.retry_errors ? "" : poison_of(key, history_);
+    if (!poison.empty()) {
+      record(poisoned_row(place, poison), attempt, true);
+      return;
+    }
+    attempt.began(key);
+    const CrashScope scope(key);
+    try {
+      record(run_or_refuse(run_.episodes().at(place), run_.suite(), run_.identity(), run_.bodies(), trajectories_,
+                           [&] { return stop_.asked(); }),
+             attempt, false);
+    } catch (const EpisodeInterrupted&) {
+      return;  // no row: it runs again
+    }
+  }
+
+  [[nodiscard]] EpisodeRow poisoned_row(std::int64_t place, const std::string& why) const {
+    const EpisodeSpec spec = run_.episodes().at(place);
+    EpisodeRow row = row_for(spec, run_.suite(), run_.identity(), *run_.bodies().robot(spec.controller));
+    row.started_at = utc_now();
+    row.outcome = Outcome::kError;
+    row.message = why;
+    row.success = false;
+    return row;
+  }
+
+  void record(const EpisodeRow& row, AttemptWriter& attempt, bool poisoned) {
+    attempt.append(row);
+    const std::lock_guard lock(mutex_);
+    ++summary_.run;
+    ++summary_.outcomes[std::string(to_string(row.outcome))];
+    summary_.poisoned += poisoned ? 1 : 0;
+  }
+
+  // A disk that is full takes no last line; all that it says is that the worker was not killed.
+  static void say_end(AttemptWriter& attempt, const std::string& how) {
+    try {
+      attempt.ended(how);
+    } catch (const StorageError&) {
+      return;
+    }
+  }
+
+  PlannedRun run_;
+  std::int64_t number_;
+  Shard shard_;
+  WorkOptions options_;
+  const StopSign& stop_;
+  ShardHistory history_;
+  std::string trajectories_;
+  std::mutex mutex_;
+  WorkSummary summary_;
+};
+
+}  // namespace
+
+WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopSign& stop,
+                       Progress& progress) {
+  const ShardPlan plan = read_shard_plan(run);
+  static_cast<void>(shard_of(plan, shard));
+  if (plan.kind == ShardPlan::Kind::kTrainings) return work_training(run, plan, shard, stop);
+  return ShardWorker(run, shard, options, stop).work(progress);
+}
+
+}  // namespace duet

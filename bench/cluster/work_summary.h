@@ -1,0 +1,20 @@
+// What a worker did.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "duet/bench/stop_sign.h"
+
+namespace duet {
+
+struct WorkSummary {
+  std::int64_t planned = 0, already_there = 0, run = 0;
+  std::map<std::string, int> outcomes;  // of those run now
+  std::int64_t poisoned = 0;            // of these: rows of episodes that killed their workers
+  RunEnd end = RunEnd::kComplete;
+  int exit_code = 0;  // of a training: of `duet train`
+};
+
+}  // namespace duet
