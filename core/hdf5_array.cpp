@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t{256} << 20;
 constexpr std::uint64_t kDeflatesAtMost = 1040;  // times: what zlib can make of zeros
-constexpr std::size_t kMostEntries = 2'000'000;  // of all nodes of a tree of chunks
+constexpr std::size_t kMostTreeEntries = 2'000'000;  // of all nodes of a tree of chunks
 constexpr int kMostRank = 8;
 
 struct ElementType {
@@ -137,7 +137,7 @@ class ChunkTree {
     const int found = static_cast<int>(head.number(1));
     const std::uint64_t count = head.number(2);
     entries_ += count + 1;
-    if ((level >= 0 && found != level) || entries_ > kMostEntries) head.fail("the tree of chunks is none");
+    if ((level >= 0 && found != level) || entries_ > kMostTreeEntries) head.fail("the tree of chunks is none");
     Hdf5Block block = file_.block(begin + 24, count * (key_size + 8));
     for (std::uint64_t i = 0; i < count; ++i) {
       Hdf5Chunk chunk;
