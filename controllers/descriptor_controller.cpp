@@ -130,8 +130,9 @@ class DescriptorController final : public Controller {
  public:
   DescriptorController(const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot,
                        std::unique_ptr<Network> network, const std::string& network_path,
-                       const DescriptorOptions& options)
+                       const DescriptorOptions& options, std::shared_ptr<const VelocityCommand> told)
       : robot_(std::move(robot)),
+        told_(std::move(told)),
         name_(descriptor.name),
         clip_(static_cast<float>(descriptor.action_clip)),
         joints_(bind_joints(descriptor, *robot_, options.waist == WaistMode::kLocked)),
@@ -146,7 +147,8 @@ class DescriptorController final : public Controller {
     }
     bind_output(descriptor);
     bind_inputs(descriptor);
-    if (descriptor.command) bind_command(*descriptor.command, options);
+    if (descriptor.command && told_ == nullptr) bind_command(*descriptor.command, options);
+    if (descriptor.command) gate_ = StandGate(descriptor.command->stands_below);
   }
 
   [[nodiscard]] std::string_view name() const override { return name_; }
@@ -164,6 +166,7 @@ class DescriptorController final : public Controller {
   void act(const RobotState& state, const Reference& reference, JointCommand& command) override {
     rates_.update(reference);
     if (conversion_) command_ = conversion_->update(state, reference, rates_.v_WB(), rates_.w_WB_B().z());
+    if (told_ != nullptr) command_ = *told_;
     gate_.update(command_.forward, command_.lateral, command_.yaw_rate);
     const VelocityCommand shown = gate_.stands() ? VelocityCommand{.height = command_.height} : command_;
     observer_.update({state, reference, rates_, shown, action_, tick_, gate_});
@@ -260,7 +263,6 @@ class DescriptorController final : public Controller {
   }
 
   void bind_command(const VelocityInterface& interface, const DescriptorOptions& options) {
-    gate_ = StandGate(interface.stands_below);
     if (options.command.empty())
       conversion_.emplace(options.conversion, interface);
     else
@@ -268,6 +270,7 @@ class DescriptorController final : public Controller {
   }
 
   std::shared_ptr<const RobotModel> robot_;
+  std::shared_ptr<const VelocityCommand> told_;  // null: the reference's root, or a fixed command
   std::string name_;
   float clip_;
   std::vector<BoundJoint> joints_;
@@ -293,16 +296,18 @@ ControllerInfo descriptor_info(const Descriptor& descriptor) {
           .options = option_list<ControllerOption>(option_table(descriptor), defaults_of(descriptor))};
 }
 
-std::unique_ptr<Controller> make_descriptor_controller(const Descriptor& descriptor,
-                                                       std::shared_ptr<const RobotModel> robot,
-                                                       std::unique_ptr<Network> network,
-                                                       const std::string& network_path,
-                                                       const ControllerOptions& options) {
+std::unique_ptr<Controller> make_descriptor_controller(
+    const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::unique_ptr<Network> network,
+    const std::string& network_path, const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told) {
   require(robot != nullptr && network != nullptr,
           fmt::format("controller '{}': expected a robot and a network, found none", descriptor.name));
+  require(told == nullptr || descriptor.command.has_value(),
+          fmt::format("{}: controller '{}': expected a descriptor with a 'command' to be told a velocity, found none",
+                      descriptor.file, descriptor.name));
   const DescriptorOptions read =
       read_options("controller", descriptor.name, option_table(descriptor), options, defaults_of(descriptor));
-  return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path, read);
+  return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path, read,
+                                                std::move(told));
 }
 
 }  // namespace duet

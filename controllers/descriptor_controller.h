@@ -5,6 +5,7 @@
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor.h"
+#include "duet/controllers/root_conversion.h"
 #include "duet/nn/network.h"
 
 namespace duet {
@@ -15,11 +16,13 @@ ControllerInfo descriptor_info(const Descriptor& descriptor);
 // `network_path` names the network in messages. The options `network` and `engine` are the loader's and not looked at.
 // Throws std::invalid_argument for a robot that lacks one of its joints or has one that it does not know, and for an
 // option's value that it does not know; InputError for a network whose inputs and outputs are not the descriptor's,
-// with the channels' places.
+// with the channels' places. `told`, where given, is the velocity at each tick, in the place of the reference's root;
+// std::invalid_argument where the descriptor has no `command`.
 std::unique_ptr<Controller> make_descriptor_controller(const Descriptor& descriptor,
                                                        std::shared_ptr<const RobotModel> robot,
                                                        std::unique_ptr<Network> network,
                                                        const std::string& network_path,
-                                                       const ControllerOptions& options = {});
+                                                       const ControllerOptions& options = {},
+                                                       std::shared_ptr<const VelocityCommand> told = nullptr);
 
 }  // namespace duet

@@ -56,10 +56,16 @@ LoadedFiles published_files(const std::string& name, const ControllerOptions& op
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
                                            const ControllerOptions& options) {
+  return make_told(name, std::move(robot), options, nullptr);
+}
+
+std::unique_ptr<Controller> make_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                      const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told) {
   const Descriptor descriptor = load_descriptor(name);
   const std::string path = find_network(descriptor, options);
   return make_descriptor_controller(descriptor, std::move(robot),
-                                    load_network(path, option_or(options, "engine", "duet")), path, options);
+                                    load_network(path, option_or(options, "engine", "duet")), path, options,
+                                    std::move(told));
 }
 
 }  // namespace duet

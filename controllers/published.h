@@ -6,6 +6,7 @@
 
 #include "duet/controllers/controller.h"
 #include "duet/controllers/descriptor.h"
+#include "duet/controllers/root_conversion.h"
 #include "duet/core/loaded_file.h"
 
 namespace duet {
@@ -20,6 +21,9 @@ std::string find_network(const Descriptor& descriptor, const ControllerOptions& 
 
 std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
                                            const ControllerOptions& options);
+// The same, told a velocity as make_descriptor_controller has it; `told` is not null.
+std::unique_ptr<Controller> make_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                                      const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told);
 // The descriptor, its network, and each file of the network's external data ("network data NAME").
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options);
 

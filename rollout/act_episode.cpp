@@ -37,6 +37,11 @@ Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& contro
   return finished(roll_out(episode_of(setup), backend, controller, reference), setup, reference);
 }
 
+Rollout roll_out(const RolloutSetup& setup, World& world, Policy& policy, std::string_view engine) {
+  PolicyReference reference = reference_of(setup, policy);
+  return finished(roll_out(episode_of(setup), world, reference, engine), setup, reference);
+}
+
 Rollout play_back(const RolloutSetup& setup, Policy& policy) {
   PolicyReference reference = reference_of(setup, policy);
   return finished(play_back(episode_of(setup), reference), setup, reference);

@@ -29,6 +29,8 @@ struct RolloutSetup : EpisodeConditions {
 // Runs until the reference ends (and the partner with it, where it is varied: episode_ticks), or as roll_out of an
 // Episode does. A policy that is dead ends it as kError, with its message.
 Rollout roll_out(const RolloutSetup& setup, Backend& backend, Controller& controller, Policy& policy);
+// The same in any world (rollout/world.h).
+Rollout roll_out(const RolloutSetup& setup, World& world, Policy& policy, std::string_view engine);
 // The same without physics.
 Rollout play_back(const RolloutSetup& setup, Policy& policy);
 

@@ -77,19 +77,6 @@ std::string describe(Outcome outcome, int tick, std::string_view engine) {
   }
 }
 
-// What a tick does to the robot, be it in an engine or without physics.
-class World {
- public:
-  virtual ~World() = default;
-  virtual void begin(const RobotState& start) = 0;
-  [[nodiscard]] virtual const RobotState& state() const = 0;
-  [[nodiscard]] virtual std::span<const Contact> contacts() const { return {}; }  // of the last physics step
-  // What the joints are sent for this reference.
-  virtual const Eigen::VectorXd& target(const Reference& reference) = 0;
-  virtual Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) = 0;
-  virtual void finish(Rollout&) const {}
-};
-
 // Steps between two looks at the clock within a control period: only a step far below the usual ones has so many.
 constexpr int kStepsPerLook = 64;
 
@@ -180,7 +167,9 @@ void record_tick(Recording& recording, int tick, const World& world, const Human
   for (const Contact& contact : world.contacts()) recording.contacts.push_back({tick, contact});
 }
 
-Rollout run(const Episode& episode, World& world, ReferenceSource& source, std::string_view engine) {
+}  // namespace
+
+Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, std::string_view engine) {
   Rollout rollout;
   Recording& recording = rollout.recording;
   const bool somebody = !episode.partner.empty();
@@ -212,22 +201,22 @@ Rollout run(const Episode& episode, World& world, ReferenceSource& source, std::
   }
   world.finish(rollout);
   trim(recording, tick);
-  recording.message =
-      recording.outcome == Outcome::kError ? source.message() : describe(recording.outcome, tick, engine);
+  recording.message = world.message();
+  if (recording.message.empty())
+    recording.message =
+        recording.outcome == Outcome::kError ? source.message() : describe(recording.outcome, tick, engine);
   rollout.state_hash = hash.hex();
   return rollout;
 }
 
-}  // namespace
-
 Rollout roll_out(const Episode& episode, Backend& backend, Controller& controller, ReferenceSource& source) {
   Simulated world(episode, backend, controller);
-  return run(episode, world, source, backend.name());
+  return roll_out(episode, world, source, backend.name());
 }
 
 Rollout play_back(const Episode& episode, ReferenceSource& source) {
   Moved world(episode);
-  return run(episode, world, source, "playback");
+  return roll_out(episode, world, source, "playback");
 }
 
 HumanJoints partner_joints(const PointTracks& joints, int frame) {

@@ -16,6 +16,7 @@
 #include "duet/robots/robot_model.h"
 #include "duet/rollout/perturbation.h"
 #include "duet/rollout/reference_source.h"
+#include "duet/rollout/world.h"
 
 namespace duet {
 
@@ -65,6 +66,9 @@ struct Rollout {
 // Runs until the ticks are over, the robot falls, the state diverges, the wall limit passes or the source gives no
 // reference any more (kError, with its message). Never throws for what the experiment may measure.
 Rollout roll_out(const Episode& episode, Backend& backend, Controller& controller, ReferenceSource& source);
+// The same in any world, whose name (`engine`) stands in messages. The perturbation's part in engine and controller is
+// the world's. Throws what World::begin throws.
+Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, std::string_view engine);
 // An episode in which the robot is at each tick where its reference was a tick ago. The perturbation's part in engine
 // and controller has no effect.
 Rollout play_back(const Episode& episode, ReferenceSource& source);
