@@ -21,28 +21,32 @@ void sleep_until(double seconds) {
   }
 }
 
-void take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& message) {
+}  // namespace
+
+bool take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& message, double now) {
   GuardBuffer buffer;
+  bool planned = false;
   for (int k = 0; k < kMostMessages; ++k) {
     const std::size_t size = socket.receive(buffer);
-    if (size == 0) return;
+    if (size == 0) break;
     switch (decode(std::span<const std::byte>(buffer).first(size), message)) {
       case GuardMessageKind::kPlanner:
-        guard.receive(message.planner, monotonic_seconds());
+        guard.receive(message.planner, now);
+        planned = true;
         break;
       case GuardMessageKind::kPerson:
-        guard.receive(message.person, monotonic_seconds());
+        guard.receive(message.person, now);
         break;
       case GuardMessageKind::kStop:
         guard.stop();
+        planned = true;
         break;
       case GuardMessageKind::kRefused:
         break;
     }
   }
+  return planned;
 }
-
-}  // namespace
 
 double monotonic_seconds() {
   timespec now{};
@@ -68,7 +72,7 @@ void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, doub
     // After a pause it does not catch up: the state machine has to see how late it is, once.
     if (next < monotonic_seconds() - period) next = monotonic_seconds();
     sleep_until(next);
-    if (planner != nullptr) take_messages(*planner, guard, message);
+    if (planner != nullptr) take_messages(*planner, guard, message, monotonic_seconds());
     if (wire.take(odometry)) {
       odometry.at = monotonic_seconds();
       guard.receive(odometry);

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "duet/hardware/datagram_socket.h"
+#include "duet/hardware/guard_message.h"
 #include "duet/hardware/robot_guard.h"
 #include "duet/hardware/robot_wire.h"
 
@@ -30,6 +31,10 @@ class NoVelocity final : public VelocitySink {
  public:
   void send(const VelocityCommand&) override {}
 };
+
+// What came over the planner's socket since the last call, at most 32 messages. Whether a plan or a
+// stop was among them.
+bool take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& message, double now);
 
 // Runs until `go_on`, called after each tick, is false. `planner` may be null. `period` of ticks [s].
 void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, double period,

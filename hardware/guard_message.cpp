@@ -7,7 +7,7 @@
 namespace duet {
 namespace {
 
-constexpr std::uint32_t kVersion = 0x44475531;  // "DGU1"
+constexpr std::uint32_t kVersion = 0x44475532;  // "DGU2"
 
 struct GuardHead {
   std::uint32_t version, kind;
@@ -18,7 +18,8 @@ struct PlannerBody {
   GuardHead head;
   double stamp, forward, lateral, yaw_rate, height;
   double q[kG1Motors];
-  std::uint64_t acting;
+  std::uint64_t acting, has_goal;
+  double goal[7];  // position, quaternion x, y, z, w
 };
 
 struct PersonBody {
@@ -26,7 +27,7 @@ struct PersonBody {
   double joints[3 * 24];  // x, y, z of each
 };
 
-static_assert(sizeof(GuardHead) == 16 && sizeof(PlannerBody) == 16 + 8 * (5 + kG1Motors + 1));
+static_assert(sizeof(GuardHead) == 16 && sizeof(PlannerBody) == 16 + 8 * (5 + kG1Motors + 9));
 static_assert(sizeof(PersonBody) == 16 + 8 * 72 && sizeof(PersonBody) <= kMostGuardBytes);
 static_assert(sizeof(PlannerBody) != sizeof(PersonBody) && std::endian::native == std::endian::little);
 
@@ -55,6 +56,11 @@ bool read_planner(std::span<const std::byte> datagram, PlannerMessage& message) 
   message.command.root = {body.forward, body.lateral, body.yaw_rate, body.height};
   for (int j = 0; j < kG1Motors; ++j) message.command.q[j] = body.q[j];
   message.acting = body.acting != 0;
+  message.goal.reset();
+  if (body.has_goal == 0) return true;
+  message.goal.emplace();
+  std::memcpy(message.goal->p.data(), body.goal, 3 * sizeof(double));
+  std::memcpy(message.goal->R.coeffs().data(), body.goal + 3, 4 * sizeof(double));
   return true;
 }
 
@@ -77,7 +83,12 @@ std::size_t encode(const PlannerMessage& message, GuardBuffer& buffer) {
                    root.yaw_rate,
                    root.height,
                    {},
-                   message.acting ? 1u : 0u};
+                   message.acting ? 1u : 0u,
+                   message.goal ? 1u : 0u,
+                   {}};
+  const Pose goal = message.goal.value_or(Pose{});
+  std::memcpy(body.goal, goal.p.data(), 3 * sizeof(double));
+  std::memcpy(body.goal + 3, goal.R.coeffs().data(), 4 * sizeof(double));
   for (int j = 0; j < kG1Motors; ++j) body.q[j] = message.command.q[j];
   return put(body, buffer);
 }

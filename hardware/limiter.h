@@ -88,6 +88,7 @@ class Limiter {
   // Of the arms at rest after the last tick, in the last tick's pose of the root.
   [[nodiscard]] const BodyGaps& gaps() const { return distance_.gaps(); }
   [[nodiscard]] const LimiterSetup& setup() const { return setup_; }
+  [[nodiscard]] bool executes(int joint) const { return executed_[joint]; }
   [[nodiscard]] const AxisBounds& joint_bounds(int joint) const { return joint_bounds_[joint]; }
 
  private:

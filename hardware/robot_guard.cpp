@@ -17,6 +17,7 @@ constexpr RemoteKey kDeadMan = RemoteKey::kR1, kStandUp = RemoteKey::kStart, kRu
 constexpr double kWritersPeriod = 0.1;
 // Angle from the stance at which the robot counts as standing [rad].
 constexpr double kStanding = 0.05;
+constexpr double kWalkerPeriod = 0.02;  // [s]
 // Faster than anybody moves a joint of theirs: a jump of the estimate [m/s].
 constexpr double kPersonJump = 10.0;
 // A joint's measured angle may be beyond its limit by this: play and zero error [rad].
@@ -57,7 +58,7 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
   setup_.rules.person_present = setup_.limiter.person;
   setup_.stance.tau_ff.setZero(kG1Motors);
   limiter_state_ = limiter_.start(setup_.limiter.robot->standing_state());
-  input_.state = setup_.limiter.robot->standing_state();
+  input_.state = measured_ = setup_.limiter.robot->standing_state();
   joints_ = setup_.stance;
   stance_.resize(kG1Motors);
   planner_.command.q.setZero(kG1Motors);
@@ -219,6 +220,9 @@ void RobotGuard::command(double now) {
   input_.state.w_WB_B = reading_.state.w_WB_B;
   input_.state.X_WB = {odometry_.X_WB.R, odometry_.X_WB.p};
   input_.state.v_WB = odometry_.v_WB;
+  measured_ = input_.state;
+  const Eigen::Quaterniond& tilted = reading_.state.X_WB.R;
+  measured_.X_WB.R = yaw_rotation(yaw_of(odometry_.X_WB.R) - yaw_of(tilted)) * tilted;
   input_.odometry = level_of(now - next_.odometry_at, setup_.rules.odometry) < StopLevel::kHold;
   const bool person = level_of(now - next_.person_at, setup_.rules.person) < StopLevel::kHold;
   input_.person = person ? &person_.joints : nullptr;
@@ -233,11 +237,39 @@ void RobotGuard::command(double now) {
   const MotionCommand* received = planner_is_new_ ? &planner_.command : nullptr;
   limiter_.tick(received, input_, limiter_state_, status_.limited, status_.clamps);
   planner_is_new_ = false;
+  walk(planned);
   if (!planned) return;
   for (const int joint : setup_.limiter.executed.joints) {
     joints_.q_target[joint] = status_.limited.q[joint];
     joints_.kp[joint] = status_.limited.kp[joint];
     joints_.kd[joint] = status_.limited.kd[joint];
+  }
+}
+
+// From when it stands until it is damped, 50 times a second; the velocity has passed the limiter.
+void RobotGuard::walk(bool planned) {
+  const bool was_walking = walks_;
+  walks_ = walker_ != nullptr && (planned || (status_.order.stands && next_.stands));
+  if (!walks_) return;
+  if (!was_walking) {
+    walker_->begin(measured_);
+    ticks_to_step_ = 0;
+  }
+  if (ticks_to_step_-- > 0) return keep_walking();
+  ticks_to_step_ = static_cast<int>(std::lround(kWalkerPeriod / setup_.limiter.dt)) - 1;
+  const VelocityCommand stand{0.0, 0.0, 0.0, setup_.limiter.limits.height};
+  walker_joints_ = &walker_->update(measured_, planned ? status_.limited.root : stand, joints_.q_target);
+  keep_walking();
+}
+
+// The stance is written anew every tick: what the walker said last stands.
+void RobotGuard::keep_walking() {
+  for (int joint = 0; joint < kG1Motors; ++joint) {
+    if (limiter_.executes(joint)) continue;
+    joints_.q_target[joint] = walker_joints_->q_target[joint];
+    joints_.kp[joint] = walker_joints_->kp[joint];
+    joints_.kd[joint] = walker_joints_->kd[joint];
+    joints_.tau_ff[joint] = walker_joints_->tau_ff[joint];
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <functional>
+#include <optional>
 
 #include "duet/hardware/arming.h"
 #include "duet/hardware/battery.h"
@@ -13,6 +14,7 @@
 #include "duet/hardware/limiter.h"
 #include "duet/hardware/odometry.h"
 #include "duet/hardware/safety_machine.h"
+#include "duet/hardware/walker.h"
 
 namespace duet {
 
@@ -32,6 +34,7 @@ struct PlannerMessage {
   std::uint64_t sequence = 0;
   MotionCommand command;
   bool acting = false;
+  std::optional<Pose> goal = {};  // of the root, in the frame of odometry: what the velocity leads to; for the log
 };
 
 // The partner's joints in the frame of odometry, as somebody estimated them.
@@ -75,6 +78,9 @@ class RobotGuard {
   void executor_heard(double at) { next_.executor_at = at; }
   // The operator has armed: arming_refusal() was empty. Ignored in a dry run.
   void arm();
+  // Legs and waist are the walker's from when the robot stands until it is damped; without one they keep the stance.
+  // Refers to it. Before the first tick.
+  void let_walk(Walker& walker) { walker_ = &walker; }
   // As the stop key does, at the next tick.
   void stop() { stop_asked_ = true; }
 
@@ -84,6 +90,14 @@ class RobotGuard {
   [[nodiscard]] const RobotReading& reading() const { return reading_; }
   [[nodiscard]] const LimiterInput& limiter_input() const { return input_; }
   [[nodiscard]] const MotionCommand& planned() const { return planner_.command; }
+  [[nodiscard]] const PlannerMessage& planner() const { return planner_; }
+  [[nodiscard]] const OdometrySample& odometry() const { return odometry_; }
+  // Place, speed and heading of odometry, tilt of the IMU, joints of the motors.
+  [[nodiscard]] const RobotState& measured() const { return measured_; }
+  [[nodiscard]] const JointCommand& joints() const {
+    return joints_;
+  }  // of the last tick: what is sent while it stands
+  [[nodiscard]] const GuardSetup& setup() const { return setup_; }
 
  private:
   void read_states(double now);
@@ -91,6 +105,8 @@ class RobotGuard {
   void check_robot();
   void follow_stance();
   void command(double now);
+  void walk(bool planned);
+  void keep_walking();
   void restart_limiter(bool planned);
   void send();
   [[nodiscard]] bool hands_are_clear() const;
@@ -110,12 +126,17 @@ class RobotGuard {
   BatteryReading battery_;
   double battery_at_ = kNever;
   RobotReading reading_;
+  RobotState measured_;
   std::vector<AxisState> stance_;  // of all joints, on the way to the stance
   JointCommand joints_;
   SafetyMemory safety_;
   SafetyInput next_;
   bool armed_ = false, was_planned_ = false, stop_asked_ = false;
   int ticks_to_writers_ = 0;
+  Walker* walker_ = nullptr;
+  const JointCommand* walker_joints_ = nullptr;
+  bool walks_ = false;
+  int ticks_to_step_ = 0;
   GuardStatus status_;
 };
 

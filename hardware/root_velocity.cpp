@@ -5,8 +5,8 @@
 namespace duet {
 namespace {
 
-VelocityInterface interface_of(const HardwareLimits& limits) {
-  return {.forward = {-limits.backward, limits.forward, 0.0},
+VelocityInterface interface_of(const HardwareLimits& limits, double steps_from) {
+  return {.forward = {-limits.backward, limits.forward, steps_from},
           .lateral = {-limits.lateral, limits.lateral, 0.0},
           .yaw = {-limits.yaw_rate, limits.yaw_rate, 0.0},
           .height = {limits.height - limits.height_range, limits.height + limits.height_range, 0.0},
@@ -19,8 +19,8 @@ bool is_finite(const OdometrySample& sample) {
 
 }  // namespace
 
-RootVelocity::RootVelocity(OdometrySource source, const HardwareLimits& limits)
-    : conversion_(RootConversionLaw::kAdopted, interface_of(limits)), height_(limits.height) {
+RootVelocity::RootVelocity(OdometrySource source, const HardwareLimits& limits, double steps_from)
+    : conversion_(RootConversionLaw::kAdopted, interface_of(limits, steps_from)), height_(limits.height) {
   require(source != OdometrySource::kNone,
           "root velocity: expected a source of odometry (legs, external, vendor, twin), found none: supplement A.4.3 "
           "needs the measured place and speed of the root");

@@ -11,7 +11,9 @@ namespace duet {
 class RootVelocity {
  public:
   // Throws std::invalid_argument where nobody measures place and speed of the root (OdometrySource::kNone).
-  RootVelocity(OdometrySource source, const HardwareLimits& limits);
+  // `steps_from`: the least forward speed that the walking controller answers by a step [m/s]; nothing slower than it
+  // is asked for where the limit allows it.
+  RootVelocity(OdometrySource source, const HardwareLimits& limits, double steps_from = 0.0);
 
   void reset() { conversion_.reset(); }
   // `reference`: pose of the root in the frame of odometry. Where the sample is invalid, not finite or older than

@@ -18,7 +18,6 @@ namespace {
 
 constexpr std::size_t kSlots = 4096;  // of the ring: 8 s of ticks
 constexpr std::uint16_t kSetupChannel = 1, kTickChannel = 2, kFrameChannel = 3, kEventChannel = 4, kStateChannel = 5;
-constexpr const char* kTickEncoding = "duet.tick/1";
 constexpr unsigned char kCdrHead[4] = {0, 1, 0, 0};  // little-endian
 
 const McapChannel kChannels[] = {
@@ -53,6 +52,11 @@ void get(const double (&from)[N], Eigen::VectorXd& to) {
 void put_root(const VelocityCommand& root, double (&to)[4]) {
   const double values[4] = {root.forward, root.lateral, root.yaw_rate, root.height};
   std::copy_n(values, 4, to);
+}
+
+void put_pose(const Pose& pose, double (&to)[7]) {
+  std::copy_n(pose.p.data(), 3, to);
+  std::copy_n(pose.R.coeffs().data(), 4, to + 3);
 }
 
 std::uint64_t flag_if(bool set, TickFlag flag) { return set ? static_cast<std::uint64_t>(flag) : 0; }
@@ -109,9 +113,9 @@ TickRecord record_of(const RobotGuard& guard) {
   r.now = status.input.now;
   r.flags = flag_if(input.odometry, kTickOdometry) | flag_if(input.person != nullptr, kTickPerson) |
             flag_if(input.acting, kTickActing) | flag_if(input.release, kTickRelease) |
-            flag_if(status.received, kTickReceived) | flag_if(status.restarted, kTickRestarted);
-  std::copy_n(input.state.X_WB.p.data(), 3, r.root_pose);
-  std::copy_n(input.state.X_WB.R.coeffs().data(), 4, r.root_pose + 3);
+            flag_if(status.received, kTickReceived) | flag_if(status.restarted, kTickRestarted) |
+            flag_if(guard.planner().goal.has_value(), kTickGoal);
+  put_pose(input.state.X_WB, r.root_pose);
   std::copy_n(input.state.v_WB.data(), 3, r.root_velocity);
   std::copy_n(input.state.w_WB_B.data(), 3, r.root_gyro);
   put(input.state.q, r.q);
@@ -127,6 +131,8 @@ TickRecord record_of(const RobotGuard& guard) {
   put(status.limited.q, r.sent_q);
   put(status.limited.kp, r.sent_kp);
   put(status.limited.kd, r.sent_kd);
+  if (guard.planner().goal) put_pose(*guard.planner().goal, r.goal);
+  std::copy_n(guard.measured().X_WB.R.coeffs().data(), 4, r.tilt);
   return r;
 }
 

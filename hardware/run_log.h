@@ -26,6 +26,8 @@ struct TickRecord {
   double restart_q[kG1Motors];
   double stamp, asked_root[4], asked_q[kG1Motors];
   double sent_root[4], sent_q[kG1Motors], sent_kp[kG1Motors], sent_kd[kG1Motors];
+  double goal[7];  // of the planner's root, as root_pose; read where kTickGoal
+  double tilt[4];  // the IMU's orientation, quaternion x, y, z, w
 };
 enum TickFlag : std::uint64_t {
   kTickOdometry = 1,
@@ -34,7 +36,9 @@ enum TickFlag : std::uint64_t {
   kTickRelease = 8,
   kTickReceived = 16,
   kTickRestarted = 32,
+  kTickGoal = 64,
 };
+inline constexpr const char* kTickEncoding = "duet.tick/2";
 
 TickRecord record_of(const RobotGuard& guard);
 void read_record(const TickRecord& record, LimiterInput& input, HumanJoints& person, MotionCommand& command);

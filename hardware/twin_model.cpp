@@ -16,9 +16,19 @@ constexpr double kInertia = 0.2;   // of every joint: what its motor and link tu
 constexpr double kFriction = 0.5;  // [N m s/rad]
 
 void check(const TwinOptions& options) {
-  for (const double value : {options.lag, options.delay, options.place_noise, options.speed_noise, options.joint_noise})
+  for (const double value :
+       {options.lag, options.delay, options.place_noise, options.speed_noise, options.joint_noise,
+        options.joint_speed_noise, options.gyro_noise, options.acceleration_noise, options.tilt_noise})
     require(std::isfinite(value) && value >= 0.0, fmt::format("twin: expected numbers of at least 0, found {}", value));
   require(std::isfinite(options.drift), fmt::format("twin: expected a finite drift, found {}", options.drift));
+}
+
+bool is_sane(const LowCommandFrame& frame) {
+  for (const MotorCommandFrame& motor : frame.motor)
+    if (!std::isfinite(motor.q) || !std::isfinite(motor.dq) || !std::isfinite(motor.tau) || !std::isfinite(motor.kp) ||
+        !std::isfinite(motor.kd) || motor.kp < 0.0f || motor.kd < 0.0f)
+      return false;
+  return true;
 }
 
 }  // namespace
@@ -34,11 +44,12 @@ TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions&
   v_.setZero(kG1Motors);
   tau_.setZero(kG1Motors);
   asked_.height = X_WB_.p.z();
+  if (!options_.engine.empty()) physics_ = std::make_unique<TwinPhysics>(options_.engine, robot_, kTwinPeriod);
 }
 
 void TwinModel::obey(const LowCommandFrame& frame) {
   const bool whole = frame.crc == checksum_of(frame);
-  if (!whole || frame.mode_machine != options_.mode_machine || frame.mode_pr != kPitchRollMode) {
+  if (!whole || frame.mode_machine != options_.mode_machine || frame.mode_pr != kPitchRollMode || !is_sane(frame)) {
     ++refused_;
     return;
   }
@@ -69,13 +80,47 @@ void TwinModel::step_root(double dt) {
   const double yaw = yaw_of(X_WB_.R) + dt * yaw_rate_;
   X_WB_.p.head<2>() += dt * (Eigen::Rotation2Dd(yaw) * speed_);
   X_WB_.R = yaw_rotation(yaw);
-  drifted_ += dt * options_.drift;
+  v_WB_.head<2>() = Eigen::Rotation2Dd(yaw) * speed_;
+  w_WB_B_.z() = yaw_rate_;
+}
+
+void TwinModel::step_body(double dt) {
+  require(std::abs(dt - physics_->dt()) < 1e-9,
+          fmt::format("twin: expected steps of {} s in an engine, found {}", physics_->dt(), dt));
+  physics_->step(command_);
+  const RobotState& state = physics_->state();
+  q_ = state.q;
+  v_ = state.v;
+  tau_ = physics_->torques();
+  X_WB_ = state.X_WB;
+  v_WB_ = state.v_WB;
+  w_WB_B_ = state.w_WB_B;
+  specific_force_B_ = physics_->specific_force();
+  condition.motor_error = condition.motor_error || physics_->diverged();
 }
 
 void TwinModel::step(double dt) {
   time_ += dt;
+  drifted_ += dt * options_.drift;
+  if (physics_ != nullptr) return step_body(dt);
   step_joints(dt);
   step_root(dt);
+}
+
+void TwinModel::write_imu(ImuFrame& imu) {
+  const Eigen::Vector3d lean(condition.roll + options_.tilt_noise * random_.normal(),
+                             options_.tilt_noise * random_.normal(), 0.0);
+  const double angle = lean.norm();
+  Eigen::Quaterniond R = X_WB_.R;
+  if (angle > 0.0) R = R * Eigen::Quaterniond(Eigen::AngleAxisd(angle, lean / angle));
+  const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
+  for (int k = 0; k < 4; ++k) imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
+  for (int axis = 0; axis < 3; ++axis) {
+    imu.gyroscope[axis] = static_cast<float>(w_WB_B_[axis] + options_.gyro_noise * random_.normal());
+    imu.accelerometer[axis] =
+        static_cast<float>(specific_force_B_[axis] + options_.acceleration_noise * random_.normal());
+  }
+  imu.gyroscope[2] += static_cast<float>(condition.gyro);
 }
 
 void TwinModel::write_state(LowStateFrame& frame) {
@@ -83,17 +128,12 @@ void TwinModel::write_state(LowStateFrame& frame) {
   frame.mode_pr = static_cast<std::uint8_t>(condition.mode_pr);
   frame.mode_machine = static_cast<std::uint8_t>(options_.mode_machine + condition.mode_machine_offset);
   frame.tick = ++tick_;
-  const Eigen::Quaterniond R =
-      X_WB_.R * Eigen::Quaterniond(Eigen::AngleAxisd(condition.roll, Eigen::Vector3d::UnitX()));
-  const double quat_wxyz[4] = {R.w(), R.x(), R.y(), R.z()};
-  for (int k = 0; k < 4; ++k) frame.imu.quaternion[k] = static_cast<float>(quat_wxyz[k]);
-  frame.imu.gyroscope[2] = static_cast<float>(yaw_rate_ + condition.gyro);
-  frame.imu.accelerometer[2] = 9.81f;
+  write_imu(frame.imu);
   for (int j = 0; j < kG1Motors; ++j) {
     MotorStateFrame& motor = frame.motor[j];
     motor.mode = command_.motor[j].mode;
     motor.q = static_cast<float>(q_[j] + options_.joint_noise * random_.normal());
-    motor.dq = static_cast<float>(v_[j] + condition.joint_speed);
+    motor.dq = static_cast<float>(v_[j] + condition.joint_speed + options_.joint_speed_noise * random_.normal());
     motor.tau_est = static_cast<float>(tau_[j]);
     motor.temperature[0] = static_cast<std::int16_t>(condition.casing);
     motor.temperature[1] = static_cast<std::int16_t>(condition.winding);
@@ -107,7 +147,7 @@ OdometrySample TwinModel::odometry(double now) {
   OdometrySample sample{.X_WB = X_WB_, .at = now, .valid = true};
   const Eigen::Vector2d noise(random_.normal(), random_.normal());
   sample.X_WB.p.head<2>() += options_.place_noise * noise + Eigen::Vector2d(drifted_, 0.0);
-  sample.v_WB.head<2>() = Eigen::Rotation2Dd(yaw_of(X_WB_.R)) * speed_;
+  sample.v_WB = v_WB_;
   sample.v_WB.x() += options_.speed_noise * random_.normal();
   return sample;
 }

@@ -1,6 +1,7 @@
 // A stand-in for the robot at its wire: joints that follow their gains, a root that follows a velocity with lag, delay
-// and drift, the remote control. It has no gait and does not fall: it proves protocols, not walking. The same seed and
-// calls give the same frames. One owner, one thread.
+// and drift, the remote control. It has no gait and does not fall: it proves protocols, not walking. With an engine
+// (TwinOptions::engine) its body is simulated instead: what the wire commands is all that holds it up. The same seed
+// and calls give the same frames. One owner, one thread.
 #pragma once
 
 #include <deque>
@@ -11,20 +12,28 @@
 #include "duet/core/random.h"
 #include "duet/hardware/low_level_frame.h"
 #include "duet/hardware/odometry.h"
+#include "duet/hardware/twin_physics.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
 
 struct TwinOptions {
-  double lag = 0.35;         // of the root's speed [s]
-  double delay = 0.1;        // of its command [s]
-  double drift = 0.0;        // of odometry [m/s]
-  double place_noise = 0.0;  // of odometry, standard deviation [m]
-  double speed_noise = 0.0;  // [m/s]
-  double joint_noise = 0.0;  // of the measured angles [rad]
+  double lag = 0.35;                // of the root's speed [s]
+  double delay = 0.1;               // of its command [s]
+  double drift = 0.0;               // of odometry [m/s]
+  double place_noise = 0.0;         // of odometry, standard deviation [m]
+  double speed_noise = 0.0;         // [m/s]
+  double joint_noise = 0.0;         // of the measured angles [rad]
+  double joint_speed_noise = 0.0;   // [rad/s]
+  double gyro_noise = 0.0;          // [rad/s]
+  double acceleration_noise = 0.0;  // [m/s^2]
+  double tilt_noise = 0.0;          // of the IMU's orientation, about its x and y [rad]
   int mode_machine = 5;
   std::uint64_t seed = 1;
+  std::string engine;  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
 };
+
+inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]
 
 // What a script may change.
 struct TwinCondition {
@@ -40,21 +49,28 @@ struct TwinCondition {
 
 class TwinModel {
  public:
-  // Throws std::invalid_argument for a robot without the G1's motors, and for an option that is negative or not finite.
+  // Throws std::invalid_argument for a robot without the G1's motors, and for an option that is negative or not finite;
+  // as make_backend for an engine.
   TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options);
 
-  // A frame with a wrong checksum, or for another robot, is counted and not obeyed.
+  // A frame with a wrong checksum, for another robot, with numbers that are not finite or gains below 0 is counted and
+  // not obeyed.
   void obey(const LowCommandFrame& frame);
   void obey(const VelocityCommand& velocity) { asked_ = velocity; }
+  // Throws std::invalid_argument for another dt than the engine's.
   void step(double dt);
   void write_state(LowStateFrame& frame);  // with the next tick
   [[nodiscard]] OdometrySample odometry(double now);
 
   RemoteControl remote{.heard = true};
   TwinCondition condition;
+  [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] const Eigen::VectorXd& q() const { return q_; }
   [[nodiscard]] const Pose& root() const { return X_WB_; }
-  [[nodiscard]] double root_speed() const { return speed_.norm(); }
+  [[nodiscard]] double time() const { return time_; }              // stepped so far [s]
+  [[nodiscard]] TwinPhysics* physics() { return physics_.get(); }  // null: first-order
+  [[nodiscard]] double root_speed() const { return v_WB_.head<2>().norm(); }
+  [[nodiscard]] std::uint32_t tick() const { return tick_; }  // of the last state written
   [[nodiscard]] long refused_frames() const { return refused_; }
   [[nodiscard]] long obeyed_frames() const { return obeyed_; }
   [[nodiscard]] const LowCommandFrame& last_command() const { return command_; }
@@ -62,14 +78,20 @@ class TwinModel {
  private:
   void step_joints(double dt);
   void step_root(double dt);
+  void step_body(double dt);
+  void write_imu(ImuFrame& imu);
 
   std::shared_ptr<const RobotModel> robot_;
   TwinOptions options_;
   Random random_;
   Eigen::VectorXd q_, v_, tau_;
   Pose X_WB_;
-  Eigen::Vector2d speed_ = Eigen::Vector2d::Zero();  // in the heading frame [m/s]
+  Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero();           // [m/s]
+  Eigen::Vector3d w_WB_B_ = Eigen::Vector3d::Zero();         // [rad/s]
+  Eigen::Vector3d specific_force_B_ = {0.0, 0.0, kGravity};  // [m/s^2]
+  Eigen::Vector2d speed_ = Eigen::Vector2d::Zero();          // asked for and lagging, in the heading frame [m/s]
   double yaw_rate_ = 0.0, drifted_ = 0.0, time_ = 0.0;
+  std::unique_ptr<TwinPhysics> physics_;
   VelocityCommand asked_;
   struct LateCommand {
     double at;

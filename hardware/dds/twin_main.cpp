@@ -2,7 +2,8 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
@@ -11,17 +12,16 @@
 #include "duet/hardware/datagram_socket.h"
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/lcm_message.h"
+#include "duet/hardware/lock_step.h"
 #include "duet/hardware/twin_fault.h"
+#include "duet/hardware/twin_operator.h"
 
 namespace {
 
 using namespace duet;  // a program of its own
 
-constexpr double kPeriod = 0.002;   // of states [s]
-constexpr int kWritersEvery = 50;   // ticks
-constexpr double kDampedFor = 0.5;  // until the scripted operator stands it up [s]
-constexpr double kStoodFor = 2.0;   // until it is told to run [s]
-constexpr double kPressed = 0.1;    // [s]
+constexpr int kWritersEvery = 50;  // ticks
+constexpr double kPressed = 0.1;   // [s]
 volatile std::sig_atomic_t stopped = 0;
 
 struct TwinArguments {
@@ -30,35 +30,7 @@ struct TwinArguments {
   std::vector<std::string> faults;
   double seconds = 0.0;
   std::uint16_t velocity_port = 0;
-  bool operated = false, presses = false;
-};
-
-// The operator of a demonstration: holds the dead-man switch, stands the robot up once it is damped, then runs it.
-class ScriptedOperator {
- public:
-  void tick(double time, TwinModel& twin) {
-    std::uint16_t keys = bit(RemoteKey::kR1);
-    const MotorCommandFrame& motor = twin.last_command().motor[0];
-    const bool damped = motor.mode == 1 && motor.kp == 0.0f, held = motor.mode == 1 && motor.kp > 0.0f;
-    if (!damped) damped_since_ = time;
-    if (!held) held_since_ = time;
-    if (!stood_ && time - damped_since_ > kDampedFor) press(RemoteKey::kStart, time, stood_);
-    if (stood_ && !ran_ && time - held_since_ > kStoodFor) press(RemoteKey::kA, time, ran_);
-    if (time < until_) keys |= bit(pressed_);
-    twin.remote.keys = keys;
-  }
-
- private:
-  static std::uint16_t bit(RemoteKey key) { return static_cast<std::uint16_t>(1u << static_cast<int>(key)); }
-  void press(RemoteKey key, double time, bool& done) {
-    pressed_ = key;
-    until_ = time + kPressed;
-    done = true;
-  }
-
-  double damped_since_ = 0.0, held_since_ = 0.0, until_ = 0.0;
-  RemoteKey pressed_ = RemoteKey::kStart;
-  bool stood_ = false, ran_ = false;
+  bool operated = false, presses = false, lock_step = false;
 };
 
 // The same by the clock alone, for programs that command the motors before anybody has armed: R1 held, start and A in
@@ -81,43 +53,104 @@ void take_velocity(DatagramSocket& socket, TwinModel& twin) {
 }
 
 struct TwinTotals {
-  long states = 0;
+  long states = 0, answered = 0;
   int most_writers = 0;
+  double latest = 0.0;  // by which a state left [s]
 };
 
-TwinTotals run(const TwinArguments& arguments, TwinModel& twin, DatagramSocket& velocity) {
-  const std::unique_ptr<TwinWire> wire = open_twin_wire(arguments.place);
-  std::vector<TwinFault> faults;
-  for (const std::string& text : arguments.faults) faults.push_back(parse_twin_fault(text));
-  FaultyTwin faulty(twin, faults, arguments.options.seed);
-  ScriptedOperator scripted;
-  TwinTotals totals;
-  fmt::print("twin: domain {} on {}, velocity at port {}, seed {}\n", arguments.place.domain, arguments.place.interface,
-             velocity.port(), arguments.options.seed);
-  std::fflush(stdout);
-  auto next = std::chrono::steady_clock::now();
-  LowCommandFrame command;
-  LowStateFrame state;
-  for (long tick = 1; stopped == 0 && (arguments.seconds <= 0.0 || tick * kPeriod <= arguments.seconds); ++tick) {
-    const double time = static_cast<double>(tick) * kPeriod;
-    while (wire->take(command)) twin.obey(command);
-    take_velocity(velocity, twin);
-    if (arguments.operated) scripted.tick(time, twin);
-    if (arguments.presses) press_in_turn(time, twin);
-    twin.step(kPeriod);
-    if (faulty.next_state(time, state)) {
-      wire->write(state);
-      ++totals.states;
+// The twin at its wire: a state every 2 ms, or one for every command.
+class WiredTwin {
+ public:
+  WiredTwin(const TwinArguments& arguments, TwinModel& twin, DatagramSocket& velocity)
+      : arguments_(arguments),
+        twin_(twin),
+        velocity_(velocity),
+        wire_(open_twin_wire(arguments.place)),
+        faulty_(twin, faults_of(arguments), arguments.options.seed),
+        lock_step_(*wire_) {}
+
+  TwinTotals run() {
+    auto next = std::chrono::steady_clock::now();
+    for (long tick = 1; stopped == 0 && !over(tick); ++tick) {
+      if (step(tick) && arguments_.lock_step &&
+          lock_step_.await(state_, [&](const auto& frame) { twin_.obey(frame); })) {
+        ++totals_.answered;
+        next = std::chrono::steady_clock::now();
+        continue;
+      }
+      next += std::chrono::microseconds(2000);
+      const double late = std::chrono::duration<double>(std::chrono::steady_clock::now() - next).count();
+      totals_.latest = std::max(totals_.latest, late);
+      std::this_thread::sleep_until(next);
     }
-    wire->write(twin.odometry(time));
-    if (tick % kWritersEvery == 0) {
-      totals.most_writers = std::max(totals.most_writers, wire->command_writers());
-      wire->write(BatteryReading{.charge = twin.condition.charge});
-    }
-    next += std::chrono::microseconds(2000);
-    std::this_thread::sleep_until(next);
+    return totals_;
   }
-  return totals;
+
+ private:
+  static std::vector<TwinFault> faults_of(const TwinArguments& arguments) {
+    std::vector<TwinFault> faults;
+    for (const std::string& text : arguments.faults) faults.push_back(parse_twin_fault(text));
+    return faults;
+  }
+  [[nodiscard]] bool over(long tick) const {
+    return arguments_.seconds > 0.0 && static_cast<double>(tick) * kTwinPeriod > arguments_.seconds;
+  }
+  // Whether a state left.
+  bool step(long tick) {
+    const double time = static_cast<double>(tick) * kTwinPeriod;
+    while (wire_->take(command_)) twin_.obey(command_);
+    take_velocity(velocity_, twin_);
+    if (arguments_.operated) operator_.tick(time, twin_);
+    if (arguments_.presses) press_in_turn(time, twin_);
+    twin_.step(kTwinPeriod);
+    wire_->write(twin_.odometry(time));
+    const bool leaves = faulty_.next_state(time, state_);
+    if (leaves) wire_->write(state_);
+    totals_.states += leaves ? 1 : 0;
+    if (tick % kWritersEvery == 0) {
+      totals_.most_writers = std::max(totals_.most_writers, wire_->command_writers());
+      wire_->write(BatteryReading{.charge = twin_.condition.charge});
+    }
+    return leaves;
+  }
+
+  const TwinArguments& arguments_;
+  TwinModel& twin_;
+  DatagramSocket& velocity_;
+  std::unique_ptr<TwinWire> wire_;
+  FaultyTwin faulty_;
+  LockStepTwin lock_step_;
+  TwinOperator operator_;
+  TwinTotals totals_;
+  LowCommandFrame command_{};
+  LowStateFrame state_{};
+};
+
+void add_options(CLI::App& app, TwinArguments& arguments) {
+  TwinOptions& options = arguments.options;
+  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199")->required();
+  app.add_option("--seconds", arguments.seconds, "for which it runs; 0: until it is stopped");
+  app.add_option("--seed", options.seed, "of its noise");
+  app.add_option("--physics", options.engine, "engine that simulates its body (mujoco, ...); without: first-order");
+  app.add_flag("--lock-step", arguments.lock_step, "each step waits for the command that answers the last state");
+  app.add_option("--lag", options.lag, "of the first-order root [s]");
+  app.add_option("--delay", options.delay, "of the first-order root's command [s]");
+  app.add_option("--drift", options.drift, "of odometry [m/s]");
+  app.add_option("--place-noise", options.place_noise, "of odometry [m]");
+  app.add_option("--speed-noise", options.speed_noise, "of odometry [m/s]");
+  app.add_option("--joint-noise", options.joint_noise, "of measured angles [rad]");
+  app.add_option("--joint-speed-noise", options.joint_speed_noise, "of measured speeds of joints [rad/s]");
+  app.add_option("--gyro-noise", options.gyro_noise, "of the IMU [rad/s]");
+  app.add_option("--acceleration-noise", options.acceleration_noise, "of the IMU [m/s^2]");
+  app.add_option("--tilt-noise", options.tilt_noise, "of the IMU's orientation [rad]");
+  app.add_option("--mode-machine", options.mode_machine, "that it reports");
+  app.add_option("--velocity-port", arguments.velocity_port, "UDP port of 127.0.0.1 for velocities; 0: any");
+  app.add_option("--fault", arguments.faults, "KIND@BEGIN:END=VALUE, for example drop@3:5=100")
+      ->allow_extra_args(false);
+  app.add_flag("--operated", arguments.operated,
+               "an operator holds the dead-man switch, stands it up, lets it down and runs it");
+  app.add_flag("--presses", arguments.presses,
+               "an operator holds the dead-man switch and presses start and A in turn");
 }
 
 }  // namespace
@@ -125,29 +158,29 @@ TwinTotals run(const TwinArguments& arguments, TwinModel& twin, DatagramSocket& 
 int main(int argc, char** argv) {
   TwinArguments arguments;
   CLI::App app(
-      "A stand-in for a Unitree G1 on its wire: joints that follow, a root with lag and delay, faults by script. It "
-      "has no gait.");
-  app.add_option("--domain", arguments.place.domain, "of DDS, 100 to 199")->required();
-  app.add_option("--seconds", arguments.seconds, "for which it runs; 0: until it is stopped");
-  app.add_option("--seed", arguments.options.seed, "of its noise");
-  app.add_option("--lag", arguments.options.lag, "of the root [s]");
-  app.add_option("--delay", arguments.options.delay, "of the root's command [s]");
-  app.add_option("--drift", arguments.options.drift, "of odometry [m/s]");
-  app.add_option("--place-noise", arguments.options.place_noise, "of odometry [m]");
-  app.add_option("--velocity-port", arguments.velocity_port, "UDP port of 127.0.0.1 for velocities; 0: any");
-  app.add_option("--fault", arguments.faults, "KIND@BEGIN:END=VALUE, for example drop@3:5=100")
-      ->allow_extra_args(false);
-  app.add_flag("--operated", arguments.operated, "an operator holds the dead-man switch, stands it up and runs it");
-  app.add_flag("--presses", arguments.presses, "an operator holds the dead-man switch and presses start and A in turn");
+      "A stand-in for a Unitree G1 on its wire: joints that follow, a root with lag and delay, faults by script; with "
+      "--physics a body in an engine, which only the wire's commands hold up.");
+  add_options(app, arguments);
   CLI11_PARSE(app, argc, argv);
   std::signal(SIGINT, [](int) { stopped = 1; });
   std::signal(SIGTERM, [](int) { stopped = 1; });
   try {
     TwinModel twin(load_shared_robot(), arguments.options);
     DatagramSocket velocity = DatagramSocket::at_port(arguments.velocity_port);
-    const TwinTotals totals = run(arguments, twin, velocity);
-    fmt::print("twin: {} states sent, {} commands obeyed, {} refused, {} writers of commands seen at most\n",
-               totals.states, twin.obeyed_frames(), twin.refused_frames(), totals.most_writers);
+    ask_for_sharp_timers();
+    WiredTwin wired(arguments, twin, velocity);
+    fmt::print("twin: domain {} on {}, velocity at port {}, seed {}, {}, {}\n", arguments.place.domain,
+               arguments.place.interface, velocity.port(), arguments.options.seed,
+               twin.physics() != nullptr ? arguments.options.engine : "first-order",
+               arguments.lock_step ? "in lock-step" : "500 Hz");
+    std::fflush(stdout);
+    const TwinTotals totals = wired.run();
+    fmt::print(
+        "twin: {} states sent ({} answered in lock-step, the latest {:.1f} ms late), {} commands obeyed, {} refused, "
+        "{} "
+        "writers of commands seen at most\n",
+        totals.states, totals.answered, 1e3 * totals.latest, twin.obeyed_frames(), twin.refused_frames(),
+        totals.most_writers);
     return 0;
   } catch (const std::exception& error) {
     fmt::print(stderr, "duet-g1-twin: {}\n", error.what());

@@ -1,0 +1,119 @@
+#include "duet/hardware/lock_step.h"
+
+#include <sys/prctl.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "duet/hardware/frame_checksum.h"
+
+namespace duet {
+namespace {
+
+constexpr auto kStepLook = std::chrono::microseconds(20);
+constexpr double kResendAfter = 0.02;  // [s] of the wall, as all here
+constexpr double kGiveUpAfter = 10.0;
+constexpr double kPlannerPatience = 5.0;
+constexpr double kTwinPatience = 0.2;
+constexpr int kMostSilent = 5;  // states that did not come in time, until the twin counts as gone
+
+void wait_a_moment() { std::this_thread::sleep_for(kStepLook); }
+
+}  // namespace
+
+void ask_for_sharp_timers() { (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
+
+bool LockStepWire::wait(double seconds) {
+  const double begin = monotonic_seconds();
+  LowStateFrame frame;
+  while (!waits_ && monotonic_seconds() - begin < seconds) {
+    if (!wire_.take(frame)) {
+      wait_a_moment();
+      continue;
+    }
+    if (frame.tick == tick_ && tick_ != 0) {
+      if (answered_) (void)wire_.write(answer_);
+      continue;
+    }
+    state_ = frame;
+    tick_ = frame.tick;
+    waits_ = true;
+    answered_ = false;
+  }
+  return waits_;
+}
+
+bool LockStepWire::take(LowStateFrame& frame) {
+  if (!waits_) return false;
+  waits_ = false;
+  frame = state_;
+  return true;
+}
+
+void LockStepWire::close_writer() {
+  answered_ = false;
+  wire_.close_writer();
+}
+
+bool LockStepWire::write(const LowCommandFrame& frame) {
+  answer_ = frame;
+  answer_.reserve[0] = tick_;
+  answer_.crc = checksum_of(answer_);
+  answered_ = wire_.write(answer_);
+  return answered_;
+}
+
+void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocket* planner, double period,
+                            const LockStepCallbacks& callbacks) {
+  GuardMessage message;
+  OdometrySample odometry;
+  double now = 0.0;
+  bool reported = false;
+  int silent = 0;
+  do {
+    const bool came = wire.wait(silent < kMostSilent ? kTwinPatience : period);
+    silent = came ? 0 : silent + 1;
+    // Without a state time goes on all the same, so that the state machine notices.
+    now = came ? std::max(wire.time(), now + 0.5 * period) : now + period;
+    if (planner != nullptr) {
+      const double begin = monotonic_seconds();
+      bool planned = take_messages(*planner, guard, message, now);
+      while (reported && !planned && monotonic_seconds() - begin < kPlannerPatience) {
+        wait_a_moment();
+        planned = take_messages(*planner, guard, message, now);
+      }
+    }
+    if (wire.take(odometry)) {
+      odometry.at = now;
+      guard.receive(odometry);
+    }
+    guard.tick(now);
+    reported = callbacks.report && callbacks.report();
+  } while (callbacks.go_on(now));
+}
+
+bool LockStepTwin::await(const LowStateFrame& state, const std::function<void(const LowCommandFrame&)>& obey) {
+  LowCommandFrame command;
+  double sent_at = monotonic_seconds();
+  const double begin = sent_at;
+  do {
+    while (wire_.take(command)) {
+      locked_ = locked_ || (command.reserve[0] != 0 && command.crc == checksum_of(command));
+      obey(command);
+      if (command.reserve[0] == state.tick) return true;
+    }
+    if (!locked_) return false;
+    wait_a_moment();
+    const double now = monotonic_seconds();
+    if (now - sent_at > kResendAfter) {
+      locked_ = wire_.command_writers() > 0 && now - begin < kGiveUpAfter;
+      wire_.write(state);
+      sent_at = now;
+      ++resent_;
+    }
+  } while (locked_);
+  return false;
+}
+
+}  // namespace duet

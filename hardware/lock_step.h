@@ -1,0 +1,70 @@
+// Guard and twin in lock-step: the twin takes its next step when the command for the last one has come, and the guard's
+// clock is the twin's. The tick travels in the command's first reserved word, which is 0 on a robot's wire. On a
+// machine that is busy with other things an episode is then the same as on one that is not; nothing here holds a
+// robot's time.
+#pragma once
+
+#include <functional>
+
+#include "duet/hardware/guard_loop.h"
+
+namespace duet {
+
+// A twin's wire on the guard's side. A state that comes again was not answered, or the answer was lost: the last
+// command is sent again. One owner, one thread.
+class LockStepWire final : public RobotWire {
+ public:
+  explicit LockStepWire(RobotWire& wire) : wire_(wire) {}
+
+  // Waits for the twin's next state, for at most so long [s]; false where none came.
+  bool wait(double seconds) override;
+  // Of the twin, at the state that came last [s].
+  [[nodiscard]] double time() const { return static_cast<double>(tick_) * 0.002; }
+
+  bool take(LowStateFrame& frame) override;
+  bool take(OdometrySample& sample) override { return wire_.take(sample); }
+  bool take(BatteryReading& reading) override { return wire_.take(reading); }
+  int foreign_writers() override { return wire_.foreign_writers(); }
+  void open_writer() override { wire_.open_writer(); }
+  void close_writer() override;
+  [[nodiscard]] bool has_writer() const override { return wire_.has_writer(); }
+  bool write(const LowCommandFrame& frame) override;
+
+ private:
+  RobotWire& wire_;
+  LowStateFrame state_{};
+  LowCommandFrame answer_{};
+  bool waits_ = false, answered_ = false;  // a state is there to be taken; `answer_` is to the last one
+  std::uint32_t tick_ = 0;
+};
+
+// As run_guard does, by the twin's clock: a tick for every state. After each report (kReportEvery ticks, `report` says
+// whether one went out) it waits for the planner's message, so that a slow planner costs nothing.
+struct LockStepCallbacks {
+  std::function<bool(double now)> go_on;  // after each tick
+  std::function<bool()> report = {};      // after each tick
+};
+void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocket* planner, double period,
+                            const LockStepCallbacks& callbacks);
+
+// The twin's side: whether the command that answers its last state has come, or nobody answers. One owner, one thread.
+class LockStepTwin {
+ public:
+  explicit LockStepTwin(TwinWire& wire) : wire_(wire) {}
+  // After `state` was written: takes commands, handing each new one to `obey`, until its answer is there. It writes the
+  // state again where none comes, and gives up after ten seconds or where nobody writes commands any more: then the
+  // twin is on its own, at the wall's pace.
+  // False where nobody answers in lock-step (yet, or any more).
+  bool await(const LowStateFrame& state, const std::function<void(const LowCommandFrame&)>& obey);
+  [[nodiscard]] long resent() const { return resent_; }
+
+ private:
+  TwinWire& wire_;
+  bool locked_ = false;
+  long resent_ = 0;
+};
+
+// Timers of this thread wake up on time, as far as the scheduler lets them; nothing where the kernel refuses.
+void ask_for_sharp_timers();
+
+}  // namespace duet

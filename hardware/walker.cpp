@@ -1,0 +1,82 @@
+#include "duet/hardware/walker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "duet/controllers/guard.h"
+#include "duet/controllers/published.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/clock.h"
+#include "duet/core/require.h"
+
+namespace duet {
+namespace {
+
+// How far the root that is followed may be ahead of the measured one: what a robot that is held back would make up for
+// once it is free again.
+constexpr double kMostLead = 0.25;     // [m]
+constexpr double kMostTurnLead = 0.4;  // [rad]
+
+bool has_descriptor(const std::string& controller) {
+  return controller != "wbc_sim" && controller != "vmc" && controller != "pd";
+}
+
+}  // namespace
+
+double least_step_speed(const std::string& controller) {
+  if (!has_descriptor(controller)) return 0.0;
+  const Descriptor descriptor = load_descriptor(controller);
+  return descriptor.command ? descriptor.command->forward.steps_from : 0.0;
+}
+
+Walker::Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot)
+    : name_(controller), robot_(std::move(robot)) {
+  const ControllerInfo info = controller_info(controller);
+  require(info.walks, fmt::format("walker: expected a controller that walks, found '{}'", controller));
+  check_controller_options(info, options);
+  steps_from_ = least_step_speed(controller);
+  if (has_descriptor(controller) && load_descriptor(controller).command) {
+    told_ = std::make_shared<VelocityCommand>();
+    controller_ = make_guarded(make_told(controller, robot_, options, told_), robot_);
+  }
+  if (controller_ == nullptr) controller_ = make_controller(controller, robot_, options);
+  command_ = robot_->default_command(robot_->neutral);
+  reference_.q = robot_->neutral;
+}
+
+void Walker::begin(const RobotState& state) {
+  controller_->reset(state);
+  yaw_ = yaw_of(state.X_WB.R);
+  reference_.X_WB = {yaw_rotation(yaw_), state.X_WB.p};
+  command_ = robot_->default_command(state.q);
+}
+
+// The root that is followed moves at the velocity, never far from the measured one.
+void Walker::lead(const RobotState& state, const VelocityCommand& velocity) {
+  Eigen::Vector2d place = reference_.X_WB.p.head<2>();
+  place += kTick * (Eigen::Rotation2Dd(yaw_) * Eigen::Vector2d(velocity.forward, velocity.lateral));
+  const Eigen::Vector2d ahead = place - state.X_WB.p.head<2>();
+  if (ahead.norm() > kMostLead) place = state.X_WB.p.head<2>() + kMostLead * ahead.normalized();
+  const double measured = yaw_of(state.X_WB.R);
+  const double turn = std::remainder(yaw_ + kTick * velocity.yaw_rate - measured, 2.0 * std::numbers::pi);
+  yaw_ = measured + std::clamp(turn, -kMostTurnLead, kMostTurnLead);
+  reference_.X_WB.p = {place.x(), place.y(), velocity.height};
+  reference_.X_WB.R = yaw_rotation(yaw_);
+}
+
+const JointCommand& Walker::update(const RobotState& state, const VelocityCommand& velocity, const Eigen::VectorXd& q) {
+  lead(state, velocity);
+  if (told_ != nullptr) *told_ = velocity;
+  reference_.q = robot_->neutral;
+  for (const std::vector<int>& arm : robot_->roles.arms)
+    for (const int joint : arm) reference_.q[joint] = q[joint];
+  controller_->act(state, reference_, command_);
+  for (int j = 0; j < robot_->dof(); ++j)
+    command_.q_target[j] = std::clamp(command_.q_target[j], robot_->joints[j].lower, robot_->joints[j].upper);
+  return command_;
+}
+
+}  // namespace duet

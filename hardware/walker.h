@@ -1,0 +1,48 @@
+// What keeps a robot on its feet that we command joint by joint: a walking controller of controllers/, told the
+// velocity that came out of the limiter. Those made from a descriptor with a `command` (HOMIE) are told it as it is;
+// others (WBC-Sim) follow a root that moves at it. It moves what the limiter does not: legs and waist. One owner, one
+// thread.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "duet/controllers/controller.h"
+#include "duet/controllers/root_conversion.h"
+
+namespace duet {
+
+// The least forward speed that a controller answers by a step, as its descriptor says it; 0 where it has none [m/s].
+double least_step_speed(const std::string& controller);
+
+class Walker {
+ public:
+  // Throws as make_controller; std::invalid_argument for a controller that does not walk.
+  Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot);
+
+  // Begins in `state`, standing.
+  void begin(const RobotState& state);
+  // 50 times a second. `q`: what the joints are sent now; of those that it does not move it is the reference. Each
+  // target is inside its joint's limits. Valid until the next call; no allocation after the first.
+  const JointCommand& update(const RobotState& state, const VelocityCommand& velocity, const Eigen::VectorXd& q);
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  // The least forward speed that it answers by a step [m/s].
+  [[nodiscard]] double steps_from() const { return steps_from_; }
+  [[nodiscard]] ControllerFaults faults() const { return controller_->faults(); }
+
+ private:
+  void lead(const RobotState& state, const VelocityCommand& velocity);
+
+  std::string name_;
+  double steps_from_ = 0.0;
+  std::shared_ptr<const RobotModel> robot_;
+  std::shared_ptr<VelocityCommand> told_;  // null: the root that moves is what it follows
+  std::unique_ptr<Controller> controller_;
+  Reference reference_;
+  double yaw_ = 0.0;  // of the reference's root
+  JointCommand command_;
+};
+
+}  // namespace duet
