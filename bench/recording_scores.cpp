@@ -7,6 +7,7 @@
 
 #include "duet/bench/scoring.h"
 #include "duet/core/require.h"
+#include "duet/hardware/log_recording.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/diagnostics.h"
 #include "duet/metrics/onset.h"
@@ -137,6 +138,7 @@ RecordingScore score_recording_file(const std::string& file, const Npz& npz, std
   try {
     if (robot == nullptr) robot = robot_of(episode);
     check_joints(episode.recording, *robot);
+    if (const auto mask = read_executed_mask(npz)) score.executed = executed_mask_text(*mask, *robot);
     if (episode.kept) score_kept(episode, *robot, score);
     score.recording = std::move(episode.recording);
     if (!episode.kept) score.metrics = metrics_of(score.recording, *robot, options.readings);
@@ -152,7 +154,9 @@ RecordingScore score_recording_file(const std::string& file, const Npz& npz, std
 }
 
 std::string recording_text(const RecordingScore& score) {
-  std::string text = identity(score) + metrics_text(score.metrics) + repeat_text(score);
+  std::string text = identity(score);
+  if (!score.executed.empty()) text += fmt::format("executed of the reference: {}\n", score.executed);
+  text += metrics_text(score.metrics) + repeat_text(score);
   if (!score.detectors.empty()) text += "\n" + detectors_table(score.detectors);
   return text;
 }

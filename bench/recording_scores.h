@@ -22,6 +22,7 @@ struct RecordingScore {
   std::vector<DetectorScore> detectors;
   std::optional<EpisodeRow> row;             // of a kept episode, made again
   std::vector<FieldDifference> differences;  // of it from the row that the run wrote
+  std::string executed;                      // of the reference, where a robot's executor left some out; empty: all
 };
 
 // `robot`: null for the shipped one that a kept episode was run on, or else the default one. A kept episode is judged

@@ -9,11 +9,14 @@
 #include <optional>
 #include <random>
 
+#include "duet/bench/cli/hw_episodes.h"
 #include "duet/bench/cli/hw_partner.h"
 #include "duet/core/require.h"
 #include "duet/hardware/dds/robot_side.h"
+#include "duet/hardware/guard_link.h"
 #include "duet/hardware/guard_loop.h"
 #include "duet/hardware/guard_message.h"
+#include "duet/hardware/lock_step.h"
 #include "duet/hardware/person_input.h"
 #include "duet/hardware/robot_config.h"
 #include "duet/hardware/run_log.h"
@@ -28,9 +31,11 @@ volatile std::sig_atomic_t asked_to_end = 0;
 
 struct HardwareArguments {
   std::string config, socket = "duet-guard.socket", log, command = "0,0,0", person_socket = "duet-person.socket",
-                      pose_socket = "duet-pose.socket";
+                      pose_socket = "duet-pose.socket", walker, walker_network;
   double seconds = 5.0;
   int velocity_port = 0;
+  bool lock_step = false;
+  ClipEpisodeArguments episode;
 };
 
 // Not bench/interrupt.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to finish.
@@ -173,7 +178,7 @@ class ArmedRun {
  private:
   void try_to_arm(double now, const GuardStatus& status) {
     facts_.now = now;
-    facts_.remote_key_held = now - status.input.dead_man_at < 0.1;
+    facts_.remote_key_held = status.input.now - status.input.dead_man_at < 0.1;
     facts_.reported_mode_machine = guard_.reading().mode_machine;
     facts_.executor_complaint = side_.executor().complaint();
     refusal_ = arming_refusal(facts_);
@@ -197,6 +202,14 @@ std::string executed_text(const RobotConfig& config, const GuardSetup& setup) {
   return executed_channels_text(executed_channels(config.executor, robot, setup.limiter.executed.joints), robot);
 }
 
+// Null where none is asked for.
+std::unique_ptr<Walker> walker_for(const HardwareArguments& arguments, const GuardSetup& setup) {
+  if (arguments.walker.empty()) return nullptr;
+  ControllerOptions options;
+  if (!arguments.walker_network.empty()) options["network"] = arguments.walker_network;
+  return std::make_unique<Walker>(arguments.walker, options, setup.limiter.robot);
+}
+
 void run_arm(Session& session, const HardwareArguments& arguments) {
   const RobotConfig config = read_robot_config(arguments.config);
   const GuardSetup setup = guard_setup(config, false);
@@ -214,14 +227,28 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
   DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
   RobotSide side(config, side_options(arguments, true));
-  RobotGuard guard(setup, side.connection(), side.executor());
+  LockStepWire stepped(side.connection());
+  RobotGuard guard(setup, arguments.lock_step ? static_cast<RobotWire&>(stepped) : side.connection(), side.executor());
+  const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
+  if (walker != nullptr) guard.let_walk(*walker);
   std::optional<PersonInput> person = person_input(config, arguments);
   ArmedRun run(session, guard, side, log, facts);
+  ReportSender reports(arguments.socket);
   end_on_signals();
-  run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
+  ask_for_sharp_timers();
+  const auto after_tick = [&](double now) {
     if (person) person->poll(now, guard);
     return run.go_on(now);
-  });
+  };
+  if (arguments.lock_step)
+    run_guard_in_lock_step(
+        guard, stepped, &planner, setup.limiter.dt,
+        {[&](double) { return after_tick(monotonic_seconds()); }, [&] { return reports.after_tick(guard); }});
+  else
+    run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
+      (void)reports.after_tick(guard);
+      return after_tick(now);
+    });
   if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
   print(session,
         fmt::format("{}; log '{}', {} ticks left out", safety_state_name(guard.status().safety.state), arguments.log,
@@ -237,6 +264,7 @@ void tell(DatagramSocket& guard, const std::string& socket, const GuardBuffer& m
 }
 
 void run_plan(Session& session, const HardwareArguments& arguments) {
+  if (!arguments.episode.clip.empty()) return run_clip_episode(session, arguments.episode, arguments.socket);
   const std::shared_ptr<const RobotModel> robot = load_shared_robot();
   PlannerMessage message;
   message.command.root = parse_velocity_command(arguments.command, HardwareLimits{}.height);
@@ -339,7 +367,12 @@ void add_hardware(CLI::App& app, Session& session) {
         ->capture_default_str();
   }
   add_play_partner(*hardware, session);
+  arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");
+  arm->add_option("--network", arguments->walker_network, "of the walker");
+  arm->add_flag("--lock-step", arguments->lock_step, "by the clock of a twin that waits for each command");
   plan->add_option("--command", arguments->command, "\"vx,vy,wz\" [m/s, m/s, rad/s]")->capture_default_str();
+  add_clip_options(*plan, arguments->episode);
+  add_hardware_episodes(*hardware, session);
 }
 
 void add_replay_log(CLI::App& app, Session& session) {

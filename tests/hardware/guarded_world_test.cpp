@@ -1,0 +1,289 @@
+// An episode behind the guard: the same loop as in an engine, and every way in which the guard ends it is an outcome.
+#include "duet/hardware/guarded_world.h"
+
+#include <gmock/gmock.h>
+
+#include <filesystem>
+#include <limits>
+
+#include "duet/backends/factory.h"
+#include "duet/core/clock.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/hardware/log_recording.h"
+#include "duet/hardware/twin_in_process.h"
+#include "tests/hardware/guarded_twin.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+// Stands, and from 1 s on wants to be `goal` ahead; the left elbow is bent by 0.5 rad meanwhile.
+class AheadReference final : public ReferenceSource {
+ public:
+  explicit AheadReference(double goal) : goal_(goal) {}
+  void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }
+  const Reference* at(const Present& present) override {
+    if (present.tick == 50) {
+      reference_.X_WB.p += reference_.X_WB.R * Eigen::Vector3d(goal_, 0.0, 0.0);
+      reference_.q[test::g1()->roles.arms[0][3]] += 0.5;
+    }
+    return &reference_;
+  }
+
+ private:
+  double goal_;
+  Reference reference_;
+};
+
+Episode episode_of(double seconds, const Pose& start = {}) {
+  Episode episode;
+  episode.start = test::g1()->standing_state(start);
+  episode.ticks = ticks_of(seconds);
+  return episode;
+}
+
+GuardedEpisode guarded() {
+  GuardedEpisode episode;
+  episode.joints = test::arms_of(*test::g1()).joints;
+  return episode;
+}
+
+struct Behind {
+  explicit Behind(const GuardSetup& setup = test::twin_guard(), GuardedEpisode episode = guarded(),
+                  std::vector<TwinFault> faults = {}, RunLog* log = nullptr)
+      : link(setup, {}, nullptr, log, std::move(faults)), world(std::move(episode), test::g1(), link) {}
+  Rollout roll(double seconds, double goal = 0.5, const Pose& start = {}) {
+    AheadReference source(goal);
+    return roll_out(episode_of(seconds, start), world, source, "twin");
+  }
+  TwinInProcess link;
+  GuardedWorld world;
+};
+
+TEST(GuardedWorld, AnEpisodeIsRecordedAsInAnEngine) {
+  Behind behind;
+  const Pose start{yaw_rotation(1.0), {3.0, -2.0, 0.0}};
+  const Rollout rollout = behind.roll(8.0, 0.5, start);
+  const Recording& recording = rollout.recording;
+  EXPECT_EQ(recording.outcome, Outcome::kOk) << recording.message;
+  ASSERT_EQ(recording.frames(), 400);
+  EXPECT_EQ(recording.reference.size(), 400u);
+  EXPECT_EQ(recording.q_target.size(), 400u);
+  // It begins where the episode does, wherever the twin stands, and goes ahead in the episode's own frame.
+  EXPECT_NEAR((recording.robot.front().X_WB.p - start.p).head<2>().norm(), 0.0, 1e-6);
+  EXPECT_NEAR(yaw_of(recording.robot.front().X_WB.R), 1.0, 1e-6);
+  const Eigen::Vector3d gone = yaw_rotation(-1.0) * (recording.robot.back().X_WB.p - recording.robot.front().X_WB.p);
+  EXPECT_GT(gone.x(), 0.5 - 0.15);  // A.4.3 stops up to 0.15 m short
+  EXPECT_LT(gone.x(), 0.5 + 1e-3);
+  EXPECT_NEAR(gone.y(), 0.0, 0.02);
+  const int elbow = test::g1()->roles.arms[0][3];
+  EXPECT_NEAR(recording.robot.back().q[elbow] - recording.robot.front().q[elbow], 0.5, 0.05);
+  EXPECT_EQ(behind.world.held_ticks(), 0);
+  EXPECT_EQ(behind.world.missed_reports(), 0);
+}
+
+TEST(GuardedWorld, TheSameSeedGivesTheSameStates) {
+  Behind a, b;
+  EXPECT_EQ(a.roll(2.0).state_hash, b.roll(2.0).state_hash);
+}
+
+TEST(GuardedWorld, AHoldForLostStatesEndsTheEpisodeWithItsCause) {
+  // States are lost for 60 ms: too long not to hold, too short to damp; a hold for another reason than the planner ends
+  // in damping.
+  Behind behind(test::twin_guard(), guarded(), {parse_twin_fault("drop@10:10.06=100")});
+  const Rollout rollout = behind.roll(8.0);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
+  EXPECT_GT(rollout.recording.frames(), 0);
+  EXPECT_LT(rollout.recording.frames(), 400);
+  EXPECT_THAT(rollout.recording.message, HasSubstr("ended the run at"));
+  EXPECT_THAT(rollout.recording.message, HasSubstr("damp (state_age)"));
+}
+
+TEST(GuardedWorld, ARobotThatTiltsIsStoppedAndTheEpisodeSaysSo) {
+  Behind behind(test::twin_guard(), guarded(), {parse_twin_fault("tilt@10:60=1.2")});
+  const Rollout rollout = behind.roll(8.0);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kFell);
+  EXPECT_LT(rollout.recording.frames(), 400);
+  EXPECT_THAT(rollout.recording.message, HasSubstr("the robot fell at"));
+}
+
+TEST(GuardedWorld, AGuardThatDoesNotRunSaysWhatItIsAt) {
+  GuardedEpisode impatient = guarded();
+  impatient.most_wait = 1.0;
+  Behind behind(test::twin_guard(), impatient);
+  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { (void)behind.roll(1.0); }),
+              HasSubstr("does not run: it is at listen"));
+}
+
+TEST(GuardedWorld, ATwinOfAnotherRobotIsNeverArmed) {
+  GuardSetup setup = test::twin_guard();
+  setup.mode_machine = 6;
+  GuardedEpisode episode = guarded();
+  episode.most_wait = 8.0;
+  Behind behind(setup, episode);
+  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { (void)behind.roll(1.0); }),
+              HasSubstr("does not run: it is at listen"));
+  EXPECT_EQ(behind.link.twin().obeyed_frames(), 0);
+}
+
+// A guard that is killed after so many reports.
+class DyingLink final : public GuardLink {
+ public:
+  DyingLink(GuardLink& link, int reports) : link_(link), left_(reports) {}
+  bool send(const PlannerMessage& message) override { return link_.send(message); }
+  bool send(const PersonMessage& message) override { return link_.send(message); }
+  bool stop() override { return link_.stop(); }
+  bool next(GuardReport& report) override { return left_-- > 0 && link_.next(report); }
+  [[nodiscard]] double patience() const override { return 2.0; }
+  [[nodiscard]] std::string name() const override { return "the guard at 'somewhere'"; }
+
+ private:
+  GuardLink& link_;
+  int left_;
+};
+
+TEST(GuardedWorld, AGuardThatIsKilledEndsTheEpisodeAndWhatWasRecordedStays) {
+  TwinInProcess twin(test::twin_guard(), {}, nullptr, nullptr);
+  DyingLink link(twin, 600);
+  GuardedWorld world(guarded(), test::g1(), link);
+  AheadReference source(0.5);
+  const Rollout rollout = roll_out(episode_of(60.0), world, source, "twin");
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
+  EXPECT_EQ(rollout.recording.message, "the guard at 'somewhere' has gone: no report in 2 s");
+  EXPECT_GT(rollout.recording.frames(), 200);
+  EXPECT_LT(rollout.recording.frames(), 600);
+}
+
+TEST(GuardedWorld, AGuardThatIsGoneBeforeItBeginsIsSaid) {
+  TwinInProcess twin(test::twin_guard(), {}, nullptr, nullptr);
+  DyingLink link(twin, 0);
+  GuardedWorld world(guarded(), test::g1(), link);
+  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { world.begin(test::g1()->standing_state()); }),
+              HasSubstr("has gone: no report in 2 s"));
+}
+
+TEST(GuardedWorld, ThePersonIsSeenThirtyTimesASecondWhereTheClipHasThem) {
+  PointTracks partner(200, 24);
+  for (int t = 0; t < 200; ++t) partner.frame(t) = test::standing_adult({4.0 + 0.001 * t, 0.0, 0.95});
+  const PartnerSource source = partner_of_clip(partner);
+  HumanJoints joints;
+  int seen = 0;
+  for (int tick = 0; tick < 50; ++tick) {
+    if (!source(tick, joints)) continue;
+    ++seen;
+    EXPECT_EQ(joints, partner.frame(tick));
+  }
+  EXPECT_EQ(seen, 30);
+  GuardedEpisode episode = guarded();
+  episode.person = partner_of_clip(partner);
+  Behind behind(test::twin_guard(true), episode);
+  const Rollout rollout = behind.roll(3.0, 0.3);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
+  EXPECT_EQ(behind.link.guard().status().bad_messages, 0);
+}
+
+TEST(GuardedWorld, WithoutAPersonWhoHasToBeSeenTheGuardDoesNotRun) {
+  GuardedEpisode episode = guarded();
+  episode.most_wait = 10.0;
+  Behind behind(test::twin_guard(true), episode);
+  EXPECT_THAT(test::thrown_message<std::runtime_error>([&] { (void)behind.roll(1.0); }),
+              HasSubstr("does not run: it is at stand"));
+}
+
+// The log of an episode: the same bits through the limiter again, and a recording of the same states.
+struct Logged {
+  explicit Logged(const test::ScratchFolder& folder) {
+    const GuardSetup setup = test::twin_guard();
+    RunLog log(folder / "run.mcap", setup);
+    Behind behind(setup, guarded(), {}, &log);
+    rollout = behind.roll(4.0);
+    behind.world.rest(0.2);
+    dropped = log.dropped();
+  }
+  Rollout rollout;
+  long dropped = 0;
+};
+
+TEST(LogRecording, ALogBecomesTheRecordingOfItsEpisode) {
+  const test::ScratchFolder folder;
+  const Logged logged(folder);
+  ASSERT_EQ(logged.dropped, 0);
+  const LogReplay replay = replay_log(folder / "run.mcap");
+  EXPECT_EQ(replay.different, 0);
+  EXPECT_TRUE(replay.whole);
+  const LoggedRun run = recording_of_log(folder / "run.mcap", Task::kWave);
+  const Recording& expected = logged.rollout.recording;
+  EXPECT_EQ(run.recording.outcome, Outcome::kOk) << run.recording.message;
+  EXPECT_EQ(run.recording.task, Task::kWave);
+  ASSERT_EQ(run.recording.frames(), expected.frames());
+  // The planner's frame t was reported a tick of the guard before the log's.
+  for (int t = 0; t < expected.frames(); ++t) {
+    EXPECT_LT((run.recording.robot[t].X_WB.p - expected.robot[t].X_WB.p).norm(), 0.002) << t;
+    EXPECT_LT((run.recording.robot[t].q - expected.robot[t].q).norm(), 0.05) << t;
+    EXPECT_LT((run.recording.reference[t].X_WB.p - expected.reference[t].X_WB.p).norm(), 1e-6) << t;
+    EXPECT_EQ(run.recording.reference[t].q, expected.reference[t].q) << t;
+  }
+  EXPECT_EQ(std::count(run.executed.begin(), run.executed.end(), true), 5 + 14);
+  EXPECT_THAT(executed_mask_text(run.executed, *test::g1()), HasSubstr("root velocity and height; 14 of 29 joints, not "
+                                                                       "left_hip_pitch_joint"));
+}
+
+TEST(LogRecording, TheMaskIsKeptBesideTheRecording) {
+  const test::ScratchFolder folder;
+  const Logged logged(folder);
+  const LoggedRun run = recording_of_log(folder / "run.mcap");
+  save_logged_run(run.recording, run.executed, folder / "run.npz");
+  const Npz npz = Npz::load(folder / "run.npz");
+  EXPECT_EQ(read_executed_mask(npz), run.executed);
+  EXPECT_EQ(read_recording(npz).frames(), run.recording.frames());
+  EXPECT_EQ(read_executed_mask(recording_npz(run.recording)), std::nullopt);
+}
+
+TEST(LogRecording, AMaskThatIsNoneIsRefused) {
+  Npz npz;
+  npz.set("executed", std::vector<std::int64_t>(36, 2), {36});
+  EXPECT_THAT(test::thrown_message<InputError>([&] { (void)read_executed_mask(npz); }),
+              HasSubstr("array 'executed': expected 0 or 1, found 2"));
+  npz.set("executed", std::vector<std::int64_t>(7, 1), {7});
+  EXPECT_THAT(test::thrown_message<InputError>([&] { (void)read_executed_mask(npz); }),
+              HasSubstr("expected more than 7 channels, found 7"));
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>(
+                  [] { (void)executed_mask_text(ExecutedMask(20, true), *test::g1()); }),
+              HasSubstr("executed channels: expected 36 for 'g1', found 20"));
+}
+
+TEST(LogRecording, ALogThatWasCutOffGivesWhatIsThere) {
+  const test::ScratchFolder folder;
+  const Logged logged(folder);
+  const std::string bytes = read_file(folder / "run.mcap");
+  write_file(folder / "cut.mcap", bytes.substr(0, bytes.size() * 3 / 4));
+  const LoggedRun run = recording_of_log(folder / "cut.mcap");
+  EXPECT_FALSE(run.whole);
+  EXPECT_GT(run.recording.frames(), 20);
+  EXPECT_LT(run.recording.frames(), logged.rollout.recording.frames());
+}
+
+TEST(LogRecording, WhatIsNoLogOfARunIsRefused) {
+  const test::ScratchFolder folder;
+  { McapWriter writer(folder / "empty.mcap"); }
+  const auto refusal = [](const std::string& path) {
+    return test::thrown_message<InputError>([&] { (void)recording_of_log(path); });
+  };
+  EXPECT_THAT(refusal(folder / "empty.mcap"), HasSubstr("expected the log of a run, found an MCAP file without one"));
+  { RunLog log(folder / "idle.mcap", test::twin_guard()); }
+  EXPECT_THAT(refusal(folder / "idle.mcap"), HasSubstr("expected ticks in which the guard ran, found none"));
+  write_file(folder / "text", "text");
+  EXPECT_THAT(refusal(folder / "text"), HasSubstr("expected an MCAP file"));
+}
+
+TEST(LogRecording, ADiskThatIsFullIsSaidBeforeAnythingIsArmed) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "not run: /dev/full absent";
+  EXPECT_THAT(test::thrown_message<StorageError>([] { RunLog log("/dev/full", test::twin_guard()); }),
+              HasSubstr("/dev/full"));
+}
+
+}  // namespace
+}  // namespace duet

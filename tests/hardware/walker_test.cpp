@@ -1,0 +1,129 @@
+// A walking controller in the guard, the twin's body in an engine: the whole loop but for the wire between them.
+#include "duet/hardware/walker.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "duet/backends/factory.h"
+#include "duet/core/clock.h"
+#include "duet/hardware/guarded_world.h"
+#include "duet/hardware/twin_in_process.h"
+#include "tests/hardware/guarded_twin.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+bool mujoco_is_here() {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco") return engine.available;
+  return false;
+}
+
+ControllerOptions homie_options() { return {{"network", test::shared_file("models/homie_deploy.onnx")}}; }
+
+TEST(Walker, RefusesAControllerThatDoesNotWalkAndOneThatIsNotKnown) {
+  const auto refusal = [](const char* name) {
+    return test::thrown_message<std::invalid_argument>([&] { Walker(name, {}, test::g1()); });
+  };
+  EXPECT_THAT(refusal("pd"), HasSubstr("walker: expected a controller that walks, found 'pd'"));
+  EXPECT_THAT(refusal("homy"), HasSubstr("homy"));
+}
+
+TEST(Walker, ItsTargetsAreInsideTheJointsLimits) {
+  Walker walker("wbc_sim", {}, test::g1());
+  RobotState state = test::g1()->standing_state();
+  walker.begin(state);
+  Eigen::VectorXd arms = test::g1()->neutral;
+  for (int tick = 0; tick < 50; ++tick) {
+    state.q.array() += 0.02;
+    const JointCommand& command = walker.update(state, {0.25, 0.15, 0.5, 0.74}, arms);
+    for (int j = 0; j < test::g1()->dof(); ++j) {
+      EXPECT_GE(command.q_target[j], test::g1()->joints[j].lower) << j;
+      EXPECT_LE(command.q_target[j], test::g1()->joints[j].upper) << j;
+    }
+  }
+}
+
+// Stands, and from 1 s on wants to be `goal` ahead; everything between controller and body passes guard and limiter.
+class Ahead final : public ReferenceSource {
+ public:
+  explicit Ahead(double goal) : goal_(goal) {}
+  void begin(const RobotState& start) override { reference_ = {start.X_WB, start.q}; }
+  const Reference* at(const Present& present) override {
+    if (present.tick == 50) reference_.X_WB.p.x() += goal_;
+    return &reference_;
+  }
+
+ private:
+  double goal_;
+  Reference reference_;
+};
+
+Rollout walk(const std::string& controller, const ControllerOptions& options, double goal) {
+  auto walker = std::make_unique<Walker>(controller, options, test::g1());
+  GuardedEpisode guarded;
+  guarded.joints = test::arms_of(*test::g1()).joints;
+  guarded.steps_from = walker->steps_from();
+  TwinInProcess twin(test::twin_guard(), {.engine = "mujoco"}, std::move(walker), nullptr);
+  GuardedWorld world(guarded, test::g1(), twin);
+  Episode episode;
+  episode.start = test::g1()->standing_state();
+  episode.ticks = ticks_of(6.0);
+  episode.fall = test::g1()->fall;
+  Ahead ahead(goal);
+  Rollout rollout = roll_out(episode, world, ahead, "twin");
+  EXPECT_EQ(twin.twin().refused_frames(), 0);
+  EXPECT_EQ(twin.twin().physics()->hanging(), 0.0) << "the rope holds it";
+  return rollout;
+}
+
+double gone(const Rollout& rollout) {
+  return rollout.recording.robot.back().X_WB.p.x() - rollout.recording.robot.front().X_WB.p.x();
+}
+
+TEST(Walker, HomieWalksTheTwinBehindTheGuard) {
+  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  if (test::shared_file("models/homie_deploy.onnx").empty()) GTEST_SKIP() << "not run: homie_deploy.onnx absent";
+  const Rollout rollout = walk("homie", homie_options(), 0.6);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
+  EXPECT_GT(gone(rollout), 0.3);
+  EXPECT_LT(gone(rollout), 0.75);
+  EXPECT_GT(rollout.recording.robot.back().X_WB.p.z(), 0.65);
+}
+
+TEST(Walker, WbcSimStandsTheTwinBehindTheGuard) {
+  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  const Rollout rollout = walk("wbc_sim", {}, 0.0);
+  EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
+  EXPECT_LT(std::abs(gone(rollout)), 0.2);
+  EXPECT_GT(rollout.recording.robot.back().X_WB.p.z(), 0.65);
+}
+
+TEST(Walker, WithoutAWalkerTheTwinFallsAndTheGuardStops) {
+  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  GuardedEpisode guarded;
+  guarded.joints = test::arms_of(*test::g1()).joints;
+  guarded.most_wait = 30.0;
+  TwinInProcess twin(test::twin_guard(), {.engine = "mujoco"}, nullptr, nullptr);
+  GuardedWorld world(guarded, test::g1(), twin);
+  Episode episode;
+  episode.start = test::g1()->standing_state();
+  episode.ticks = ticks_of(20.0);
+  Ahead ahead(0.0);
+  const auto what_happens = [&] {
+    try {
+      return std::string(to_string(roll_out(episode, world, ahead, "twin").recording.outcome));
+    } catch (const std::runtime_error& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_NE(what_happens(), "ok");
+  EXPECT_GE(twin.guard().status().safety.state, SafetyState::kHold);
+}
+
+}  // namespace
+}  // namespace duet
