@@ -2,7 +2,6 @@
 
 #include <sys/prctl.h>
 
-#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -74,8 +73,9 @@ void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocke
   do {
     const bool came = wire.wait(silent < kMostSilent ? kTwinPatience : period);
     silent = came ? 0 : silent + 1;
-    // Without a state time goes on all the same, so that the state machine notices.
-    now = came ? std::max(wire.time(), now + 0.5 * period) : now + period;
+    // A period for each state, also where some were missed before the twin waited for answers; and without a state
+    // time goes on all the same, so that the state machine notices.
+    now += period;
     if (planner != nullptr) {
       const double begin = monotonic_seconds();
       bool planned = take_messages(*planner, guard, message, now);

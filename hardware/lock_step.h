@@ -1,7 +1,7 @@
 // Guard and twin in lock-step: the twin takes its next step when the command for the last one has come, and the guard's
-// clock is the twin's. The tick travels in the command's first reserved word, which is 0 on a robot's wire. On a
-// machine that is busy with other things an episode is then the same as on one that is not; nothing here holds a
-// robot's time.
+// clock has a period for each of its states. The tick travels in the command's first reserved word, which is 0 on a
+// robot's wire. On a machine that is busy with other things an episode is then the same as on one that is not; nothing
+// here holds a robot's time.
 #pragma once
 
 #include <functional>
@@ -18,8 +18,6 @@ class LockStepWire final : public RobotWire {
 
   // Waits for the twin's next state, for at most so long [s]; false where none came.
   bool wait(double seconds) override;
-  // Of the twin, at the state that came last [s].
-  [[nodiscard]] double time() const { return static_cast<double>(tick_) * 0.002; }
 
   bool take(LowStateFrame& frame) override;
   bool take(OdometrySample& sample) override { return wire_.take(sample); }
@@ -38,7 +36,7 @@ class LockStepWire final : public RobotWire {
   std::uint32_t tick_ = 0;
 };
 
-// As run_guard does, by the twin's clock: a tick for every state. After each report (kReportEvery ticks, `report` says
+// As run_guard does, but a tick for every state. After each report (kReportEvery ticks, `report` says
 // whether one went out) it waits for the planner's message, so that a slow planner costs nothing.
 struct LockStepCallbacks {
   std::function<bool(double now)> go_on;  // after each tick
