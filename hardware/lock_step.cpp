@@ -67,6 +67,7 @@ void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocke
                             const LockStepCallbacks& callbacks) {
   GuardMessage message;
   OdometrySample odometry;
+  BatteryReading battery;
   double now = 0.0;
   bool reported = false;
   int silent = 0;
@@ -88,6 +89,7 @@ void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocke
       odometry.at = now;
       guard.receive(odometry);
     }
+    if (wire.take(battery)) guard.receive(battery, now);
     guard.tick(now);
     reported = callbacks.report && callbacks.report();
   } while (callbacks.go_on(now));

@@ -58,6 +58,7 @@ void TwinInProcess::tick() {
   odometry.X_WB.p = as_sent(odometry.X_WB.p);
   odometry.v_WB = as_sent(odometry.v_WB);
   guard_.receive(odometry);
+  guard_.receive(BatteryReading{.charge = twin_.condition.charge}, twin_.time());
   if (guard_.status().safety.state == SafetyState::kReady) guard_.arm();
   guard_.tick(twin_.time());
   if (log_ != nullptr) log_->add(guard_);

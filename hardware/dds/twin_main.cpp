@@ -149,8 +149,7 @@ void add_options(CLI::App& app, TwinArguments& arguments) {
       ->allow_extra_args(false);
   app.add_flag("--operated", arguments.operated,
                "an operator holds the dead-man switch, stands it up, lets it down and runs it");
-  app.add_flag("--presses", arguments.presses,
-               "an operator holds the dead-man switch and presses start and A in turn");
+  app.add_flag("--presses", arguments.presses, "an operator holds the dead-man switch and presses start and A in turn");
 }
 
 }  // namespace
