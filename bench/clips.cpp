@@ -347,6 +347,15 @@ std::string people_folder(const std::string& dataset) {
 
 }  // namespace
 
+void use_clips(const std::vector<std::string>& paths, Suite& suite) {
+  if (paths.empty()) return;
+  require(suite.references.empty(), "clips: the suite has a `reference` and no clips");
+  if (suite.clips.synth_per_task > 0) suite.clips = {.files = {}, .pad = suite.clips.pad, .roles = suite.clips.roles};
+  suite.clips.given = false;
+  suite.clips.files.clear();
+  for (const std::string& file : find_clip_files(paths)) suite.clips.files.push_back(fs::absolute(file).string());
+}
+
 std::vector<std::string> find_clip_files(const std::vector<std::string>& paths) {
   std::vector<std::string> places;
   for (const std::string& path : paths) places.push_back(is_dataset(path) ? people_folder(path) : path);

@@ -52,6 +52,10 @@ std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOpt
 
 PairOptions pair_options(const Suite& suite);
 
+// Clips that are given take the place of the suite's; a task without clips is left out. None: the suite's own stay.
+// Throws std::invalid_argument for a suite of walking commands, and as find_clip_files.
+void use_clips(const std::vector<std::string>& paths, Suite& suite);
+
 // What find_motion_files gives, but of a folder that is a data set (docs/datasets.md) its people alone.
 std::vector<std::string> find_clip_files(const std::vector<std::string>& paths);
 // Whether a folder is a data set that `duet dataset` made.

@@ -9,6 +9,7 @@
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/share.h"
 #include "duet/core/version.h"
 
 namespace duet {
@@ -44,7 +45,7 @@ void remove_prepared_clips(const std::string& folder) {
 
 std::string program_identity() {
   struct stat program {};
-  if (::stat("/proc/self/exe", &program) != 0) return duet_version();
+  if (::stat(program_file().c_str(), &program) != 0) return duet_version();
   return fmt::format("{} {} {}.{:09}", duet_version(), program.st_size, program.st_mtim.tv_sec,
                      program.st_mtim.tv_nsec);
 }

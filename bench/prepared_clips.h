@@ -30,7 +30,8 @@ class PreparedClips {
 // Removes them from a run folder.
 void remove_prepared_clips(const std::string& folder);
 
-// This program: version, and size and time of its file, so that a program that was built anew trusts nothing older.
+// This program: version, and size and time of its file (core/share.h), so that a program that was built anew trusts
+// nothing older.
 std::string program_identity();
 
 }  // namespace duet

@@ -295,7 +295,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors);
   keep_inputs(kept, directory);
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
-  const StopSign stop(options.time_limit, options.begin);
+  const StopSign stop(options.time_limit, options.begin, options.stop_asked);
   try {
     if (suite.clips.files.empty()) ask_for(suite, tasks_of_own_clips(suite), options, run, summary);
     const PrepareOptions prepare{.keep_in = directory, .stop = &stop};

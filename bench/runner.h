@@ -32,6 +32,7 @@ struct RunOptions {
   DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart
   std::size_t episodes_per_look = kEpisodesPerLook;  // of a decision
   nlohmann::json certificate;                        // parity certificate that the run keeps; null: none
+  std::function<bool()> stop_asked = {};             // the run then ends resumable, as after an interrupt
 };
 
 struct RunSummary {

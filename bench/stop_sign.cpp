@@ -20,6 +20,7 @@ RunEnd StopSign::end() const {
     case Interrupt::kNone:
       break;
   }
+  if (stop_asked_ && stop_asked_()) return RunEnd::kInterrupted;
   const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
   return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
 }

@@ -1,4 +1,5 @@
-// What stops a run early, as a question that every loop asks: a signal, or the time limit of the command. Thread-safe.
+// What stops a run early, as a question that every loop asks: a signal, the time limit of the command, or a program
+// that runs suites and has its own reasons. Thread-safe.
 #pragma once
 
 #include <chrono>
@@ -6,6 +7,7 @@
 #include <functional>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace duet {
 
@@ -15,8 +17,10 @@ class StopSign {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // `limit` [s] counts from `begin`; 0 is none.
-  explicit StopSign(double limit = 0.0, Clock::time_point begin = Clock::now()) : limit_(limit), begin_(begin) {}
+  // `limit` [s] counts from `begin`; 0 is none. `stop_asked`, where there is one, stops as an interrupt does; it is
+  // called from any thread.
+  explicit StopSign(double limit = 0.0, Clock::time_point begin = Clock::now(), std::function<bool()> stop_asked = {})
+      : limit_(limit), begin_(begin), stop_asked_(std::move(stop_asked)) {}
   // kComplete: go on.
   [[nodiscard]] RunEnd end() const;
   [[nodiscard]] bool asked() const { return end() != RunEnd::kComplete; }
@@ -24,6 +28,7 @@ class StopSign {
  private:
   double limit_;
   Clock::time_point begin_;
+  std::function<bool()> stop_asked_;
 };
 
 // Thrown by work that ends because of the sign.

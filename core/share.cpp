@@ -10,6 +10,8 @@
 
 // Defined by a program that was linked against an installed duet (cmake/duet_location.cpp.in), absent elsewhere.
 extern "C" const char* duet_installed_prefix() __attribute__((weak));
+// Defined in a module that another program loads (python/module_file.cpp), absent elsewhere.
+extern "C" const char* duet_module_file() __attribute__((weak));
 
 namespace duet {
 
@@ -18,11 +20,14 @@ namespace fs = std::filesystem;
 std::vector<std::string> installed_prefixes() {
   std::vector<std::string> prefixes;
   std::error_code ignored;
+  if (duet_module_file != nullptr) prefixes.push_back(fs::path(duet_module_file()).parent_path().string());
   const fs::path program = fs::read_symlink("/proc/self/exe", ignored);
   if (!program.empty()) prefixes.push_back((program.parent_path() / "..").lexically_normal().string());
   if (duet_installed_prefix != nullptr) prefixes.emplace_back(duet_installed_prefix());
   return prefixes;
 }
+
+std::string program_file() { return duet_module_file != nullptr ? duet_module_file() : "/proc/self/exe"; }
 
 std::vector<std::string> share_folders() {
   std::vector<std::string> folders;

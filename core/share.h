@@ -12,10 +12,12 @@ namespace duet {
 // looked at.
 std::string share_file(std::string_view what, std::string_view relative);
 
-// The folders that may be the one into which duet was installed, in the order in which they are to be asked: the one
-// above the program's own (<prefix>/bin/duet), and that of the package that a program was built against
-// (find_package(duet) says it to the program).
+// The folders that may be the one into which duet was installed, in the order in which they are to be asked: that of a
+// module in which another program loads duet (the Python package), the one above the program's own (<prefix>/bin/duet),
+// and that of the package that a program was built against (find_package(duet) says it to the program).
 std::vector<std::string> installed_prefixes();
+// The file that duet's code is in: the program, or such a module.
+std::string program_file();
 // The folders that share_file looks in, in its order.
 std::vector<std::string> share_folders();
 

@@ -14,17 +14,6 @@
 namespace duet::cli {
 namespace {
 
-// Clips given on the command line take the place of the suite's; a task without clips is left out.
-void use_clips(const std::vector<std::string>& paths, Suite& suite) {
-  if (paths.empty()) return;
-  require(suite.references.empty(), "--clips: the suite has a `reference` and no clips");
-  if (suite.clips.synth_per_task > 0) suite.clips = {.files = {}, .pad = suite.clips.pad, .roles = suite.clips.roles};
-  suite.clips.given = false;
-  suite.clips.files.clear();
-  for (const std::string& file : find_clip_files(paths))
-    suite.clips.files.push_back(std::filesystem::absolute(file).string());
-}
-
 // Of a controller or a policy; a name that is neither is refused with both.
 void set_network(Suite& suite, const std::string& actor, const std::string& path) {
   const std::vector<std::string> policies = policy_names_of(suite);

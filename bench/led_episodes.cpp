@@ -1,0 +1,115 @@
+#include "duet/bench/led_episodes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/bench/run_episode.h"
+#include "duet/bench/run_identity.h"
+#include "duet/bench/run_work.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr double kWhile = 1.0;  // [s] between two looks at whether the episode is over
+
+// `asked`, or the first of `known` where none is.
+std::string one_of(const char* kind, const std::string& asked, const std::vector<std::string>& known) {
+  if (asked.empty() && !known.empty()) return known.front();
+  if (std::ranges::find(known, asked) == known.end())
+    throw std::invalid_argument(unknown_name_message(kind, asked, known));
+  return asked;
+}
+
+std::string engine_of(const Suite& suite, const std::string& asked) {
+  if (!asked.empty()) return one_of("engine", asked, suite.engines);
+  const auto runs = [](const std::string& name) { return name != kPlaybackEngine && can_run_in(name); };
+  const auto found = std::ranges::find_if(suite.engines, runs);
+  return found == suite.engines.end() ? suite.engines.front() : *found;
+}
+
+// The suite of one policy, the caller, in one engine under one controller.
+Suite narrowed(Suite suite, const LedPart& part) {
+  require_clips(suite);
+  if (!suite.references.empty())
+    throw InputError(fmt::format("{}: expected a suite of clips, found one of walking commands", suite.file));
+  suite.engines = {engine_of(suite, part.engine)};
+  suite.controllers = {controller_of(suite, one_of("controller", part.controller, controller_names_of(suite)))};
+  suite.perturbations = {
+      perturbation_of(suite, one_of("perturbation", part.perturbation, perturbation_names_of(suite)))};
+  if (!part.task.empty()) suite.tasks = {parse_task(part.task)};
+  suite.policies = {SuitePolicy{.name = kCaller, .use = kNullPolicy}};  // Bodies loads one; each episode has its own
+  suite.null_arm = false;
+  suite.record = RecordTrajectories::kNone;
+  return suite;
+}
+
+}  // namespace
+
+LedSuite::LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress)
+    : suite_(narrowed(std::move(suite), part)), identity_(identity_of(suite_)) {
+  identity_.policies[kCaller].clear();  // what the caller is nobody knows
+  if (suite_.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite_.engines.front()));
+  bodies_ = std::make_unique<Bodies>(suite_);
+  if (!bodies_->absent().empty()) throw MissingError(bodies_->absent().begin()->second);
+  bodies_->take_clips(prepare_clips(suite_, *bodies_->nominal(), threads, progress));
+  plan_ = std::make_unique<EpisodePlan>(suite_, *bodies_);
+}
+
+const std::shared_ptr<const RobotModel>& LedSuite::robot() const {
+  return bodies_->robot(suite_.controllers.front().name);
+}
+
+EpisodeRow LedSuite::run(int episode, const PolicyMaker& policy, const std::function<bool()>& stop_asked) const {
+  return run_episode(plan_->at(episode), suite_, identity_, robot(), "", policy, stop_asked);
+}
+
+void LedEpisode::start(int episode) {
+  require(episode >= 0 && episode < suite_->size(),
+          fmt::format("episode: expected a number from 0 to {}, found {}", suite_->size() - 1, episode));
+  stop();
+  stop_ = false;
+  row_.reset();
+  queue_ = PlanQueue::make({.name = kCaller, .patience = 0.0, .share = 1.0});
+  const PolicyMaker maker = queue_->maker(suite_->robot());
+  thread_ = std::thread([this, episode, maker, queue = queue_] {
+    try {
+      row_ = suite_->run(episode, maker, [this] { return stop_.load(); });
+    } catch (const EpisodeInterrupted&) {  // it leaves no row
+    } catch (const std::exception& error) {
+      row_ = EpisodeRow{};
+      row_->outcome = Outcome::kError;
+      row_->message = error.what();
+    }
+    queue->close("the episode is over");
+  });
+}
+
+void LedEpisode::answer(std::span<const double> numbers, int rows) {
+  require(question_ != nullptr, "the episode is over: begin another one");
+  queue_->answer(*question_, numbers, rows);
+}
+
+std::shared_ptr<const PlanRequest> LedEpisode::next() {
+  question_.reset();
+  std::vector<std::shared_ptr<const PlanRequest>> taken;
+  while (taken.empty() && !queue_->closed()) taken = queue_->take(kWhile);
+  if (!taken.empty()) question_ = taken.front();
+  if (taken.empty()) thread_.join();
+  return question_;
+}
+
+void LedEpisode::stop() {
+  stop_ = true;
+  if (queue_) queue_->close("the episode was stopped");
+  if (thread_.joinable()) thread_.join();
+  question_.reset();
+  row_.reset();
+}
+
+}  // namespace duet

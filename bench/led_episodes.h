@@ -1,0 +1,89 @@
+// Episodes of a suite that their caller leads, plan by plan: what an environment of reinforcement learning is made of.
+// Loop, scoring and row are those of `duet run`.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+
+#include "duet/bench/bodies.h"
+#include "duet/bench/episode.h"
+#include "duet/bench/progress.h"
+#include "duet/bench/suite.h"
+#include "duet/policies/plan_queue.h"
+
+namespace duet {
+
+// Which part of a suite; what is empty is the first that the suite has, of engines the first that this machine has too.
+struct LedPart {
+  std::string engine = {}, controller = {}, task = {}, perturbation = {};
+};
+
+// The name that the caller has among a suite's policies.
+inline constexpr const char* kCaller = "caller";
+
+// What such episodes are drawn from: clips are prepared and networks loaded once. Immutable, thread-safe.
+class LedSuite {
+ public:
+  // Throws std::invalid_argument for a name that the suite does not have, MissingError for an engine or a controller
+  // that this machine lacks, InputError (clips, cards, a suite of walking commands).
+  LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress);
+
+  [[nodiscard]] int size() const { return static_cast<int>(plan_->size()); }
+  [[nodiscard]] EpisodeSpec at(int episode) const { return plan_->at(episode); }
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot() const;
+  // As run_episode: an exception is a row, but StorageError and EpisodeInterrupted.
+  [[nodiscard]] EpisodeRow run(int episode, const PolicyMaker& policy, const std::function<bool()>& stop_asked) const;
+
+ private:
+  Suite suite_;
+  RunIdentity identity_;
+  std::unique_ptr<Bodies> bodies_;     // that the plan refers to
+  std::unique_ptr<EpisodePlan> plan_;  // likewise the suite
+};
+
+// One episode at a time, on a thread of its own. One owner, not thread-safe.
+class LedEpisode {
+ public:
+  explicit LedEpisode(std::shared_ptr<const LedSuite> suite) : suite_(std::move(suite)) {}
+  ~LedEpisode() { stop(); }
+  LedEpisode(const LedEpisode&) = delete;
+  LedEpisode& operator=(const LedEpisode&) = delete;
+
+  // Begins an episode of the suite and ends the one before. The first question; null where it ended without one.
+  // Throws std::invalid_argument for a number that is not in [0, size).
+  std::shared_ptr<const PlanRequest> begin(int episode) {
+    start(episode);
+    return next();
+  }
+  // Answers the last question (PlanQueue::answer). The next one; null: the episode is over. Throws
+  // std::invalid_argument where it is over already, and for a plan of another shape.
+  std::shared_ptr<const PlanRequest> go_on(std::span<const double> numbers, int rows) {
+    answer(numbers, rows);
+    return next();
+  }
+  // The same in two halves, so that many episodes compute at once.
+  void start(int episode);
+  void answer(std::span<const double> numbers, int rows);
+  std::shared_ptr<const PlanRequest> next();
+  [[nodiscard]] bool is_over() const { return question_ == nullptr; }
+  // Of the episode that is over; none before the first one was and of one that was stopped.
+  [[nodiscard]] const std::optional<EpisodeRow>& row() const { return row_; }
+  // Ends it, and there is no row.
+  void stop();
+
+ private:
+  std::shared_ptr<const LedSuite> suite_;        // shared by the episodes of a batch
+  std::shared_ptr<PlanQueue> queue_;             // with the episode's thread
+  std::shared_ptr<const PlanRequest> question_;  // that waits for its answer
+  std::optional<EpisodeRow> row_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace duet

@@ -1,0 +1,211 @@
+"""Clips, paired motions and recordings as read-only arrays; retargeting, scores and detectors."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import TYPE_CHECKING, Any, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Type, Union
+
+from duet import _duet
+from duet._tools import path_of, texts_of
+
+if TYPE_CHECKING:
+    import numpy
+
+    Array = numpy.ndarray[Any, Any]
+
+Path = Union[str, "os.PathLike[str]"]
+
+
+class Motion:
+    """A file of motion. `motion["q"]` is a read-only view of the array of that key, and keeps the motion alive."""
+
+    def __init__(self, archive: "_duet.Archive"):
+        self._archive = archive
+
+    @property
+    def kind(self) -> str:
+        return self._archive.kind
+
+    def keys(self) -> List[str]:
+        return self._archive.keys()
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._archive
+
+    def __getitem__(self, key: str) -> Any:
+        return self._archive[key]
+
+    def __repr__(self) -> str:
+        return f"<duet.{type(self).__name__} {self._archive.name!r}>"
+
+    def save(self, path: Path) -> None:
+        """As NPZ (docs/file-formats.md); the write is atomic."""
+        self._archive.save(path_of(path))
+
+    @property
+    def rate_hz(self) -> float:
+        return self._archive["rate_hz"]
+
+
+def _view(key: str, about: str) -> property:
+    def get(self: Motion) -> Any:
+        return self._archive[key]
+
+    return property(get, doc=about)
+
+
+class Clip(Motion):
+    """Two people and a task."""
+
+    id = _view("id", "Its name.")
+    task = _view("task", "Its task.")
+    reactor = _view("reactor", "Who the robot replaces: A or B.")
+    phases = _view("phases", "(2,): frames at which the act begins and ends.")
+    a = _view("a_joints", "(T, 24, 3): person A, SMPL-24 joints [m].")
+    b = _view("b_joints", "(T, 24, 3): person B.")
+
+
+class Paired(Motion):
+    """What retargeting makes of a clip: the robot's motion beside the adapted partner."""
+
+    id = _view("clip_id", "Its clip's name.")
+    task = _view("task", "Its task.")
+    phases = _view("phases", "(2,): frames at which the act begins and ends.")
+    root_position = _view("robot_root_position", "(T, 3): the robot's base [m].")
+    root_quat_wxyz = _view("robot_root_quat_wxyz", "(T, 4): its orientation.")
+    q = _view("robot_q", "(T, 29): joints [rad].")
+    joint_names = _view("robot_joint_names", "Names of q's columns.")
+    partner = _view("partner_joints", "(T, 24, 3): the partner after adaptation [m].")
+
+
+class Recording(Motion):
+    """What a robot did beside a partner: states at 50 Hz."""
+
+    task = _view("task", "Its task.")
+    outcome = _view("outcome", "How it ended.")
+    message = _view("message", "Why, where it did not end well.")
+    root_position = _view("root_position", "(T, 3): the robot's base [m].")
+    root_quat_wxyz = _view("root_quat_wxyz", "(T, 4): its orientation.")
+    root_velocity = _view("root_velocity", "(T, 3) [m/s].")
+    q = _view("q", "(T, 29): joints [rad].")
+    v = _view("v", "(T, 29) [rad/s].")
+    q_target = _view("q_target", "(T, 29): what the joints were sent [rad].")
+    reference_q = _view("reference_q", "(T, 29): what the controller was asked for [rad].")
+    partner = _view("partner", "(T, 24, 3): the human partner [m].")
+
+    @property
+    def row(self) -> Optional[Dict[str, Any]]:
+        """The episode's row, of a recording that a run kept."""
+        return json.loads(self["row"]) if "row" in self else None
+
+
+class RobotMotion(Motion):
+    """A robot's motion from a file of any of `robot_motion_formats()`."""
+
+    root_position = _view("root_position", "(T, 3) [m].")
+    root_quat_wxyz = _view("root_quat_wxyz", "(T, 4).")
+    q = _view("q", "(T, joints) [rad].")
+    joint_names = _view("joint_names", "Names of q's columns.")
+    evidence = _view("evidence", "Sentences: what was found of order, units and rate.")
+
+
+_KINDS: Dict[str, Type[Motion]] = {"clip": Clip, "paired": Paired, "recording": Recording, "robot": RobotMotion}
+
+
+def load(path: Path) -> Any:
+    """A clip, a paired motion or a recording (NPZ). Raises InputError for anything else, naming what was found."""
+    archive = _duet.load(path_of(path))
+    return _KINDS[archive.kind](archive)
+
+
+def clip(a: Any, b: Any, *, rate_hz: float, task: str, reactor: str = "B", act: Optional[Tuple[int, int]] = None,
+         id: str = "clip") -> Clip:
+    """Two people from joints of shape (T, 24, 3) [m], world frame, z up. The act's frames are proposed where none are
+    given."""
+    return Clip(_duet.make_clip(a, b, rate_hz, task, reactor, act, id))
+
+
+def synthesize(task: str, *, seed: int = 42, index: int = 0) -> Clip:
+    """A clip made from nothing, the same for the same arguments."""
+    return Clip(_duet.synthesize(task, seed, index))
+
+
+def retarget(a: Any, b: Any = None, *, rate_hz: float = 50.0, task: str = "", reactor: str = "", robot: str = "",
+             options: Optional[Mapping[str, Any]] = None, act: Optional[Tuple[int, int]] = None) -> Paired:
+    """PAIR: one person becomes the robot. `retarget(clip)`, or joints of two people with rate and task.
+
+    `options` are those of `duet list pair-options` ({"mode": "best"})."""
+    if not isinstance(a, Clip):
+        if b is None or not task:
+            raise ValueError("retarget: expected a clip, or joints of two people and a task")
+        a = clip(a, b, rate_hz=rate_hz, task=task, reactor=reactor or "B", act=act)
+    if reactor not in ("", "A", "B"):
+        raise ValueError(f"reactor: expected A or B, found '{reactor}'")
+    return Paired(_duet.retarget(a._archive, texts_of(options), robot, reactor))
+
+
+def _motion_of(motion: Union[Motion, Path]) -> Motion:
+    return motion if isinstance(motion, Motion) else load(motion)
+
+
+def score(motion: Union[Motion, Path], *, readings: Optional[Mapping[str, Any]] = None, thresholds: str = "paper",
+          robot: str = "") -> Dict[str, Any]:
+    """What `duet score --json` says of one file: the 18 metrics and the detectors, of a run's recording its row again."""
+    return json.loads(_duet.score(_motion_of(motion)._archive, texts_of(readings), thresholds, robot))
+
+
+def detect(motion: Union[Motion, Path], task: str, *, version: str = "robot", thresholds: str = "paper",
+           robot: str = "") -> Dict[str, Any]:
+    """A task's detector over human and robot: success, parts, values, margins, and the evidence per frame."""
+    return json.loads(_duet.detect(_motion_of(motion)._archive, task, version, thresholds, robot))
+
+
+class _People(Sequence[Clip]):
+    def __init__(self, reader: "_duet.PeopleReader"):
+        self._reader = reader
+        self.format: str = reader.format
+
+    def __len__(self) -> int:
+        return len(self._reader)
+
+    def __getitem__(self, i: Any) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"people: expected a place below {len(self)}, found {i}")
+        archive, evidence = self._reader.at(i % len(self))
+        read = Clip(archive)
+        read.evidence = evidence  # type: ignore[attr-defined]
+        return read
+
+    def __iter__(self) -> Iterator[Clip]:
+        return (self[i] for i in range(len(self)))
+
+
+def read_people(paths: Union[Path, Sequence[Path]], *, format: str = "", task: str = "") -> Sequence[Clip]:
+    """Recordings of two people in any of `people_formats()`; each is read when it is asked for."""
+    several = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
+    return _People(_duet.PeopleReader([path_of(path) for path in several], format, task))
+
+
+def people_formats() -> List[str]:
+    return _duet.people_formats()
+
+
+def read_robot_motion(path: Path, *, format: str = "", robot: str = "") -> RobotMotion:
+    return RobotMotion(_duet.read_robot_motion(path_of(path), format, robot))
+
+
+def write_robot_motion(motion: Union[Paired, RobotMotion], path: Path, *, format: str, robot: str = "") -> None:
+    """A robot's motion in one of `robot_motion_formats()`; some of them are only read."""
+    _duet.write_robot_motion(motion._archive, path_of(path), format, robot)
+
+
+def robot_motion_formats() -> List[str]:
+    return _duet.robot_motion_formats()
+
+
+def dataset(folder: Path) -> List[Dict[str, Any]]:
+    """The entries of a data set that `duet dataset` made (docs/datasets.md)."""
+    return json.loads(_duet.dataset_entries(path_of(folder)))

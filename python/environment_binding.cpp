@@ -1,0 +1,223 @@
+// Many episodes that Python leads in step, and what they see as live arrays.
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "duet/bench/led_episodes.h"
+#include "duet/bench/shipped_suites.h"
+#include "duet/core/require.h"
+#include "duet/python/bindings.h"
+#include "duet/results/episode_row.h"
+#include "duet/results/json_fields.h"
+
+namespace duet::python {
+namespace {
+
+// Place in a frame and size of what a view shows; the layout is that of to_vector (policies/policy.h).
+struct Part {
+  const char* name;
+  int first, size;
+};
+
+class EpisodeBatch {
+ public:
+  EpisodeBatch(std::shared_ptr<const LedSuite> suite, int n) : suite_(std::move(suite)) {
+    require(n >= 1 && n <= 4096, fmt::format("n: expected 1 to 4096 episodes, found {}", n));
+    joints_ = suite_->robot()->dof();
+    numbers_ = 91 + 2 * joints_;
+    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(suite_));
+    frames_.resize(static_cast<std::size_t>(n) * kHistoryFrames * numbers_);
+    root_.resize(static_cast<std::size_t>(n) * 7);
+    hold_.resize(static_cast<std::size_t>(n) * kAnchors * width());
+    over_.assign(n, 1);
+    success_.assign(n, 0);
+    tick_.assign(n, 0);
+    episode_.assign(n, -1);
+  }
+
+  [[nodiscard]] int size() const { return static_cast<int>(episodes_.size()); }
+  [[nodiscard]] int joints() const { return joints_; }
+  [[nodiscard]] int width() const { return 7 + joints_; }
+  [[nodiscard]] const LedSuite& suite() const { return *suite_; }
+
+  // Begins episode numbers[i] at place places[i]; all compute at once.
+  void reset(const std::vector<int>& places, const std::vector<int>& numbers) {
+    require(places.size() == numbers.size(),
+            fmt::format("reset: expected {} episodes, found {}", places.size(), numbers.size()));
+    for (const int place : places) check(place);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      episodes_[places[i]]->start(numbers[i]);
+      episode_[places[i]] = numbers[i];
+    }
+    for (const int place : places) show(place, episodes_[place]->next());
+  }
+
+  // Answers every episode that is not over; rows of the others are not looked at.
+  void step(const double* plans, int rows) {
+    const std::size_t numbers = static_cast<std::size_t>(rows) * width();
+    std::vector<int> led;
+    for (int place = 0; place < size(); ++place)
+      if (!episodes_[place]->is_over()) led.push_back(place);
+    for (const int place : led) episodes_[place]->answer({plans + place * numbers, numbers}, rows);
+    for (const int place : led) show(place, episodes_[place]->next());
+  }
+
+  [[nodiscard]] std::string row(int place) const {
+    check(place);
+    return episodes_[place]->row() ? dumped(to_json(*episodes_[place]->row())) : "";
+  }
+
+  void close() {
+    for (const auto& episode : episodes_) episode->stop();
+    over_.assign(over_.size(), 1);
+  }
+
+  std::vector<double> frames_, root_, hold_;  // (n, 12, numbers), (n, 7), (n, 5, 7 + joints)
+  std::vector<std::uint8_t> over_, success_;
+  std::vector<std::int64_t> tick_, episode_;
+  int numbers_ = 0;
+
+ private:
+  void check(int place) const {
+    require(place >= 0 && place < size(), fmt::format("episode: expected a place below {}, found {}", size(), place));
+  }
+
+  void show(int place, const std::shared_ptr<const PlanRequest>& request) {
+    over_[place] = request == nullptr ? 1 : 0;
+    success_[place] = 0;
+    if (request == nullptr) {
+      const auto& row = episodes_[place]->row();
+      success_[place] = row && row->success.value_or(false) ? 1 : 0;
+      return;
+    }
+    const std::size_t size = request->frames.size();
+    std::copy(request->frames.data(), request->frames.data() + size, &frames_[place * size]);
+    put(request->now, &root_[static_cast<std::size_t>(place) * 7]);
+    for (int row = 0; row < kAnchors; ++row) {
+      double* out = &hold_[(static_cast<std::size_t>(place) * kAnchors + row) * width()];
+      put(request->standing, out);
+      std::copy(suite_->robot()->neutral.data(), suite_->robot()->neutral.data() + joints_, out + 7);
+    }
+    tick_[place] = request->tick;
+  }
+
+  static void put(const Pose& X, double* out) {
+    for (const double value : {X.p.x(), X.p.y(), X.p.z(), X.R.w(), X.R.x(), X.R.y(), X.R.z()}) *out++ = value;
+  }
+
+  std::shared_ptr<const LedSuite> suite_;
+  std::vector<std::unique_ptr<LedEpisode>> episodes_;
+  int joints_ = 0;
+};
+
+// A part of each episode's newest frame.
+py::array part_of(const py::object& self, const Part& part) {
+  auto& batch = self.cast<EpisodeBatch&>();
+  const py::ssize_t number = sizeof(double), frame = batch.numbers_ * number;
+  const double* newest =
+      batch.frames_.data() + static_cast<std::ptrdiff_t>(kHistoryFrames - 1) * batch.numbers_ + part.first;
+  const py::ssize_t n = batch.size(), episode = kHistoryFrames * frame;
+  if (std::string_view(part.name) == "partner")
+    return view_of(newest, {n, kSmplJoints, 3}, {episode, 3 * number, number}, self);
+  return view_of(newest, {n, part.size}, {episode, number}, self);
+}
+
+std::vector<Part> parts_of(int joints) {
+  return {{"partner", 3, 3 * kSmplJoints},
+          {"velocity", 75, 3},
+          {"angular_velocity", 78, 3},
+          {"gravity", 81, 3},
+          {"q", 84, joints},
+          {"v", 84 + joints, joints},
+          {"offset", 84 + 2 * joints, 3},
+          {"orientation", 87 + 2 * joints, 4}};
+}
+
+py::array named_view(const py::object& self, const std::string& name) {
+  auto& batch = self.cast<EpisodeBatch&>();
+  const py::ssize_t n = batch.size();
+  if (name == "frames") return view_of(batch.frames_.data(), {n, kHistoryFrames, batch.numbers_}, self);
+  if (name == "root") return view_of(batch.root_.data(), {n, 7}, self);
+  if (name == "hold") return view_of(batch.hold_.data(), {n, kAnchors, batch.width()}, self);
+  if (name == "over") return view_of(batch.over_.data(), {n}, self);
+  if (name == "success") return view_of(batch.success_.data(), {n}, self);
+  if (name == "tick") return view_of(batch.tick_.data(), {n}, self);
+  if (name == "episode") return view_of(batch.episode_.data(), {n}, self);
+  std::string known = "frames, root, hold, over, success, tick, episode";
+  for (const Part& part : parts_of(batch.joints())) {
+    if (name == part.name) return part_of(self, part);
+    known += std::string(", ") + part.name;
+  }
+  throw std::invalid_argument(fmt::format("view: expected one of {}, found '{}'", known, name));
+}
+
+void step_batch(EpisodeBatch& batch, const Numbers& plans) {
+  const bool fits = plans.ndim() == 3 && plans.shape(0) == batch.size() && plans.shape(2) == batch.width() &&
+                    (plans.shape(1) == kAnchors || plans.shape(1) == kDensePlan);
+  if (!fits) {
+    const std::vector<py::ssize_t> shape(plans.shape(), plans.shape() + plans.ndim());
+    throw std::invalid_argument(
+        fmt::format("step: expected plans of shape ({0}, {1}, {3}) or ({0}, {2}, {3}), found ({4})", batch.size(),
+                    kAnchors, kDensePlan, batch.width(), fmt::join(shape, ", ")));
+  }
+  const double* data = plans.data();
+  const auto rows = static_cast<int>(plans.shape(1));
+  const py::gil_scoped_release released;
+  batch.step(data, rows);
+}
+
+std::shared_ptr<LedSuite> led_suite(const std::string& suite, const Overrides& overrides, const LedPart& part,
+                                    int threads) {
+  Progress quiet(Progress::Style::kQuiet);
+  return std::make_shared<LedSuite>(load_suite(suite_file(suite), overrides), part, threads, quiet);
+}
+
+}  // namespace
+
+void add_environment(py::module_& module) {
+  const auto released = py::call_guard<py::gil_scoped_release>();
+  py::class_<LedSuite, std::shared_ptr<LedSuite>>(module, "LedSuite", "What episodes are drawn from.")
+      .def(py::init([](const std::string& suite, const Overrides& overrides, const std::string& engine,
+                       const std::string& controller, const std::string& task, const std::string& perturbation,
+                       int threads) {
+             return led_suite(suite, overrides, {engine, controller, task, perturbation}, threads);
+           }),
+           py::arg("suite"), py::arg("overrides"), py::arg("engine"), py::arg("controller"), py::arg("task"),
+           py::arg("perturbation"), py::arg("threads"), released)
+      .def("__len__", &LedSuite::size)
+      .def(
+          "clip",
+          [](const LedSuite& suite, int episode) {
+            require(episode >= 0 && episode < suite.size(),
+                    fmt::format("episode: expected a number below {}, found {}", suite.size(), episode));
+            return suite.at(episode).clip->clip_id;
+          },
+          py::arg("episode"))
+      .def_property_readonly("joints", [](const LedSuite& suite) { return suite.robot()->joint_names(); })
+      .def_property_readonly("lower",
+                             [](const LedSuite& suite) {
+                               const Eigen::VectorXd lower = suite.robot()->lower();
+                               return std::vector<double>(lower.begin(), lower.end());
+                             })
+      .def_property_readonly("upper", [](const LedSuite& suite) {
+        const Eigen::VectorXd upper = suite.robot()->upper();
+        return std::vector<double>(upper.begin(), upper.end());
+      });
+  py::class_<EpisodeBatch>(module, "EpisodeBatch", "Episodes that are led in step.")
+      .def(py::init(
+               [](const std::shared_ptr<LedSuite>& suite, int n) { return std::make_unique<EpisodeBatch>(suite, n); }),
+           py::arg("suite"), py::arg("n"))
+      .def("__len__", &EpisodeBatch::size)
+      .def("reset", &EpisodeBatch::reset, py::arg("places"), py::arg("episodes"), released)
+      .def("step", &step_batch, py::arg("plans"))
+      .def("view", &named_view, py::arg("name"), "A live view, read-only.")
+      .def("row", &EpisodeBatch::row, py::arg("place"), "JSON; empty while the episode goes on.")
+      .def("close", &EpisodeBatch::close, released);
+}
+
+}  // namespace duet::python

@@ -1,0 +1,20 @@
+// The module duet._duet (docs/python.md).
+#include <pybind11/pybind11.h>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/version.h"
+#include "duet/python/bindings.h"
+
+PYBIND11_MODULE(_duet, module) {
+  namespace py = pybind11;
+  module.doc() = "The C++ half of the package duet.";
+  module.attr("__version__") = duet::duet_version();
+  py::register_exception<duet::InputError>(module, "InputError", PyExc_ValueError);
+  py::register_exception<duet::StorageError>(module, "StorageError", PyExc_OSError);
+  py::register_exception<duet::MissingError>(module, "MissingError", PyExc_RuntimeError);
+  duet::python::add_plans(module);
+  duet::python::add_evaluation(module);
+  duet::python::add_archive(module);
+  duet::python::add_environment(module);
+}

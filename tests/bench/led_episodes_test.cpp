@@ -1,0 +1,95 @@
+#include "duet/bench/led_episodes.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/bench/run_episode.h"
+#include "duet/core/require.h"
+#include "duet/policies/registry.h"
+#include "tests/bench/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+std::shared_ptr<const LedSuite> led(const LedPart& part = {}) {
+  Progress quiet(Progress::Style::kQuiet);
+  return std::make_shared<const LedSuite>(test::playback_suite(), part, 1, quiet);
+}
+
+// The null arm's answer to a question.
+std::vector<double> holding(const PlanRequest& request, const RobotModel& robot) {
+  const Pose& X = request.standing;
+  std::vector<double> numbers;
+  for (int row = 0; row < kAnchors; ++row) {
+    numbers.insert(numbers.end(), {X.p.x(), X.p.y(), X.p.z(), X.R.w(), X.R.x(), X.R.y(), X.R.z()});
+    numbers.insert(numbers.end(), robot.neutral.data(), robot.neutral.data() + robot.dof());
+  }
+  return numbers;
+}
+
+TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  ASSERT_EQ(suite->size(), 2);
+  LedEpisode episode(suite);
+  int questions = 0;
+  for (auto request = episode.begin(1); request != nullptr; ++questions) {
+    EXPECT_EQ(request->tick, questions * kTicksPerPlan);
+    request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+  }
+  EXPECT_GT(questions, 5);
+  EXPECT_TRUE(episode.is_over());
+  ASSERT_TRUE(episode.row().has_value());
+  const EpisodeRow expected = suite->run(1, policy_maker("null", suite->robot()), [] { return false; });
+  EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
+  EXPECT_EQ(episode.row()->state_hash, expected.state_hash);
+  EXPECT_EQ(episode.row()->key, expected.key);
+  EXPECT_EQ(episode.row()->seed, expected.seed);
+}
+
+TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  LedEpisode episode(suite);
+  const auto first = episode.begin(0);
+  ASSERT_NE(first, nullptr);
+  ASSERT_NE(episode.go_on(holding(*first, *suite->robot()), kAnchors), nullptr);
+  const auto again = episode.begin(0);
+  ASSERT_NE(again, nullptr);
+  EXPECT_EQ(again->tick, 0);
+  EXPECT_EQ(again->frames, first->frames);
+  episode.stop();
+  EXPECT_TRUE(episode.is_over());
+  EXPECT_FALSE(episode.row().has_value());
+}
+
+TEST(LedEpisode, RefusesWhatItCannotLead) {
+  LedEpisode episode(led());
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.begin(2); }),
+            "episode: expected a number from 0 to 1, found 2");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.answer({}, kAnchors); }),
+            "the episode is over: begin another one");
+  ASSERT_NE(episode.begin(0), nullptr);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { episode.answer(std::vector<double>(10), kAnchors); }),
+              HasSubstr("policy 'caller': plan: expected (5, 36) or (100, 36) numbers, found 5 rows and 10 numbers"));
+}
+
+TEST(LedSuite, RefusesNamesThatTheSuiteDoesNotHave) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.engine = "mujoco"}); }),
+              HasSubstr("unknown engine 'mujoco'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.controller = "vmc"}); }),
+              HasSubstr("unknown controller 'vmc'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.perturbation = "ice"}); }),
+              HasSubstr("unknown perturbation 'ice'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.task = "waltz"}); }), HasSubstr("'waltz'"));
+}
+
+TEST(LedSuite, ChoosesATask) {
+  const std::shared_ptr<const LedSuite> suite = led({.task = "handshake"});
+  ASSERT_EQ(suite->size(), 1);
+  EXPECT_EQ(suite->at(0).clip->task, Task::kHandshake);
+}
+
+}  // namespace
+}  // namespace duet
