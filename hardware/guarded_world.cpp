@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "duet/core/clock.h"
+#include "duet/hardware/guard_loop.h"
 
 namespace duet {
 namespace {
