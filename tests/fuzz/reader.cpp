@@ -9,9 +9,9 @@ namespace duet::fuzz {
 
 std::vector<Reader> all_readers() {
   std::vector<Reader> all;
-  for (const auto& room :
-       {core_readers, format_readers, motion_readers, body_readers, robot_readers, network_readers, controller_readers,
-        policy_readers, result_readers, dataset_readers, bench_readers, training_readers})
+  for (const auto& room : {core_readers, format_readers, motion_readers, body_readers, robot_readers, network_readers,
+                           controller_readers, policy_readers, result_readers, dataset_readers, bench_readers,
+                           training_readers, guard_readers, hardware_readers})
     for (const Reader& reader : room()) all.push_back(reader);
   return all;
 }

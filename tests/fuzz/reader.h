@@ -31,6 +31,8 @@ std::vector<Reader> result_readers();
 std::vector<Reader> dataset_readers();
 std::vector<Reader> bench_readers();
 std::vector<Reader> training_readers();
+std::vector<Reader> guard_readers();
+std::vector<Reader> hardware_readers();
 
 std::vector<Reader> all_readers();
 

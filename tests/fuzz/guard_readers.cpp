@@ -1,0 +1,79 @@
+// What the guard and its planner tell one another over their sockets, and the log of a run.
+#include <cstring>
+#include <filesystem>
+
+#include "duet/core/file.h"
+#include "duet/hardware/guard_message.h"
+#include "duet/hardware/guard_report.h"
+#include "duet/hardware/log_recording.h"
+#include "duet/hardware/run_log.h"
+#include "tests/fuzz/reader.h"
+#include "tests/hardware/guarded_twin.h"
+
+namespace duet::fuzz {
+namespace {
+
+std::string text_of(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::span<const std::byte> bytes_in(std::string_view text) {
+  return std::as_bytes(std::span(text.data(), text.size()));
+}
+
+std::string report_sample(unsigned /*seed*/) {
+  ReportBuffer buffer;
+  encode(GuardReport(), buffer);
+  return text_of(buffer);
+}
+
+void read_report(std::string_view bytes) {
+  GuardReport report;
+  (void)decode(bytes_in(bytes), report);
+}
+
+std::string message_sample(unsigned seed) {
+  GuardBuffer buffer;
+  PlannerMessage planner;
+  planner.command.q.setZero(kG1Motors);
+  if (seed / 64 % 2 == 1) planner.goal.emplace();
+  const std::size_t size = seed / 128 % 2 == 0 ? encode(planner, buffer) : encode(PersonMessage(), buffer);
+  return text_of(std::span<const std::byte>(buffer).first(size));
+}
+
+void read_message(std::string_view bytes) {
+  GuardMessage message;
+  (void)decode(bytes_in(bytes), message);
+}
+
+// A few ticks of a guard that runs.
+std::string log_sample(unsigned /*seed*/) {
+  static const std::string sample = [] {
+    test::GuardedTwin robot;
+    robot.start();
+    robot.message.goal.emplace();
+    const std::string path = scratch_folder() + "/sample.mcap";
+    std::filesystem::remove(path);
+    {
+      RunLog log(path, test::twin_guard());
+      for (int k = 0; k < 12; ++k) {
+        robot.tick();
+        log.add(robot.guard);
+      }
+    }
+    return read_file(path);
+  }();
+  return sample;
+}
+
+void read_log(std::string_view bytes) { (void)recording_of_log(scratch_file("fuzz.mcap", bytes)); }
+
+}  // namespace
+
+std::vector<Reader> guard_readers() {
+  return {{"guard_report", report_sample, read_report},
+          {"guard_message", message_sample, read_message},
+          {"run_log", log_sample, read_log}};
+}
+
+}  // namespace duet::fuzz

@@ -1,0 +1,206 @@
+// What reaches the guard of a real robot from outside: messages of sockets and topics, configurations, logs.
+#include <cstring>
+
+#include "duet/core/file.h"
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/core/skeleton.h"
+#include "duet/hardware/guard_message.h"
+#include "duet/hardware/homie_stand_in.h"
+#include "duet/hardware/limiter_setup_json.h"
+#include "duet/hardware/odometry_source.h"
+#include "duet/hardware/person_input.h"
+#include "duet/hardware/robot_config.h"
+#include "duet/hardware/run_log.h"
+#include "duet/hardware/sport_rpc.h"
+#include "tests/fuzz/reader.h"
+
+namespace duet::fuzz {
+namespace {
+
+std::span<const std::byte> datagram(std::string_view bytes) { return std::as_bytes(std::span(bytes)); }
+
+template <typename Buffer>
+std::string text_of(const Buffer& buffer, std::size_t size) {
+  return {reinterpret_cast<const char*>(buffer.data()), size};
+}
+
+void refuse_unless(bool taken) {
+  if (!taken) throw InputError("refused");
+}
+
+// LCM: each of the four messages.
+std::string lcm_sample(unsigned seed) {
+  LcmBuffer buffer;
+  switch (seed / 64 % 4) {
+    case 0:
+      return text_of(buffer, encode(PedalCommand{{0.2, 0.0, 0.1, 0.74}}, seed, buffer));
+    case 1:
+      return text_of(buffer, encode(ArmAction{}, seed, buffer));
+    case 2:
+      return text_of(buffer, encode(PdTargets{}, seed, buffer));
+    default:
+      return text_of(buffer, encode(BodyControlData{}, seed, buffer));
+  }
+}
+
+void read_lcm(std::string_view bytes) {
+  PedalCommand pedal;
+  ArmAction arms;
+  PdTargets targets;
+  BodyControlData body;
+  HomieStandIn homie;
+  homie.receive(datagram(bytes), 1.0);
+  refuse_unless(decode(datagram(bytes), pedal).refusal.empty() || decode(datagram(bytes), arms).refusal.empty() ||
+                decode(datagram(bytes), targets).refusal.empty() || decode(datagram(bytes), body).refusal.empty());
+}
+
+std::string guard_sample(unsigned seed) {
+  GuardBuffer buffer;
+  PlannerMessage planner;
+  planner.command.q.setZero(kG1Motors);
+  planner.sequence = seed;
+  if (seed / 64 % 3 == 0) return text_of(buffer, encode(planner, buffer));
+  if (seed / 64 % 3 == 1) return text_of(buffer, encode(PersonMessage{}, buffer));
+  return text_of(buffer, encode_stop(buffer));
+}
+
+void read_guard(std::string_view bytes) {
+  GuardMessage message;
+  refuse_unless(decode(datagram(bytes), message) != GuardMessageKind::kRefused);
+}
+
+// A track of them: the joints of every body that is taken are used.
+std::string person_sample(unsigned seed) {
+  PersonEstimate estimate;
+  estimate.sequence = seed;
+  estimate.seen = seed / 64 % 2 == 0;
+  for (int j = 0; j < kSmplJoints; ++j) estimate.joints.col(j) = Eigen::Vector3d(0.01 * j, -0.02 * j, 3.0);
+  PersonBuffer buffer;
+  encode(estimate, buffer);
+  return text_of(buffer, buffer.size());
+}
+
+void read_person(std::string_view bytes) {
+  PersonEstimate estimate;
+  refuse_unless(decode(datagram(bytes), estimate) == PersonFault::kNone);
+  PersonTrack track(Pose{});
+  (void)track.receive(estimate, {}, 1.0);
+  (void)track.at(1.1);
+}
+
+std::string external_sample(unsigned seed) {
+  ExternalPoseBuffer buffer;
+  encode(ExternalPose{.sequence = seed, .X_WB = {}, .v_WB = Eigen::Vector3d::Zero(), .valid = true}, buffer);
+  return text_of(buffer, buffer.size());
+}
+
+void read_external(std::string_view bytes) {
+  ExternalPose pose;
+  refuse_unless(decode(datagram(bytes), pose));
+}
+
+std::string state_sample(unsigned seed) {
+  LowStateFrame frame{};
+  frame.tick = seed + 1;
+  frame.imu.quaternion[0] = 1.0f;
+  seal(frame);
+  return {reinterpret_cast<const char*>(&frame), sizeof(frame)};
+}
+
+// Its checksum is made right, so that what is behind it is read too.
+void read_low_state(std::string_view bytes) {
+  LowStateFrame frame{};
+  std::memcpy(&frame, bytes.data(), std::min(bytes.size(), sizeof(frame)));
+  seal(frame);
+  RobotReading reading;
+  refuse_unless(read_state(frame, reading) == FrameFault::kNone && bytes.size() == sizeof(frame));
+}
+
+std::string sport_sample(unsigned seed) {
+  if (seed / 64 % 2 == 0) return R"({"data":500})";
+  return velocity_request(1, {0.2, 0.0, 0.1, 0.0}, 0.3).parameter.data();
+}
+
+void read_sport(std::string_view bytes) {
+  const bool order = order_of(SportCall::kSetVelocity, bytes).has_value();
+  refuse_unless(order || fsm_of(bytes).has_value());
+}
+
+std::string config_sample(unsigned seed) {
+  constexpr const char* kExamples[] = {"twin", "homie", "sport", "camera"};
+  return read_file(std::string(DUET_SOURCE_DIR "/examples/hardware/") + kExamples[seed / 64 % std::size(kExamples)] +
+                   ".yaml");
+}
+
+void read_config(std::string_view bytes) { (void)parse_robot_config(std::string(bytes), "fuzz.yaml"); }
+
+RobotConfig twin_config() { return parse_robot_config(config_sample(0), "twin.yaml"); }
+
+std::string setup_sample(unsigned seed) {
+  RobotConfig config = twin_config();
+  config.person = seed / 64 % 2 == 1;
+  return limiter_setup_json(guard_setup(config, true).limiter).dump();
+}
+
+void read_setup(std::string_view bytes) {
+  const nlohmann::json json = nlohmann::json::parse(bytes, nullptr, false);
+  if (json.is_discarded()) throw InputError("fuzz: not JSON");
+  (void)parse_limiter_setup(json, "fuzz.json");
+}
+
+// A wire on which nothing ever comes.
+class SilentWire final : public FrameTransport {
+ public:
+  bool take(LowStateFrame&) override { return false; }
+  int foreign_writers() override { return 0; }
+  void open_writer() override {}
+  void close_writer() override {}
+  [[nodiscard]] bool has_writer() const override { return false; }
+  bool write(const LowCommandFrame&) override { return false; }
+};
+
+class SilentVelocity final : public VelocitySink {
+ public:
+  void send(const VelocityCommand&) override {}
+};
+
+std::string make_log() {
+  const std::string path = scratch_folder() + "/made.mcap";
+  std::remove(path.c_str());
+  const GuardSetup setup = guard_setup(twin_config(), true);
+  SilentWire wire;
+  SilentVelocity velocity;
+  RobotGuard guard(setup, wire, velocity);
+  {
+    RunLog log(path, setup);
+    for (int k = 1; k <= 3; ++k) {
+      guard.tick(0.002 * k);
+      log.add(guard);
+    }
+  }
+  return read_file(path);
+}
+
+std::string log_sample(unsigned) {
+  static const std::string log = make_log();
+  return log;
+}
+
+void read_log(std::string_view bytes) { (void)replay_log(scratch_file("fuzz.mcap", bytes)); }
+
+}  // namespace
+
+std::vector<Reader> hardware_readers() {
+  return {{"lcm_message", lcm_sample, read_lcm},
+          {"guard_message", guard_sample, read_guard},
+          {"person_estimate", person_sample, read_person},
+          {"external_pose", external_sample, read_external},
+          {"low_state", state_sample, read_low_state},
+          {"sport_answer", sport_sample, read_sport},
+          {"robot_config", config_sample, read_config},
+          {"limiter_setup", setup_sample, read_setup},
+          {"run_log", log_sample, read_log}};
+}
+
+}  // namespace duet::fuzz
