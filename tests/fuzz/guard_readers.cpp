@@ -1,9 +1,8 @@
-// What the guard and its planner tell one another over their sockets, and the log of a run.
+// What the guard reports to its planner, and the log of a run read as a recording.
 #include <cstring>
 #include <filesystem>
 
 #include "duet/core/file.h"
-#include "duet/hardware/guard_message.h"
 #include "duet/hardware/guard_report.h"
 #include "duet/hardware/log_recording.h"
 #include "duet/hardware/run_log.h"
@@ -32,20 +31,6 @@ void read_report(std::string_view bytes) {
   (void)decode(bytes_in(bytes), report);
 }
 
-std::string message_sample(unsigned seed) {
-  GuardBuffer buffer;
-  PlannerMessage planner;
-  planner.command.q.setZero(kG1Motors);
-  if (seed / 64 % 2 == 1) planner.goal.emplace();
-  const std::size_t size = seed / 128 % 2 == 0 ? encode(planner, buffer) : encode(PersonMessage(), buffer);
-  return text_of(std::span<const std::byte>(buffer).first(size));
-}
-
-void read_message(std::string_view bytes) {
-  GuardMessage message;
-  (void)decode(bytes_in(bytes), message);
-}
-
 // A few ticks of a guard that runs.
 std::string log_sample(unsigned /*seed*/) {
   static const std::string sample = [] {
@@ -71,9 +56,7 @@ void read_log(std::string_view bytes) { (void)recording_of_log(scratch_file("fuz
 }  // namespace
 
 std::vector<Reader> guard_readers() {
-  return {{"guard_report", report_sample, read_report},
-          {"guard_message", message_sample, read_message},
-          {"run_log", log_sample, read_log}};
+  return {{"guard_report", report_sample, read_report}, {"log_recording", log_sample, read_log}};
 }
 
 }  // namespace duet::fuzz
