@@ -17,7 +17,7 @@ namespace duet {
 namespace {
 
 constexpr std::uint64_t kMostChunkBytes = std::uint64_t{256} << 20;
-constexpr std::uint64_t kDeflatesAtMost = 1040;  // times: what zlib can make of zeros
+constexpr std::uint64_t kDeflatesAtMost = 1040;      // times: what zlib can make of zeros
 constexpr std::size_t kMostTreeEntries = 2'000'000;  // of all nodes of a tree of chunks
 constexpr int kMostRank = 8;
 
