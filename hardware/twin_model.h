@@ -30,7 +30,8 @@ struct TwinOptions {
   double tilt_noise = 0.0;          // of the IMU's orientation, about its x and y [rad]
   int mode_machine = 5;
   std::uint64_t seed = 1;
-  std::string engine;  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
+  std::string engine =
+      {};  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
 };
 
 inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]

@@ -150,12 +150,10 @@ PairOptions pair_options_of(PairMode mode) {
   options.contact_blocks = ContactBlocks::kCrossAndHuman;
   options.weights.bone = 5.0;
   options.weights.partner = 0.2;
-  options.weights.collision = 30.0;
-  options.weights.hand = 3.0;
-  options.step_speed = 1.8;
+  options.weights.collision = 10.0;
   if (mode != PairMode::kBest) return options;
   options.optimizer = Optimizer::kLbfgs;
-  options.lbfgs_iterations = 80;
+  options.lbfgs_iterations = 60;
   return options;
 }
 
