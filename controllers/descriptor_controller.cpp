@@ -63,7 +63,7 @@ Field<DescriptorOptions> command_field() {
   return field<DescriptorOptions>(
       {.name = "command", .meaning = "[m/s, m/s, rad/s, m] instead of what is made of the reference's root"}, kForms,
       [](const DescriptorOptions& options) { return options.command; },
-      [kForms](DescriptorOptions& options, const std::string& text) -> std::string {
+      [](DescriptorOptions& options, const std::string& text) -> std::string {
         try {
           if (!text.empty()) static_cast<void>(parse_velocity_command(text, 0.0));
         } catch (const std::invalid_argument&) {

@@ -18,10 +18,11 @@ bool can_be_made(const std::string& name) {
 }
 
 TEST(ReferencePages, TheFilesAreWhatTheTablesSay) {
-  for (const std::string& name : reference_page_names())
-    if (can_be_made(name))
-      EXPECT_EQ(read_file(std::string(DUET_SOURCE_DIR) + "/docs/reference/" + name + ".md"), reference_page(name))
-          << "`./run reference` writes docs/reference/" << name << ".md anew";
+  for (const std::string& name : reference_page_names()) {
+    if (!can_be_made(name)) continue;
+    EXPECT_EQ(read_file(std::string(DUET_SOURCE_DIR) + "/docs/reference/" + name + ".md"), reference_page(name))
+        << "`./run reference` writes docs/reference/" << name << ".md anew";
+  }
 }
 
 TEST(ReferencePages, AnUnknownOneIsRefusedWithTheNearest) {
