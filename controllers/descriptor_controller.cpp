@@ -113,6 +113,7 @@ Descriptor with_yaw_scale(Descriptor descriptor, const std::optional<double>& sc
 template <typename Joint>
 std::vector<std::string> names_of(const std::vector<Joint>& joints) {
   std::vector<std::string> names;
+  names.reserve(joints.size());
   for (const Joint& joint : joints) names.push_back(joint.name);
   return names;
 }
