@@ -47,15 +47,17 @@ std::vector<RunInput> read_inputs(const std::string& folder);
 // copied there from the run directory `from`.
 Suite rebased(Suite suite, const std::string& from, const std::string& to);
 
+// Where what a run does not keep is looked for, and what need not be.
+struct InputPlaces {
+  std::vector<std::string> skipped_policies = {}, skipped_controllers = {};
+  std::string clips = {};  // a folder or one file; empty: nobody gave one
+};
+
 // The suite of a run: from its suite.yaml, each network where it is found. Looked at are the place that the suite names
 // or duet's own, the run directory, what ships with duet and $DUET_MODELS. Clips that the run does not keep are looked
 // for where the suite names them, and by what is in them among the files below `clips`. Throws InputError for a file
 // that is not what it was when the run was made, MissingError for one that is not there: which, the SHA-256 expected
 // and found. Policies and controllers in `skipped` are not looked at.
-struct InputPlaces {
-  std::vector<std::string> skipped_policies = {}, skipped_controllers = {};
-  std::string clips = {};  // a folder or one file; empty: nobody gave one
-};
 Suite suite_of_run(const Run& run, const InputPlaces& places = {});
 
 // What is left out where the clips of a run may not be passed on: the files, and an index that has their SHA-256 alone.
