@@ -1,6 +1,7 @@
 # duet_add_module(<room> SOURCES ... LINK ...): the library duet_<room>, duet::<room> to others. One room = one folder =
 # one target.
-# duet_add_test(<room> SOURCES ... LINK ...): the GoogleTest program <room>_test, each TEST known to ctest.
+# duet_add_test(<room> SOURCES ... LINK ... [HEADERS ...]): the GoogleTest program <room>_test, each TEST known to ctest;
+#   HEADERS are compiled once for all of its sources, beside those that every test has.
 # duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `dev`).
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
@@ -77,7 +78,7 @@ function(duet_add_module room)
 endfunction()
 
 function(duet_add_test room)
-  cmake_parse_arguments(ARG "SERIAL" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "SERIAL" "" "SOURCES;LINK;HEADERS" ${ARGN})
   find_package(GTest REQUIRED)
   include(GoogleTest)
   add_executable(${room}_test ${ARG_SOURCES})
@@ -87,7 +88,7 @@ function(duet_add_test room)
   # What is timed is in the rooms.
   target_compile_options(${room}_test PRIVATE $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
   # Half of a test's compilation. The rooms themselves have none: clang-tidy cannot read those of GCC.
-  target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h>)
+  target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h> ${ARG_HEADERS})
   # A test whose data are not there says "not run: ... absent" and counts as skipped.
   gtest_discover_tests(${room}_test TEST_PREFIX "${room}/" DISCOVERY_TIMEOUT 60
                        WORKING_DIRECTORY ${PROJECT_SOURCE_DIR} PROPERTIES TIMEOUT 300 RUN_SERIAL "${ARG_SERIAL}")
