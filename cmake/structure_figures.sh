@@ -28,7 +28,7 @@ touched() {  # touched WHAT PATTERN
 echo "  robot 't1': the folder robots/t1, and $(sources | xargs grep -lE '"t1"' | wc -l) source files"
 touched "task 'fist_bump' (and a row of tasks/list.cmake)" 'fist_bump'
 touched "metric 'jerk'" '"jerk"'
-touched "perturbation 'kick'" 'kick_fields|KickPlan|\bKick\b|KickEffect'
+touched "perturbation 'kick' (and a row of rollout/perturbation_kinds.cpp)" 'kick_kind|\bKick\b|"kick"'
 
 lines_now() { find "$1" \( -name '*.h' -o -name '*.cpp' \) -exec cat {} + 2>/dev/null | wc -l; }
 lines_then() { { git grep -c "" "$1" -- "$2/*.h" "$2/*.cpp" || true; } | awk -F: '{ sum += $NF } END { print sum + 0 }'; }

@@ -3,11 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "duet/backends/backend.h"
-#include "duet/core/random.h"
-#include "duet/robots/kinematics.h"
 #include "duet/rollout/perturbation.h"
 
 namespace duet {
@@ -19,22 +18,18 @@ class Disturbance {
   Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start, int steps_per_tick,
               double dt, std::uint64_t seed);
 
-  // What the controller sees at this tick; once per tick. Without delay and noise `state` itself.
+  // What the controller sees at this tick; once per tick. Without delay, and where no act changes it, `state` itself.
   const RobotState& seen(const RobotState& state);
   // The command of this tick; once per tick. Copies.
   void send(const JointCommand& command);
   // The command that is in effect in a physics step of this tick, counted from 0.
   [[nodiscard]] const JointCommand& in_effect(int step) const;
-  // Begins and ends pushes, and kicks; before the physics steps of `tick`.
-  void push(int tick, Backend& backend);
+  // What is done to the robot; before the physics steps of `tick`.
+  void act(int tick, Backend& backend);
 
  private:
-  void add_noise(RobotState& state);
-  void kick(int tick, Backend& backend);
-
-  Perturbation perturbation_;
-  const RobotModel& robot_;
-  Random noise_, direction_, kick_;
+  std::vector<std::unique_ptr<RobotAct>> acts_;
+  bool view_changes_ = false;
 
   std::vector<RobotState> past_;  // a ring of the last delay_ticks + 1 states
   std::size_t newest_ = 0;
@@ -44,12 +39,6 @@ class Disturbance {
   int late_steps_;                      // from a command to its effect
   std::vector<JointCommand> commands_;  // a ring of the latest, newest at latest_
   std::size_t latest_ = 0;
-
-  Kinematics kinematics_;
-  int link_ = -1;
-  int push_ticks_ = 0, every_ticks_ = 0;
-  bool pushing_ = false;
-  int next_kick_ = 0;  // tick
 };
 
 }  // namespace duet

@@ -108,7 +108,7 @@ class Simulated final : public World {
   Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) override {
     if (!partner.empty())
       backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
-    disturbance_.push(tick, backend_);
+    disturbance_.act(tick, backend_);
     const Outcome outcome = step_control_period(
         backend_, steps_, [this](int i) -> const JointCommand& { return disturbance_.in_effect(i); },
         [&](int i) {

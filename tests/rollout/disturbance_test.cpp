@@ -80,7 +80,7 @@ TEST(Disturbance, CleanPassesStateAndCommandThrough) {
   clean.send(stage.command(0.5));
   for (int step = 0; step < kSteps; ++step) EXPECT_EQ(clean.in_effect(step).q_target[3], 0.5);
   Bench bench(stage.robot);
-  for (int tick = 0; tick < 1000; ++tick) clean.push(tick, bench);
+  for (int tick = 0; tick < 1000; ++tick) clean.act(tick, bench);
   EXPECT_TRUE(bench.pushes.empty());
 }
 
@@ -147,7 +147,7 @@ TEST(Disturbance, PushesBeginAfterHalfTheirPeriodAndEnd) {
   std::vector<int> ticks;
   for (int tick = 0; tick < 280; ++tick) {
     const size_t before = bench.pushes.size();
-    pushing.push(tick, bench);
+    pushing.act(tick, bench);
     if (bench.pushes.size() > before) ticks.push_back(tick);
   }
   EXPECT_EQ(ticks, (std::vector<int>{50, 75, 150, 175, 250, 275}));
@@ -171,7 +171,7 @@ TEST(Disturbance, KicksComeAtTheirTimeEachInADirectionOfItsOwn) {
   std::vector<int> ticks;
   for (int tick = 0; tick < 2000; ++tick) {
     const size_t before = bench.kicks.size();
-    kicking.push(tick, bench);
+    kicking.act(tick, bench);
     if (bench.kicks.size() > before) ticks.push_back(tick);
   }
   ASSERT_GT(ticks.size(), 12U);
@@ -202,7 +202,7 @@ TEST(Disturbance, NothingAllocatesAfterConstruction) {
     all.seen(state);
     all.send(command);
     static_cast<void>(all.in_effect(tick % kSteps));
-    all.push(tick, bench);
+    all.act(tick, bench);
   }
   EXPECT_EQ(test::allocation_count(), before);
 }

@@ -1,0 +1,80 @@
+// A kind of perturbation: how it is read, written, listed and documented. Made of a table of fields (core/field.h) by
+// one of four forms below.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "duet/core/field.h"
+#include "duet/robots/yaml_fields.h"
+#include "duet/rollout/perturbation.h"
+
+namespace duet {
+
+struct PerturbationKind {
+  std::string name, meaning;
+  std::vector<FieldRow> rows;  // of its mapping; of a kind that is one value, that value
+  // From the mapping of a perturbation, which has the key. Throws InputError: file, line, expected, found.
+  std::function<void(const YamlSection& item, const std::string& file, Perturbation& into)> read;
+  std::function<std::string(const Perturbation& of)> write;  // "" where there is none of it
+  std::string fallback = "{}";                               // what the name alone stands for
+};
+
+inline constexpr FieldRange kEpisodeTime = {0.0, 600.0};  // [s]
+
+// A kind of one value, under a key of its mapping: what the perturbation has of it where it is not clean, `fallback`
+// where the mapping is empty.
+PerturbationKind valued_kind(const std::string& name, std::string meaning, const Field<Perturbation>& value,
+                             const std::string& fallback);
+// A kind that is a value itself, without a mapping.
+PerturbationKind plain_kind(const Field<Perturbation>& value, const std::string& fallback);
+
+// What a mapping says of `values`, which are those of the name alone; where it names some of them, the others are
+// `named`'s.
+template <typename Plan>
+Plan read_plan(const YamlSection& item, const std::string& file, const std::string& name, const FieldTable<Plan>& table,
+               const Plan& named) {
+  const YamlSection mapping(file, item.node(name.c_str()), name, field_keys(table));
+  Plan plan = mapping.keys().size() > 0 ? named : Plan();
+  read_fields(mapping, table, plan);
+  return plan;
+}
+
+// A kind whose values are a struct of its own: `slot` is the optional one of a perturbation.
+template <typename Plan, typename Slot>
+PerturbationKind planned_kind(std::string name, std::string meaning, FieldTable<Plan> table, Slot slot,
+                              Plan named = {}) {
+  PerturbationKind kind{name, std::move(meaning), field_rows(table, Plan()), {}, {}};
+  kind.read = [name, table, slot, named](const YamlSection& item, const std::string& file, Perturbation& into) {
+    slot(into) = read_plan(item, file, name, table, named);
+  };
+  kind.write = [table, slot](const Perturbation& of) { return slot(of) ? flow_mapping(table, *slot(of)) : ""; };
+  return kind;
+}
+
+// The values of a kind that acts on the robot; null where the perturbation has none of it.
+template <typename Plan>
+const Plan* robot_plan(const Perturbation& of) {
+  for (const std::shared_ptr<const RobotPerturbation>& one : of.robot)
+    if (const auto* plan = dynamic_cast<const Plan*>(one.get())) return plan;
+  return nullptr;
+}
+
+// A kind that acts on the robot: `Plan` is a RobotPerturbation.
+template <typename Plan>
+PerturbationKind robot_kind(std::string name, std::string meaning, FieldTable<Plan> table, Plan named = {}) {
+  PerturbationKind kind{name, std::move(meaning), field_rows(table, Plan()), {}, {}};
+  kind.read = [name, table, named](const YamlSection& item, const std::string& file, Perturbation& into) {
+    into.robot.push_back(std::make_shared<const Plan>(read_plan(item, file, name, table, named)));
+  };
+  kind.write = [table](const Perturbation& of) {
+    const Plan* plan = robot_plan<Plan>(of);
+    return plan ? flow_mapping(table, *plan) : "";
+  };
+  return kind;
+}
+
+}  // namespace duet
