@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -32,6 +33,20 @@ double to_segment(const Eigen::Vector3d& point, const Eigen::Vector3d& from, con
 
 double root_distance(const People& people, int t) {
   return (joint(*people[0], t, kPelvis) - joint(*people[1], t, kPelvis)).head<2>().norm();
+}
+
+// Where the hips face, level. [rad]
+double facing(const HumanMotion& person, int t) {
+  const Eigen::Vector3d to_left = joint(person, t, kLeftHip) - joint(person, t, kRightHip);
+  return std::atan2(-to_left.x(), to_left.y());
+}
+
+double turned(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi; }
+
+// To the right of where this one faces. [deg]
+double bearing_of_other(const HumanMotion& person, const HumanMotion& other, int t) {
+  const Eigen::Vector3d way = joint(other, t, kPelvis) - joint(person, t, kPelvis);
+  return turned(facing(person, t) - std::atan2(way.y(), way.x()));
 }
 
 // The hands that are nearest to touching, left 0, right 1; in an embrace only one of them is a hand (side of it twice).
@@ -90,6 +105,9 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   result.before_s = first / rate;
   result.after_s = (clip.frames() - 1 - last) / rate;
   result.touch_distance = root_distance(people, first);
+  result.touch_bearing =
+      0.5 * (bearing_of_other(*people[0], *people[1], first) + bearing_of_other(*people[1], *people[0], first));
+  result.touch_turn = std::abs(turned(facing(*people[0], first) - facing(*people[1], first) + std::numbers::pi));
   if (!hands && !embrace) return;
   result.touch_height = height / count;
   result.right_hands = 0.5 * right / count;
@@ -224,6 +242,8 @@ std::span<const InteractionStatisticInfo> interaction_statistic_catalogue() {
       {"before_s", "Before the touch", "s", &S::before_s, false},
       {"after_s", "After the touch", "s", &S::after_s, false},
       {"touch_distance", "Distance of the roots at the touch", "m", &S::touch_distance, false},
+      {"touch_bearing", "The other is to the right by", "deg", &S::touch_bearing, false},
+      {"touch_turn", "Turned from facing each other", "deg", &S::touch_turn, false},
       {"largest_distance", "Largest distance of the roots", "m", &S::largest_distance, false},
       {"touch_height", "Height of the touch", "m", &S::touch_height, false},
       {"approach_speed", "Closing speed of the roots", "m/s", &S::approach_speed, false},
@@ -262,7 +282,7 @@ StatisticSpread spread_of(std::span<const InteractionStatistics> clips, const In
 
 bool agree(const StatisticSpread& one, const StatisticSpread& other, const InteractionStatisticInfo& info) {
   const double allowed = kAgreement * (info.is_share ? 1.0 : std::abs(other.middle));
-  return std::abs(one.middle - other.middle) <= allowed;
+  return std::abs(one.middle - other.middle) <= (info.unit == "deg" ? std::max(allowed, kAngleAgreement) : allowed);
 }
 
 }  // namespace duet

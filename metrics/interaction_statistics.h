@@ -24,6 +24,8 @@ struct InteractionStatistics {
   double after_s = kUnknownStatistic;           // from the last touch to the end of the clip [s]
   double touch_distance = kUnknownStatistic;    // of the roots, level, at the first touch [m]
   double largest_distance = kUnknownStatistic;  // of the roots, level, in the clip [m]
+  double touch_bearing = kUnknownStatistic;     // of the other from either's facing, to the right, mean of both [deg]
+  double touch_turn = kUnknownStatistic;        // by which the two do not face opposite ways then [deg]
   double touch_height = kUnknownStatistic;      // of the touching hands over the lowest foot, mean in touch [m]
   double approach_speed = kUnknownStatistic;    // fastest closing of the roots over kApproachWindow [m/s]
   double root_speed_p95 = kUnknownStatistic;    // of either root over kApproachWindow, over frames, mean of both [m/s]
@@ -68,8 +70,10 @@ struct StatisticSpread {
 };
 StatisticSpread spread_of(std::span<const InteractionStatistics> clips, const InteractionStatisticInfo& info);
 
-// The middles of two sets agree where they differ by at most kAgreement of the second's (of 1 for a share).
+// The middles of two sets agree where they differ by at most kAgreement of the second's (of 1 for a share); angles, which
+// may lie about 0, also where they differ by at most kAngleAgreement.
 inline constexpr double kAgreement = 0.20;
+inline constexpr double kAngleAgreement = 6.0;  // [deg]
 bool agree(const StatisticSpread& one, const StatisticSpread& other, const InteractionStatisticInfo& info);
 
 }  // namespace duet

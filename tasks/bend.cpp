@@ -65,6 +65,7 @@ Layout bend_layout(const Cast& cast, Draws& draws) {
     layout.distance += head_from_root(cast.body[k], layout.lean[k]).x();
   }
   layout.distance = std::min(layout.distance + draws.uniform("act.room", 0.0, 0.5), cast.farthest);
+  stand_at_bearings(cast, layout);
   return layout;
 }
 

@@ -61,6 +61,7 @@ Layout fly_kiss_layout(const Cast& cast, Draws& draws) {
   Layout layout;
   layout.distance = std::min(draws.uniform("act.distance", 1.2, 2.1), cast.farthest);
   for (Lean& lean : layout.lean) lean.forward = draws.styled("lean", cast.style, 0.02, 0.12);
+  stand_at_bearings(cast, layout);
   return layout;
 }
 

@@ -20,15 +20,16 @@ constexpr double kReach = 1.0;  // from the first movement to the clasp [s]
 constexpr double kOverlap = 0.010, kAside = 0.012;
 
 // Found on the 18 handshakes of SBU (docs/synthesis.md).
-constexpr RecordedManner kRecordedHandshake = {.tempo = {0.9, 1.15, 1.45},
+constexpr RecordedManner kRecordedHandshake = {.tempo = {0.95, 1.25, 1.55},
                                                .touch = {0.85, 1.3, 1.7},
                                                .until_touch = kReach,
                                                .distance = {0.98, 1.08, 1.26},
+                                               .bearing = {0.20, 0.47, 0.72},
                                                .way = {0.0, 0.04, 0.4},
                                                .speed = {0.5, 0.75, 1.0},
                                                .stands = 0.15,
                                                .overlap = {0.5, 0.75, 1.0},
-                                               .reaction = {0.0, 0.25, 0.45},
+                                               .reaction = {0.0, 0.2, 0.45},
                                                .left = 0.03,
                                                .before = {0.3, 0.65, 1.1},
                                                .after = {0.33, 0.58, 0.7}};
@@ -55,7 +56,9 @@ Layout handshake_layout(const Cast& cast, Draws& draws) {
   const double share = draws.uniform("reach.share", 0.80, 0.87);
   Lean lean;
   lean.forward = draws.styled("lean", cast.style, 0.03, 0.12);
-  lean.twist = -side_sign(cast.side) * draws.uniform("twist", 0.10, 0.22);
+  // Who has the other before the acting hand has no need to turn the trunk.
+  lean.twist = -side_sign(cast.side) *
+               (cast.manner.rehearsed ? draws.uniform("twist", 0.10, 0.22) : draws.uniform("twist", -0.04, 0.06));
   if (cast.manner.distance) {
     lean.shift = draws.uniform("shift", 0.06, 0.14);  // onto the front foot; found by the speed of the roots
     return meeting_at_distance(cast, z, *cast.manner.distance + 2.0 * lean.shift, lean);

@@ -28,6 +28,7 @@ constexpr RecordedManner kRecordedHug = {.tempo = {1.1, 1.36, 1.7},
                                          .touch = {0.05, 0.05, 0.5},
                                          .until_touch = kWrap,
                                          .distance = {0.2, 0.24, 0.42},
+                                         .bearing = {-0.45, 0.17, 0.8},
                                          .way = {0.5, 0.8, 1.05},
                                          .speed = {1.6, 2.0, 2.4},
                                          .stands = 0.03,
@@ -131,6 +132,7 @@ Layout hug_layout(const Cast& cast, Draws& draws) {
   }
   if (cast.manner.distance)
     stand_off(cast, *cast.manner.distance + layout.lean[0].shift + layout.lean[1].shift, layout);
+  stand_at_bearings(cast, layout);
   return layout;
 }
 

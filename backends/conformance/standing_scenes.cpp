@@ -58,7 +58,7 @@ std::string lacks_soles(const RobotModel& robot) {
 
 std::string lacks_ankles(const RobotModel& robot) {
   for (const std::vector<int>& leg : robot.roles.legs)
-    if (leg.size() < 2) return fmt::format("the card of robot '{}' has no legs with ankles", robot.name);
+    if (leg.size() < 2) return fmt::format("the card of robot '{}' has no 'legs' of two or more joints", robot.name);
   return lacks_soles(robot);
 }
 

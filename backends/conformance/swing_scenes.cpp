@@ -47,7 +47,8 @@ Swing swing(World& world, double amplitude, double seconds) {
     const double now = energy_above_base(world.robot(), world.state(), kGravity) - rest;
     found.highest_energy_error = std::max(found.highest_energy_error, std::abs(now - energy) / energy);
   }
-  found.period = (passages.back() - passages.front()) / static_cast<double>(passages.size() - 1);
+  if (passages.size() > 1)
+    found.period = (passages.back() - passages.front()) / static_cast<double>(passages.size() - 1);
   return found;
 }
 

@@ -36,6 +36,7 @@ Cast draw_cast(Task task, const SynthesisOptions& options, Draws& draws) {
   cast.manner.rehearsed = false;
   cast.manner.tempo = draws.spread("tempo", recorded.tempo);
   if (recorded.distance.middle > 0.0) cast.manner.distance = draws.spread("act.apart", recorded.distance);
+  for (const int k : {0, 1}) cast.manner.bearing[k] = draws.spread(std::string(kWho[k]) + "bearing", recorded.bearing);
   return cast;
 }
 
@@ -46,6 +47,22 @@ double draw_act(const Act& act, double tempo, Draws& draws) {
     return recorded.until_touch + tempo * std::max(0.05, draws.spread("touch", recorded.touch));
   if (recorded.act.middle > 0.0) return draws.spread("act", recorded.act);
   return draws.uniform("act", act.shortest, 0.6 * act.shortest + 0.4 * act.longest);
+}
+
+Eigen::Vector2d facing(const Placement& at) { return {std::cos(at.yaw), std::sin(at.yaw)}; }
+
+// The four ends of the two ways, the middle between the two in the act at the origin: each comes straight to its place,
+// from where it has turned by half of `angle`.
+Ways people_ways(const Layout& layout, double way, double angle, double share) {
+  Ways ways;
+  ways.act[1] = {Eigen::Vector2d(layout.distance, layout.lateral), std::numbers::pi + layout.turn};
+  for (Placement& place : ways.act) place.position -= 0.5 * Eigen::Vector2d(layout.distance, layout.lateral);
+  for (const int k : {0, 1}) {
+    ways.start[k] = ways.act[k];
+    ways.start[k].yaw += 0.5 * angle;
+    ways.start[k].position -= (k == 0 ? share : 1.0 - share) * way * facing(ways.start[k]);
+  }
+  return ways;
 }
 
 // The share of the way that A walks.
@@ -123,11 +140,12 @@ Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws
   Cast cast = draw_cast(task, options, draws);
   const double tempo = cast.manner.tempo;
   const Layout layout = act.layout(cast, draws);
-  draws.record("act.distance", layout.distance);
+  const double roots = std::hypot(layout.distance, layout.lateral);
+  draws.record("act.distance", roots);
   const double drawn_way = std::max(0.0, draws.spread("way", act.recorded.way));
-  const double way = options.distance ? std::max(0.0, *options.distance - layout.distance) : drawn_way;
+  const double way = options.distance ? std::max(0.0, *options.distance - roots) : drawn_way;
   const double angle = draws.uniform("angle", -0.15, 0.15, options.angle);
-  Ways ways = plan_ways(layout, layout.distance + way, angle, draw_share(act.recorded.stands, draws));
+  Ways ways = people_ways(layout, way, angle, draw_share(act.recorded.stands, draws));
   for (const int k : {0, 1})
     if ((ways.act[k].position - ways.start[k].position).norm() < kShortestStep) ways.start[k] = ways.act[k];
 

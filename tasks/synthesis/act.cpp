@@ -14,6 +14,12 @@ double reach_ahead(const Body& body, int side, double z, double share, const Lea
   return shoulder.x() + std::sqrt(std::max(square, 0.0));
 }
 
+// On the line between the roots, which are then where the manner has them.
+void meet_between(const Cast& cast, double share_of_a, Layout& layout) {
+  stand_at_bearings(cast, layout);
+  layout.meet.head<2>() = share_of_a * Eigen::Vector2d(layout.distance, layout.lateral);
+}
+
 }  // namespace
 
 Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& point) {
@@ -23,7 +29,18 @@ Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& poin
 
 Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a) {
   if (person == 0) return point_of_a;
-  return {layout.distance - point_of_a.x(), layout.lateral - point_of_a.y(), point_of_a.z()};
+  const Eigen::Vector3d ahead(layout.distance - point_of_a.x(), layout.lateral - point_of_a.y(), point_of_a.z());
+  return layout.turn == 0.0 ? ahead : Eigen::Vector3d(rot_z(-layout.turn) * ahead);
+}
+
+void stand_at_bearings(const Cast& cast, Layout& layout) {
+  const auto& [a, b] = cast.manner.bearing;
+  if (a == 0.0 && b == 0.0) return;
+  const double to_hand = side_sign(cast.side), roots = std::hypot(layout.distance, layout.lateral);
+  const double bearing = std::atan2(layout.lateral, layout.distance) + to_hand * a;
+  layout.distance = roots * std::cos(bearing);
+  layout.lateral = roots * std::sin(bearing);
+  layout.turn = to_hand * (a - b);
 }
 
 Layout meeting_layout(const Cast& cast, double z, double share, double nearest, double farthest, const Lean& lean) {
@@ -33,6 +50,7 @@ Layout meeting_layout(const Cast& cast, double z, double share, double nearest, 
   Layout layout;
   layout.distance = ahead[0] + ahead[1];
   layout.meet = {ahead[0], 0.0, z};
+  if (!cast.manner.rehearsed) meet_between(cast, ahead[0] / layout.distance, layout);
   for (const int k : {0, 1})
     layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.93);
   return layout;
@@ -43,6 +61,7 @@ Layout meeting_at_distance(const Cast& cast, double z, double distance, const Le
   Layout layout;
   layout.distance = distance;
   layout.meet = {distance * cast.body[0].arm() / arms, 0.0, z};
+  if (!cast.manner.rehearsed) meet_between(cast, cast.body[0].arm() / arms, layout);
   for (const int k : {0, 1})
     layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.96);
   return layout;

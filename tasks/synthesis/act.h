@@ -15,6 +15,8 @@ struct Manner {
   bool rehearsed = true;
   double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
   std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
+  // Of A and B: where each has the other in the act, from its own facing towards the acting hand. [rad]
+  std::array<double, 2> bearing = {0.0, 0.0};
 };
 
 // What recorded people do in an act. docs/synthesis.md says where each figure is from.
@@ -24,6 +26,7 @@ struct RecordedManner {
   Deciles touch = {};                   // of an act with a touch that lasts, its length as played [s]
   double until_touch = 0.0;             // from the act's begin to that touch, at tempo 1 [s]
   Deciles distance = {};                // of the roots in the act [m]; zeros: the layout's own
+  Deciles bearing = {-0.2, 0.0, 0.2};   // Manner::bearing, of either [rad]
   Deciles way = {0.0, 0.2, 0.5};        // that both together walk up to each other [m]
   Deciles speed = {0.45, 0.7, 1.0};     // in the middle of such a way [m/s]
   double stands = 0.35;                 // share of people who leave it to the other
@@ -44,10 +47,11 @@ struct Cast {
   Manner manner = {};
 };
 
-// How they stand to each other: A at the origin facing +x, B at (distance, lateral) facing -x. [m]
+// How they stand to each other: A at the origin facing +x, B at (distance, lateral) facing -x turned by `turn`. [m]
 struct Layout {
   double distance = 1.0;
   double lateral = 0.0;
+  double turn = 0.0;                               // [rad]
   Eigen::Vector3d meet = Eigen::Vector3d::Zero();  // where the hands meet, for acts that have such a point
   std::array<Lean, 2> lean;                        // of the trunks during the act
 };
@@ -84,6 +88,9 @@ struct Act {
 Eigen::Vector3d in_world(const Placement& placement, const Eigen::Vector3d& point);
 // The same point seen by A and by B of a layout.
 Eigen::Vector3d seen_by(int person, const Layout& layout, const Eigen::Vector3d& point_of_a);
+
+// The same two, each having the other where the cast's manner says; the roots keep their distance.
+void stand_at_bearings(const Cast& cast, Layout& layout);
 
 // Distance and leans where the distance is given and the hands meet at height `z` between them.
 Layout meeting_at_distance(const Cast& cast, double z, double distance, const Lean& lean);

@@ -72,6 +72,19 @@ TEST_F(Faults, AModuleInTheFolderIsAnEngine) {
   EXPECT_THAT(ended.text, HasSubstr("faulty"));
 }
 
+// Nothing of it moves: no pendulum swings, nothing falls or slides.
+TEST_F(Faults, AnEngineThatStandsStillFailsItsScenesAndAllAreReported) {
+  const Ended ended = run("validate --engine faulty --effort quick -q");
+  EXPECT_EQ(ended.code, 5) << ended.text;
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("pendulum"), HasSubstr("chain"), HasSubstr("stand")));
+}
+
+TEST_F(Faults, WhatIsNotInTheFoldersThatWereGivenIsSaidToBeThere) {
+  fs::remove(fs::path(engines()) / "duet_ode.so");
+  EXPECT_THAT(run("list engines").text,
+              HasSubstr("no duet_ode.so in the folders of DUET_ENGINES ('" + engines() + "')"));
+}
+
 TEST_F(Faults, AnEngineThatThrowsEndsItsEpisodeByNameAndTheOthersGoOn) {
   const Ended ended = run("run " + suite("playback, faulty") + " -q -o " + (folder_ / "run"));
   EXPECT_EQ(ended.code, 3) << ended.text;

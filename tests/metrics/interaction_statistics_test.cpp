@@ -1,6 +1,8 @@
 #include "duet/metrics/interaction_statistics.h"
 
 #include <cmath>
+#include <numbers>
+#include <utility>
 
 #include "tests/support.h"
 
@@ -47,6 +49,37 @@ TEST(InteractionStatistics, TouchIsTimedAndPlaced) {
   EXPECT_DOUBLE_EQ(found.right_hands, 1.0);
   EXPECT_DOUBLE_EQ(found.standing, 1.0);
   EXPECT_DOUBLE_EQ(found.reaction_s, 0.0);
+}
+
+// Facing +x (A) and, turned by `turn`, -x (B), who stands `right` to the right of A.
+InteractionClip facing_each_other(double right, double turn) {
+  InteractionClip clip = meeting(20, 70);
+  for (int t = 0; t < clip.frames(); ++t) {
+    clip.b.joints.frame(t).row(1).array() -= right;
+    for (const auto& [person, yaw] : {std::pair(&clip.a, 0.0), std::pair(&clip.b, std::numbers::pi + turn)}) {
+      const Eigen::Vector3d pelvis = person->joints.at(t, kPelvis);
+      const Eigen::Vector3d to_left(-0.1 * std::sin(yaw), 0.1 * std::cos(yaw), 0.0);
+      person->joints.at(t, kLeftHip) = pelvis + to_left;
+      person->joints.at(t, kRightHip) = pelvis - to_left;
+    }
+    if (t >= 20 && t < 70) clip.b.joints.at(t, kRightHand) = clip.a.joints.at(t, kRightHand);
+  }
+  return clip;
+}
+
+TEST(InteractionStatistics, BearingIsToTheRightAndTurnHasNoSign) {
+  const InteractionStatistics straight = interaction_statistics(facing_each_other(0.0, 0.0));
+  EXPECT_NEAR(straight.touch_bearing, 0.0, 1e-9);
+  EXPECT_NEAR(straight.touch_turn, 0.0, 1e-9);
+  const InteractionStatistics aside = interaction_statistics(facing_each_other(1.0, 0.0));
+  EXPECT_NEAR(aside.touch_bearing, 45.0, 1e-9);  // of both: each has the other to its right
+  EXPECT_NEAR(aside.touch_turn, 0.0, 1e-9);
+  EXPECT_NEAR(interaction_statistics(facing_each_other(-1.0, 0.0)).touch_bearing, -45.0, 1e-9);
+  for (const double turn : {0.4, -0.4}) {
+    const InteractionStatistics turned = interaction_statistics(facing_each_other(1.0, turn));
+    EXPECT_NEAR(turned.touch_turn, 0.4 * 180.0 / std::numbers::pi, 1e-9);
+    EXPECT_NEAR(turned.touch_bearing, 45.0 + 0.5 * turn * 180.0 / std::numbers::pi, 1e-9);  // B's alone
+  }
 }
 
 TEST(InteractionStatistics, HandsTouchBelowTheirThresholdOnly) {
@@ -117,6 +150,7 @@ TEST(InteractionStatistics, TooShortAClipIsRefused) {
 TEST(InteractionStatistics, SpreadsAgreeWithinAFifth) {
   const InteractionStatisticInfo time = {"t", "T", "s", &InteractionStatistics::touch_s, false};
   const InteractionStatisticInfo share = {"s", "S", "1", &InteractionStatistics::touches, true};
+  const InteractionStatisticInfo angle = {"a", "A", "deg", &InteractionStatistics::touch_bearing, false};
   std::vector<InteractionStatistics> clips(11);
   for (int i = 0; i < 11; ++i) clips[i].touch_s = i;
   clips[0].touches = 1.0;
@@ -132,6 +166,10 @@ TEST(InteractionStatistics, SpreadsAgreeWithinAFifth) {
   EXPECT_TRUE(agree(middle(4.0), middle(5.0), time));
   EXPECT_FALSE(agree(middle(3.99), middle(5.0), time));
   EXPECT_FALSE(agree(middle(6.01), middle(5.0), time));
+  EXPECT_TRUE(agree(middle(-5.9), middle(0.0), angle));
+  EXPECT_FALSE(agree(middle(-6.1), middle(0.0), angle));
+  EXPECT_TRUE(agree(middle(47.9), middle(40.0), angle));
+  EXPECT_FALSE(agree(middle(48.1), middle(40.0), angle));
   EXPECT_TRUE(agree(middle(0.19), middle(0.0), share));
   EXPECT_FALSE(agree(middle(0.21), middle(0.0), share));
 }

@@ -1,5 +1,8 @@
 // Clips like people: what was drawn, what is shown, and what a tracker makes of it.
+#include <cmath>
+#include <numbers>
 #include <set>
+#include <string>
 
 #include "duet/motion/synthesis.h"
 #include "duet/motion/tracked_clip.h"
@@ -107,6 +110,31 @@ TEST(PeopleSynthesis, OptionsOfTheOtherGeneratorAreRefused) {
   EXPECT_EQ(refused(Task::kHug, {.outcome = ActOutcome::kComplete}), message);
   EXPECT_EQ(refused(Task::kHug, {.like = Likeness::kPeople, .before = 31.0}),
             "synthesize: before 31 s is out of range; expected [0, 30] s");
+}
+
+// Level, from where the hips face towards the left. [rad]
+double bearing_of_other(const HumanMotion& person, const HumanMotion& other, int t) {
+  const Eigen::Vector3d hips = person.joints.at(t, kLeftHip) - person.joints.at(t, kRightHip);
+  const Eigen::Vector3d way = other.joints.at(t, kPelvis) - person.joints.at(t, kPelvis);
+  return std::remainder(std::atan2(way.y(), way.x()) - std::atan2(-hips.x(), hips.y()), 2.0 * std::numbers::pi);
+}
+
+TEST(PeopleSynthesis, WhoShakesHandsHasTheOtherBeforeThatHand) {
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    for (int index = 0; index < 12; ++index) {
+      const InteractionClip clip =
+          people(Task::kHandshake, {.seed = 12, .index = index, .side = side, .outcome = ActOutcome::kComplete});
+      const int middle = (clip.phases.act_begin + clip.phases.act_end) / 2;
+      const double towards_hand = side == Side::kLeft ? 1.0 : -1.0;
+      const HumanMotion* const both[] = {&clip.a, &clip.b};
+      for (const int k : {0, 1}) {
+        const double drawn = std::stod(clip.source.at(k == 0 ? "a.bearing" : "b.bearing"));
+        // The hips shift onto the front foot and sway.
+        EXPECT_NEAR(towards_hand * bearing_of_other(*both[k], *both[1 - k], middle), drawn, 0.15)
+            << clip.id << ' ' << k;
+      }
+    }
+  }
 }
 
 double largest_difference(const PointTracks& one, const PointTracks& other, int joint) {
