@@ -77,8 +77,8 @@ Loaded load(const std::string& name) {
     if (fs::exists(folder / file, error)) return load_file(name, folder / file);
   }
   if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0')
-    return {nullptr, fmt::format("no {} in the folders of DUET_ENGINES ('{}'), which take the place of duet's own", file,
-                                 set)};
+    return {nullptr,
+            fmt::format("no {} in the folders of DUET_ENGINES ('{}'), which take the place of duet's own", file, set)};
   return {nullptr, fmt::format("{} was not built (its development files were missing, or it was left out)", file)};
 }
 

@@ -31,7 +31,7 @@ bad=0
 for room in "${!may[@]}"; do
   [ -d "$room" ] || continue
   while IFS=: read -r file line text; do
-    target=$(sed -E 's/.*"duet\/([a-z]+)\/.*/\1/' <<<"$text")
+    target=${text#*\"duet/} target=${target%%/*}
     case " ${may[$room]} " in
       *" $target "*) ;;
       *) echo "$file:$line: $room may not include $target ($text)"; bad=1 ;;
