@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+"""Writes the marked regions of the documents, or with --check says which of them are not what their source prints.
+
+A region stands between two comments of Markdown:
+
+    <!-- figures: SOURCE -->
+    ...
+    <!-- end -->
+
+SOURCE is one of the tables below with its argument (a folder of results/tables, which a test holds against the published
+rows), or `duet ARGUMENTS`: what the program prints. A comment `<!-- long: COMMAND -->` stands above figures that take a long
+run, a download or another machine: they are not compared, --long lists them with the command that repeats them.
+"""
+import argparse
+import csv
+import json
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+TASKS = {"hug": "Hug", "handshake": "Handshake", "high_five": "High-five", "wave": "Wave", "bend": "Bend", "fly_kiss": "Fly-kiss"}
+ENGINES = {"mujoco": "MuJoCo", "bullet": "Bullet", "ode": "ODE", "simbody": "Simbody", "dart": "DART"}
+POLICIES = {
+    "dstar": "dstar",
+    "dp": "dp",
+    "dstar_shuffled": "dstar, partner of another clip",
+    "retrieval": "retrieval",
+    "replay": "replay (knows the motion)",
+    "null": "null (stands still)",
+}
+
+
+class Refused(Exception):
+    pass
+
+
+def rows_of(folder, name):
+    path = ROOT / folder / name
+    if not path.is_file():
+        raise Refused(f"no file {folder}/{name}")
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+def percent(text):
+    return f"{100 * float(text):.1f}"
+
+
+def short(text):  # none and all of them have no decimal
+    value = f"{100 * float(text):.1f}"
+    return value.removesuffix(".0") if value in ("0.0", "100.0") else value
+
+
+def markdown(header, right, rows):
+    marks = ["---:" if r else ":---" for r in right]
+    return [f"| {' | '.join(line)} |" for line in [header, marks, *rows]]
+
+
+def wilson(k, n):
+    """The interval that the program gives a rate (results/statistics.h)."""
+    z, p = 1.959963984540054, k / n
+    middle, spread = p + z * z / (2 * n), z * ((p * (1 - p) + z * z / (4 * n)) / n) ** 0.5
+    return [f"{100 * x / (1 + z * z / n):.1f}" for x in (max(middle - spread, 0.0), min(middle + spread, 1 + z * z / n))]
+
+
+def success(folder):
+    """Success of each policy in MuJoCo, by task, and under the detectors as the paper prints them."""
+    rows = [r for r in rows_of(folder, "leaderboard.csv") if r["engine"] == "mujoco"]
+    table = []
+    for policy, name in POLICIES.items():
+        by_task = {r["task"]: r for r in rows if r["policy"] == policy}
+        if not by_task:
+            raise Refused(f"{folder}/leaderboard.csv has no policy {policy} in mujoco")
+        every = by_task["all"]
+        n, printed = int(every["n"]), float(every["success:paper/paper"])
+        low, high = wilson(round(printed * n), n)
+        table.append([name, str(n), f"{percent(every['success'])} [{percent(every['ci_low'])}, {percent(every['ci_high'])}]",
+                      *[short(by_task[task]["success"]) for task in TASKS], every["fell"], f"{percent(printed)} [{low}, {high}]"])
+    paper = [r for r in rows_of(folder, "policies.csv") if (r["source"], r["policy"], r["task"], r["figure"]) == ("paper", "D-STAR", "all", "paper_success")]
+    table.append(["the paper's D-STAR", "126", *["-"] * 8, percent(paper[0]["value"])])
+    header = ["Policy", "n", "Overall", *TASKS.values(), "Fell", "printed detectors"]
+    return markdown(header, [False] + [True] * 10, table)
+
+
+def engines(folder):
+    """Success of each policy that ran in every engine, and the mean over them."""
+    rows = rows_of(folder, "engines.csv")
+    table = []
+    for policy, name in POLICIES.items():
+        rates = {r["engine"]: r["value"] for r in rows if (r["table"], r["policy"], r["figure"]) == ("success", policy, "rate")}
+        if set(rates) < set(ENGINES):
+            continue
+        mean = next(r for r in rows if (r["table"], r["policy"], r["figure"]) == ("spread", policy, "mean"))
+        table.append([name, *[percent(rates[engine]) for engine in ENGINES],
+                      f"{percent(mean['value'])} [{percent(mean['ci_low'])}, {percent(mean['ci_high'])}]"])
+    return markdown(["Policy", *ENGINES.values(), "mean"], [False] + [True] * 6, table)
+
+
+def suites(program):
+    """The suites that ship, what each asks, and whether its rows are published."""
+    found = json.loads(output([program, "list", "suites", "--json"]))
+    table = []
+    for suite in found:
+        what, question = suite["detail"].split(": ", 1)
+        published = (ROOT / "results/published" / suite["name"]).is_dir()
+        table.append([f"`{suite['name']}`", question, what, "yes" if published else "no"])
+    return markdown(["suite", "question", "version, episodes", "published rows"], [False] * 4, table)
+
+
+def output(command):
+    done = subprocess.run(command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+    if done.returncode != 0:
+        raise Refused(f"'{' '.join(map(str, command))}' ended with {done.returncode}: {done.stderr.strip()}")
+    return done.stdout
+
+
+def contents(source, program):
+    words = shlex.split(source)
+    if words[:1] == ["suites"] and len(words) == 1:
+        return suites(program)
+    if words[:1] == ["duet"]:
+        lines = output([program, *words[1:]]).rstrip("\n").split("\n")
+        return lines if any(line.startswith("|") for line in lines) else ["```", *lines, "```"]
+    tables = {"success": success, "engines": engines}
+    if len(words) == 2 and words[0] in tables:
+        return tables[words[0]](words[1])
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, suites, duet ARGUMENT...")
+
+
+def refreshed(text, program):
+    """The text with every region as its source prints it, and for each region its line, source and whether it was so."""
+    lines, result, regions = text.split("\n"), [], []
+    at = 0
+    while at < len(lines):
+        result.append(lines[at])
+        begin = re.fullmatch(r"<!-- figures: (.+) -->", lines[at])
+        at += 1
+        if not begin:
+            continue
+        try:
+            end = lines.index("<!-- end -->", at)
+        except ValueError:
+            raise Refused(f"line {at}: the region '{begin[1]}' has no '<!-- end -->'") from None
+        if any(line.startswith("<!-- figures:") for line in lines[at:end]):
+            raise Refused(f"line {at}: the region '{begin[1]}' has no '<!-- end -->' before the next begins")
+        try:
+            new = ["", *contents(begin[1], program), ""]
+        except Refused as refused:
+            raise Refused(f"line {at}: {refused}") from None
+        regions.append((at, begin[1], new == lines[at:end]))
+        result += new
+        at = end
+    return "\n".join(result), regions
+
+
+def documents():
+    found = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("*/*/README.md")]
+    return sorted(path for path in found if "build" not in path.parts and "node_modules" not in path.parts)
+
+
+def list_long(files):
+    for path in files:
+        for number, line in enumerate(path.read_text().split("\n"), 1):
+            if (long := re.fullmatch(r"<!-- long: (.+) -->", line)):
+                print(f"{path.relative_to(ROOT)}:{number}: {long[1]}")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a region differs")
+    parser.add_argument("--long", action="store_true", help="list the figures that are not compared")
+    parser.add_argument("--program", default=str(ROOT / "build/release/duet"))
+    parser.add_argument("files", nargs="*", type=pathlib.Path, help="documents (default: all)")
+    arguments = parser.parse_args()
+    files = [path.resolve() for path in arguments.files] or documents()
+    if arguments.long:
+        return list_long(files)
+    count = stale = 0
+    for path in files:
+        text = path.read_text()
+        try:
+            new, regions = refreshed(text, arguments.program)
+        except Refused as refused:
+            sys.exit(f"figures: {path}, {refused}")
+        count += len(regions)
+        for line, source, same in regions:
+            if not same:
+                stale += 1
+                print(f"{path}:{line}: {'is not' if arguments.check else 'was not'} what '{source}' prints")
+        if new != text and not arguments.check:
+            path.write_text(new)
+    print(f"figures: {count} regions, {stale} {'differ' if arguments.check else 'written anew'}")
+    return 1 if arguments.check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
