@@ -41,7 +41,10 @@ add_library(duet::options ALIAS duet_options)
 # How duet itself is compiled; nobody who links it inherits this. Contraction is off so that the same source gives the
 # same bits whatever the optimiser chooses; wider instruction sets appear only in kernel files that dispatch at run time.
 add_library(duet_flags INTERFACE)
-target_compile_options(duet_flags INTERFACE -Wall -Wextra -march=x86-64-v2 -ffp-contract=off)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+  set(DUET_X86 TRUE)  # kernels for wider sets are compiled beside the portable ones
+endif()
+target_compile_options(duet_flags INTERFACE -Wall -Wextra $<$<BOOL:${DUET_X86}>:-march=x86-64-v2> -ffp-contract=off)
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   # GCC 12 takes the sum of two std::string for a write past the end, if the constant one is longer than 15 characters.
   target_compile_options(duet_flags INTERFACE -Wno-array-bounds)

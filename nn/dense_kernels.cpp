@@ -7,28 +7,23 @@
 
 namespace duet {
 
+extern const DenseKernels kDenseKernelsPortable;
+#if defined(__x86_64__)
 extern const DenseKernels kDenseKernelsV2, kDenseKernelsV3, kDenseKernelsV4;
+#endif
 
 namespace {
 
-bool runs_here(const DenseKernels& kernels) {
-  __builtin_cpu_init();
-  if (&kernels == &kDenseKernelsV4)
-    return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-           __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-           __builtin_cpu_supports("avx512cd");
-  if (&kernels == &kDenseKernelsV3)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-           __builtin_cpu_supports("bmi2");
-  return true;
-}
-
-const std::array<const DenseKernels*, 3> kWidestFirst = {&kDenseKernelsV4, &kDenseKernelsV3, &kDenseKernelsV2};
+const std::array kWidestFirst = {
+#if defined(__x86_64__)
+    &kDenseKernelsV4, &kDenseKernelsV3, &kDenseKernelsV2,
+#endif
+    &kDenseKernelsPortable};
 
 const DenseKernels& widest() {
   for (const DenseKernels* kernels : kWidestFirst)
-    if (runs_here(*kernels)) return *kernels;
-  return kDenseKernelsV2;
+    if (runs_here(kernels->level)) return *kernels;
+  return kDenseKernelsPortable;
 }
 
 }  // namespace
@@ -40,9 +35,9 @@ const DenseKernels& dense_kernels() {
 
 const DenseKernels& dense_kernels(std::string_view level) {
   for (const DenseKernels* kernels : kWidestFirst)
-    if (kernels->level == level && runs_here(*kernels)) return *kernels;
+    if (to_string(kernels->level) == level && runs_here(kernels->level)) return *kernels;
   throw std::invalid_argument("dense kernels: '" + std::string(level) +
-                              "' is not one of x86-64-v2, x86-64-v3, x86-64-v4 or not of this machine");
+                              "' is not one of portable, x86-64-v2, x86-64-v3, x86-64-v4 or not of this machine");
 }
 
 }  // namespace duet

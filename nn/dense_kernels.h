@@ -1,4 +1,4 @@
-// Dense linear algebra in float for networks: one source compiled for three instruction sets, chosen at run time. The
+// Dense linear algebra in float for networks: one source compiled for four instruction sets, chosen at run time. The
 // only float arithmetic of the project beside PAIR's lanes. Thread-safe: no state. gemv, gemv_half and elu do not
 // allocate; gemm may (blocking buffers).
 #pragma once
@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+
+#include "duet/core/instruction_set.h"
 
 namespace duet {
 
@@ -21,7 +23,7 @@ constexpr std::size_t half_index(int row, int c, int cols) {
 }
 
 struct DenseKernels {
-  std::string_view level;  // "x86-64-v4", "x86-64-v3", "x86-64-v2"
+  InstructionSet level;  // what it was compiled for
   // C = op(A) op(B), or C += it with `accumulate`. Column-major without gaps: C is (m, n), op(A) (m, k), op(B) (k, n).
   void (*gemm)(bool transpose_a, bool transpose_b, int m, int n, int k, const float* A, const float* B, float* C,
                bool accumulate);
@@ -38,8 +40,8 @@ struct DenseKernels {
   void (*adam)(int n, const float* g, float scale, float step, float correction, float* m, float* v, float* p);
 };
 
-// The widest set that this machine has; or the one named, for tests (throws std::invalid_argument where it is unknown
-// or the machine lacks it).
+// The widest set that this machine has; or the one named ("x86-64-v3", "portable"), for tests (throws
+// std::invalid_argument where it is unknown or the machine lacks it).
 const DenseKernels& dense_kernels();
 const DenseKernels& dense_kernels(std::string_view level);
 

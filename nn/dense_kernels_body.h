@@ -1,5 +1,5 @@
 // Body of one level of DenseKernels. Each kernel_*.cpp defines DUET_KERNEL (the table's name) and DUET_LEVEL and
-// compiles it with its own -march. Eigen's name is changed by level: the linker would otherwise keep one of the three
+// compiles it with its own -march. Eigen's name is changed by level: the linker would otherwise keep one of the four
 // copies of each of its inline functions, possibly one that the machine cannot run.
 #define Eigen DUET_EIGEN
 #include <Eigen/Core>

@@ -160,36 +160,25 @@ struct VectorSweep {
   int begin, end;  // blocks, of dots_* only
 };
 
-// gradient -> D^(-1/2) L^-1 of it, with the gradient of variables at their bounds that want to go out set to zero; each
-// lane's segment from a state of zero.
-void filter_gradient_v2(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
-void filter_gradient_v3(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
-void filter_gradient_v4(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
+// The functions of one instruction set; the table of each stands in the kernel file that is compiled for it.
+struct LaneKernel {
+  // One Adam iteration over the blocks.
+  void (*sweep)(const Sweep& sweep);
+  // gradient -> D^(-1/2) L^-1 of it, with the gradient of variables at their bounds that want to go out set to zero;
+  // each lane's segment from a state of zero.
+  void (*filter_gradient)(const VectorSweep&, const Row* x, const Row* gradient, Row* out);
+  // s = D^(1/2) L^T (x1 - x0), y = g1 - g0. x0, x1 have their halo.
+  void (*step)(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
+  // Products of the `newest` s and y and of g with all `count` vectors and g, lane by lane: sums[3 i], [3 i + 1],
+  // [3 i + 2] are those of vector i with vectors[newest], vectors[newest + 1], g; i = count is g itself.
+  void (*dots)(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
+  // out = L^-T D^(-1/2) sum_i factors[i] vectors[i], each lane's segment from a state of zero at its end.
+  void (*combine)(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
+  // next = x + rate * direction, no joint by more than `turn`, inside the bounds.
+  void (*move)(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
+};
 
-// s = D^(1/2) L^T (x1 - x0), y = g1 - g0. x0, x1 have their halo.
-void step_v2(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
-void step_v3(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
-void step_v4(const VectorSweep&, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y);
-
-// Products of the `newest` s and y and of g with all `count` vectors and g, lane by lane: sums[3 i], [3 i + 1], [3 i +
-// 2] are those of vector i with vectors[newest], vectors[newest + 1], g; i = count is g itself.
-void dots_v2(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
-void dots_v3(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
-void dots_v4(const VectorSweep&, const Row* const* vectors, int count, int newest, const Row* g, Row* sums);
-
-// out = L^-T D^(-1/2) sum_i factors[i] vectors[i], each lane's segment from a state of zero at its end.
-void combine_v2(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
-void combine_v3(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
-void combine_v4(const VectorSweep&, const Row* const* vectors, const float* factors, int count, Row* out);
-
-// next = x + rate * direction, no joint by more than `turn`, inside the bounds.
-void move_v2(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
-void move_v3(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
-void move_v4(const VectorSweep&, const Row* x, const Row* direction, float rate, float turn, Row* next);
-
-// One Adam iteration over the blocks. v2 needs nothing beyond x86-64-v2, v3 AVX2 and FMA, v4 AVX-512.
-void sweep_v2(const Sweep& sweep);
-void sweep_v3(const Sweep& sweep);
-void sweep_v4(const Sweep& sweep);
+extern const LaneKernel kPortable;      // plain C++, four lanes at a time: any processor
+extern const LaneKernel kV2, kV3, kV4;  // x86-64-v2, AVX2 with FMA, AVX-512: on x86-64 only
 
 }  // namespace duet::pair_kernel

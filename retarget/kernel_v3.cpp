@@ -21,21 +21,11 @@ inline bool any(VI x) { return _mm256_movemask_ps(reinterpret_cast<__m256>(x)) !
 
 namespace duet::pair_kernel {
 
-void sweep_v3(const Sweep& sweep) { sweep_blocks(sweep); }
-void filter_gradient_v3(const VectorSweep& at, const Row* x, const Row* gradient, Row* out) {
-  filter_gradient(at, x, gradient, out);
-}
-void step_v3(const VectorSweep& at, const Row* x0, const Row* x1, const Row* g0, const Row* g1, Row* s, Row* y) {
-  step(at, x0, x1, g0, g1, s, y);
-}
-void dots_v3(const VectorSweep& at, const Row* const* vectors, int count, int newest, const Row* g, Row* sums) {
-  dots(at, vectors, count, newest, g, sums);
-}
-void combine_v3(const VectorSweep& at, const Row* const* vectors, const float* factors, int count, Row* out) {
-  combine(at, vectors, factors, count, out);
-}
-void move_v3(const VectorSweep& at, const Row* x, const Row* direction, float rate, float turn, Row* next) {
-  move(at, x, direction, rate, turn, next);
-}
+const LaneKernel kV3 = {.sweep = sweep_blocks,
+                        .filter_gradient = filter_gradient,
+                        .step = step,
+                        .dots = dots,
+                        .combine = combine,
+                        .move = move};
 
 }  // namespace duet::pair_kernel

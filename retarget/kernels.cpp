@@ -1,16 +1,17 @@
 #include "duet/retarget/kernels.h"
 
+#include "duet/core/instruction_set.h"
+
 namespace duet {
 
 bool kernel_runs_here(KernelKind kernel) {
   switch (kernel) {
     case KernelKind::kV4:
-      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-             __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-             __builtin_cpu_supports("avx512vl") && kernel_runs_here(KernelKind::kV3);
+      return runs_here(InstructionSet::kV4);
     case KernelKind::kV3:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-             __builtin_cpu_supports("bmi2");
+      return runs_here(InstructionSet::kV3);
+    case KernelKind::kV2:
+      return runs_here(InstructionSet::kV2);
     default:
       return true;
   }
@@ -18,7 +19,7 @@ bool kernel_runs_here(KernelKind kernel) {
 
 std::vector<KernelKind> available_kernels() {
   std::vector<KernelKind> kernels;
-  for (const KernelKind kind : {KernelKind::kV4, KernelKind::kV3, KernelKind::kV2}) {
+  for (const KernelKind kind : {KernelKind::kV4, KernelKind::kV3, KernelKind::kV2, KernelKind::kPortable}) {
     if (kernel_runs_here(kind)) kernels.push_back(kind);
   }
   kernels.push_back(KernelKind::kScalar);
@@ -29,6 +30,8 @@ std::string_view to_string(KernelKind kernel) {
   switch (kernel) {
     case KernelKind::kScalar:
       return "scalar";
+    case KernelKind::kPortable:
+      return "portable";
     case KernelKind::kV2:
       return "v2";
     case KernelKind::kV3:

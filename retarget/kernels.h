@@ -8,9 +8,9 @@
 
 namespace duet {
 
-// Kernels that run here, best first, scalar last. kV2 is always there on x86-64.
+// Kernels that run here, best first, scalar last. kPortable is always there.
 std::vector<KernelKind> available_kernels();
-std::string_view to_string(KernelKind kernel);  // "auto", "scalar", "v2", "v3" (AVX2), "v4" (AVX-512)
+std::string_view to_string(KernelKind kernel);  // "auto", "scalar", "portable", "v2", "v3" (AVX2), "v4" (AVX-512)
 
 bool kernel_runs_here(KernelKind kernel);
 

@@ -76,17 +76,18 @@ pair_kernel::Setup pack_setup(const PairProblem& problem, const PairOptions& opt
 
 }  // namespace
 
-LaneKernel lane_kernel(KernelKind kind) {
+const pair_kernel::LaneKernel& lane_kernel(KernelKind kind) {
   switch (kind) {
+#if defined(__x86_64__)
     case KernelKind::kV4:
-      return {pair_kernel::sweep_v4, pair_kernel::filter_gradient_v4, pair_kernel::step_v4,
-              pair_kernel::dots_v4,  pair_kernel::combine_v4,         pair_kernel::move_v4};
+      return pair_kernel::kV4;
     case KernelKind::kV3:
-      return {pair_kernel::sweep_v3, pair_kernel::filter_gradient_v3, pair_kernel::step_v3,
-              pair_kernel::dots_v3,  pair_kernel::combine_v3,         pair_kernel::move_v3};
+      return pair_kernel::kV3;
+    case KernelKind::kV2:
+      return pair_kernel::kV2;
+#endif
     default:
-      return {pair_kernel::sweep_v2, pair_kernel::filter_gradient_v2, pair_kernel::step_v2,
-              pair_kernel::dots_v2,  pair_kernel::combine_v2,         pair_kernel::move_v2};
+      return pair_kernel::kPortable;
   }
 }
 

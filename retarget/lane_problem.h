@@ -9,21 +9,8 @@
 
 namespace duet {
 
-// The functions of one instruction set.
-struct LaneKernel {
-  void (*sweep)(const pair_kernel::Sweep&);
-  void (*filter_gradient)(const pair_kernel::VectorSweep&, const pair_kernel::Row*, const pair_kernel::Row*,
-                          pair_kernel::Row*);
-  void (*step)(const pair_kernel::VectorSweep&, const pair_kernel::Row*, const pair_kernel::Row*,
-               const pair_kernel::Row*, const pair_kernel::Row*, pair_kernel::Row*, pair_kernel::Row*);
-  void (*dots)(const pair_kernel::VectorSweep&, const pair_kernel::Row* const*, int, int, const pair_kernel::Row*,
-               pair_kernel::Row*);
-  void (*combine)(const pair_kernel::VectorSweep&, const pair_kernel::Row* const*, const float*, int,
-                  pair_kernel::Row*);
-  void (*move)(const pair_kernel::VectorSweep&, const pair_kernel::Row*, const pair_kernel::Row*, float, float,
-               pair_kernel::Row*);
-};
-LaneKernel lane_kernel(KernelKind kind);  // kV2, kV3 or kV4
+// Of a kernel in lanes that runs here (kPortable or wider).
+const pair_kernel::LaneKernel& lane_kernel(KernelKind kind);
 
 bool kernel_fits(const PairProblem& problem);  // whether the robot fits the kernels' arrays
 
@@ -37,7 +24,7 @@ class LaneProblem {
 
   LaneProblem(const PairProblem& problem, const PairOptions& options, KernelKind kernel);
 
-  [[nodiscard]] const LaneKernel& kernel() const { return kernel_; }
+  [[nodiscard]] const pair_kernel::LaneKernel& kernel() const { return kernel_; }
   [[nodiscard]] const pair_kernel::Setup& setup() const { return setup_; }
   [[nodiscard]] int frames() const { return frames_; }
   [[nodiscard]] int blocks() const { return blocks_; }
@@ -64,7 +51,7 @@ class LaneProblem {
   void pack_frame(const PairProblem& problem, int block, int lane);
 
   const PairOptions& options_;
-  LaneKernel kernel_;
+  const pair_kernel::LaneKernel& kernel_;
   pair_kernel::Setup setup_;
   int frames_;
   int blocks_;

@@ -47,7 +47,8 @@ enum class ContactKeypoints {
   kEleven,
   kSeven
 };  // head, shoulders, elbows, wrists, hands | + hips | without hands
-enum class KernelKind { kAuto, kScalar, kV2, kV3, kV4 };  // double reference | float lanes: x86-64-v2, AVX2, AVX-512
+// Double reference | float lanes: of any processor, x86-64-v2, AVX2, AVX-512; later ones are wider.
+enum class KernelKind { kAuto, kScalar, kPortable, kV2, kV3, kV4 };
 
 struct PairOptions {
   PairMode mode = PairMode::kPaper;  // sets the options below; what is set after it changes that

@@ -18,7 +18,7 @@ using Eigen::VectorXf;
 // Levels that this machine has.
 std::vector<const DenseKernels*> levels() {
   std::vector<const DenseKernels*> found;
-  for (const char* level : {"x86-64-v2", "x86-64-v3", "x86-64-v4"}) {
+  for (const char* level : {"portable", "x86-64-v2", "x86-64-v3", "x86-64-v4"}) {
     try {
       found.push_back(&dense_kernels(level));
     } catch (const std::invalid_argument&) {
@@ -49,9 +49,11 @@ TEST(DenseKernels, GemmEqualsDoubleForEveryTransposition) {
         MatrixXf C = random_matrix(m, n, 3);
         const Eigen::MatrixXd sum = C.cast<double>() + a * b;
         kernels->gemm(ta, tb, m, n, k, A.data(), B.data(), C.data(), true);
-        EXPECT_LT((C.cast<double>() - sum).cwiseAbs().maxCoeff(), tolerance(k)) << kernels->level << ta << tb;
+        EXPECT_LT((C.cast<double>() - sum).cwiseAbs().maxCoeff(), tolerance(k))
+            << to_string(kernels->level) << ta << tb;
         kernels->gemm(ta, tb, m, n, k, A.data(), B.data(), C.data(), false);
-        EXPECT_LT((C.cast<double>() - a * b).cwiseAbs().maxCoeff(), tolerance(k)) << kernels->level << ta << tb;
+        EXPECT_LT((C.cast<double>() - a * b).cwiseAbs().maxCoeff(), tolerance(k))
+            << to_string(kernels->level) << ta << tb;
       }
 }
 
@@ -82,7 +84,7 @@ TEST(DenseKernels, GemvOfHalvesEqualsDoubleForAnyNumberOfRows) {
     for (const DenseKernels* kernels : levels()) {
       VectorXf y(rows);
       kernels->gemv_half(rows, cols, halves.data(), x.data(), nullptr, y.data());
-      EXPECT_LT((y.cast<double>() - product).cwiseAbs().maxCoeff(), tolerance(cols)) << kernels->level;
+      EXPECT_LT((y.cast<double>() - product).cwiseAbs().maxCoeff(), tolerance(cols)) << to_string(kernels->level);
       kernels->gemv_half(rows, cols, halves.data(), x.data(), b.data(), y.data());
       EXPECT_LT((y.cast<double>() - product - b.cast<double>()).cwiseAbs().maxCoeff(), tolerance(cols));
     }
@@ -109,7 +111,8 @@ TEST(DenseKernels, BitsDoNotDependOnWhereTheArrayLies) {
       std::vector<float> room(316);
       std::copy(x.begin(), x.end(), room.begin() + offset);
       kernels->elu(300, room.data() + offset);
-      for (int i = 0; i < 300; ++i) ASSERT_EQ(room[offset + i], expected[i]) << kernels->level << " " << offset;
+      for (int i = 0; i < 300; ++i)
+        ASSERT_EQ(room[offset + i], expected[i]) << to_string(kernels->level) << " " << offset;
     }
   }
 }
@@ -127,12 +130,12 @@ TEST(DenseKernels, NanComesOutAsNan) {
     const float W[2] = {1.0F, 1.0F}, x[2] = {std::nanf(""), 1.0F};
     float y = 0.0F;
     kernels->gemv(1, 2, W, x, nullptr, &y);
-    EXPECT_TRUE(std::isnan(y)) << kernels->level;
+    EXPECT_TRUE(std::isnan(y)) << to_string(kernels->level);
     float a[4] = {std::nanf(""), -INFINITY, INFINITY, -1.0F};
     kernels->elu(4, a);
-    EXPECT_TRUE(std::isnan(a[0])) << kernels->level;
-    EXPECT_EQ(a[1], -1.0F) << kernels->level;
-    EXPECT_EQ(a[2], INFINITY) << kernels->level;
+    EXPECT_TRUE(std::isnan(a[0])) << to_string(kernels->level);
+    EXPECT_EQ(a[1], -1.0F) << to_string(kernels->level);
+    EXPECT_EQ(a[2], INFINITY) << to_string(kernels->level);
   }
 }
 
