@@ -164,8 +164,8 @@ def documents():
 def list_long(files):
     for path in files:
         for number, line in enumerate(path.read_text().split("\n"), 1):
-            if (long := re.fullmatch(r"<!-- long: (.+) -->", line)):
-                print(f"{path.relative_to(ROOT)}:{number}: {long[1]}")
+            if long := re.fullmatch(r"<!-- long: (.+) -->", line):
+                print(f"{path.relative_to(ROOT) if path.is_relative_to(ROOT) else path}:{number}: {long[1]}")
 
 
 def main():

@@ -1,0 +1,64 @@
+"""cmake/figures.py: a table that is not what its source prints is found, and what cannot be made is refused in one sentence."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+ENGINES = "<!-- figures: engines results/tables/policies -->"
+END = "<!-- end -->"
+
+
+class Figures(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.page = pathlib.Path(self.folder.name) / "page.md"
+        self.addCleanup(self.folder.cleanup)
+
+    def run_on(self, text, *arguments):
+        self.page.write_text(text)
+        return subprocess.run([sys.executable, str(ROOT / "cmake/figures.py"), *arguments, str(self.page)], capture_output=True, text=True, check=False)
+
+    def refused(self, text, *arguments):
+        done = self.run_on(text, *arguments)
+        self.assertEqual(done.returncode, 1, done.stdout)
+        self.assertEqual(self.page.read_text(), text)
+        return done.stderr
+
+    def test_a_region_is_written_and_then_holds(self):
+        self.assertEqual(self.run_on(f"before\n{ENGINES}\nold\n{END}\nafter\n").returncode, 0)
+        text = self.page.read_text()
+        self.assertTrue(text.startswith(f"before\n{ENGINES}\n\n| Policy | MuJoCo |") and text.endswith(f"\n\n{END}\nafter\n"), text)
+        self.assertEqual(self.run_on(text, "--check").returncode, 0)
+
+    def test_a_digit_that_differs_is_found_and_left(self):
+        self.run_on(f"{ENGINES}\n{END}\n")
+        stale = self.page.read_text().replace("98.1", "98.2")
+        done = self.run_on(stale, "--check")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("page.md:1: is not what 'engines results/tables/policies' prints", done.stdout)
+        self.assertEqual(self.page.read_text(), stale)
+
+    def test_a_region_without_an_end_is_refused(self):
+        self.assertIn("line 2: the region 'engines results/tables/policies' has no '<!-- end -->'", self.refused(f"a\n{ENGINES}\nb\n"))
+        self.assertIn("before the next begins", self.refused(f"{ENGINES}\n{ENGINES}\n{END}\n"))
+
+    def test_what_is_no_source_is_refused(self):
+        self.assertIn("line 1: 'engine x' is none of: success FOLDER", self.refused(f"<!-- figures: engine x -->\n{END}\n"))
+        self.assertIn("no file results/none/engines.csv", self.refused(f"<!-- figures: engines results/none -->\n{END}\n"))
+
+    def test_a_command_that_fails_is_refused_with_what_it_said(self):
+        self.assertIn("ended with 1", self.refused(f"<!-- figures: duet list -->\n{END}\n", "--program", "/bin/false"))
+
+    def test_what_a_program_prints_is_a_block(self):
+        self.run_on(f"<!-- figures: duet a b -->\n{END}\n", "--program", "/bin/echo")
+        self.assertEqual(self.page.read_text(), f"<!-- figures: duet a b -->\n\n```\na b\n```\n\n{END}\n")
+
+    def test_long_figures_are_listed_with_their_command(self):
+        done = self.run_on("a\n<!-- long: duet bench -->\n", "--long")
+        self.assertEqual(done.stdout, f"{self.page}:2: duet bench\n")
+
+
+if __name__ == "__main__":
+    unittest.main()
