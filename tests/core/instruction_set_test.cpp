@@ -11,7 +11,7 @@ constexpr InstructionSet kAll[] = {InstructionSet::kPortable, InstructionSet::kV
 TEST(InstructionSet, WhoeverHasOneHasTheNarrowerOnes) {
   EXPECT_TRUE(runs_here(InstructionSet::kPortable));
   for (std::size_t i = 1; i < std::size(kAll); ++i)
-    if (runs_here(kAll[i])) EXPECT_TRUE(runs_here(kAll[i - 1])) << to_string(kAll[i]);
+    EXPECT_TRUE(!runs_here(kAll[i]) || runs_here(kAll[i - 1])) << to_string(kAll[i]);
 }
 
 TEST(InstructionSet, OnlyX86HasThoseOfX86) {
