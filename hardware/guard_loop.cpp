@@ -48,6 +48,17 @@ bool take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& mess
   return planned;
 }
 
+void take_readings(RobotWire& wire, RobotGuard& guard, double now) {
+  OdometrySample odometry;
+  if (wire.take(odometry)) {
+    odometry.at = now;
+    guard.receive(odometry);
+  }
+  BatteryReading battery;
+  if (wire.take(battery)) guard.receive(battery, now);
+  if (const double heard = wire.executor_heard(now); heard != kNever) guard.executor_heard(heard);
+}
+
 double monotonic_seconds() {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
@@ -64,7 +75,6 @@ void LcmVelocity::send(const VelocityCommand& velocity) {
 void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, double period,
                const std::function<bool(double now)>& go_on) {
   GuardMessage message;
-  OdometrySample odometry;
   double next = monotonic_seconds();
   double now = next;
   do {
@@ -73,10 +83,7 @@ void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, doub
     if (next < monotonic_seconds() - period) next = monotonic_seconds();
     sleep_until(next);
     if (planner != nullptr) take_messages(*planner, guard, message, monotonic_seconds());
-    if (wire.take(odometry)) {
-      odometry.at = monotonic_seconds();
-      guard.receive(odometry);
-    }
+    take_readings(wire, guard, monotonic_seconds());
     now = monotonic_seconds();
     guard.tick(now);
   } while (go_on(now));

@@ -36,6 +36,10 @@ class NoVelocity final : public VelocitySink {
 // stop was among them.
 bool take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& message, double now);
 
+// What the wire has for the guard beside the robot's states: odometry, battery, who executes the commands. `now`: by
+// the clock of its ticks. Called before each tick.
+void take_readings(RobotWire& wire, RobotGuard& guard, double now);
+
 // Runs until `go_on`, called after each tick, is false. `planner` may be null. `period` of ticks [s].
 void run_guard(RobotGuard& guard, RobotWire& wire, DatagramSocket* planner, double period,
                const std::function<bool(double now)>& go_on);

@@ -66,8 +66,6 @@ bool LockStepWire::write(const LowCommandFrame& frame) {
 void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocket* planner, double period,
                             const LockStepCallbacks& callbacks) {
   GuardMessage message;
-  OdometrySample odometry;
-  BatteryReading battery;
   double now = 0.0;
   bool reported = false;
   int silent = 0;
@@ -85,11 +83,7 @@ void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocke
         planned = take_messages(*planner, guard, message, now);
       }
     }
-    if (wire.take(odometry)) {
-      odometry.at = now;
-      guard.receive(odometry);
-    }
-    if (wire.take(battery)) guard.receive(battery, now);
+    take_readings(wire, guard, now);
     guard.tick(now);
     reported = callbacks.report && callbacks.report();
   } while (callbacks.go_on(now));

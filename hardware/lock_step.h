@@ -22,6 +22,7 @@ class LockStepWire final : public RobotWire {
   bool take(LowStateFrame& frame) override;
   bool take(OdometrySample& sample) override { return wire_.take(sample); }
   bool take(BatteryReading& reading) override { return wire_.take(reading); }
+  double executor_heard(double now) override { return wire_.executor_heard(now); }
   int foreign_writers() override { return wire_.foreign_writers(); }
   void open_writer() override { wire_.open_writer(); }
   void close_writer() override;
@@ -39,7 +40,7 @@ class LockStepWire final : public RobotWire {
 // As run_guard does, but a tick for every state. After each report (kReportEvery ticks, `report` says
 // whether one went out) it waits for the planner's message, so that a slow planner costs nothing.
 struct LockStepCallbacks {
-  std::function<bool(double now)> go_on;  // after each tick
+  std::function<bool(double now)> go_on;  // after each tick, with the guard's time
   std::function<bool()> report = {};      // after each tick
 };
 void run_guard_in_lock_step(RobotGuard& guard, LockStepWire& wire, DatagramSocket* planner, double period,

@@ -2,11 +2,9 @@
 
 namespace duet {
 
-void RobotConnection::poll(double now, RobotGuard& guard) {
+double RobotConnection::executor_heard(double now) {
   executor_.poll(now);
-  if (executor_.answers()) guard.executor_heard(executor_.heard_at());
-  BatteryReading battery;
-  if (wire_.take(battery)) guard.receive(battery, now);
+  return executor_.answers() ? executor_.heard_at() : kNever;
 }
 
 bool RobotConnection::take(LowStateFrame& frame) {

@@ -43,12 +43,10 @@ class RobotConnection final : public RobotWire {
   RobotConnection(RobotWire& wire, Executor& executor, OdometryReader* odometry)
       : wire_(wire), executor_(executor), odometry_(odometry) {}
 
-  // What has come from the executor, and the battery, for the guard. Called once a tick.
-  void poll(double now, RobotGuard& guard);
-
   bool take(LowStateFrame& frame) override;
   bool take(OdometrySample& sample) override { return odometry_ != nullptr && odometry_->take(sample); }
   bool take(BatteryReading& reading) override { return wire_.take(reading); }
+  double executor_heard(double now) override;
   int foreign_writers() override { return executor_.foreign_writers(wire_.foreign_writers()); }
   void open_writer() override { executor_.open(); }
   void close_writer() override { executor_.close(); }

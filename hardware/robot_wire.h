@@ -13,6 +13,9 @@ class RobotWire : public FrameTransport {
   virtual bool take(OdometrySample& sample) = 0;
   // The newest state of the battery; false where none has come.
   virtual bool take(BatteryReading&) { return false; }
+  // Takes what the executor of the commands has sent by `now`; when it was last heard of and well, kNever where it was
+  // not or does not answer.
+  virtual double executor_heard([[maybe_unused]] double now) { return kNever; }
   // Until a state can be taken, at most so long [s]; false where none came.
   virtual bool wait(double) { return false; }
   using FrameTransport::take;

@@ -117,7 +117,6 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
   end_on_signals();
   const double begin = monotonic_seconds();
   run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
-    side.connection().poll(now, guard);
     if (person) person->poll(now, guard);
     if (log) log->add(guard);
     return asked_to_end == 0 && now - begin < arguments.seconds;
@@ -157,8 +156,7 @@ class ArmedRun {
   ArmedRun(Session& session, RobotGuard& guard, RobotSide& side, RunLog& log, ArmingFacts facts)
       : session_(session), guard_(guard), side_(side), log_(log), facts_(std::move(facts)) {}
 
-  bool go_on(double now) {
-    side_.connection().poll(now, guard_);
+  bool go_on() {
     log_.add(guard_);
     const GuardStatus& status = guard_.status();
     const SafetyState state = status.safety.state;
@@ -166,7 +164,7 @@ class ArmedRun {
       note(session_, fmt::format("{} ({})", safety_state_name(state), stop_cause_name(status.safety.cause)));
       last_ = state;
     }
-    if (state == SafetyState::kReady && !armed_) try_to_arm(now, status);
+    if (state == SafetyState::kReady && !armed_) try_to_arm(status);
     if (asked_to_end != 0 && !status.order.writes) return false;
     if (asked_to_end != 0) guard_.stop();
     // Damped to the end: the operator's stop comes back to listening, everything else is a fault.
@@ -176,8 +174,8 @@ class ArmedRun {
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
 
  private:
-  void try_to_arm(double now, const GuardStatus& status) {
-    facts_.now = now;
+  void try_to_arm(const GuardStatus& status) {
+    facts_.now = monotonic_seconds();  // as the word's age is told, whatever clock the guard ticks by
     facts_.remote_key_held = status.input.now - status.input.dead_man_at < 0.1;
     facts_.reported_mode_machine = guard_.reading().mode_machine;
     facts_.executor_complaint = side_.executor().complaint();
@@ -238,12 +236,11 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   ask_for_sharp_timers();
   const auto after_tick = [&](double now) {
     if (person) person->poll(now, guard);
-    return run.go_on(now);
+    return run.go_on();
   };
   if (arguments.lock_step)
-    run_guard_in_lock_step(
-        guard, stepped, &planner, setup.limiter.dt,
-        {[&](double) { return after_tick(monotonic_seconds()); }, [&] { return reports.after_tick(guard); }});
+    run_guard_in_lock_step(guard, stepped, &planner, setup.limiter.dt,
+                           {after_tick, [&] { return reports.after_tick(guard); }});
   else
     run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
       (void)reports.after_tick(guard);

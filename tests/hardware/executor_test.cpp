@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "duet/hardware/lock_step.h"
 #include "duet/hardware/robot_connection.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
@@ -92,6 +93,7 @@ class SeenOdometry final : public OdometryReader {
   void see(const LowStateFrame&) override { ++seen; }
   bool take(OdometrySample& sample) override {
     sample.X_WB.p.x() = 7.0;
+    sample.valid = true;
     return true;
   }
   long seen = 0;
@@ -122,19 +124,51 @@ TEST(RobotConnection, PassesEachThingToTheOneWhoseItIs) {
   EXPECT_FALSE(blind.take(sample));
 }
 
-TEST(RobotConnection, TellsTheGuardOfTheBattery) {
+// An executor that has always been heard of just now.
+class PromptExecutor final : public Executor {
+ public:
+  void poll(double now) override { heard_ = now; }
+  [[nodiscard]] double heard_at() const override { return heard_; }
+  [[nodiscard]] bool answers() const override { return true; }
+  [[nodiscard]] std::string complaint() const override { return ""; }
+  int foreign_writers(int command_writers) override { return command_writers; }
+  void open() override {}
+  void close() override {}
+  [[nodiscard]] bool is_open() const override { return false; }
+  bool write(const LowCommandFrame&) override { return true; }
+  void send(const VelocityCommand&) override {}
+
+ private:
+  double heard_ = kNever;
+};
+
+// Three ticks of a loop; what the guard then knows has to be at most a tick old by the clock that it ticks by.
+void expect_readings_by_the_guards_clock(bool lock_step) {
   MemoryWire wire;
-  CountedVelocity velocity;
-  TwinExecutor executor(wire, velocity);
-  RobotConnection link(wire, executor, nullptr);
+  PromptExecutor executor;
+  SeenOdometry odometry;
+  RobotConnection link(wire, executor, &odometry);
   GuardSetup setup = test::twin_guard();
   setup.has_battery = true;
-  RobotGuard guard(setup, link, executor);
+  LockStepWire stepped(link);
+  RobotGuard guard(setup, lock_step ? static_cast<RobotWire&>(stepped) : link, executor);
   wire.charge = 12.0;
-  link.poll(1.0, guard);
-  guard.tick(1.0);
-  EXPECT_EQ(guard.status().input.health.charge, 12.0);
+  int ticks = 0;
+  const auto go_on = [&](double) { return ++ticks < 3; };
+  if (lock_step)
+    run_guard_in_lock_step(guard, stepped, nullptr, setup.limiter.dt, {go_on});
+  else
+    run_guard(guard, link, nullptr, setup.limiter.dt, go_on);
+  const SafetyInput& input = guard.status().input;
+  EXPECT_EQ(input.health.charge, 12.0);
+  for (const double at : {input.odometry_at, input.executor_at}) {
+    EXPECT_LE(at, input.now);
+    EXPECT_GT(at, input.now - 1.0);
+  }
 }
+
+TEST(RobotConnection, IsReadInRealTimeByTheGuardsClock) { expect_readings_by_the_guards_clock(false); }
+TEST(RobotConnection, IsReadInLockStepByTheGuardsClock) { expect_readings_by_the_guards_clock(true); }
 
 }  // namespace
 }  // namespace duet
