@@ -1,7 +1,5 @@
 #include "duet/hardware/lock_step.h"
 
-#include <sys/prctl.h>
-
 #include <chrono>
 #include <thread>
 
@@ -20,8 +18,6 @@ constexpr int kMostSilent = 5;  // states that did not come in time, until the t
 void wait_a_moment() { std::this_thread::sleep_for(kStepLook); }
 
 }  // namespace
-
-void ask_for_sharp_timers() { (void)prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL); }
 
 bool LockStepWire::wait(double seconds) {
   const double begin = monotonic_seconds();

@@ -63,7 +63,4 @@ class LockStepTwin {
   long resent_ = 0;
 };
 
-// Timers of this thread wake up on time, as far as the scheduler lets them; nothing where the kernel refuses.
-void ask_for_sharp_timers();
-
 }  // namespace duet

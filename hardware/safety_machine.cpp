@@ -15,8 +15,12 @@ void enter(SafetyState state, StopCause cause, double now, SafetyMemory& memory)
 }
 
 void listen(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
-  const bool well = missing_for_arming(rules, memory, input).empty();
-  if (!well) memory.well_since = kNever;
+  const std::string_view missing = missing_for_arming(rules, memory, input);
+  const bool well = missing.empty();
+  if (!well) {
+    memory.well_since = kNever;
+    memory.missing = missing;
+  }
   if (well && memory.well_since == kNever) memory.well_since = input.now;
   const bool ready = well && input.now - memory.well_since >= rules.ready_time;
   if (memory.state == SafetyState::kListen && ready) enter(SafetyState::kReady, StopCause::kNone, input.now, memory);

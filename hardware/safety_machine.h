@@ -28,6 +28,7 @@ struct SafetyMemory {
   double since = 0.0;                  // begin of the state [s]
   double well_since = kNever;          // from when everything that arming needs has been well; kNever: it is not
   double last_now = kNever;            // of the tick before
+  std::string_view missing = {};       // why it was last not ready, while it listens
   BadStates bad;
 };
 

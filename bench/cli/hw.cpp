@@ -11,6 +11,7 @@
 
 #include "duet/bench/cli/hw_episodes.h"
 #include "duet/bench/cli/hw_partner.h"
+#include "duet/bench/cli/hw_status.h"
 #include "duet/core/require.h"
 #include "duet/hardware/dds/robot_side.h"
 #include "duet/hardware/guard_link.h"
@@ -18,6 +19,7 @@
 #include "duet/hardware/guard_message.h"
 #include "duet/hardware/lock_step.h"
 #include "duet/hardware/person_input.h"
+#include "duet/hardware/real_time.h"
 #include "duet/hardware/robot_config.h"
 #include "duet/hardware/run_log.h"
 
@@ -25,6 +27,7 @@ namespace duet::cli {
 namespace {
 
 constexpr double kPlanPeriod = 0.02;  // [s]
+constexpr double kSaidEvery = 3.0;    // what is missing [s]
 constexpr const char* kNotSafetyRated =
     "This software is not safety-rated. It replaces neither gantry nor emergency stop nor spotter.";
 volatile std::sig_atomic_t asked_to_end = 0;
@@ -49,43 +52,6 @@ std::string where(const RobotConfig& config) {
                      config.permission.domain, config.permission.interface);
 }
 
-// Why it is not ready, or "ready".
-std::string readiness(const GuardStatus& status) {
-  if (status.safety.state == SafetyState::kOffline) return "no state has come";
-  const std::string_view missing = missing_for_arming(SafetyRules{}, status.safety, status.input);
-  return missing.empty() ? std::string(safety_state_name(status.safety.state)) : fmt::format("missing: {}", missing);
-}
-
-std::string clamp_text(const ClampCounts& clamps) {
-  std::string text;
-  for (std::size_t k = 0; k < kClampReasons; ++k)
-    if (clamps[k] > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", kClampNames[k], clamps[k]);
-  return text.empty() ? "none" : text;
-}
-
-nlohmann::json status_json(const GuardStatus& status) {
-  nlohmann::json clamps = nlohmann::json::object();
-  for (std::size_t k = 0; k < kClampReasons; ++k) clamps[std::string(kClampNames[k])] = status.clamps[k];
-  return {{"state", safety_state_name(status.safety.state)},
-          {"cause", stop_cause_name(status.safety.cause)},
-          {"readiness", readiness(status)},
-          {"states", status.states},
-          {"checksum_faults", status.checksum_faults},
-          {"tick_faults", status.tick_faults},
-          {"number_faults", status.number_faults},
-          {"clamps", clamps}};
-}
-
-std::string status_text(const GuardStatus& status, double seconds) {
-  const RobotHealth& health = status.input.health;
-  return fmt::format(
-      "{}\n  {} states in {:.1f} s; {} with a wrong checksum, {} old, {} not finite\n  tilt {:.3f} rad, hottest casing "
-      "{:.0f} and winding {:.0f} degrees C, remote control {}\n  other writers of commands: {}\n  clamps: {}",
-      readiness(status), status.states, seconds, status.checksum_faults, status.tick_faults, status.number_faults,
-      health.tilt, health.casing, health.winding, status.input.remote_at == kNever ? "not heard" : "heard",
-      status.input.foreign_writer ? "yes" : "none", clamp_text(status.clamps));
-}
-
 RobotSideOptions side_options(const HardwareArguments& arguments, bool commands) {
   RobotSideOptions options;
   options.commands = commands;
@@ -106,14 +72,15 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
                    arguments.seconds,
                    with_planner ? fmt::format("takes a planner's commands at '{}' and limits them", arguments.socket)
                                 : "reads only"));
-  RobotSide side(config, side_options(arguments, false));
   const GuardSetup setup = guard_setup(config, true);
+  std::unique_ptr<RunLog> log;  // its thread has no priority
+  if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
+  note(session, real_time_text());
+  RobotSide side(config, side_options(arguments, false));
   RobotGuard guard(setup, side.connection(), side.executor());
   std::optional<PersonInput> person = person_input(config, arguments);
   std::optional<DatagramSocket> planner;
   if (with_planner) planner.emplace(DatagramSocket::at_path(arguments.socket));
-  std::unique_ptr<RunLog> log;
-  if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
   end_on_signals();
   const double begin = monotonic_seconds();
   run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
@@ -121,9 +88,8 @@ void listen_for(Session& session, const HardwareArguments& arguments, bool with_
     if (log) log->add(guard);
     return asked_to_end == 0 && now - begin < arguments.seconds;
   });
-  const GuardStatus& status = guard.status();
-  print(session, status_text(status, monotonic_seconds() - begin), status_json(status));
-  if (status.states == 0) throw MissingError(fmt::format("no state of {} has come", where(config)));
+  print(session, status_text(guard, monotonic_seconds() - begin), status_json(guard));
+  if (guard.status().states == 0) throw MissingError(fmt::format("no state of {} has come", where(config)));
 }
 
 // A word for a person to type; not a secret.
@@ -163,7 +129,9 @@ class ArmedRun {
     if (state != last_) {
       note(session_, fmt::format("{} ({})", safety_state_name(state), stop_cause_name(status.safety.cause)));
       last_ = state;
+      said_at_ = status.input.now;
     }
+    if (state == SafetyState::kListen && !armed_) say_what_is_missing(status);
     if (state == SafetyState::kReady && !armed_) try_to_arm(status);
     if (asked_to_end != 0 && !status.order.writes) return false;
     if (asked_to_end != 0) guard_.stop();
@@ -174,6 +142,12 @@ class ArmedRun {
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
 
  private:
+  // Now and then while it waits: nobody else says why.
+  void say_what_is_missing(const GuardStatus& status) {
+    if (status.safety.missing.empty() || status.input.now - said_at_ < kSaidEvery) return;
+    said_at_ = status.input.now;
+    note(session_, fmt::format("listen (lately missing: {})", status.safety.missing));
+  }
   void try_to_arm(const GuardStatus& status) {
     facts_.now = monotonic_seconds();  // as the word's age is told, whatever clock the guard ticks by
     facts_.remote_key_held = status.input.now - status.input.dead_man_at < 0.1;
@@ -191,6 +165,7 @@ class ArmedRun {
   RunLog& log_;
   ArmingFacts facts_;
   SafetyState last_ = SafetyState::kOffline;
+  double said_at_ = 0.0;  // by the guard's clock [s]
   bool armed_ = false;
   std::string refusal_;
 };
@@ -224,6 +199,10 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   facts.remote_key_held = true;
   if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
   DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
+  if (arguments.lock_step)
+    ask_for_sharp_timers();
+  else
+    note(session, real_time_text());
   RobotSide side(config, side_options(arguments, true));
   LockStepWire stepped(side.connection());
   RobotGuard guard(setup, arguments.lock_step ? static_cast<RobotWire&>(stepped) : side.connection(), side.executor());
@@ -233,7 +212,6 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   ArmedRun run(session, guard, side, log, facts);
   ReportSender reports(arguments.socket);
   end_on_signals();
-  ask_for_sharp_timers();
   const auto after_tick = [&](double now) {
     if (person) person->poll(now, guard);
     return run.go_on();
@@ -250,7 +228,7 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
   print(session,
         fmt::format("{}; log '{}', {} ticks left out", safety_state_name(guard.status().safety.state), arguments.log,
                     log.dropped()),
-        status_json(guard.status()));
+        status_json(guard));
   if (guard.status().safety.state == SafetyState::kFault) session.exit_code = kExitGate;
 }
 

@@ -16,6 +16,7 @@
 #include "duet/hardware/guard_loop.h"
 #include "duet/hardware/homie_stand_in.h"
 #include "duet/hardware/lcm_channel.h"
+#include "duet/hardware/real_time.h"
 #include "duet/hardware/sport_stand_in.h"
 
 namespace {
@@ -155,6 +156,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { services_stopped = 1; });
   try {
     check_twin_place(arguments.place);
+    (void)ask_for_real_time();
     if (arguments.homie) play_homie(arguments);
     if (arguments.sport) play_sport(arguments);
     if (arguments.echo) play_echo(arguments);

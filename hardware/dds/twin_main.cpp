@@ -13,6 +13,7 @@
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/lcm_message.h"
 #include "duet/hardware/lock_step.h"
+#include "duet/hardware/real_time.h"
 #include "duet/hardware/twin_fault.h"
 #include "duet/hardware/twin_operator.h"
 
@@ -166,7 +167,10 @@ int main(int argc, char** argv) {
   try {
     TwinModel twin(load_shared_robot(), arguments.options);
     DatagramSocket velocity = DatagramSocket::at_port(arguments.velocity_port);
-    ask_for_sharp_timers();
+    if (arguments.lock_step)
+      ask_for_sharp_timers();
+    else
+      (void)ask_for_real_time();
     WiredTwin wired(arguments, twin, velocity);
     fmt::print("twin: domain {} on {}, velocity at port {}, seed {}, {}, {}\n", arguments.place.domain,
                arguments.place.interface, velocity.port(), arguments.options.seed,

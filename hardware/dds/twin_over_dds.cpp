@@ -14,6 +14,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/lock_step.h"
+#include "duet/hardware/real_time.h"
 
 extern char** environ;
 
@@ -106,7 +107,10 @@ TwinOverDds::~TwinOverDds() {
 }
 
 void TwinOverDds::run_thread(const GuardSetup& setup, RunLog* log, bool lock_step) {
-  ask_for_sharp_timers();
+  if (lock_step)
+    ask_for_sharp_timers();
+  else
+    (void)ask_for_real_time();
   LockStepWire stepped(*wire_);
   RobotWire& wire = lock_step ? static_cast<RobotWire&>(stepped) : *wire_;
   RobotGuard guard(setup, wire, nobody_);

@@ -43,6 +43,7 @@ TEST(SafetyMachine, ABadMomentBeginsTheTwoSecondsAnew) {
   robot.input.health.tilt = 0.0;
   robot.run_for(1.9);
   EXPECT_EQ(robot.memory.state, SafetyState::kListen);
+  EXPECT_EQ(robot.memory.missing, "tilt") << "what was last missing stays, for whoever asks why it waits";
   robot.run_for(0.2);
   EXPECT_EQ(robot.memory.state, SafetyState::kReady);
 }
@@ -169,6 +170,18 @@ TEST(SafetyMachine, APlannerThatStaysAwayEndsInDampingAfterTwoSeconds) {
   robot.run_for(1.98, away);
   EXPECT_EQ(robot.memory.state, SafetyState::kHold);
   robot.run_for(0.03, away);
+  EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
+  EXPECT_EQ(robot.memory.cause, StopCause::kHeldTooLong);
+}
+
+// Under the rules as they are a planner counts as dead before that: here it does not.
+TEST(SafetyMachine, AHoldLastsNoLongerThanItsTime) {
+  SimulatedSafety robot = in_state(SafetyState::kRun);
+  robot.rules.planner.damp = 100.0;
+  const Spoil away = cut(&SafetyInput::planner_at);
+  robot.run_for(2.5, away);
+  EXPECT_EQ(robot.memory.state, SafetyState::kHold);
+  robot.run_for(0.2, away);
   EXPECT_EQ(robot.memory.state, SafetyState::kDamp);
   EXPECT_EQ(robot.memory.cause, StopCause::kHeldTooLong);
 }
