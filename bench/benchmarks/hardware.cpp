@@ -95,6 +95,7 @@ std::vector<double> tick_seconds(bool person, int count) {
     guard.receive(planned, now);
     guard.receive(seen, now);
     guard.receive(twin.odometry(now));
+    guard.receive(BatteryReading{.charge = twin.condition.charge}, now);
     const double begin = wall_seconds();
     guard.tick(now);
     if (k >= kRunsFrom) seconds.push_back(wall_seconds() - begin);

@@ -38,6 +38,13 @@ TEST(HwCommand, SaysFirstThatNothingIsWrittenAndThenThatNobodyAnswers) {
   EXPECT_THAT(answer.err, HasSubstr("no state of twin 'twin'"));
 }
 
+// What a tick costs is measured while the guard runs, beside a twin with everything that running needs.
+TEST(HwCommand, BenchTimesAGuardThatRuns) {
+  const Answer answer = duet_program("bench hardware/tick/alone --seconds 0.01");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+  EXPECT_THAT(answer.out, HasSubstr("hardware/tick/alone:p99"));
+}
+
 TEST(HwCommand, RefusesAConfigurationThatIsWrong) {
   const test::ScratchFolder folder;
   write_file(folder / "bad.yaml", config_of("interface: auto\n"));
