@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "duet/core/require.h"
 #include "duet/hardware/touch_speed.h"
@@ -263,18 +264,33 @@ const BodyGaps& Limiter::gaps_at_rest(const LimiterInput& input, const std::vect
   return distance_.measure(input.state.X_WB, q_rest_, person, setup_.limits.pose_uncertainty, input.acting);
 }
 
-// A step after which the arms could no longer come to rest in time is not made: they brake instead, which the step
-// before left room for.
+// A step after which the arms could no longer come to rest in time is not made: one brakes instead, where that is
+// enough, so that an arm which rests on its own body leaves the other free; otherwise both, which the step before left
+// room for.
 void Limiter::avoid_bodies(const LimiterInput& input, const std::vector<AxisState>& before, const BodyGaps& gaps,
                            LimiterState& state, ClampCounts& counts) {
-  const BodyGaps& next = gaps_at_rest(input, state.joints);
-  const bool self = next.self < setup_.limits.self_distance && next.self < gaps.self - kNearer;
-  const bool head = next.head < setup_.limits.head_distance && next.head < gaps.head - kNearer;
+  const auto nearness = [&] {
+    const BodyGaps& next = gaps_at_rest(input, state.joints);
+    const bool self = next.self < setup_.limits.self_distance && next.self < gaps.self - kNearer;
+    const bool head = next.head < setup_.limits.head_distance && next.head < gaps.head - kNearer;
+    return std::pair(self, head);
+  };
+  const auto [self, head] = nearness();
   count_if(self, counts, ClampReason::kSelfCollision);
   count_if(head, counts, ClampReason::kHeadDistance);
   if (!self && !head) return;
-  for (const int joint : setup_.executed.joints)
-    state.joints[joint] = brake(before[joint], joint_bounds_[joint], setup_.dt);
+  std::vector<AxisState>& braked = before_;  // of which `before` is nothing more from here on
+  for (const int joint : setup_.executed.joints) braked[joint] = brake(before[joint], joint_bounds_[joint], setup_.dt);
+  for (const std::vector<int>& arm : setup_.robot->roles.arms) {
+    const auto swap_arm = [&] {
+      for (const int joint : arm)
+        if (executed_[joint]) std::swap(state.joints[joint], braked[joint]);
+    };
+    swap_arm();
+    if (nearness() == std::pair(false, false)) return;
+    swap_arm();
+  }
+  for (const int joint : setup_.executed.joints) state.joints[joint] = braked[joint];
 }
 
 void Limiter::write(const LimiterInput& input, const LimiterState& state, LimitedCommand& out,

@@ -95,6 +95,35 @@ TEST(Limiter, RootAccelerationAndJerkStopAtTheirBounds) {
   EXPECT_GT(robot.counted(ClampReason::kRootJerk), 0);
 }
 
+TEST(Limiter, HeightTurnAndStopKeepTheirRates) {
+  LimitedRobot robot(test::nobody_near());
+  const HardwareLimits& limits = robot.limiter.setup().limits;
+  const double dt = robot.limiter.setup().dt;
+  robot.command.root = {0.25, 0.0, -0.5, 0.84};
+  VelocityCommand before{0.0, 0.0, 0.0, limits.height};
+  double height = 0.0, turn = 0.0, stop = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    if (k == 200) robot.command.root = {0.0, 0.0, 0.5, 0.84};
+    const VelocityCommand now = robot.tick().root;
+    height = std::max(height, std::abs(now.height - before.height) / dt);
+    turn = std::max(turn, std::abs(now.yaw_rate - before.yaw_rate) / dt);
+    stop = std::max(stop, (before.forward - now.forward) / dt);
+    before = now;
+  }
+  EXPECT_NEAR(before.yaw_rate, 0.5, 1e-6);
+  EXPECT_LE(height, limits.height_rate + 1e-9);
+  EXPECT_LE(turn, limits.yaw_acceleration + 1e-9);
+  EXPECT_LE(stop, limits.stop_acceleration + 1e-9);
+}
+
+TEST(Limiter, HeldItKeepsItsHeight) {
+  LimitedRobot robot(test::nobody_near());
+  robot.command.root.height = 0.84;
+  robot.input.share = 0.0;
+  for (int k = 0; k < 50; ++k) robot.tick();
+  EXPECT_EQ(robot.out.root.height, 0.74);
+}
+
 TEST(Limiter, TheHeightStaysWithinATenthOfItsMiddle) {
   for (const double asked : {0.3, 1.2}) {
     LimitedRobot robot(test::nobody_near());
@@ -226,6 +255,14 @@ TEST(Limiter, TheFenceStopsWhatLeadsOutAndNotWhatLeadsIn) {
   EXPECT_NEAR(robot.out.root.forward, -0.2, 1e-6);
 }
 
+TEST(Limiter, TheFenceHasTwoSides) {
+  LimitedRobot robot(test::nobody_near());
+  robot.input.state.X_WB.p.y() = 1.95;
+  robot.command.root.lateral = 0.1;
+  for (int k = 0; k < 100; ++k) robot.tick();
+  EXPECT_NEAR(robot.out.root.lateral, 0.0, 1e-6);
+}
+
 // Both arms are asked through the trunk.
 TEST(Limiter, ArmsStopBeforeTheBody) {
   LimitedRobot robot(test::nobody_near());
@@ -243,6 +280,19 @@ TEST(Limiter, ArmsStopBeforeTheBody) {
   }
   EXPECT_GT(robot.counted(ClampReason::kSelfCollision), 0);
   EXPECT_GT(nearest, 0.025);
+}
+
+TEST(Limiter, AnArmThatWouldTouchTheBodyLeavesTheOtherFree) {
+  LimitedRobot robot(test::nobody_near());
+  const auto& arms = test::g1()->roles.arms;
+  robot.command.q[arms[0][1]] = -0.6;  // into the trunk
+  robot.command.q[arms[1][0]] -= 1.0;  // ahead
+  for (int k = 0; k < 400; ++k) robot.move();
+  EXPECT_GT(robot.counted(ClampReason::kSelfCollision), 0);
+  EXPECT_GT(std::abs(robot.out.q[arms[0][1]] - robot.command.q[arms[0][1]]), 0.1);
+  EXPECT_NEAR(robot.out.q[arms[1][0]], robot.command.q[arms[1][0]], 1e-6);
+  BodyDistance distance(test::g1(), HumanBody{}, {});
+  EXPECT_GT(distance.measure(robot.input.state.X_WB, robot.out.q, nullptr, 0.0, false).self, 0.025);
 }
 
 TEST(Limiter, ReleaseOpensTheArmsAndThenStepsBack) {
