@@ -86,6 +86,15 @@ TEST(AxisLimit, FromOutsideItOnlyGoesInwards) {
   EXPECT_NEAR(state.value, 1.0, kRounding);
 }
 
+// Whatever brought it there: the bound of the value counts for more than that of the change of its rate.
+TEST(AxisLimit, AStateThatIsTooFastForItsBoundStopsThere) {
+  const AxisBounds joint{-1.0, 1.0, 0.5, 0.5, 5.0};
+  for (const double side : {-1.0, 1.0}) {
+    const AxisState state = followed(side * 2.0, {side * 0.99, side * 2.0}, 1, joint);
+    EXPECT_LE(side * state.value, 1.0 + kRounding) << side;
+  }
+}
+
 TEST(AxisLimit, BrakesToTheValueThatItSaid) {
   const AxisBounds joint{-1.0, 1.0, 0.5, 0.5, 5.0};
   AxisState state = followed(0.8, {}, 13, joint);

@@ -94,6 +94,16 @@ TEST(RobotGuard, AForeignWriterRefusesArmingAndHoldsARun) {
   EXPECT_EQ(during.cause(), StopCause::kForeignWriter);
 }
 
+TEST(RobotGuard, AMessageForAnotherRobotIsNotKept) {
+  GuardedTwin robot;
+  PlannerMessage other = robot.message;
+  other.sequence = 1;
+  other.command.q = Eigen::VectorXd::Zero(12);
+  robot.guard.receive(other, robot.now);
+  EXPECT_EQ(robot.guard.planned().q.size(), kG1Motors) << "what the log writes";
+  EXPECT_EQ(counted(robot.guard.status().clamps, ClampReason::kSize), 1);
+}
+
 TEST(RobotGuard, OldAndRepeatedMessagesAreDropped) {
   GuardedTwin robot;
   robot.start();
@@ -106,6 +116,108 @@ TEST(RobotGuard, OldAndRepeatedMessagesAreDropped) {
   }
   EXPECT_EQ(robot.guard.status().old_messages, 50);
   EXPECT_EQ(robot.guard.status().limited.root.forward, 0.0);
+}
+
+TEST(RobotGuard, OldAndRepeatedMessagesOfPerceptionAreDropped) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.sees = false;
+  robot.person.sequence = 5;
+  robot.guard.receive(robot.person, robot.now);
+  robot.tick();
+  const double seen_at = robot.guard.status().input.person_at;
+  robot.run_for(0.1);
+  for (const std::uint64_t old : {5u, 4u}) {
+    robot.person.sequence = old;
+    robot.guard.receive(robot.person, robot.now);
+  }
+  robot.tick();
+  EXPECT_EQ(robot.guard.status().input.person_at, seen_at);
+  EXPECT_EQ(robot.guard.status().old_messages, 2);
+}
+
+TEST(RobotGuard, OdometryThatCallsItselfInvalidIsNotUsed) {
+  GuardedTwin robot;
+  robot.run_for(0.1);
+  robot.measures = false;
+  const double at = robot.guard.odometry().at;
+  OdometrySample invalid = robot.twin.odometry(robot.now);
+  invalid.X_WB.p.x() += 0.01;
+  invalid.valid = false;
+  robot.guard.receive(invalid);
+  robot.tick();
+  EXPECT_EQ(robot.guard.status().input.odometry_at, at);
+  EXPECT_LT(robot.guard.odometry().X_WB.p.x(), 0.005);
+}
+
+TEST(RobotGuard, TheLimiterIsGivenNoOldOdometryAndNoOldPerson) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.run_for(0.2);
+  EXPECT_TRUE(robot.guard.limiter_input().odometry && robot.guard.limiter_input().person != nullptr);
+  robot.measures = robot.sees = false;
+  robot.run_for(0.3);
+  EXPECT_FALSE(robot.guard.limiter_input().odometry);
+  EXPECT_EQ(robot.guard.limiter_input().person, nullptr);
+}
+
+TEST(RobotGuard, WhatTheRemoteControlSaidLastIsNoNewsWithoutAState) {
+  GuardedTwin robot;
+  robot.hold_key(RemoteKey::kR1);
+  robot.run_for(0.1);
+  robot.spoil = [](GuardedTwin::Frames& frames) { frames.clear(); };
+  robot.run_for(0.05);
+  EXPECT_LT(robot.guard.status().input.remote_at, robot.now - 0.04);
+  EXPECT_LT(robot.guard.status().input.dead_man_at, robot.now - 0.04);
+}
+
+TEST(RobotGuard, AJointBeyondItsLimitKeepsItFromBeingReady) {
+  GuardedTwin robot;
+  robot.spoil = [](GuardedTwin::Frames& frames) {
+    for (LowStateFrame& frame : frames) {
+      frame.motor[3].q = static_cast<float>(test::g1()->joints[3].upper + 0.05);
+      seal(frame);
+    }
+  };
+  robot.run_for(3.0);
+  EXPECT_EQ(robot.state(), SafetyState::kListen);
+  EXPECT_EQ(robot.guard.status().safety.missing, "joints_in_range");
+}
+
+TEST(RobotGuard, ItKnowsWhetherItsHandsAreNearAPerson) {
+  for (const double distance : {0.3, 4.0}) {
+    GuardedTwin robot(test::twin_guard(true));
+    robot.person.joints = test::standing_adult({distance, 0.0, 0.95});
+    robot.run_for(0.2);
+    EXPECT_EQ(robot.guard.status().input.hands_clear, distance > 1.0) << distance;
+  }
+}
+
+TEST(RobotGuard, AHoldThatWillEndInDampingOpensTheArms) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.person.joints = test::standing_adult({0.3, 0.0, 0.95});
+  robot.start();
+  ASSERT_EQ(robot.state(), SafetyState::kRun) << stop_cause_name(robot.cause());
+  EXPECT_FALSE(robot.guard.limiter_input().release);
+  robot.wire.foreign = 1;
+  robot.time_to_leave(SafetyState::kRun);
+  robot.tick();
+  EXPECT_EQ(robot.state(), SafetyState::kHold) << "the hands are not off the person yet";
+  EXPECT_TRUE(robot.guard.limiter_input().release);
+}
+
+TEST(RobotGuard, AnArmThatIsPushedHardOpensBoth) {
+  GuardedTwin robot;
+  robot.start();
+  EXPECT_FALSE(robot.guard.limiter_input().release);
+  robot.spoil = [](GuardedTwin::Frames& frames) {
+    for (LowStateFrame& frame : frames) {
+      const int joint = test::g1()->roles.arms[0][0];
+      frame.motor[joint].tau_est = static_cast<float>(0.9 * test::g1()->joints[joint].effort);
+      seal(frame);
+    }
+  };
+  robot.run_for(0.1);
+  EXPECT_EQ(robot.state(), SafetyState::kRun);
+  EXPECT_TRUE(robot.guard.limiter_input().release);
 }
 
 TEST(RobotGuard, AMessageOfAnotherSizeIsNoSignOfLife) {

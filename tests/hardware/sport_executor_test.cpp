@@ -91,6 +91,15 @@ TEST(SportExecutor, AsksNothingButItsStateBeforeItIsOpened) {
   EXPECT_EQ(trial.executor.complaint(), "");
 }
 
+TEST(SportExecutor, AMachineThatAnswersAndDoesNotWalkIsNotHeard) {
+  SportStandIn damped(neutral_stance(), 1);
+  MemorySport wire(damped);
+  SportExecutor executor(wire, kDt);
+  for (; wire.now < 1.0; wire.now += kDt) executor.poll(wire.now);
+  EXPECT_GT(wire.asked(SportCall::kGetFsm), 5);
+  EXPECT_EQ(executor.heard_at(), kNever);
+}
+
 TEST(SportExecutor, AVelocityEndsByItselfWhenNobodyRenewsIt) {
   SportTrial trial;
   trial.executor.open();
