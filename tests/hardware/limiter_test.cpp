@@ -97,7 +97,7 @@ TEST(Limiter, RootAccelerationAndJerkStopAtTheirBounds) {
 
 TEST(Limiter, HeightTurnAndStopKeepTheirRates) {
   LimitedRobot robot(test::nobody_near());
-  const HardwareLimits& limits = robot.limiter.setup().limits;
+  const HardwareLimits limits;  // not the limiter's own copy, which is what is asked
   const double dt = robot.limiter.setup().dt;
   robot.command.root = {0.25, 0.0, -0.5, 0.84};
   VelocityCommand before{0.0, 0.0, 0.0, limits.height};
