@@ -151,7 +151,9 @@ PairOptions pair_options_of(PairMode mode) {
   options.contact_blocks = ContactBlocks::kCrossAndHuman;
   options.weights.bone = 5.0;
   options.weights.partner = 0.2;
-  options.weights.collision = 10.0;
+  options.weights.collision = 60.0;
+  options.weights.hand = 3.0;
+  options.step_speed = 1.8;
   if (mode != PairMode::kBest) return options;
   options.optimizer = Optimizer::kLbfgs;
   options.lbfgs_iterations = 60;

@@ -287,8 +287,9 @@ TEST(PairOnGround, HandsWeighAsAskedUnlessKeypointsAreListed) {
     return hands;
   };
   EXPECT_THAT(hand_weights({{"mode", "paper"}}), testing::ElementsAre(1.0, 1.0));
-  EXPECT_THAT(hand_weights({{"mode", "best"}}), testing::ElementsAre(1.0, 1.0));
-  EXPECT_THAT(hand_weights({{"mode", "best"}, {"w-hand", "3"}}), testing::ElementsAre(3.0, 3.0));
+  EXPECT_THAT(hand_weights({{"mode", "grounded"}}), testing::ElementsAre(3.0, 3.0));
+  EXPECT_THAT(hand_weights({{"mode", "best"}}), testing::ElementsAre(3.0, 3.0));
+  EXPECT_THAT(hand_weights({{"mode", "best"}, {"w-hand", "2"}}), testing::ElementsAre(2.0, 2.0));
   EXPECT_THAT(hand_weights({{"mode", "paper"}, {"w-hand", "0.5"}}), testing::ElementsAre(0.5, 0.5));
   EXPECT_THAT(hand_weights({{"mode", "best"}, {"keypoint-list", "head,left_hand,right_hand"}}),
               testing::ElementsAre(1.0, 1.0));
