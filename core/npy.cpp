@@ -188,7 +188,11 @@ template <typename Value>
 std::string number_bytes(std::string_view type, const NpyArray& array, const std::vector<Value>& values) {
   std::string bytes = header_text(type, array.shape);
   bytes.reserve(bytes.size() + values.size() * sizeof(Value));
-  for (const Value value : values) append_little_endian(bytes, value);
+  if constexpr (std::endian::native == std::endian::little) {  // as they stand in memory
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value));
+  } else {
+    for (const Value value : values) append_little_endian(bytes, value);
+  }
   return bytes;
 }
 

@@ -120,10 +120,16 @@ std::string read_source(zip_source_t* source) {
   zip_stat_t status;
   if (zip_source_stat(source, &status) != 0 || zip_source_open(source) != 0)
     throw InputError(fmt::format("cannot make an archive: {}", zip_error_strerror(zip_source_error(source))));
-  std::string bytes(status.size, '\0');
-  const zip_int64_t count = zip_source_read(source, bytes.data(), bytes.size());
+  std::string bytes;
+  bytes.reserve(status.size);
+  char buffer[1 << 15];  // stays in the first cache: the text is not filled with zeros before
+  for (;;) {
+    const zip_int64_t count = zip_source_read(source, buffer, sizeof buffer);
+    if (count <= 0) break;
+    bytes.append(buffer, static_cast<std::size_t>(count));
+  }
   zip_source_close(source);
-  if (count != static_cast<zip_int64_t>(bytes.size())) throw InputError("cannot make an archive: short read");
+  if (bytes.size() != status.size) throw InputError("cannot make an archive: short read");
   return bytes;
 }
 
