@@ -1,6 +1,9 @@
 // The `duet` program: parses the command line, runs one command, turns exceptions into one sentence and an exit code.
 #include <fcntl.h>
 #include <fmt/format.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <unistd.h>
 
 #include <algorithm>
@@ -35,6 +38,13 @@ void prepare_process() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
     if (fcntl(stream, F_GETFD) == -1 && errno == EBADF && open("/dev/null", O_RDWR) != stream) std::_Exit(1);
   std::signal(SIGXFSZ, SIG_IGN);
+#ifdef __GLIBC__
+  // Arrays of megabytes come and go with every clip: given back to the system each time, they cost a page fault for
+  // every 4 KiB when they are made anew, a quarter of the time of `duet dataset retarget`.
+  constexpr int kMappedBytes = 32 << 20, kKeptBytes = 256 << 20;
+  mallopt(M_MMAP_THRESHOLD, kMappedBytes);
+  mallopt(M_TRIM_THRESHOLD, kKeptBytes);
+#endif
 }
 
 // The parser itself only says that a command is required.
