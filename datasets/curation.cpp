@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "duet/core/names.h"
 #include "duet/core/number.h"
@@ -27,6 +28,8 @@ using Measure = Worst (*)(const InteractionClip& clip);
 
 // A single frame that is off makes two steps that are too long; the third is an error of the clip.
 constexpr int kStepsOfNoise = 2;
+
+constexpr double kShortestAcross = 0.01;  // of the lines of hips and shoulders together, from above [m]
 
 // The worst of both people: `of(person)`.
 template <typename F>
@@ -69,6 +72,33 @@ Worst bone_change(const InteractionClip& clip) {
       for (int t = 0; t < motion.frames(); ++t) change[t * kEnds.size() + e] = std::abs(length[t] / usual - 1.0);
     }
     return tail(change, kEnds.size(), 0.95);
+  });
+}
+
+// How far a person's heading swings within the act. Who does a task to another faces him: a swing past a right angle is
+// a tracker that took left for right where the bodies hide each other.
+Worst act_turn(const InteractionClip& clip) {
+  return worse(clip, [&](const HumanMotion& motion) {
+    double lowest = 0.0, highest = 0.0, turned = 0.0, before = 0.0, fastest = 0.0;
+    Worst worst{0.0, clip.phases.act_begin};  // the frame is that of the fastest turn
+    bool first = true;
+    for (int t = clip.phases.act_begin; t < clip.phases.act_end; ++t) {
+      const Eigen::Vector3d left = motion.joints.at(t, kLeftHip) - motion.joints.at(t, kRightHip) +
+                                   motion.joints.at(t, kLeftShoulder) - motion.joints.at(t, kRightShoulder);
+      if (left.head<2>().norm() < kShortestAcross) continue;  // a frame without a heading
+      const double heading = std::atan2(left.y(), left.x());
+      const double turn = first ? 0.0 : std::remainder(heading - before, 2.0 * std::numbers::pi);
+      first = false;
+      before = heading;
+      turned += turn;
+      lowest = std::min(lowest, turned);
+      highest = std::max(highest, turned);
+      worst.value = highest - lowest;
+      if (std::abs(turn) <= fastest) continue;
+      fastest = std::abs(turn);
+      worst.frame = t;
+    }
+    return worst;
   });
 }
 
@@ -136,9 +166,10 @@ struct Criterion {
   Measure measure;
 };
 
-constexpr std::array<Criterion, 10> kCriteria = {{
+constexpr std::array<Criterion, 11> kCriteria = {{
     {{"joint_speed", Gate::kMotionFidelity, "fastest joint, but for two frames", "m/s", 8.0, true}, joint_speed},
     {{"bone_change", Gate::kMotionFidelity, "change of a limb's bone, 95th percentile", "1", 0.25, true}, bone_change},
+    {{"act_turn", Gate::kMotionFidelity, "swing of a person's heading within the act", "rad", 1.7, true}, act_turn},
     {{"implausible", Gate::kMotionFidelity, "people who cannot be (size, up, floor, sides)", "faults", 0.0, true},
      implausible},
     {{"task_seen", Gate::kInteractionClarity, "the task's detector sees it on the people", "1", 1.0, false}, task_seen},

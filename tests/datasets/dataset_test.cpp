@@ -80,7 +80,8 @@ TEST_F(Dataset, EachRecordingIsKeptRejectedOrCountedWithItsReason) {
   EXPECT_EQ(entries.at("nolabel").task, "handshake");
   EXPECT_EQ(entries.at("nolabel").provenance.at("task"), "detected");
   EXPECT_THAT(entries.at("kick").reasons, ElementsAre("its label 'kicking' is none of duet's tasks"));
-  EXPECT_THAT(entries.at("wrong").gates, ElementsAre("interaction clarity"));
+  // Where nothing is done the proposed act is what it may be: other gates may refuse it, too.
+  EXPECT_THAT(entries.at("wrong").gates, ::testing::Contains("interaction clarity"));
   EXPECT_TRUE(fs::exists(out() + "/" + rejected_file("wrong")));
   EXPECT_FALSE(fs::exists(out() + "/" + people_file("wrong")));
 }
