@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Dict, Iterable, List, Mapping, Optional, 
 
 from duet import _duet
 from duet._spaces import batched, box
-from duet._tools import overrides_of
+from duet._tools import array_of, overrides_of
 
 if TYPE_CHECKING:
     import numpy
@@ -69,7 +69,7 @@ class Batch:
 
     def step(self, plans: Any) -> None:
         """Plans of shape (n, 5, 36) or (n, 100, 36); those of episodes that are over are not looked at."""
-        self._batch.step(plans)
+        self._batch.step(array_of(plans))
 
     def row(self, place: int) -> Optional[Dict[str, Any]]:
         """The row of an episode that is over."""
@@ -138,11 +138,9 @@ class Env:
         return self._observation(), {"episode": episode, "clip": self._batch.clip(episode)}
 
     def step(self, action: Any) -> Tuple[Any, float, bool, bool, Dict[str, Any]]:
-        import numpy
-
         if self._batch.view("over")[0]:
             raise RuntimeError("the episode is over: call reset()")
-        self._batch.step(numpy.asarray(action, dtype=numpy.float64)[None])
+        self._batch.step(array_of(action)[None])
         if not self._batch.view("over")[0]:
             return self._observation(), 0.0, False, False, {"is_success": False}
         info = _ended_info(self._batch.row(0))
@@ -234,23 +232,24 @@ def make_env(suite: str = "demo", *, engine: str = "", controller: str = "", per
     """An environment in Gymnasium's form: `make_env("core/handshake", engine="dart")`. Where Gymnasium is installed it is
     one of its environments too."""
     batch = Batch(suite, n=1, engine=engine, controller=controller, perturbation=perturbation, settings=settings, jobs=jobs)
-    return _of_gymnasium(Env, "Env")(batch)
+    return _of_package(Env, "gymnasium", "Env")(batch)
 
 
 def make_vec_env(suite: str = "demo", *, n: int, engine: str = "", controller: str = "", perturbation: str = "",
                  settings: Optional[Mapping[str, Any]] = None, jobs: Optional[int] = None) -> Any:
     """n of them, which compute at once."""
     batch = Batch(suite, n=n, engine=engine, controller=controller, perturbation=perturbation, settings=settings, jobs=jobs)
-    return _of_gymnasium(VectorEnv, "vector.VectorEnv")(batch)
+    return _of_package(VectorEnv, "gymnasium", "vector.VectorEnv")(batch)
 
 
-def _of_gymnasium(kind: Any, name: str) -> Any:
-    """`kind` as a subclass of Gymnasium's class of that name, where there is one."""
+def _of_package(kind: Any, package: str, name: str) -> Any:
+    """`kind` as a subclass of that package's class of that name, where there is one."""
+    import importlib
+
     try:
-        import gymnasium  # type: ignore[import]
+        base: Any = importlib.import_module(package)
     except ImportError:
         return kind
-    base: Any = gymnasium
     for part in name.split("."):
         base = getattr(base, part)
     return type(kind.__name__, (kind, base), {"__module__": kind.__module__})

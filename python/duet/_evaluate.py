@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from duet import _duet
 from duet._run import Run
-from duet._tools import Names, names_of, overrides_of, path_of
+from duet._tools import Names, array_of, names_of, overrides_of, path_of
 
 Policy = Callable[[_duet.Observations], Any]
 AskedPolicy = Union[None, str, Policy, Iterable[Union[str, Policy]], Mapping[str, Union[str, Policy]]]
@@ -132,13 +132,6 @@ def last_line(error: BaseException) -> str:
 
     lines = "".join(traceback.format_exception_only(type(error), error)).strip().splitlines()
     return lines[-1] if lines else type(error).__name__
-
-
-def array_of(plans: Any) -> Any:
-    """What NumPy takes: a tensor of torch leaves its graph and its device."""
-    if hasattr(plans, "detach"):
-        plans = plans.detach().cpu().numpy()
-    return plans
 
 
 class _Called:

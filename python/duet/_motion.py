@@ -20,6 +20,8 @@ Path = Union[str, "os.PathLike[str]"]
 class Motion:
     """A file of motion. `motion["q"]` is a read-only view of the array of that key, and keeps the motion alive."""
 
+    _prefix = ""  # of the robot's keys
+
     def __init__(self, archive: "_duet.Archive"):
         self._archive = archive
 
@@ -50,45 +52,54 @@ class Motion:
 
 def _view(key: str, about: str) -> property:
     def get(self: Motion) -> Any:
-        return self._archive[key]
+        return self._archive[self._prefix + key]
 
     return property(get, doc=about)
 
 
-class Clip(Motion):
+class _Acted(Motion):
+    """Of a task."""
+
+    task = property(lambda self: self._archive["task"], doc="Its task.")
+    phases = property(lambda self: self._archive["phases"], doc="(2,): frames at which the act begins and ends.")
+
+
+class _Moved(Motion):
+    """A robot's base and joints over time."""
+
+    root_position = _view("root_position", "(T, 3): the robot's base [m].")
+    root_quat_wxyz = _view("root_quat_wxyz", "(T, 4): its orientation.")
+    q = _view("q", "(T, 29): joints [rad].")
+
+
+class _Named(_Moved):
+    joint_names = _view("joint_names", "Names of q's columns.")
+
+
+class Clip(_Acted):
     """Two people and a task."""
 
     id = _view("id", "Its name.")
-    task = _view("task", "Its task.")
     reactor = _view("reactor", "Who the robot replaces: A or B.")
-    phases = _view("phases", "(2,): frames at which the act begins and ends.")
     a = _view("a_joints", "(T, 24, 3): person A, SMPL-24 joints [m].")
     b = _view("b_joints", "(T, 24, 3): person B.")
 
 
-class Paired(Motion):
+class Paired(_Acted, _Named):
     """What retargeting makes of a clip: the robot's motion beside the adapted partner."""
 
-    id = _view("clip_id", "Its clip's name.")
-    task = _view("task", "Its task.")
-    phases = _view("phases", "(2,): frames at which the act begins and ends.")
-    root_position = _view("robot_root_position", "(T, 3): the robot's base [m].")
-    root_quat_wxyz = _view("robot_root_quat_wxyz", "(T, 4): its orientation.")
-    q = _view("robot_q", "(T, 29): joints [rad].")
-    joint_names = _view("robot_joint_names", "Names of q's columns.")
-    partner = _view("partner_joints", "(T, 24, 3): the partner after adaptation [m].")
+    _prefix = "robot_"
+    id = property(lambda self: self._archive["clip_id"], doc="Its clip's name.")
+    partner = property(lambda self: self._archive["partner_joints"],
+                       doc="(T, 24, 3): the partner after adaptation [m].")
 
 
-class Recording(Motion):
+class Recording(_Acted, _Moved):
     """What a robot did beside a partner: states at 50 Hz."""
 
-    task = _view("task", "Its task.")
     outcome = _view("outcome", "How it ended.")
     message = _view("message", "Why, where it did not end well.")
-    root_position = _view("root_position", "(T, 3): the robot's base [m].")
-    root_quat_wxyz = _view("root_quat_wxyz", "(T, 4): its orientation.")
     root_velocity = _view("root_velocity", "(T, 3) [m/s].")
-    q = _view("q", "(T, 29): joints [rad].")
     v = _view("v", "(T, 29) [rad/s].")
     q_target = _view("q_target", "(T, 29): what the joints were sent [rad].")
     reference_q = _view("reference_q", "(T, 29): what the controller was asked for [rad].")
@@ -100,13 +111,9 @@ class Recording(Motion):
         return json.loads(self["row"]) if "row" in self else None
 
 
-class RobotMotion(Motion):
+class RobotMotion(_Named):
     """A robot's motion from a file of any of `robot_motion_formats()`."""
 
-    root_position = _view("root_position", "(T, 3) [m].")
-    root_quat_wxyz = _view("root_quat_wxyz", "(T, 4).")
-    q = _view("q", "(T, joints) [rad].")
-    joint_names = _view("joint_names", "Names of q's columns.")
     evidence = _view("evidence", "Sentences: what was found of order, units and rate.")
 
 

@@ -12,11 +12,13 @@ from duet._tools import path_of
 
 
 class Table:
-    """A table as text (`print`, a notebook) and as rows of values (`rows`)."""
+    """A table as text (`print`, a notebook), as rows of values (`rows`), and all that its JSON has (`values`)."""
 
     def __init__(self, table: "_duet.Table"):
         self.markdown: str = table.markdown
-        self.rows: Any = json.loads(table.json)
+        self.values: Dict[str, Any] = json.loads(table.json)
+        kinds = ("entries", "comparisons", "groups", "success")  # of the tables, in docs/file-formats.md
+        self.rows: List[Dict[str, Any]] = next(self.values[kind] for kind in kinds if kind in self.values)
 
     def __str__(self) -> str:
         return self.markdown
@@ -32,7 +34,8 @@ class Table:
 
 
 class Comparison(Table):
-    """Two runs or policies on the same episodes: exact paired tests and intervals."""
+    """Two runs or policies on the same episodes: exact paired tests and intervals; `values["margin"]` is that of the
+    verdicts."""
 
 
 class Run:

@@ -53,3 +53,15 @@ def texts_of(options: Optional[Mapping[str, Any]]) -> Dict[str, str]:
 
 def path_of(path: Union[str, "os.PathLike[str]"]) -> str:
     return os.fspath(path)
+
+
+def array_of(numbers: Any) -> Any:
+    """An array of float64 in C order; a tensor of torch leaves its graph and its device. Raises ValueError or TypeError in
+    NumPy's words for what is no array of numbers."""
+    import numpy
+
+    if numbers is None:
+        raise TypeError("expected an array of numbers, found None")
+    if hasattr(numbers, "detach"):
+        numbers = numbers.detach().cpu().numpy()
+    return numpy.ascontiguousarray(numbers, dtype=numpy.float64)

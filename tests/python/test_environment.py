@@ -103,6 +103,12 @@ class Batches(ScratchTest):
 
 
 class GymnasiumForm(ScratchTest):
+    def hub(self):
+        spec = importlib.util.spec_from_file_location("hub_env", os.path.join(SOURCE, "examples", "python", "envhub", "env.py"))
+        hub = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(hub)
+        return hub
+
     def env(self):
         env = duet.make_env(self.suite(per_task=2))
         self.addCleanup(env.close)
@@ -127,8 +133,9 @@ class GymnasiumForm(ScratchTest):
         self.assertIsInstance(terminated, bool)
         self.assertIsInstance(truncated, bool)
         self.assertIsInstance(info, dict)
+        observation, _ = env.reset(seed=123)  # an action drawn at random lets the robot fall
         before = observation.copy()
-        env.step(action)
+        env.step(env.hold())
         self.assertTrue((observation == before).all())  # what was returned does not change
         self.assertIsNone(env.render())
         self.assertIs(env.unwrapped, env)
@@ -165,7 +172,7 @@ class GymnasiumForm(ScratchTest):
         self.assertIn(observations, env.observation_space)
         self.assertEqual(observations.shape, (3, 12, 149))
         ended = numpy.zeros(3, int)
-        for _ in range(200):
+        for _ in range(300):  # an episode is up to 100 steps
             observations, rewards, terminated, truncated, info = env.step(env.hold())
             self.assertEqual((rewards.shape, terminated.shape, truncated.shape), ((3,), (3,), (3,)))
             ended += terminated
@@ -177,12 +184,21 @@ class GymnasiumForm(ScratchTest):
                 break
         self.assertTrue((ended >= 2).all())
 
+    def test_the_hub_file_offers_success_as_lerobot_reads_it(self):
+        made = self.hub().make_env(n_envs=2, cfg={"suite": self.suite()})
+        (env,) = next(iter(made.values())).values()
+        self.addCleanup(env.close)
+        env.reset(seed=[3, 4])
+        for _ in range(120):
+            _, _, terminated, truncated, info = env.step(env.hold())
+            if (terminated | truncated).any():
+                break
+        self.assertEqual(info["final_info"]["is_success"].dtype, bool)
+        self.assertEqual(info["_final_info"].tolist(), (terminated | truncated).tolist())
+
     def test_the_hub_file_makes_a_vector_environment(self):
-        spec = importlib.util.spec_from_file_location("hub_env", os.path.join(SOURCE, "examples", "python", "envhub", "env.py"))
-        hub = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(hub)
         suite = self.suite()
-        made = hub.make_env(n_envs=2, cfg={"suite": suite})
+        made = self.hub().make_env(n_envs=2, cfg={"suite": suite})
         env = made[suite][0]
         self.addCleanup(env.close)
         env.reset(seed=0)

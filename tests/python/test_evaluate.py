@@ -101,6 +101,9 @@ class Rows(ScratchTest):
         self.assertIn("replay", str(comparison))
         self.assertIn("mine", str(run.table()))
         self.assertEqual({entry["policy"] for entry in run.table()}, {"mine", "replay", "null"})
+        for name in ("leaderboard", "metrics", "engines", "controllers", "contacts"):
+            self.assertIsInstance(run.table(name).rows, list)
+            self.assertTrue(run.table(name).values["schema"].startswith("duet."))
         self.assertEqual(len(run.columns("clip", "success")["success"]), len(run.episodes))
         self.assertIn("12 episodes", repr(run))
 
