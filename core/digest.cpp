@@ -1,6 +1,5 @@
 #include "duet/core/digest.h"
 
-#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include <array>
@@ -60,8 +59,13 @@ std::string Sha256::hex() const {
   unsigned int size = 0;
   check(copy != nullptr && EVP_MD_CTX_copy_ex(copy.get(), context_->evp.get()) == 1 &&
         EVP_DigestFinal_ex(copy.get(), digest.data(), &size) == 1);
+  constexpr std::string_view kHex = "0123456789abcdef";
   std::string text;
-  for (unsigned int i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
+  text.reserve(std::size_t{2} * size);
+  for (unsigned int i = 0; i < size; ++i) {
+    text += kHex[digest[i] >> 4U];
+    text += kHex[digest[i] & 15U];
+  }
   return text;
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstring>
 #include <random>
 #include <system_error>
 #include <tuple>
@@ -53,31 +54,32 @@ LineFile::LineFile(std::string path) : path_(std::move(path)), file_(std::fopen(
 // More of the file behind what is there; false at its end.
 bool LineFile::fill() {
   if (!file_) return false;
-  block_.erase(0, begin_);
+  std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
   searched_ -= begin_;
+  end_ -= begin_;
   begin_ = 0;
-  const std::size_t before = block_.size();
-  if (static_cast<std::int64_t>(before) > kMostTextBytes)
+  if (static_cast<std::int64_t>(end_) > kMostTextBytes)
     throw InputError(
         fmt::format("{}:{}: expected a row of at most {} bytes, found more", path_, line_ + 1, kMostTextBytes));
-  block_.resize(before + kMergeBlock);
-  const std::size_t count = std::fread(block_.data() + before, 1, kMergeBlock, file_.get());
+  if (block_.size() < end_ + kMergeBlock) block_.resize(end_ + kMergeBlock);
+  const std::size_t count = std::fread(block_.data() + end_, 1, kMergeBlock, file_.get());
   if (std::ferror(file_.get()) != 0) throw InputError(fmt::format("cannot read '{}': {}", path_, last_reason()));
-  block_.resize(before + count);
+  end_ += count;
   return count > 0;
 }
 
 std::optional<std::string_view> LineFile::next() {
-  std::size_t end = block_.find('\n', searched_);
-  while (end == std::string::npos) {
-    searched_ = block_.size();
+  const auto newline = [this] { return std::string_view(block_.data(), end_).find('\n', searched_); };
+  std::size_t end = newline();
+  while (end == std::string_view::npos) {
+    searched_ = end_;
     if (!fill()) {
-      torn_ = begin_ < block_.size();
+      torn_ = begin_ < end_;
       return std::nullopt;
     }
-    end = block_.find('\n', searched_);
+    end = newline();
   }
-  const std::string_view line = std::string_view(block_).substr(begin_, end - begin_);
+  const std::string_view line(block_.data() + begin_, end - begin_);
   begin_ = searched_ = end + 1;
   offset_ = next_;
   next_ += line.size() + 1;
@@ -152,24 +154,28 @@ int SourceFiles::descriptor(std::uint32_t source) {
 }
 
 std::string SourceFiles::read(const RowEntry& entry) {
-  const int from = descriptor(entry.source);
   std::string line(entry.length, '\0');
-  for (std::size_t done = 0; done < line.size();) {
-    const ssize_t count =
-        ::pread(from, line.data() + done, line.size() - done, static_cast<off_t>(entry.offset + done));
+  read(entry, line.data());
+  return line;
+}
+
+void SourceFiles::read(const RowEntry& entry, char* to) {
+  const int from = descriptor(entry.source);
+  for (std::size_t done = 0; done < entry.length;) {
+    const ssize_t count = ::pread(from, to + done, entry.length - done, static_cast<off_t>(entry.offset + done));
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0)
       throw InputError(fmt::format("cannot read '{}': {}", paths_[entry.source],
                                    count < 0 ? last_reason() : "it was made shorter while it was read"));
     done += static_cast<std::size_t>(count);
   }
-  return line;
 }
 
 ReplacedFile::ReplacedFile(std::string path) : path_(std::move(path)), partial_(beside_output(path_)) {
   file_.reset(std::fopen(partial_.c_str(), "wbe"));
   if (!file_) throw StorageError(fmt::format("cannot write '{}': {}", path_, last_reason()));
-  std::setvbuf(file_.get(), nullptr, _IOFBF, kMergeBlock);
+  std::setvbuf(file_.get(), nullptr, _IONBF, 0);
+  block_.resize(kMergeBlock);
 }
 
 ReplacedFile::~ReplacedFile() {
@@ -178,12 +184,22 @@ ReplacedFile::~ReplacedFile() {
 
 void ReplacedFile::fail() { throw StorageError(fmt::format("cannot write '{}': {}", path_, last_reason())); }
 
-void ReplacedFile::append(std::string_view line) {
-  if (std::fwrite(line.data(), 1, line.size(), file_.get()) != line.size() || std::fputc('\n', file_.get()) == EOF)
-    fail();
+void ReplacedFile::flush() {
+  if (std::fwrite(block_.data(), 1, filled_, file_.get()) != filled_) fail();
+  filled_ = 0;
+}
+
+char* ReplacedFile::line(std::size_t bytes) {
+  if (filled_ + bytes + 1 > block_.size()) flush();
+  if (bytes + 1 > block_.size()) block_.resize(bytes + 1);
+  char* const place = block_.data() + filled_;
+  place[bytes] = '\n';
+  filled_ += bytes + 1;
+  return place;
 }
 
 void ReplacedFile::commit() {
+  flush();
   if (std::fflush(file_.get()) != 0 || ::fsync(::fileno(file_.get())) != 0) fail();
   if (::rename(partial_.c_str(), path_.c_str()) != 0) fail();
   file_.reset();

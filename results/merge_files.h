@@ -49,8 +49,8 @@ class LineFile {
 
   std::string path_;
   OpenFile file_;
-  std::string block_;
-  std::size_t begin_ = 0, searched_ = 0;  // of what is not given out yet
+  std::vector<char> block_;                         // grows with the longest line
+  std::size_t begin_ = 0, searched_ = 0, end_ = 0;  // in it: what is not given out yet, what has no newline
   std::uint64_t offset_ = 0, next_ = 0;
   int line_ = 0;
   bool torn_ = false;
@@ -81,6 +81,8 @@ class SourceFiles {
   SourceFiles(const SourceFiles&) = delete;
   SourceFiles& operator=(const SourceFiles&) = delete;
   std::string read(const RowEntry& entry);
+  // The row to `to`, which has room for it.
+  void read(const RowEntry& entry, char* to);
 
  private:
   int descriptor(std::uint32_t source);
@@ -102,14 +104,18 @@ class ReplacedFile {
   ~ReplacedFile();
   ReplacedFile(const ReplacedFile&) = delete;
   ReplacedFile& operator=(const ReplacedFile&) = delete;
-  void append(std::string_view line);
+  // Room for a line of so many bytes, to be filled before the next call; its newline is set.
+  char* line(std::size_t bytes);
   void commit();
 
  private:
   [[noreturn]] void fail();
+  void flush();
 
   std::string path_, partial_;
   OpenFile file_;
+  std::vector<char> block_;  // lines that are not in the file yet
+  std::size_t filled_ = 0;
 };
 
 }  // namespace duet

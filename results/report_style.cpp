@@ -33,6 +33,7 @@ details.fold>summary{padding:10px 0;list-style-position:outside}
 details.fold>summary h2{display:inline;margin:0;padding:0;font-size:19px}
 details.fold[open]{padding-bottom:14px}
 .ranked td,.ranked th{padding:6px 10px}
+.ranked thead th:nth-child(-n+2),.ranked thead th:nth-child(4){text-align:left}
 .ranked .ci{white-space:normal;font-weight:400}
 .rate.big{font-size:18px}
 .rank{color:var(--soft)}
@@ -43,6 +44,7 @@ details.fold[open]{padding-bottom:14px}
 .axis .null,.legend .null{stroke:var(--null);stroke-width:2.4;stroke-dasharray:3 2}
 .e1{fill:var(--t1)}.e2{fill:var(--t2)}.e3{fill:var(--t3)}.e4{fill:var(--t4)}.e5{fill:var(--t5)}.e6{fill:var(--t6)}.e7{fill:var(--t7)}
 .e8{fill:var(--t8)}
+.map thead th:not(:first-child){text-align:center}
 .map td{text-align:center;min-width:74px;font-weight:600}
 .map td a{color:inherit;text-decoration:none;display:block}
 .map td a:hover,.map td a:focus{text-decoration:underline}
@@ -105,7 +107,7 @@ th[aria-sort=descending] button::after{content:"\25BE"}
 .intervals .h{fill:none;stroke:var(--source);stroke-width:2}
 .intervals .m{stroke:var(--null);stroke-width:3}
 .intervals .r{fill:var(--null);opacity:.13}
-.legend{color:var(--soft);font-size:13px;display:flex;gap:18px;flex-wrap:wrap;align-items:center;margin:4px 0 0}
+.legend{color:var(--soft);font-size:13px;max-width:none;display:flex;gap:18px;flex-wrap:wrap;align-items:center;margin:4px 0 0}
 .legend svg{vertical-align:-3px;display:inline-block;margin:0 5px 0 0}
 .filter{display:flex;gap:8px;flex-wrap:wrap;margin:12px 0}
 .filter button{font:inherit;font-size:14px;padding:4px 12px;border:1px solid var(--line);border-radius:99px;
@@ -153,14 +155,16 @@ footer{max-width:1360px;margin:40px auto 30px;padding:0 28px;color:var(--soft);f
 .context{display:none}.where{display:block}
 .sortable tbody th{position:sticky;left:0;background:var(--panel)}
 .ranked thead{display:none}
-.ranked tr{display:grid;grid-template-columns:26px 1fr auto;border-top:1px solid var(--line);padding:8px 0 6px}
+.ranked tr{display:grid;grid-template-columns:26px 1fr 10.5em;border-top:1px solid var(--line);padding:8px 0 6px}
 .ranked td,.ranked th{border:0;padding:2px 8px;text-align:left!important;position:static!important}
 .ranked .plotcell{grid-column:1/4;grid-row:2}
 .ranked td:nth-child(n+5){grid-row:3;font-size:12px}
 .ranked td:nth-child(5)::before{content:"null "}.ranked td:nth-child(6)::before{content:"fell "}.ranked td:nth-child(7){display:none}
+.ranked td:nth-child(8):not(:last-child)::before{content:"over a limit "}
 .ranked td:nth-child(5){grid-column:1/3}.ranked td:nth-child(6){grid-column:1/3;grid-row:4}
 .ranked td:last-child{grid-column:3;grid-row:4}
-.ranked .axis{width:100%;height:auto}.answer .first{font-size:18px}nav ul{gap:12px}}
+.ranked .axis{width:100%;height:auto}.answer .first{font-size:18px}details.fold>summary{list-style-position:inside}
+nav{position:static}nav ul{gap:14px;flex-wrap:nowrap;overflow-x:auto;white-space:nowrap}}
 @media print{nav,.filter,.finder{display:none}.tall{max-height:none}body{background:#fff;font-size:11px}.scroll{overflow:visible;border:0}
 main,header,footer{max-width:none;padding:0}h2{break-after:avoid}.stage{max-height:220px}}
 )css";

@@ -3,12 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <exception>
+#include <iterator>
+#include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <queue>
 #include <set>
 #include <unordered_set>
 
+#include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/results/json_fields.h"
 #include "duet/results/merge_files.h"
@@ -31,25 +38,52 @@ std::string merge_place(const EpisodeRow& row) {
   return place;
 }
 
-// Reads all sources once, sorts what it has found of them a budget at a time.
+// The error of the first source that has one, whatever thread reads it.
+class MergeFailure {
+ public:
+  void note(std::size_t source) {
+    const std::lock_guard lock(mutex_);
+    if (source < source_) error_ = std::current_exception();
+    source_ = std::min(source_, source);
+  }
+  // Whether a source before this one has failed: what comes after it is not looked at.
+  bool before(std::size_t source) {
+    const std::lock_guard lock(mutex_);
+    return source_ < source;
+  }
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::size_t source_ = std::numeric_limits<std::size_t>::max();
+  std::exception_ptr error_;
+};
+
+// Reads sources, one after the other, and sorts what it has found of them a budget at a time. One thread.
 class MergeIndexer {
  public:
   MergeIndexer(const std::vector<RowSource>& sources, const RunInfo& info, std::size_t budget, std::string scratch)
-      : sources_(sources), info_(info), budget_(std::max<std::size_t>(budget, 1)), scratch_(std::move(scratch)) {}
+      : sources_(sources), info_(info), budget_(budget), scratch_(std::move(scratch)) {}
 
-  // Sorted pieces, each an own stream.
-  std::vector<std::unique_ptr<EntryStream>> index(int& torn) {
-    for (std::size_t source = 0; source < sources_.size(); ++source) {
-      LineFile lines(sources_[source].path);
-      while (const std::optional<std::string_view> line = lines.next()) {
-        add(static_cast<std::uint32_t>(source), *line, lines);
-        if (entries_.size() >= budget_) spill();
-      }
-      torn += lines.torn() ? 1 : 0;
+  void read(std::size_t source) {
+    LineFile lines(sources_[source].path);
+    while (const std::optional<std::string_view> line = lines.next()) {
+      add(static_cast<std::uint32_t>(source), *line, lines);
+      if (entries_.size() >= budget_) spill();
     }
+    torn_ += lines.torn() ? 1 : 0;
+  }
+  [[nodiscard]] int torn() const { return torn_; }
+  // Rows that name something for the first time here, with their source.
+  [[nodiscard]] const std::map<std::uint32_t, std::vector<EpisodeRow>>& naming() const { return naming_; }
+
+  // Sorted pieces, each an own stream, behind those that are there.
+  void finish(std::vector<std::unique_ptr<EntryStream>>& streams) {
     std::ranges::sort(entries_, is_before);
     streams_.push_back(std::make_unique<EntryStream>(std::move(entries_)));
-    return std::move(streams_);
+    std::ranges::move(streams_, std::back_inserter(streams));
   }
 
  private:
@@ -66,7 +100,7 @@ class MergeIndexer {
     if (row.suite_hash != info_.suite_hash)
       throw InputError(fmt::format("{}: the row is of suite {}, the run of {}", where(),
                                    suite_label(row.suite, row.suite_version, row.suite_hash), suite_label(info_)));
-    check_digests(row, source);
+    note_names(row, source);
     entries_.push_back({.place = merge_place(row),
                         .fingerprint = scanned.fingerprint,
                         .started_at = std::move(scanned.row.started_at),
@@ -77,7 +111,7 @@ class MergeIndexer {
   }
 
   // A million rows name a dozen of things.
-  void check_digests(const EpisodeRow& row, std::uint32_t source) {
+  void note_names(const EpisodeRow& row, std::uint32_t source) {
     std::string said;
     for (const std::string* part :
          {&row.policy, &row.policy_digest, &row.controller, &row.controller_digest, &row.engine, &row.profile_digest}) {
@@ -85,7 +119,7 @@ class MergeIndexer {
       said += '\0';
     }
     said += row.outcome == Outcome::kUnsupported ? '0' : '1';
-    if (seen_.insert(std::move(said)).second) digests_.add(row, sources_[source].from);
+    if (seen_.insert(std::move(said)).second) naming_[source].push_back(row);
   }
 
   void spill() {
@@ -100,9 +134,50 @@ class MergeIndexer {
   std::string scratch_;
   std::vector<RowEntry> entries_;
   std::vector<std::unique_ptr<EntryStream>> streams_;
-  NameDigests digests_;
   std::unordered_set<std::string> seen_;
+  std::map<std::uint32_t, std::vector<EpisodeRow>> naming_;
+  int torn_ = 0;
 };
+
+// Throws InputError where a name stands for two digests. In the order of the sources, whatever thread read them.
+void check_digests(const std::vector<MergeIndexer>& indexers, const std::vector<RowSource>& sources) {
+  NameDigests digests;
+  for (std::uint32_t source = 0; source < sources.size(); ++source)
+    for (const MergeIndexer& indexer : indexers)
+      if (const auto found = indexer.naming().find(source); found != indexer.naming().end())
+        for (const EpisodeRow& row : found->second) digests.add(row, sources[source].from);
+}
+
+// All sources, on all cores: each thread takes the next one and has its share of the budget.
+std::vector<std::unique_ptr<EntryStream>> index_sources(const std::vector<RowSource>& sources, const RunInfo& info,
+                                                        std::size_t budget, const std::string& scratch, int& torn) {
+  constexpr int kMostThreads = 16;  // more of them than a disk can feed
+  const int threads = std::clamp(static_cast<int>(sources.size()), 1, std::min(default_threads(), kMostThreads));
+  MergeFailure failure;
+  std::vector<MergeIndexer> indexers;
+  indexers.reserve(threads);
+  const std::size_t share = std::max<std::size_t>(budget / threads, 1);
+  for (int i = 0; i < threads; ++i) indexers.emplace_back(sources, info, share, scratch);
+  std::atomic<std::size_t> next{0};
+  parallel_for_each(threads, threads, [&](int i) {
+    for (std::size_t source = next++; source < sources.size(); source = next++) {
+      if (failure.before(source)) return;
+      try {
+        indexers[i].read(source);
+      } catch (...) {
+        failure.note(source);
+      }
+    }
+  });
+  failure.rethrow();
+  check_digests(indexers, sources);
+  std::vector<std::unique_ptr<EntryStream>> streams;
+  for (MergeIndexer& indexer : indexers) {
+    torn += indexer.torn();
+    indexer.finish(streams);
+  }
+  return streams;
+}
 
 // The entries of all streams in order, an episode's together.
 class EntryGroups {
@@ -235,13 +310,13 @@ std::vector<std::string> paths_of(const std::vector<RowSource>& sources) {
 MergedRows merge_rows(const std::vector<RowSource>& sources, const RunInfo& info, const std::string& output,
                       const MergeBudget& budget) {
   int torn = 0;
-  EntryGroups groups(MergeIndexer(sources, info, budget.entries, output).index(torn));
+  EntryGroups groups(index_sources(sources, info, budget.entries, output, torn));
   SourceFiles files(paths_of(sources));
   MergeJudge judge(sources, files);
   ReplacedFile result(output);
   for (std::vector<RowEntry> group = groups.next(); !group.empty(); group = groups.next()) {
     const RowEntry stands = judge.judge(std::move(group));
-    if (judge.merged().violations == 0) result.append(files.read(stands));
+    if (judge.merged().violations == 0) files.read(stands, result.line(stands.length));
   }
   judge.merged().torn = torn;
   if (judge.merged().violations == 0) result.commit();

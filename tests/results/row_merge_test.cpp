@@ -179,6 +179,21 @@ TEST_F(RowMerge, RefusesRowsThatDoNotBelongThere) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "."), {}), 4);  // the sources, nothing else
 }
 
+// Sources are read on several threads; which one fails first must not matter.
+TEST_F(RowMerge, OfSeveralBrokenSourcesTheFirstIsNamed) {
+  std::vector<RowSource> sources;
+  for (int i = 0; i < 12; ++i) {
+    const std::string name = "s" + std::to_string(i);
+    if (i % 4 == 3) {
+      write_file(folder_ / name, "{\"schema\":5}\n");
+      sources.push_back({.path = folder_ / name, .from = name, .run = 0, .shard = -1, .node = {}});
+    } else {
+      sources.push_back(source(name, {row_number(i)}));
+    }
+  }
+  for (int repetition = 0; repetition < 20; ++repetition) EXPECT_THAT(refusal(sources), HasSubstr("s3:1: episode row"));
+}
+
 TEST_F(RowMerge, AFolderThatCannotBeWrittenIsAStorageError) {
   const RowSource good = source("good", {row_number(1)});
   EXPECT_THAT(
