@@ -18,41 +18,20 @@ import faults
 import slurm
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-TIMES = ("started_at", "wall_s", "policy_ms")  # all that may differ between two runs of one episode
+sys.path.insert(0, os.path.join(os.path.dirname(HERE), "torture"))
+from common import Counted, exit_with, litter_of, rows_of
 
 
-def lasting(row):
-    return {name: value for name, value in row.items() if name not in TIMES}
-
-
-def rows_of(run):
-    with open(run + "/episodes.jsonl", encoding="utf-8") as file:
-        lines = file.read().split("\n")[:-1]
-    return lines, {row["key"]: lasting(row) for row in map(json.loads, lines)}
-
-
-class Trials:
-    """The program, two nodes where Slurm is, and what was tried."""
+class Trials(Counted):
+    """Of many processes, and two nodes where Slurm is."""
 
     def __init__(self, program, folder, short, seed, nodes):
-        self.program = os.path.abspath(program)
-        self.folder = folder
-        self.short = short
+        super().__init__(program, folder, short)
         self.chance = random.Random(seed)
         self.nodes = nodes
-        self.passed = self.failed = 0
         self.suite = HERE + "/cluster.yaml"
         self.rows = None
         self.planned = None
-
-    def check(self, what, holds, detail=""):
-        self.passed += bool(holds)
-        self.failed += not holds
-        if not holds:
-            print(f"  FAILED {what}: {detail}", flush=True)
-
-    def say(self, text):
-        print(f"  {text}", flush=True)
 
     def duet(self, *arguments, program=None, **options):
         environment = dict(self.nodes.environment if self.nodes else os.environ, **options.pop("variables", {}))
@@ -70,7 +49,7 @@ class Trials:
             out = self.folder + "/reference"
             ended = self.duet("run", self.suite, "-q", "-j", "1", "-o", out)
             self.check("a run of one process ends well", ended.returncode == 0, ended.stderr)
-            self.rows = rows_of(out)[1]
+            self.rows = rows_of(out)
         return self.rows
 
     def plan(self, name, folder=None, shards=4):
@@ -110,28 +89,15 @@ class Trials:
         if merge:
             ended = self.duet("merge", run, "-q")
             self.check(f"{what}: merges", ended.returncode == 0, ended.stderr + ended.stdout)
-        lines, rows = rows_of(run)
-        wanted = self.reference()
-        self.check(f"{what}: none lost", not wanted.keys() - rows.keys(), f"{len(wanted.keys() - rows.keys())} lost")
-        self.check(f"{what}: none more", not rows.keys() - wanted.keys(), f"{len(rows.keys() - wanted.keys())} more")
-        self.check(f"{what}: none twice", len(lines) == len(rows), f"{len(lines)} lines, {len(rows)} episodes")
-        different = [key for key in wanted.keys() & rows.keys() if wanted[key] != rows[key]]
-        self.check(f"{what}: equal bit for bit", not different, f"{len(different)} differ")
-        litter = [name for _, _, names in os.walk(run) for name in names if ".part-" in name]
+        self.check_same_rows(what, self.reference(), run)
+        litter = litter_of(run)
         self.check(f"{what}: nothing half-written is left", not litter, litter)
 
 
 def run_trials(trials, only):
-    for trial in faults.SHORT if trials.short else faults.ALL:
-        if only and only not in trial.__name__:
-            continue
-        if trials.nodes is None and trial in faults.NEED_SLURM:
-            print(f"{trial.__name__}: SKIPPED (Slurm does not start here)", flush=True)
-            continue
-        print(f"{trial.__name__}: {trial.__doc__}", flush=True)
-        begin = time.monotonic()
-        trial(trials)
-        print(f"  {time.monotonic() - begin:.1f} s", flush=True)
+    def skip(trial):
+        return "Slurm does not start here" if trials.nodes is None and trial in faults.NEED_SLURM else None
+    trials.try_each(faults.SHORT if trials.short else faults.ALL, only, skip=skip)
 
 
 def start_nodes(folder):
@@ -167,8 +133,7 @@ def main():
         finally:
             if nodes:
                 nodes.stop()
-    print(f"{trials.passed} passed, {trials.failed} failed")
-    sys.exit(1 if trials.failed else 0)
+    exit_with(trials)
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def kill_slurmd(trials):
 def kill_node(trials):
     """kill -9 of slurmd, its step and the worker: the node is down, Slurm puts the shard back."""
     run = trials.plan("kill-node")
-    jobs = trials.submit(run)["jobs"]
+    trials.submit(run)
     trials.wait_for_rows(run)
     trials.nodes.wait_for(lambda: slurm.workers_of(run), 60, "a worker")
     node = slurm.environment_of(slurm.workers_of(run)[0]).get("SLURMD_NODENAME", "n1")
@@ -86,10 +86,7 @@ def kill_node(trials):
     trials.nodes.wait_for(lambda: trials.nodes.states().get(node, "").startswith("down"), 120, f"{node} to be down")
     trials.say(f"{node} was down for Slurm {time.monotonic() - begin:.0f} s after it died (SlurmdTimeout 10 s)")
     trials.nodes.start_node(node)
-    # Slurm waits two minutes before it starts again what it has put back.
-    for job in jobs:
-        trials.nodes.command("scontrol", "update", f"jobid={job}", "StartTime=now", check=False)
-    trials.nodes.wait_for_end(400)
+    trials.nodes.wait_for_end()
     trials.check("the dead node cost an episode a worker at most", most_open(run) <= 1, most_open(run))
     trials.check_run("node killed", run)
 
@@ -115,10 +112,7 @@ def time_limit(trials):
     for line in trials.nodes.queue():
         if " RUNNING " in line:
             trials.nodes.command("scancel", "--signal=USR1", "--batch", line.split()[0], check=False)
-    time.sleep(3)
-    for line in trials.nodes.queue():
-        trials.nodes.command("scontrol", "update", f"jobid={line.split()[0]}", "StartTime=now", check=False)
-    trials.nodes.wait_for_end(400)
+    trials.nodes.wait_for_end()
     trials.check_run("put back before its time limit", run)
 
 

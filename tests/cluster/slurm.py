@@ -127,8 +127,15 @@ class Nodes:
         """Lines of what has not ended, an array's tasks each for itself."""
         return [line for line in self.command("squeue", "-h", "-r", "-o", "%i %T %N %r", check=False).split("\n") if line]
 
-    def wait_for_end(self, seconds=180):
-        self.wait_for(lambda: not self.queue(), seconds, "the end of all jobs")
+    def wait_for_end(self, seconds=400):
+        """Slurm waits two minutes before it starts again what it has put back: here that is at once."""
+        def over():
+            waiting = self.queue()
+            for line in waiting:
+                if line.endswith("BeginTime"):
+                    self.command("scontrol", "update", f"jobid={line.split()[0]}", "StartTime=now", check=False)
+            return not waiting
+        self.wait_for(over, seconds, "the end of all jobs")
 
     def node_pid(self, node):
         return pid_in(f"{self.folder}/slurmd-{node}.pid")

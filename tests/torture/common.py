@@ -16,15 +16,54 @@ QUICK = ["--engines", "playback"]  # the part of the suite that takes no time
 PERTURBATIONS = ("clean", "push", "noise", "delay")
 
 
-class Trials:
-    """The program under trial, and what was tried."""
+class Counted:
+    """The program under trial, a folder, and what was tried: here, and on clusters (tests/cluster)."""
 
-    def __init__(self, program, folder, short, seed):
+    def __init__(self, program, folder, short):
         self.program = os.path.abspath(program)
         self.folder = folder
         self.short = short
-        self.seed = seed
         self.passed = self.failed = 0
+
+    def check(self, what, holds, detail=""):
+        self.passed += bool(holds)
+        self.failed += not holds
+        if not holds:
+            print(f"  FAILED {what}: {detail}", flush=True)
+
+    def say(self, text):
+        print(f"  {text}", flush=True)
+
+    def check_same_rows(self, what, wanted, out):
+        """The rows of `out` are those that are wanted, each once, in every field that repeats."""
+        found = rows_of(out)
+        missing, more = wanted.keys() - found.keys(), found.keys() - wanted.keys()
+        self.check(f"{what}: the same episodes", not missing and not more, f"{len(missing)} missing, {len(more)} more")
+        lines = len(lines_of(out))
+        self.check(f"{what}: each once", lines == len(found), f"{lines} lines, {len(found)} episodes")
+        different = [key for key in wanted.keys() & found.keys() if lasting(wanted[key]) != lasting(found[key])]
+        self.check(f"{what}: equal rows", not different, f"{len(different)} differ, the first: {different[:1]}")
+
+    def try_each(self, trials, only=None, name=lambda trial: trial.__name__, skip=lambda trial: None):
+        """Those whose name contains `only`; `skip` gives the reason why one is left out."""
+        for trial in trials:
+            if only and only not in name(trial):
+                continue
+            if skip(trial):
+                print(f"{name(trial)}: SKIPPED ({skip(trial)})", flush=True)
+                continue
+            print(f"{name(trial)}: {trial.__doc__}", flush=True)
+            begin = time.monotonic()
+            trial(self)
+            print(f"  {time.monotonic() - begin:.1f} s", flush=True)
+
+
+class Trials(Counted):
+    """Of one process on one machine."""
+
+    def __init__(self, program, folder, short, seed):
+        super().__init__(program, folder, short)
+        self.seed = seed
         self.engines = "playback"
         if self.run(["doctor", "--need", "mujoco"]).returncode == 0:
             self.engines = "playback, mujoco"
@@ -37,15 +76,6 @@ class Trials:
         path = self.path(name)
         shutil.rmtree(path, ignore_errors=True)
         return path
-
-    def check(self, what, holds, detail=""):
-        self.passed += bool(holds)
-        self.failed += not holds
-        if not holds:
-            print(f"  FAILED {what}: {detail}", flush=True)
-
-    def say(self, text):
-        print(f"  {text}", flush=True)
 
     def command(self, out, *more):
         size = ["-s", f"engines=[{self.engines}]", "-s", f"clips.synth.per_task={1 if self.short else 2}"]
@@ -84,13 +114,7 @@ class Trials:
     def check_rows(self, what, out, engines=("playback", "mujoco")):
         """The rows of `out` are those of the reference in these engines, each once, in every field that repeats."""
         wanted = {key: row for key, row in self.reference().items() if row["engine"] in engines}
-        found = rows_of(out)
-        missing, more = wanted.keys() - found.keys(), found.keys() - wanted.keys()
-        self.check(f"{what}: the same episodes", not missing and not more, f"{len(missing)} missing, {len(more)} more")
-        lines = len(lines_of(out))
-        self.check(f"{what}: each once", lines == len(found), f"{lines} lines, {len(found)} episodes")
-        different = [key for key in wanted.keys() & found.keys() if lasting(wanted[key]) != lasting(found[key])]
-        self.check(f"{what}: equal rows", not different, f"{len(different)} differ, the first: {different[:1]}")
+        self.check_same_rows(what, wanted, out)
 
 
 def lasting(row):

@@ -4,7 +4,6 @@
 import argparse
 import random
 import tempfile
-import time
 
 import disks
 import kills
@@ -25,14 +24,7 @@ def main():
         trials = Trials(arguments.program, folder, arguments.short, arguments.seed)
         print(f"torture: {trials.program}, engines {trials.engines}, --seed {arguments.seed}", flush=True)
         for room in (kills, sharing, disks, processes, links):
-            for trial in room.TRIALS:
-                name = f"{room.__name__}.{trial.__name__}"
-                if arguments.only and arguments.only not in name:
-                    continue
-                print(f"{name}: {trial.__doc__}", flush=True)
-                begin = time.monotonic()
-                trial(trials)
-                print(f"  {time.monotonic() - begin:.1f} s", flush=True)
+            trials.try_each(room.TRIALS, arguments.only, lambda trial: f"{trial.__module__}.{trial.__name__}")
         exit_with(trials)
 
 
