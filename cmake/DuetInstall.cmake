@@ -42,6 +42,13 @@ if(engines)
 endif()
 if(TARGET duet)
   install(TARGETS duet RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
+  # The program writes its own manual page; one for another processor cannot be asked.
+  if(NOT CMAKE_CROSSCOMPILING)
+    set(manual ${PROJECT_BINARY_DIR}/package/duet.1)
+    add_custom_command(OUTPUT ${manual} COMMAND sh -c "'$<TARGET_FILE:duet>' man >'${manual}'" DEPENDS duet VERBATIM)
+    add_custom_target(duet_manual ALL DEPENDS ${manual})
+    install(FILES ${manual} DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program OPTIONAL)
+  endif()
 endif()
 
 set(DUET_INSTALLED_ROOMS ${rooms})

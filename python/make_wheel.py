@@ -45,7 +45,8 @@ def stage(source, build, folder):
     for component in ("share", "program"):
         subprocess.run(["cmake", "--install", build, "--prefix", package, "--component", component], check=True,
                        stdout=subprocess.DEVNULL)
-    shutil.rmtree(os.path.join(package, "share", "doc"), ignore_errors=True)
+    for folder_of_systems in ("doc", "man"):
+        shutil.rmtree(os.path.join(package, "share", folder_of_systems), ignore_errors=True)
     for path in glob.glob(os.path.join(package, "**", "*.so"), recursive=True) + [os.path.join(package, "bin", "duet")]:
         subprocess.run(["strip", "--strip-unneeded", path], check=True)
 

@@ -5,6 +5,7 @@
 
 #include "duet/backends/factory.h"
 #include "duet/bench/cli/command.h"
+#include "duet/bench/replay/replay_page.h"
 #include "duet/bench/version.h"
 #include "duet/controllers/controller.h"
 #include "duet/controllers/registry.h"
@@ -59,6 +60,16 @@ Finding controller_finding(const ControllerInfo& info) {
   }
 }
 
+// The bundle that `duet replay` and `duet report --replays` put into their pages.
+Finding viewer_finding() {
+  try {
+    const ViewerBundle viewer = load_viewer();
+    return {"viewer of replays", true, fmt::format("{} kB", (viewer.script.size() + viewer.style.size()) / 1000)};
+  } catch (const std::exception& error) {
+    return {"viewer of replays", false, error.what()};
+  }
+}
+
 std::vector<Finding> findings() {
   std::vector<Finding> list;
   for (const EngineInfo& engine : engines())
@@ -72,6 +83,7 @@ std::vector<Finding> findings() {
   list.push_back({"training of policies", can_train_dstar(),
                   can_train_dstar() ? "libtorch with " + training_blas()
                                     : "built without libtorch; `./run train dstar` builds a program with it"});
+  list.push_back(viewer_finding());
   list.push_back({"machine", true, describe_machine()});
   return list;
 }

@@ -136,7 +136,7 @@ TEST(CommandLine, ListSaysWhatControllersAndPerturbationsAre) {
 }
 
 TEST(CommandLine, DoctorSaysWhichControllersCanRun) {
-  EXPECT_THAT(duet_program("doctor").out, HasSubstr("controller vmc"));
+  EXPECT_THAT(duet_program("doctor").out, AllOf(HasSubstr("controller vmc"), HasSubstr("viewer of replays")));
 }
 
 TEST(CommandLine, JsonIsOneDocumentOnStandardOutput) {

@@ -49,6 +49,10 @@ foreach(header IN LISTS headers)
   endforeach()
 endforeach()
 
+if(NOT EXISTS ${prefix}/share/man/man1/duet.1)
+  message(FATAL_ERROR "expected the manual page share/man/man1/duet.1, found none")
+endif()
+
 # The program finds its own files and no others: a suite that is in no other place is listed.
 set(duet ${prefix}/bin/duet)
 file(READ ${prefix}/share/duet/suites/demo.yaml suite)
