@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -18,15 +20,27 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "MCAP is little-endian, and so is this code");
 
 constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
-constexpr std::size_t kRecordHead = 9;  // kind, length
+constexpr std::size_t kRecordHead = 9;                     // kind, length
+constexpr std::size_t kChunkBytes = std::size_t{4} << 20;  // of records, before they are packed
+constexpr std::size_t kMostChunk = std::size_t{64} << 20;  // that is unpacked
+constexpr int kZstdLevel = 9;
 enum McapKind : std::uint8_t {
   kMcapHeader = 0x01,
   kMcapFooter = 0x02,
   kMcapSchema = 0x03,
   kMcapChannelRecord = 0x04,
   kMcapMessageRecord = 0x05,
+  kMcapChunk = 0x06,
   kMcapDataEnd = 0x0F
 };
+
+std::string zstd_packed(std::string_view bytes) {
+  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size = ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kZstdLevel);
+  if (ZSTD_isError(size) != 0U) throw StorageError(fmt::format("zstd: {}", ZSTD_getErrorName(size)));
+  packed.resize(size);
+  return packed;
+}
 
 std::uint32_t more_checksum(std::uint32_t checksum, std::span<const std::byte> bytes) {
   if (bytes.empty()) return checksum;  // where there is no place at all, zlib begins anew
@@ -60,8 +74,6 @@ class McapFields {
     return {reinterpret_cast<const char*>(found.data()), found.size()};
   }
   std::span<const std::byte> rest() { return take(bytes_.size()); }
-
- private:
   std::span<const std::byte> take(std::size_t size) {
     if (size > bytes_.size()) throw InputError(fmt::format("{}: expected a whole record, found a shorter one", name_));
     const std::span<const std::byte> taken = bytes_.first(size);
@@ -69,6 +81,7 @@ class McapFields {
     return taken;
   }
 
+ private:
   std::span<const std::byte> bytes_;
   const std::string& name_;
 };
@@ -104,6 +117,41 @@ struct McapScan {
   McapFile file;
   std::vector<McapChannel> schemas;
 
+  // Whole records, one after the other, up to a footer; `inside` a chunk there are no chunks.
+  void records(std::span<const std::byte> all, std::size_t at, bool inside) {
+    while (at + kRecordHead <= all.size()) {
+      std::uint64_t length = 0;
+      std::memcpy(&length, all.data() + at + 1, sizeof(length));
+      if (length > all.size() - at - kRecordHead) return;
+      const auto kind = static_cast<std::uint8_t>(all[at]);
+      if (kind == kMcapFooter) return;
+      const McapFields fields(all.subspan(at + kRecordHead, length), name);
+      if (kind == kMcapChunk && !inside)
+        chunk(fields);
+      else
+        read(kind, at, fields);
+      at += kRecordHead + length;
+    }
+  }
+  void chunk(McapFields fields) {
+    (void)fields.number<std::uint64_t>();  // the first time
+    (void)fields.number<std::uint64_t>();  // the last time
+    const auto size = fields.number<std::uint64_t>();
+    const auto checksum = fields.number<std::uint32_t>();
+    const std::string packing = fields.text();
+    const std::span<const std::byte> packed = fields.take(fields.number<std::uint64_t>());
+    if (packing.empty()) return records(packed, 0, true);
+    if (packing != "zstd" || size > kMostChunk)
+      throw InputError(fmt::format("{}: expected chunks of at most {} bytes packed by zstd, found {} bytes by '{}'",
+                                   name, kMostChunk, size, shown(packing)));
+    std::vector<std::byte> unpacked(size);
+    const std::size_t found = ZSTD_decompress(unpacked.data(), unpacked.size(), packed.data(), packed.size());
+    if (ZSTD_isError(found) != 0U || found != size)
+      throw InputError(fmt::format("{}: expected a chunk of {} bytes, found one that is not", name, size));
+    if (checksum != 0 && checksum != more_checksum(0, unpacked))
+      throw InputError(fmt::format("{}: the checksum of a chunk does not agree", name));
+    records(unpacked, 0, true);
+  }
   // The record at byte `at`; kinds that are not known are passed over.
   void read(std::uint8_t kind, std::size_t at, McapFields fields) {
     if (kind == kMcapSchema) schemas.push_back(read_schema(fields));
@@ -131,7 +179,8 @@ struct McapScan {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::string& path) : file_(std::fopen(path.c_str(), "wbx")) {
+McapWriter::McapWriter(const std::string& path, McapChunks chunks)
+    : file_(std::fopen(path.c_str(), "wbx")), chunks_(chunks) {
   if (file_ == nullptr) throw StorageError(fmt::format("cannot make '{}': {}", path, std::strerror(errno)));
   put(bytes_of(kMcapMagic));
   put_record(kMcapHeader, sized("") + sized("duet"));
@@ -153,13 +202,34 @@ void McapWriter::put_record(std::uint8_t kind, std::string_view content) {
   put(bytes_of(content));
 }
 
+void McapWriter::gather(std::span<const std::byte> bytes) {
+  if (chunks_ == McapChunks::kNone) return put(bytes);
+  chunk_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+void McapWriter::gather_record(std::uint8_t kind, std::string_view content) {
+  const std::string head = little(kind) + little(static_cast<std::uint64_t>(content.size()));
+  gather(bytes_of(head));
+  gather(bytes_of(content));
+}
+
+void McapWriter::end_chunk() {
+  if (chunk_.empty()) return;
+  const std::string packed = zstd_packed(chunk_);
+  put_record(kMcapChunk, little(chunk_begin_) + little(chunk_end_) + little(static_cast<std::uint64_t>(chunk_.size())) +
+                             little(more_checksum(0, bytes_of(chunk_))) + sized("zstd") +
+                             little(static_cast<std::uint64_t>(packed.size())) + packed);
+  chunk_.clear();
+  chunk_begin_ = chunk_end_ = 0;
+}
+
 void McapWriter::add(const McapChannel& channel) {
   const std::uint16_t schema = channel.schema_name.empty() ? std::uint16_t{0} : channel.id;
   if (schema != 0)
-    put_record(kMcapSchema,
-               little(schema) + sized(channel.schema_name) + sized(channel.schema_encoding) + sized(channel.schema));
-  put_record(kMcapChannelRecord,
-             little(channel.id) + little(schema) + sized(channel.topic) + sized(channel.message_encoding) + sized(""));
+    gather_record(kMcapSchema,
+                  little(schema) + sized(channel.schema_name) + sized(channel.schema_encoding) + sized(channel.schema));
+  gather_record(kMcapChannelRecord, little(channel.id) + little(schema) + sized(channel.topic) +
+                                        sized(channel.message_encoding) + sized(""));
 }
 
 bool McapWriter::write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time,
@@ -172,8 +242,12 @@ bool McapWriter::write(std::uint16_t channel, std::uint32_t sequence, std::uint6
   std::memcpy(&head[11], &sequence, 4);
   std::memcpy(&head[15], &time, 8);
   std::memcpy(&head[23], &time, 8);
-  put(head);
-  put(data);
+  gather(head);
+  gather(data);
+  if (chunks_ == McapChunks::kNone) return good_;
+  chunk_begin_ = chunk_end_ == 0 ? time : std::min(chunk_begin_, time);
+  chunk_end_ = std::max(chunk_end_, time);
+  if (chunk_.size() >= kChunkBytes) end_chunk();
   return good_;
 }
 
@@ -184,6 +258,7 @@ bool McapWriter::flush() {
 
 bool McapWriter::finish() {
   finished_ = true;
+  end_chunk();
   put_record(kMcapDataEnd, little(checksum_));
   put_record(kMcapFooter, little(std::uint64_t{0}) + little(std::uint64_t{0}) + little(std::uint32_t{0}));
   put(bytes_of(kMcapMagic));
@@ -195,15 +270,7 @@ McapFile read_mcap(std::span<const std::byte> bytes, const std::string& name,
   if (bytes.size() < kMcapMagic.size() || std::memcmp(bytes.data(), kMcapMagic.data(), kMcapMagic.size()) != 0)
     throw InputError(fmt::format("{}: expected an MCAP file, found another", name));
   McapScan scan{bytes, name, each, {}, {}};
-  for (std::size_t at = kMcapMagic.size(); at + kRecordHead <= bytes.size();) {
-    std::uint64_t length = 0;
-    std::memcpy(&length, bytes.data() + at + 1, sizeof(length));
-    if (length > bytes.size() - at - kRecordHead) break;
-    const auto kind = static_cast<std::uint8_t>(bytes[at]);
-    if (kind == kMcapFooter) break;
-    scan.read(kind, at, McapFields(bytes.subspan(at + kRecordHead, length), name));
-    at += kRecordHead + length;
-  }
+  scan.records(bytes, kMcapMagic.size(), false);
   return scan.file;
 }
 

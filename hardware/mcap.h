@@ -1,5 +1,6 @@
-// MCAP files, the container of robot logs that Foxglove's tools read: written unchunked and append-only, so that a file
-// whose writer was killed can be read up to the last whole record. Source: the MCAP specification, version 0.
+// MCAP files, the container of robot logs that Foxglove's tools read: append-only, so that a file whose writer was
+// killed can be read up to the last whole record; of logs that is a message, of compressed files a chunk of some
+// megabytes. Source: the MCAP specification, version 0.
 #pragma once
 
 #include <cstdint>
@@ -21,11 +22,13 @@ struct McapChannel {
   std::string schema_name, schema_encoding, schema;
 };
 
+enum class McapChunks { kNone, kZstd };
+
 // One owner, one thread.
 class McapWriter {
  public:
   // Makes `path`; throws StorageError where it is there already or cannot be made.
-  explicit McapWriter(const std::string& path);
+  explicit McapWriter(const std::string& path, McapChunks chunks = McapChunks::kNone);
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
@@ -34,7 +37,7 @@ class McapWriter {
   void add(const McapChannel& channel);
   // `time` [ns]. False where the file could not be written, now or before.
   bool write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time, std::span<const std::byte> data);
-  bool flush();
+  bool flush();  // of chunks the whole ones
   // The end of the data with its checksum; nothing may follow. False as above.
   bool finish();
   [[nodiscard]] bool good() const { return good_; }
@@ -42,8 +45,15 @@ class McapWriter {
  private:
   void put(std::span<const std::byte> bytes);
   void put_record(std::uint8_t kind, std::string_view content);
+  // To the chunk, where there are chunks.
+  void gather(std::span<const std::byte> bytes);
+  void gather_record(std::uint8_t kind, std::string_view content);
+  void end_chunk();
 
   std::FILE* file_ = nullptr;
+  McapChunks chunks_ = McapChunks::kNone;
+  std::string chunk_;                              // records that are not in the file yet
+  std::uint64_t chunk_begin_ = 0, chunk_end_ = 0;  // times of its messages [ns]; 0, 0: it has none
   std::uint32_t checksum_ = 0;
   bool good_ = true, finished_ = false;
 };
@@ -63,7 +73,8 @@ struct McapFile {
 
 // Calls `each` for every message of `bytes`, in order, with the channels so far. A file that ends in the middle of a
 // record ends there. Throws InputError naming `name` for bytes that are no MCAP, a record whose content is shorter than
-// it says, a channel that is not there, and a checksum that disagrees.
+// it says, a channel that is not there, a checksum that disagrees, and a chunk that cannot be unpacked (zstd or none,
+// at most 64 MiB).
 McapFile read_mcap(std::span<const std::byte> bytes, const std::string& name,
                    const std::function<void(const McapChannel&, const McapMessage&)>& each);
 

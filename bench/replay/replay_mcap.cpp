@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <utility>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
@@ -17,21 +19,32 @@
 namespace duet {
 namespace {
 
-constexpr int kMcapStride = 2;  // frames: a scene 25 times a second
+constexpr int kMcapStride = 2;  // frames: 25 times a second
 
-// What Foxglove needs of its schema; it knows the name.
+// What Foxglove needs of its schemas; it knows the names.
 constexpr const char* kSceneSchema =
     R"({"title":"foxglove.SceneUpdate","type":"object","properties":{"deletions":{"type":"array","items":{"type":"object"}},"entities":{"type":"array","items":{"type":"object"}}}})";
+constexpr const char* kTransformSchema =
+    R"({"title":"foxglove.FrameTransforms","type":"object","properties":{"transforms":{"type":"array","items":{"type":"object"}}}})";
 constexpr const char* kStateSchema =
     R"({"title":"duet.ReplayState","type":"object","properties":{"time":{"type":"number"},"q":{"type":"object"},"root":{"type":"array"},"partner_force":{"type":"number"}}})";
 
-nlohmann::json xyz_json(const Eigen::Vector3d& p) { return {{"x", p.x()}, {"y", p.y()}, {"z", p.z()}}; }
+// To five digits: 0.01 mm, or what turns a limb of half a metre by that.
+double rounded(double x) { return std::round(x * 1e5) / 1e5; }
 
-nlohmann::json pose_json(const Eigen::Vector3d& p, const Eigen::Quaterniond& R) {
-  return {{"position", xyz_json(p)}, {"orientation", {{"x", R.x()}, {"y", R.y()}, {"z", R.z()}, {"w", R.w()}}}};
+nlohmann::json xyz_json(const Eigen::Vector3d& p) {
+  return {{"x", rounded(p.x())}, {"y", rounded(p.y())}, {"z", rounded(p.z())}};
 }
 
-nlohmann::json colour_json(double r, double g, double b, double a) { return {{"r", r}, {"g", g}, {"b", b}, {"a", a}}; }
+nlohmann::json turn_json(const Eigen::Quaterniond& R) {
+  return {{"x", rounded(R.x())}, {"y", rounded(R.y())}, {"z", rounded(R.z())}, {"w", rounded(R.w())}};
+}
+
+nlohmann::json pose_json(const Eigen::Vector3d& p, const Eigen::Quaterniond& R) {
+  return {{"position", xyz_json(p)}, {"orientation", turn_json(R)}};
+}
+
+nlohmann::json colour_json(double r, double g, double b) { return {{"r", r}, {"g", g}, {"b", b}, {"a", 1.0}}; }
 
 nlohmann::json sphere_json(const Eigen::Vector3d& p, double radius, const nlohmann::json& colour) {
   return {{"pose", pose_json(p, Eigen::Quaterniond::Identity())},
@@ -57,76 +70,139 @@ nlohmann::json stamp_json(std::uint64_t time) {
   return {{"sec", time / 1'000'000'000}, {"nsec", time % 1'000'000'000}};
 }
 
-nlohmann::json entity_json(const char* id, std::uint64_t time) {
+// Fixed to its frame.
+nlohmann::json entity_json(const std::string& id, const std::string& frame, std::uint64_t time) {
+  nlohmann::json entity = {
+      {"timestamp", stamp_json(time)}, {"frame_id", frame},    {"id", id},
+      {"lifetime", stamp_json(0)},     {"frame_locked", true}, {"metadata", nlohmann::json::array()}};
+  for (const char* kind : {"arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models"})
+    entity[kind] = nlohmann::json::array();
+  return entity;
+}
+
+nlohmann::json transform_json(const std::string& frame, const Eigen::Vector3d& p, const Eigen::Quaterniond& R,
+                              std::uint64_t time) {
   return {{"timestamp", stamp_json(time)},
-          {"frame_id", "world"},
-          {"id", id},
-          {"lifetime", stamp_json(0)},
-          {"frame_locked", false},
-          {"metadata", nlohmann::json::array()},
-          {"arrows", nlohmann::json::array()},
-          {"cubes", nlohmann::json::array()},
-          {"spheres", nlohmann::json::array()},
-          {"cylinders", nlohmann::json::array()},
-          {"lines", nlohmann::json::array()},
-          {"triangles", nlohmann::json::array()},
-          {"texts", nlohmann::json::array()},
-          {"models", nlohmann::json::array()}};
+          {"parent_frame_id", "world"},
+          {"child_frame_id", frame},
+          {"translation", xyz_json(p)},
+          {"rotation", turn_json(R)}};
+}
+
+// Topics of one file, which may be added at any time.
+class ReplayTopics {
+ public:
+  explicit ReplayTopics(const std::string& path) : file_(path, McapChunks::kZstd) {}
+
+  std::uint16_t add(const std::string& topic, const char* schema_name, const char* schema) {
+    require(topics_ < std::numeric_limits<std::uint16_t>::max(), "an MCAP file has at most 65535 topics");
+    file_.add({++topics_, topic, "json", schema_name, "jsonschema", schema});
+    return topics_;
+  }
+  std::uint16_t scene(const std::string& topic) { return add(topic, "foxglove.SceneUpdate", kSceneSchema); }
+  std::uint16_t transforms(const std::string& topic) {
+    return add(topic, "foxglove.FrameTransforms", kTransformSchema);
+  }
+  void put(std::uint16_t topic, int t, std::uint64_t time, const nlohmann::json& json) {
+    const std::string text = dumped(json);
+    if (!file_.write(topic, static_cast<std::uint32_t>(t), time, std::as_bytes(std::span(text))))
+      throw StorageError("the MCAP file cannot be written");
+  }
+  void put_entities(std::uint16_t topic, int t, std::uint64_t time, nlohmann::json entities) {
+    put(topic, t, time, {{"deletions", nlohmann::json::array()}, {"entities", std::move(entities)}});
+  }
+  bool finish() { return file_.finish(); }
+
+ private:
+  McapWriter file_;
+  std::uint16_t topics_ = 0;
+};
+
+std::uint64_t nanoseconds(double begin, int t, double rate_hz) {
+  return static_cast<std::uint64_t>(std::llround((begin + t / rate_hz) * 1e9));
+}
+
+// The person: capsules as long as in the first frame.
+void write_partner(const Recording& recording, double begin, const std::string& name, ReplayTopics& topics) {
+  const PointTracks& partner = recording.partner;
+  const HumanBody human =
+      make_human_body(bone_lengths(HumanMotion{.rate_hz = recording.rate_hz, .joints = partner, .rotations = {}}));
+  const std::uint16_t bodies = topics.scene("/" + name), where = topics.transforms("/" + name + "/where");
+  const nlohmann::json colour = colour_json(0.85, 0.72, 0.55);
+  nlohmann::json entities = nlohmann::json::array();
+  for (const HumanCapsule& capsule : human.capsules) {
+    const auto [a, b] = capsule.ends(partner.frame(0));
+    const Eigen::Vector3d half(0.0, 0.0, (b - a).norm() / 2.0);
+    entities.push_back(entity_json(capsule.name, name + "/" + capsule.name, nanoseconds(begin, 0, 1.0)));
+    add_capsule(-half, half, capsule.radius, colour, entities.back());
+  }
+  topics.put_entities(bodies, 0, nanoseconds(begin, 0, 1.0), std::move(entities));
+  for (int t = 0; t < partner.frames(); t += kMcapStride) {
+    const std::uint64_t time = nanoseconds(begin, t, recording.rate_hz);
+    nlohmann::json transforms = nlohmann::json::array();
+    for (const HumanCapsule& capsule : human.capsules) {
+      const auto [a, b] = capsule.ends(partner.frame(t));
+      const Eigen::Quaterniond R = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), b - a);
+      transforms.push_back(transform_json(name + "/" + capsule.name, (a + b) / 2.0, R, time));
+    }
+    topics.put(where, t, time, {{"transforms", std::move(transforms)}});
+  }
 }
 
 class TrackWriter {
  public:
-  TrackWriter(const ReplayTrack& track, double begin, std::uint16_t channel, McapWriter& file)
-      : track_(track), begin_(begin), channel_(channel), file_(file), kinematics_(*track.robot) {
-    const PointTracks& partner = track.recording.partner;
-    if (partner.frames() > 1)
-      human_ = make_human_body(bone_lengths(HumanMotion{.rate_hz = 50.0, .joints = partner, .rotations = {}}));
-  }
+  TrackWriter(const ReplayTrack& track, double begin, std::string name, ReplayTopics& topics)
+      : track_(track), begin_(begin), name_(std::move(name)), topics_(topics), kinematics_(*track.robot) {}
 
   void write() {
+    const std::uint16_t where = topics_.transforms("/" + name_ + "/where");
+    const std::uint16_t contacts = topics_.scene("/" + name_ + "/contacts");
+    const std::uint16_t state = topics_.add("/" + name_ + "/state", "duet.ReplayState", kStateSchema);
+    time_ = nanoseconds(begin_, 0, 1.0);
+    topics_.put_entities(topics_.scene("/" + name_ + "/robot"), 0, time_, links_json());
     const Recording& recording = track_.recording;
+    bool touched = true;  // so that the first frame has its arrows, or none
     for (int t = 0; t < recording.frames(); t += kMcapStride) {
-      const double seconds = begin_ + t / recording.rate_hz;
-      time_ = static_cast<std::uint64_t>(std::llround(seconds * 1e9));
+      time_ = nanoseconds(begin_, t, recording.rate_hz);
       kinematics_.update(recording.robot[t].X_WB, recording.robot[t].q);
-      put(channel_, t, scene_of(t));
-      put(static_cast<std::uint16_t>(channel_ + 1), t, state_of(t, seconds));
+      topics_.put(where, t, time_, {{"transforms", transforms_json()}});
+      const std::vector<Contact> now = at(t);
+      if (touched || !now.empty()) topics_.put_entities(contacts, t, time_, {contacts_json(now)});
+      touched = !now.empty();
+      topics_.put(state, t, time_, state_json(t, now));
     }
   }
 
  private:
-  nlohmann::json scene_of(int t) {
+  [[nodiscard]] std::string frame(std::size_t link) const { return name_ + "/" + track_.robot->links[link].name; }
+
+  nlohmann::json links_json() {
+    const nlohmann::json colour = colour_json(0.0, 0.45, 0.7);
     nlohmann::json entities = nlohmann::json::array();
-    entities.push_back(robot_of());
-    if (!human_.capsules.empty()) entities.push_back(partner_of(t));
-    entities.push_back(contacts_of(t));
-    return {{"deletions", nlohmann::json::array()}, {"entities", std::move(entities)}};
-  }
-  nlohmann::json robot_of() {
-    nlohmann::json entity = entity_json("robot", time_);
-    const nlohmann::json colour = colour_json(0.0, 0.45, 0.7, 1.0);
-    for (std::size_t i = 0; i < track_.robot->shapes.size(); ++i) {
-      const RobotShape& shape = track_.robot->shapes[i];
-      const Eigen::Vector3d p = kinematics_.shape_position(static_cast<int>(i));
-      const Eigen::Vector3d half =
-          kinematics_.R_WL(shape.link) * (shape.X_LS.R * Eigen::Vector3d(0.0, 0.0, shape.half_length));
-      add_capsule(p - half, p + half, shape.radius, colour, entity);
+    for (std::size_t link = 0; link < track_.robot->links.size(); ++link) {
+      nlohmann::json entity = entity_json(track_.robot->links[link].name, frame(link), time_);
+      for (const RobotShape& shape : track_.robot->shapes) {
+        if (shape.link != static_cast<int>(link)) continue;
+        const Eigen::Vector3d half = shape.X_LS.R * Eigen::Vector3d(0.0, 0.0, shape.half_length);
+        add_capsule(shape.X_LS.p - half, shape.X_LS.p + half, shape.radius, colour, entity);
+      }
+      if (!entity["spheres"].empty()) entities.push_back(std::move(entity));
     }
-    return entity;
+    return entities;
   }
-  nlohmann::json partner_of(int t) {
-    nlohmann::json entity = entity_json("partner", time_);
-    const nlohmann::json colour = colour_json(0.85, 0.72, 0.55, 1.0);
-    for (const HumanCapsule& capsule : human_.capsules) {
-      const auto [a, b] = capsule.ends(track_.recording.partner.frame(t));
-      add_capsule(a, b, capsule.radius, colour, entity);
+  nlohmann::json transforms_json() {
+    nlohmann::json transforms = nlohmann::json::array();
+    for (std::size_t link = 0; link < track_.robot->links.size(); ++link) {
+      const int i = static_cast<int>(link);
+      transforms.push_back(
+          transform_json(frame(link), kinematics_.p_WL(i), Eigen::Quaterniond(kinematics_.R_WL(i)), time_));
     }
-    return entity;
+    return transforms;
   }
   // Arrows of 0.5 m a 100 N.
-  nlohmann::json contacts_of(int t) {
-    nlohmann::json entity = entity_json("contacts", time_);
-    for (const Contact& contact : at(t)) {
+  nlohmann::json contacts_json(const std::vector<Contact>& contacts) const {
+    nlohmann::json entity = entity_json("contacts", "world", time_);
+    for (const Contact& contact : contacts) {
       const double newton = contact.f_W.norm();
       if (newton <= 0.0) continue;
       const Eigen::Quaterniond R = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), contact.f_W);
@@ -135,67 +211,74 @@ class TrackWriter {
                                   {"shaft_diameter", 0.015},
                                   {"head_length", 0.001 * newton},
                                   {"head_diameter", 0.03},
-                                  {"color", colour_json(0.84, 0.1, 0.1, 1.0)}});
+                                  {"color", colour_json(0.84, 0.1, 0.1)}});
     }
     return entity;
   }
-  nlohmann::json state_of(int t, double seconds) {
+  nlohmann::json state_json(int t, const std::vector<Contact>& contacts) const {
     const RobotState& state = track_.recording.robot[t];
     nlohmann::json q = nlohmann::json::object();
     for (std::size_t i = 0; i < track_.robot->joints.size(); ++i)
-      q[track_.robot->joints[i].name] = number_or_null(state.q[static_cast<Eigen::Index>(i)]);
+      q[track_.robot->joints[i].name] = number_or_null(rounded(state.q[static_cast<Eigen::Index>(i)]));
     double force = 0.0;
-    for (const Contact& contact : at(t)) force += contact.f_W.norm();
-    return {{"time", seconds},
+    for (const Contact& contact : contacts) force += contact.f_W.norm();
+    const Eigen::Vector3d& p = state.X_WB.p;
+    return {{"time", begin_ + t / track_.recording.rate_hz},
             {"q", std::move(q)},
-            {"root", {state.X_WB.p.x(), state.X_WB.p.y(), state.X_WB.p.z()}},
+            {"root", {rounded(p.x()), rounded(p.y()), rounded(p.z())}},
             {"partner_force", force}};
   }
   // Of the partner.
-  std::vector<Contact> at(int t) {
+  [[nodiscard]] std::vector<Contact> at(int t) const {
     std::vector<Contact> contacts;
     for (const RecordedContact& contact : track_.recording.contacts)
       if (contact.frame == t && contact.contact.side == ContactSide::kHuman) contacts.push_back(contact.contact);
     return contacts;
   }
-  void put(std::uint16_t channel, int t, const nlohmann::json& json) {
-    const std::string text = dumped(json);
-    if (!file_.write(channel, static_cast<std::uint32_t>(t), time_, std::as_bytes(std::span(text))))
-      throw StorageError("the MCAP file cannot be written");
-  }
 
   const ReplayTrack& track_;
   double begin_;
-  std::uint16_t channel_;
-  McapWriter& file_;
+  std::string name_;
+  ReplayTopics& topics_;
   Kinematics kinematics_;
-  HumanBody human_;
   std::uint64_t time_ = 0;
 };
 
 double begin_of(const ReplayTrack& track) { return -track.recording.phases.act_begin / track.recording.rate_hz; }
 
+// Whether what b's partner does is the beginning of what a's does, at the same times.
+bool same_partner(const ReplayTrack& a, const ReplayTrack& b) {
+  const std::vector<double>&whole = a.recording.partner.data(), &part = b.recording.partner.data();
+  return begin_of(a) == begin_of(b) && part.size() <= whole.size() &&
+         std::equal(part.begin(), part.end(), whole.begin());
+}
+
+void write_scene(const ReplayScene& scene, ReplayTopics& topics) {
+  double earliest = 0.0;
+  const ReplayTrack* longest = nullptr;
+  for (const ReplayTrack& track : scene.tracks) {
+    earliest = std::min(earliest, begin_of(track));
+    const int frames = track.recording.partner.frames();
+    if (frames > 1 && (longest == nullptr || frames > longest->recording.partner.frames())) longest = &track;
+  }
+  if (longest != nullptr)
+    write_partner(longest->recording, begin_of(*longest) - earliest, scene.id + "/partner", topics);
+  for (const ReplayTrack& track : scene.tracks) {
+    const std::string name = fmt::format("{}/{}", scene.id, track.name);
+    const double begin = begin_of(track) - earliest;
+    if (track.recording.partner.frames() > 1 && !same_partner(*longest, track))
+      write_partner(track.recording, begin, name + "/partner", topics);
+    TrackWriter(track, begin, name, topics).write();
+  }
+}
+
 }  // namespace
 
 void write_replay_mcap(const ReplayContent& content, const std::string& path) {
   std::filesystem::remove(path);
-  McapWriter file(path);
-  std::vector<std::pair<const ReplayTrack*, double>> tracks;
-  for (const ReplayScene& scene : content.scenes) {
-    double earliest = 0.0;
-    for (const ReplayTrack& track : scene.tracks) earliest = std::min(earliest, begin_of(track));
-    for (const ReplayTrack& track : scene.tracks) {
-      const auto id = static_cast<std::uint16_t>(2 * tracks.size() + 1);
-      const std::string topic = fmt::format("/{}/{}", scene.id, track.name);
-      file.add({id, topic + "/scene", "json", "foxglove.SceneUpdate", "jsonschema", kSceneSchema});
-      file.add({static_cast<std::uint16_t>(id + 1), topic + "/state", "json", "duet.ReplayState", "jsonschema",
-                kStateSchema});
-      tracks.emplace_back(&track, begin_of(track) - earliest);
-    }
-  }
-  for (std::size_t i = 0; i < tracks.size(); ++i)
-    TrackWriter(*tracks[i].first, tracks[i].second, static_cast<std::uint16_t>(2 * i + 1), file).write();
-  if (!file.finish()) throw StorageError(fmt::format("'{}' cannot be written", path));
+  ReplayTopics topics(path);
+  for (const ReplayScene& scene : content.scenes) write_scene(scene, topics);
+  if (!topics.finish()) throw StorageError(fmt::format("'{}' cannot be written", path));
 }
 
 }  // namespace duet

@@ -1,5 +1,5 @@
-// A replay as MCAP for Foxglove: each track's bodies and contacts as `foxglove.SceneUpdate`, its joints as
-// `foxglove.JointStates`-like JSON. Written by hardware/mcap.h.
+// A replay as MCAP for Foxglove, by hardware/mcap.h: bodies are told once, and where they are at each frame. Told anew
+// at each frame, as one scene, they take some twenty times as much.
 #pragma once
 
 #include <string>
@@ -8,9 +8,12 @@
 
 namespace duet {
 
-// Topics "/SCENE/TRACK/scene" (foxglove.SceneUpdate, JSON) and "/SCENE/TRACK/state" (duet.ReplayState: time, joints by
-// name, force of the partner on the robot [N]), time 0 where the earliest track of a scene begins. Replaces `path`.
-// Throws StorageError.
+// Topics of a scene: "/SCENE/partner" and "/SCENE/partner/where" of the person, and of each track "/SCENE/TRACK/robot"
+// (foxglove.SceneUpdate: the links' bodies, once), ".../where" (foxglove.FrameTransforms: the links, named
+// "SCENE/TRACK/link"), ".../contacts" (foxglove.SceneUpdate: arrows), ".../state" (duet.ReplayState: time, joints by
+// name, force of the partner on the robot [N]). A track whose partner moves otherwise than the first one's has an own
+// one, "/SCENE/TRACK/partner". JSON, 25 frames a second, in chunks packed by zstd; places to 0.01 mm. Time 0 is where
+// the earliest track of a scene begins. Replaces `path`. Throws StorageError.
 void write_replay_mcap(const ReplayContent& content, const std::string& path);
 
 }  // namespace duet

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
+#include <set>
 
 #include "duet/bench/replay/detector_trace.h"
 #include "duet/bench/replay/replay_columns.h"
@@ -15,6 +17,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/mcap.h"
 #include "duet/results/json_fields.h"
+#include "duet/robots/kinematics.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"
 #include "tests/bench/verified_run.h"
@@ -262,23 +265,36 @@ TEST_F(Replay, TheVerdictOfATraceEndsAsTheRowsDoes) {
       detector_trace(diverged, *track.robot, DetectorVersion::kRobot, ThresholdSet::kPaper, {}, 5).frames.empty());
 }
 
-TEST_F(Replay, TheMcapHoldsEveryTracksScenes) {
+TEST_F(Replay, TheMcapTellsBodiesOnceAndWhereTheyAreAtEachFrame) {
   const ReplayContent content_of_run = content(run("all"));
   write_replay_mcap(content_of_run, folder_ / "replay.mcap");
   write_replay_mcap(content_of_run, folder_ / "replay.mcap");  // again: replaces it
   const std::string bytes = read_file(folder_ / "replay.mcap");
-  int scenes = 0;
+  const ReplayTrack& track = content_of_run.scenes[0].tracks[0];
+  const std::string topic = "/" + content_of_run.scenes[0].id + "/" + track.name;
+  std::map<std::string, int> messages;
+  std::set<std::string> placed;
+  Kinematics kinematics(*track.robot);
   const McapFile file = read_mcap(
       std::as_bytes(std::span(bytes)), "replay.mcap", [&](const McapChannel& channel, const McapMessage& message) {
-        if (channel.schema_name != "foxglove.SceneUpdate") return;
-        ++scenes;
+        ++messages[channel.topic];
+        if (channel.topic != topic + "/where") return;
         const std::string text(reinterpret_cast<const char*>(message.data.data()), message.data.size());
-        EXPECT_EQ(parse_json(text, "scene").at("entities").size(), 3U);
+        const nlohmann::json transforms = parse_json(text, "where").at("transforms");
+        const RobotState& state = track.recording.robot[message.sequence];
+        kinematics.update(state.X_WB, state.q);
+        const auto last = static_cast<int>(track.robot->links.size()) - 1;
+        EXPECT_NEAR(transforms.back().at("translation").at("z").get<double>(), kinematics.p_WL(last).z(), 1e-5);
+        for (const nlohmann::json& transform : transforms) placed.insert(transform.at("child_frame_id"));
       });
   EXPECT_TRUE(file.whole);
-  EXPECT_EQ(file.channels.size(), 4U);
-  const int frames = content_of_run.scenes[0].tracks[0].recording.frames();
-  EXPECT_EQ(scenes, 2 * ((frames + 1) / 2));
+  EXPECT_EQ(file.channels.size(), 2U + 2U * 4U);  // the partner of both, and each track's
+  EXPECT_EQ(placed.size(), track.robot->links.size());
+  EXPECT_EQ(messages.at(topic + "/robot"), 1);
+  EXPECT_EQ(messages.at(topic + "/where"), (track.recording.frames() + 1) / 2);
+  EXPECT_EQ(messages.at(topic + "/state"), (track.recording.frames() + 1) / 2);
+  EXPECT_EQ(messages.at("/" + content_of_run.scenes[0].id + "/partner"), 1);
+  EXPECT_LT(bytes.size(), 1000U * track.recording.frames());
 }
 
 TEST_F(Replay, RecordingsOfAnybodyAreShownToo) {

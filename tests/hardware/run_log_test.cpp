@@ -37,6 +37,59 @@ TEST(Mcap, WhatIsWrittenIsRead) {
   EXPECT_EQ(file.messages, 2);
 }
 
+std::vector<std::string> messages_of(const std::string& bytes) {
+  std::vector<std::string> found;
+  read_mcap(bytes_of(bytes), "a.mcap", [&](const McapChannel& c, const McapMessage& m) {
+    found.push_back(c.topic + std::to_string(m.sequence) + std::to_string(m.data.size()));
+  });
+  return found;
+}
+
+std::string chunked_file(const std::string& path) {
+  const std::string long_text(3'000'000, 'x');
+  {
+    McapWriter writer(path, McapChunks::kZstd);
+    writer.add({1, "first", "json", "Type", "jsonschema", "{}"});
+    writer.write(1, 1, 10, bytes_of(long_text));
+    writer.write(1, 2, 20, bytes_of(long_text));  // a chunk is full
+    writer.add({2, "second", "json", "", "", ""});
+    writer.write(2, 3, 30, bytes_of("abc"));
+  }
+  return read_file(path);
+}
+
+TEST(Mcap, ChunksAreSmallAndHoldTheSame) {
+  const test::ScratchFolder folder;
+  const std::string bytes = chunked_file(folder / "a.mcap");
+  EXPECT_LT(bytes.size(), 10'000U);
+  EXPECT_THAT(messages_of(bytes), ElementsAre("first13000000", "first23000000", "second33"));
+  const std::size_t second = bytes.find("zstd", bytes.find("zstd") + 1);
+  ASSERT_NE(second, std::string::npos);
+  EXPECT_THAT(messages_of(bytes.substr(0, second)), ElementsAre("first13000000", "first23000000"));
+}
+
+TEST(Mcap, AChunkThatCannotBeUnpackedIsNamed) {
+  const test::ScratchFolder folder;
+  const std::string bytes = chunked_file(folder / "a.mcap");
+  const auto refusal = [](const std::string& file) {
+    return test::thrown_message<InputError>([&] { static_cast<void>(messages_of(file)); });
+  };
+  const std::size_t name = bytes.find("zstd");
+  std::string other = bytes;
+  other.replace(name, 4, "lzma");
+  EXPECT_THAT(refusal(other), HasSubstr("expected chunks of at most 67108864 bytes packed by zstd, found"));
+  EXPECT_THAT(refusal(other), HasSubstr("'lzma'"));
+  std::string huge = bytes;
+  huge.replace(name - 16, 8, std::string(8, '\x7f'));  // what it says to unpack to
+  EXPECT_THAT(refusal(huge), HasSubstr("expected chunks of at most 67108864 bytes"));
+  std::string broken = bytes;
+  broken.replace(name + 12, 4, "junk");  // of the packed bytes
+  EXPECT_THAT(refusal(broken), HasSubstr("found one that is not"));
+  std::string sum = bytes;
+  sum[name - 8] = static_cast<char>(sum[name - 8] + 1);
+  EXPECT_THAT(refusal(sum), HasSubstr("the checksum of a chunk does not agree"));
+}
+
 // The bytes that the format's specification prescribes, for its smallest file: magic, header, end of data, footer,
 // magic.
 TEST(Mcap, TheSmallestFileHasTheBytesOfTheSpecification) {

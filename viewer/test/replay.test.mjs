@@ -6,6 +6,7 @@ import {createRequire} from 'node:module';
 import {join} from 'node:path';
 import {deflateSync} from 'node:zlib';
 import {McapStreamReader} from '@mcap/core';
+import {decompress as unzstd} from 'fzstd';
 import {brightness, closeAll, executable, folder, launch, meanOf, open, pictures, readNpz, readPage, spread} from './browser.mjs';
 import {Kinematics, readColumns} from '../../build/web/parts/parts.mjs';
 
@@ -51,10 +52,16 @@ test('playing draws pictures and moves the clock', async () => {
   console.log(`${await attribute(page, 'capsules')} capsules at 1440 x 1000, ${await attribute(page, 'fps')} pictures a second`);
 });
 
-// Of MCAP's spheres, which C++ placed: both ends of each capsule.
+// A point of a frame, in the world.
+function placed({translation: p, rotation: {x, y, z, w}}, [a, b, c]) {
+  const [u, v, t] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
+  return [p.x + a + w * u + y * t - z * v, p.y + b + w * v + z * u - x * t, p.z + c + w * t + x * v - y * u];
+}
+
+// Of MCAP's transforms, which C++ made (rounded to 0.01 mm): both ends of each capsule.
 test('links are where C++ has them, to 0.1 mm', async () => {
-  const {header, bytes} = readPage(html), reader = new McapStreamReader();
-  const tracks = new Map(header.scenes.flatMap((scene) => scene.tracks.map((track) => [`/${scene.id}/${track.name}/scene`, track])));
+  const {header, bytes} = readPage(html), reader = new McapStreamReader({decompressHandlers: {zstd: (packed, size) => unzstd(packed, new Uint8Array(Number(size)))}});
+  const tracks = new Map(header.scenes.flatMap((scene) => scene.tracks.map((track) => [`/${scene.id}/${track.name}/where`, track])));
   reader.append(readFileSync(join(folder, 'replay.mcap')));
   const channels = new Map();
   let worst = 0, compared = 0;
@@ -67,14 +74,13 @@ test('links are where C++ has them, to 0.1 mm', async () => {
     for (const name of ['position', 'turn', 'q']) motion[name] = readColumns(bytes, track.motion[name]);
     const kinematics = new Kinematics(robot);
     assert.ok(kinematics.update(motion, record.sequence));
-    const spheres = JSON.parse(new TextDecoder().decode(record.data)).entities.find((e) => e.id === 'robot').spheres;
-    let at = 0;
+    const links = JSON.parse(new TextDecoder().decode(record.data)).transforms;
     for (const shape of robot.shapes) {
       for (const side of shape.half_length > 0 ? [-1, 1] : [0]) {
         const [w, x, y, z] = shape.quat_wxyz, d = side * shape.half_length;
         const end = [shape.p[0] + d * 2 * (x * z + w * y), shape.p[1] + d * 2 * (y * z - w * x), shape.p[2] + d * (1 - 2 * (x * x + y * y))];
-        const here = kinematics.point(shape.link, end, [0, 0, 0]), there = spheres[at++].pose.position;
-        worst = Math.max(worst, Math.hypot(here[0] - there.x, here[1] - there.y, here[2] - there.z));
+        const here = kinematics.point(shape.link, end, [0, 0, 0]), there = placed(links[shape.link], end);
+        worst = Math.max(worst, Math.hypot(here[0] - there[0], here[1] - there[1], here[2] - there[2]));
         ++compared;
       }
     }
