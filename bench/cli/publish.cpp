@@ -4,6 +4,8 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/run_inputs.h"
+#include "duet/bench/suite.h"
+#include "duet/core/file.h"
 #include "duet/results/published.h"
 #include "duet/results/run_directory.h"
 
@@ -15,9 +17,20 @@ struct PublishArguments {
   bool partial = false, without_clips = false;
 };
 
+// suite.yaml as it stands in the published folder: networks and other files that the run does not keep are named from
+// there. What the engines were set to stands behind it, for people.
+std::string suite_from_there(const std::string& run, const std::string& folder) {
+  const std::string path = run + "/suite.yaml", text = read_text(path);
+  std::string moved = resolved_yaml(rebased(parse_suite(text, path), run, folder));
+  if (const std::size_t settings = text.find("\n# "); settings != std::string::npos) moved += text.substr(settings + 1);
+  return moved;
+}
+
 void run_publish(Session& session, const PublishArguments& arguments) {
   require_whole(open_run(arguments.run), arguments.run, arguments.partial, "publish");
-  publish_run(arguments.run, arguments.folder, arguments.without_clips ? without_clips(arguments.run) : Withheld{});
+  Withheld withheld = arguments.without_clips ? without_clips(arguments.run) : Withheld{};
+  if (has_inputs(arguments.run)) withheld.replaced["suite.yaml"] = suite_from_there(arguments.run, arguments.folder);
+  publish_run(arguments.run, arguments.folder, withheld);
   const Run run = load_run(arguments.folder);
   const std::vector<std::string> notes = completeness_notes({arguments.folder}, {run});
   print(session,

@@ -113,8 +113,7 @@ TEST(OnOtherBody, OfStrangersIsRefused) {
 
 TEST(Bodies, PerturbationsAreCheckedOnEveryBody) {
   Suite suite = test::playback_suite();
-  suite.perturbations = {default_perturbation("push")};
-  suite.perturbations[0].push->link = "nowhere";
+  suite.perturbations = {test::perturbation("{push: {link: nowhere}}")};
   EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { const Bodies bodies(suite); }), HasSubstr("nowhere"));
 }
 

@@ -24,4 +24,14 @@ inline Suite playback_suite() {
       "test.yaml");
 }
 
+// One item of a suite's list of perturbations.
+inline Perturbation perturbation(const std::string& yaml) {
+  return parse_suite(
+             "schema: duet.suite/1\nname: p\nversion: 1\nclips: {synth: {per_task: 1}}\nengines: [playback]\n"
+             "controllers: [pd]\npolicies: [replay]\nperturbations: [" +
+                 yaml + "]\n",
+             "p.yaml")
+      .perturbations.front();
+}
+
 }  // namespace duet::test

@@ -114,6 +114,18 @@ TEST_F(RunFolder, APartialRunSaysSoInEveryOutputAndIsNeitherBlessedNorPublished)
   EXPECT_THAT(bash("$D report $o/run -q --no-clips").text, Not(HasSubstr("partial")));
 }
 
+// The folder that is published lies elsewhere, and the name of the network is that of one that ships.
+TEST_F(RunFolder, APublishedRunFindsANetworkThatIsNamedFromTheRun) {
+  fs::create_directory(folder_ / "nets");
+  fs::copy(std::string(DUET_SOURCE_DIR) + "/policies/dstar/dp.safetensors", folder_ / "nets/dstar.safetensors");
+  write_suite("[wave]");
+  const Ended ended = bash(
+      "cd $o; $D run suite.yaml -o run -q -s 'policies=[{name: mine, use: dp, options: {network: "
+      "nets/dstar.safetensors}}]' "
+      "&& $D publish run -o a/b/published -q && $D verify a/b/published -q --all");
+  EXPECT_EQ(ended.code, 0) << ended.text;
+}
+
 TEST_F(RunFolder, AnErrorOfStorageStopsTheRunAndNoEpisodeFailsByIt) {
   write_suite("[wave, handshake]", 1, "record: {trajectories: all}\n");
   const Ended full = bash("ulimit -f 24; $D run $o/suite.yaml -o $o/run -q");

@@ -45,21 +45,12 @@ class Bench final : public Backend {
   void do_restore(std::span<const double>) override {}
 };
 
-Perturbation perturbation(const std::string& yaml) {
-  return parse_suite(
-             "schema: duet.suite/1\nname: p\nversion: 1\nclips: {synth: {per_task: 1}}\nengines: [playback]\n"
-             "controllers: [pd]\npolicies: [replay]\nperturbations: [" +
-                 yaml + "]\n",
-             "p.yaml")
-      .perturbations.front();
-}
-
 struct Stage {
   std::shared_ptr<const RobotModel> robot = test::g1();
   RobotState start = robot->standing_state();
 
   [[nodiscard]] Disturbance disturbance(const std::string& yaml, std::uint64_t seed = 1) const {
-    return {perturbation(yaml), *robot, start, kSteps, 0.002, seed};
+    return {test::perturbation(yaml), *robot, start, kSteps, 0.002, seed};
   }
   // The state whose first joint says when it was.
   [[nodiscard]] RobotState at(double time) const {
