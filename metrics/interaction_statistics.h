@@ -70,8 +70,8 @@ struct StatisticSpread {
 };
 StatisticSpread spread_of(std::span<const InteractionStatistics> clips, const InteractionStatisticInfo& info);
 
-// The middles of two sets agree where they differ by at most kAgreement of the second's (of 1 for a share); angles, which
-// may lie about 0, also where they differ by at most kAngleAgreement.
+// The middles of two sets agree where they differ by at most kAgreement of the second's (of 1 for a share); angles,
+// which may lie about 0, also where they differ by at most kAngleAgreement.
 inline constexpr double kAgreement = 0.20;
 inline constexpr double kAngleAgreement = 6.0;  // [deg]
 bool agree(const StatisticSpread& one, const StatisticSpread& other, const InteractionStatisticInfo& info);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <set>
 
 #include "duet/core/random.h"
 #include "duet/metrics/spectrum.h"
@@ -47,6 +48,21 @@ TEST(HfRatio, BinAtTheEdgeReadings) {
 }
 
 // Velocity amplitudes of differenced sines: 2 A sin(pi f / rate) rate.
+// Eigen sums in an order that depends on the first cache of the machine: 32 KiB there, 48 KiB here.
+TEST(HfRatio, DoesNotDependOnTheSizeOfCaches) {
+  Random random(3);
+  Eigen::MatrixXd q(29, 1300);
+  for (double& value : q.reshaped()) value = random.normal();
+  const std::ptrdiff_t first = Eigen::l1CacheSize(), second = Eigen::l2CacheSize(), third = Eigen::l3CacheSize();
+  std::set<double> found;
+  for (const std::ptrdiff_t size : {32, 48, 64, 128}) {
+    Eigen::setCpuCacheSizes(size << 10, second, third);
+    found.insert(ratio(q));
+  }
+  Eigen::setCpuCacheSizes(first, second, third);
+  EXPECT_EQ(found.size(), 1U);
+}
+
 TEST(HfRatio, WeighsByVelocityEnergy) {
   const auto energy = [](double a, double hz) { return std::pow(a * std::sin(kPi * hz / 50.0), 2); };
   const double low = energy(1.0, 2.0), high = energy(0.1, 10.0);
