@@ -50,7 +50,7 @@ TEST(HfRatio, BinAtTheEdgeReadings) {
 // Velocity amplitudes of differenced sines: 2 A sin(pi f / rate) rate.
 // Eigen sums in an order that depends on the first cache of the machine: 32 KiB there, 48 KiB here.
 TEST(HfRatio, DoesNotDependOnTheSizeOfCaches) {
-  Random random(3);
+  Random random(3, stream_key({"caches"}));
   Eigen::MatrixXd q(29, 1300);
   for (double& value : q.reshaped()) value = random.normal();
   const std::ptrdiff_t first = Eigen::l1CacheSize(), second = Eigen::l2CacheSize(), third = Eigen::l3CacheSize();
