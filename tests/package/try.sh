@@ -15,7 +15,7 @@ command -v debootstrap >/dev/null || { echo "package trial: not run: debootstrap
 [ -n "${DUET_TRIAL_MOUNTS:-}" ] || DUET_TRIAL_MOUNTS=1 exec unshare --mount bash "$0" "$@"
 
 fail() { echo "package trial: $1" >&2; exit 1; }
-inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C DEBIAN_FRONTEND=noninteractive bash -euc "$1"; }
+inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/srv LC_ALL=C DEBIAN_FRONTEND=noninteractive bash -euc "$1"; }
 expect() {  # expect NAME PATTERN TEXT
   grep -qE -- "$2" <<<"$3" || fail "$1: expected /$2/, found: $3"
 }
@@ -44,7 +44,7 @@ inside "apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends \$(dpk
 inside 'duet doctor --need mujoco,bullet,ode,simbody,dart' >/dev/null || fail "an engine is absent with all that is recommended"
 inside 'duet --version; test -s /usr/share/man/man1/duet.1.gz; test -s /usr/share/doc/duet/copyright'
 
-inside 'mkdir /root/demo; cd /root/demo
+inside 'mkdir /srv/demo; cd /srv/demo
   duet synth hug -n 1 -o clips -q
   duet retarget clips -o paired -q
   duet score paired -q
@@ -52,13 +52,13 @@ inside 'mkdir /root/demo; cd /root/demo
   duet report run --format html,md,csv -o report -q >/dev/null
   duet replay run -o replay.html -q
   test -s report/report.html; test -s replay.html'
-rows=$(inside 'cat /root/demo/run/episodes.jsonl')
+rows=$(inside 'cat /srv/demo/run/episodes.jsonl')
 for engine in mujoco bullet ode simbody dart; do expect "rows of the demo" "\"engine\": ?\"$engine\"" "$rows"; done
 if grep -q '"outcome": *"error"' <<<"$rows"; then fail "an episode of the demo ended with an error"; fi
 
 inside 'apt-get install -y -qq -o Dpkg::Use-Pty=0 --no-install-recommends /packages/libduet-dev_*.deb cmake g++ make >/dev/null'
-cp -r "$examples/score_my_motion" "$root/root/score_my_motion"
-inside 'cd /root/score_my_motion; cmake -S . -B build -D CMAKE_BUILD_TYPE=Debug >/dev/null; cmake --build build >/dev/null'
-scores=$(inside 'build=/root/score_my_motion/build; $build/score_my_motion /root/demo/paired/*.npz')
+cp -r "$examples/score_my_motion" "$root/srv/score_my_motion"
+inside 'cd /srv/score_my_motion; cmake -S . -B build -D CMAKE_BUILD_TYPE=Debug >/dev/null; cmake --build build >/dev/null'
+scores=$(inside 'build=/srv/score_my_motion/build; $build/score_my_motion /srv/demo/paired/*.npz')
 expect "a program that links duet" 'hug (not )?detected' "$scores"
 echo "package trial: installed, $(grep -c . <<<"$rows") episodes in five engines, a program linked by find_package(duet)"
