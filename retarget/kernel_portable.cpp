@@ -21,11 +21,6 @@ inline bool any(VI x) { return (x[0] | x[1] | x[2] | x[3]) != 0; }
 
 namespace duet::pair_kernel {
 
-const LaneKernel kPortable = {.sweep = sweep_blocks,
-                              .filter_gradient = filter_gradient,
-                              .step = step,
-                              .dots = dots,
-                              .combine = combine,
-                              .move = move};
+const LaneKernel kPortable = kKernel;
 
 }  // namespace duet::pair_kernel

@@ -22,11 +22,6 @@ inline bool any(VI x) { return _mm_movemask_ps(reinterpret_cast<__m128>(x)) != 0
 
 namespace duet::pair_kernel {
 
-const LaneKernel kV2 = {.sweep = sweep_blocks,
-                        .filter_gradient = filter_gradient,
-                        .step = step,
-                        .dots = dots,
-                        .combine = combine,
-                        .move = move};
+const LaneKernel kV2 = kKernel;
 
 }  // namespace duet::pair_kernel

@@ -21,11 +21,6 @@ inline bool any(VI x) { return _mm256_movemask_ps(reinterpret_cast<__m256>(x)) !
 
 namespace duet::pair_kernel {
 
-const LaneKernel kV3 = {.sweep = sweep_blocks,
-                        .filter_gradient = filter_gradient,
-                        .step = step,
-                        .dots = dots,
-                        .combine = combine,
-                        .move = move};
+const LaneKernel kV3 = kKernel;
 
 }  // namespace duet::pair_kernel

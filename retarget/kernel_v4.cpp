@@ -21,11 +21,6 @@ inline bool any(VI x) { return _mm512_movepi32_mask(reinterpret_cast<__m512i>(x)
 
 namespace duet::pair_kernel {
 
-const LaneKernel kV4 = {.sweep = sweep_blocks,
-                        .filter_gradient = filter_gradient,
-                        .step = step,
-                        .dots = dots,
-                        .combine = combine,
-                        .move = move};
+const LaneKernel kV4 = kKernel;
 
 }  // namespace duet::pair_kernel

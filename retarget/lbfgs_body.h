@@ -1,5 +1,5 @@
-// The vectors of L-BFGS in lanes (kernel_types.h, VectorSweep). Included by kernel_v2/v3/v4.cpp only, after
-// kernel_body.h; everything has internal linkage.
+// The vectors of L-BFGS in lanes (kernel_types.h, VectorSweep). Included by the kernel files only, after kernel_body.h;
+// everything has internal linkage.
 #pragma once
 
 namespace duet::pair_kernel {
@@ -129,6 +129,14 @@ inline void move(const VectorSweep& at, const Row* x, const Row* direction, floa
     }
   }
 }
+
+// What the kernel file gives out, under the name of its instruction set.
+constexpr LaneKernel kKernel = {.sweep = sweep_blocks,
+                                .filter_gradient = filter_gradient,
+                                .step = step,
+                                .dots = dots,
+                                .combine = combine,
+                                .move = move};
 
 }  // namespace
 }  // namespace duet::pair_kernel

@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 namespace duet {
 
 Perturbation with_links(Perturbation perturbation, const RobotModel& robot) {
-  for (std::shared_ptr<const RobotPerturbation>& one : perturbation.robot) one = one->with_links(robot);
+  for (std::shared_ptr<const RobotPerturbation>& one : perturbation.robot)
+    if (std::shared_ptr<const RobotPerturbation> named = one->with_links(robot)) one = std::move(named);
   return perturbation;
 }
 

@@ -31,8 +31,8 @@ class RobotPerturbation {
  public:
   virtual ~RobotPerturbation() = default;
 
-  // With the robot's own link where none is named: what a suite's hash is made of.
-  [[nodiscard]] virtual std::shared_ptr<const RobotPerturbation> with_links(const RobotModel& robot) const = 0;
+  // With the robot's own link where none is named: what a suite's hash is made of. Null where it names no link.
+  [[nodiscard]] virtual std::shared_ptr<const RobotPerturbation> with_links(const RobotModel&) const { return nullptr; }
   // Throws std::invalid_argument: a link that the robot lacks (with the nearest and all that it has), values that it
   // cannot have.
   virtual void check(const RobotModel&) const {}

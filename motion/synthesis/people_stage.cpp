@@ -49,8 +49,6 @@ double draw_act(const Act& act, double tempo, Draws& draws) {
   return draws.uniform("act", act.shortest, 0.6 * act.shortest + 0.4 * act.longest);
 }
 
-Eigen::Vector2d facing(const Placement& at) { return {std::cos(at.yaw), std::sin(at.yaw)}; }
-
 // The four ends of the two ways, the middle between the two in the act at the origin: each comes straight to its place,
 // from where it has turned by half of `angle`.
 Ways people_ways(const Layout& layout, double way, double angle, double share) {
@@ -60,7 +58,7 @@ Ways people_ways(const Layout& layout, double way, double angle, double share) {
   for (const int k : {0, 1}) {
     ways.start[k] = ways.act[k];
     ways.start[k].yaw += 0.5 * angle;
-    ways.start[k].position -= (k == 0 ? share : 1.0 - share) * way * facing(ways.start[k]);
+    ways.start[k].position -= (k == 0 ? share : 1.0 - share) * way * towards(ways.start[k].yaw);
   }
   return ways;
 }

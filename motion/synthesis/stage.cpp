@@ -34,11 +34,7 @@ Body draw_body(const std::string& who, std::optional<double> height, Draws& draw
   return make_body(h, proportions);
 }
 
-namespace {
-
 Eigen::Vector2d towards(double yaw) { return {std::cos(yaw), std::sin(yaw)}; }
-
-}  // namespace
 
 Ways plan_ways(const Layout& layout, double distance, double angle, double share) {
   Ways ways;

@@ -22,6 +22,9 @@ Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws);
 Body draw_body(const std::string& who, std::optional<double> height, Draws& draws, double shortest_arms = 0.97,
                double longest_arms = 1.03);
 
+// The level direction that somebody of this yaw faces.
+Eigen::Vector2d towards(double yaw);
+
 // The four ends of the two ways. The middle between the two in the act is the origin, A sets out along +x.
 struct Ways {
   std::array<Placement, 2> start, act;

@@ -17,9 +17,6 @@ struct Kick final : RobotPerturbation {
   double first = 2.0;           // [s]
   double from = 3.0, to = 6.0;  // [s]
 
-  [[nodiscard]] std::shared_ptr<const RobotPerturbation> with_links(const RobotModel&) const override {
-    return std::make_shared<const Kick>(*this);
-  }
   [[nodiscard]] std::unique_ptr<RobotAct> begin(const RobotModel& robot, std::uint64_t seed) const override;
 };
 

@@ -17,9 +17,6 @@ struct Noise final : RobotPerturbation {
   double w = 0.2;         // of the base, each axis of B [rad/s]
   double gravity = 0.05;  // turn of the base about its x and y, which is what gravity in B shows of it [rad]
 
-  [[nodiscard]] std::shared_ptr<const RobotPerturbation> with_links(const RobotModel&) const override {
-    return std::make_shared<const Noise>(*this);
-  }
   [[nodiscard]] std::unique_ptr<RobotAct> begin(const RobotModel& robot, std::uint64_t seed) const override;
 };
 
