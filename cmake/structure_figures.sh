@@ -13,8 +13,9 @@ indented() { sed 's/^/  /'; }
 circles=$(cmake/check_layers.sh | grep -c 'in a circle:$' || true)
 echo "circles of units: $circles"
 
-# Where a controller's act() is called: controllers wrap one another, benchmarks time it alone.
-loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers|bench/benchmarks)/')
+# Where a controller's act() is called: controllers wrap one another, hardware/walker commands over the wire and steps
+# no engine, benchmarks time it alone.
+loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers|bench/benchmarks)/|^hardware/walker\.cpp$')
 echo "places that step a robot under a controller: $(wc -l <<<"$loops")"
 indented <<<"$loops"
 

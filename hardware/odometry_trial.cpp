@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
+#include <vector>
 
 #include "duet/backends/factory.h"
 #include "duet/controllers/registry.h"
@@ -9,12 +12,13 @@
 #include "duet/core/random.h"
 #include "duet/hardware/leg_odometry.h"
 #include "duet/robots/dynamics.h"
-#include "duet/rollout/reference_source.h"
+#include "duet/rollout/rollout.h"
 
 namespace duet {
 namespace {
 
-constexpr int kStepsOfTick = 10, kTicksOfWay = 10;
+constexpr int kStepsOfTick = 10;
+constexpr std::size_t kTicksOfWay = 10;
 
 Scene flat_ground(const std::shared_ptr<const RobotModel>& robot) {
   Scene scene;
@@ -51,7 +55,7 @@ Eigen::Vector3d measured_force(Eigen::Vector3d force, const OdometryTrial& trial
 // Compares what the legs say with where the base is.
 class OdometryComparison {
  public:
-  explicit OdometryComparison(const RobotState& start) : begin_(start.X_WB.p), last_(start.X_WB.p) {}
+  explicit OdometryComparison(const RobotState& start) : begin_(start.X_WB.p) {}
 
   void add(const RobotState& state, const OdometrySample& sample) {
     const Eigen::Vector3d off = sample.X_WB.p - state.X_WB.p + Eigen::Vector3d(begin_.x(), begin_.y(), 0.0);
@@ -61,55 +65,97 @@ class OdometryComparison {
     squares_ += (sample.v_WB - state.v_WB).head<2>().squaredNorm();
     ++count_;
   }
-  void walk_to(const Eigen::Vector3d& p_WB) {
-    error_.walked += (p_WB - last_).head<2>().norm();
-    last_ = p_WB;
-  }
   [[nodiscard]] OdometryError error() const {
     OdometryError error = error_;
-    error.speed_rms = std::sqrt(squares_ / static_cast<double>(count_));
+    if (count_ > 0) error.speed_rms = std::sqrt(squares_ / static_cast<double>(count_));
     return error;
   }
 
  private:
-  Eigen::Vector3d begin_, last_;
+  Eigen::Vector3d begin_;
   OdometryError error_;
   double squares_ = 0.0;
   long count_ = 0;
 };
 
+// An engine whose robot carries the odometry along: after each step it is told what joints and IMU say.
+class Measured final : public Backend {
+ public:
+  Measured(const OdometryTrial& trial, const Scene& scene)
+      : Backend(scene),
+        engine_(make_backend(trial.engine, scene)),
+        trial_(trial),
+        random_(trial.seed, stream_key({"odometry trial"})),
+        odometry_(scene.robot) {}
+
+  [[nodiscard]] std::string_view name() const override { return engine_->name(); }
+  [[nodiscard]] std::string version() const override { return engine_->version(); }
+  // Since the last reset; there has been one.
+  [[nodiscard]] OdometryError error() const { return comparison_->error(); }
+
+ private:
+  void do_reset() override {
+    engine_->reset(state_);
+    comparison_.emplace(state_);
+    odometry_.update(measured(state_, trial_, random_), {0.0, 0.0, kGravity});
+  }
+  Outcome do_step(const JointCommand& command) override {
+    const Eigen::Vector3d v_before = state_.v_WB;
+    const Outcome outcome = engine_->step(command);
+    state_ = engine_->state();
+    contacts_.assign(engine_->contacts().begin(), engine_->contacts().end());
+    torques_ = engine_->torques();
+    const Eigen::Vector3d a_W = (state_.v_WB - v_before) / scene().dt + kGravity * Eigen::Vector3d::UnitZ();
+    odometry_.update(measured(state_, trial_, random_),
+                     measured_force(state_.X_WB.R.conjugate() * a_W, trial_, random_));
+    comparison_->add(state_, odometry_.sample());
+    return outcome;
+  }
+  void do_set_partner(const HumanJoints& joints, const HumanJoints& velocities) override {
+    engine_->set_partner(joints, velocities);
+  }
+  void do_push(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_W) override {
+    engine_->push(link, f_W, p_W);
+  }
+  void do_kick(const Eigen::Vector3d& dv_W) override { engine_->kick(dv_W); }
+  void do_snapshot(Snapshot& snapshot) const override {
+    const Snapshot inner = engine_->snapshot();
+    snapshot.values.insert(snapshot.values.end(), inner.values.begin(), inner.values.end());
+  }
+  void do_restore(std::span<const double> values) override {
+    engine_->restore({std::vector<double>(values.begin(), values.end())});
+    state_ = engine_->state();
+  }
+
+  std::unique_ptr<Backend> engine_;
+  const OdometryTrial& trial_;
+  Random random_;
+  LegOdometry odometry_;
+  std::optional<OdometryComparison> comparison_;
+};
+
+// Length of the base's way in the plane, at 5 Hz.
+double walked_way(const std::vector<RobotState>& states) {
+  double way = 0.0;
+  for (std::size_t t = kTicksOfWay; t < states.size(); t += kTicksOfWay)
+    way += (states[t].X_WB.p - states[t - kTicksOfWay].X_WB.p).head<2>().norm();
+  return way;
+}
+
 }  // namespace
 
 OdometryError measure_leg_odometry(const std::shared_ptr<const RobotModel>& robot, const OdometryTrial& trial) {
-  const std::unique_ptr<Backend> backend = make_backend(trial.engine, flat_ground(robot));
+  Measured engine(trial, flat_ground(robot));
   const std::unique_ptr<Controller> controller = make_controller(trial.controller, robot);
   StreamReference source(robot, walk_of(trial), trial.seed);
-  Random random(trial.seed, stream_key({"odometry trial"}));
-  const RobotState start = robot->standing_state();
-  backend->reset(start);
-  controller->reset(start);
-  source.begin(start);
-  LegOdometry odometry(robot);
-  odometry.update(measured(start, trial, random), {0.0, 0.0, kGravity});
-  OdometryComparison comparison(start);
-  JointCommand command = robot->default_command(robot->neutral);
-  bool fell = false;
-  for (int tick = 0; tick < ticks_of(trial.seconds) && !fell; ++tick) {
-    const Reference* reference = source.at({.tick = tick, .robot = backend->state(), .partner = nullptr});
-    controller->act(backend->state(), *reference, command);
-    for (int step = 0; step < kStepsOfTick; ++step) {
-      const Eigen::Vector3d v_before = backend->state().v_WB;
-      fell = backend->step(command) != Outcome::kOk || fell;
-      const RobotState& now = backend->state();
-      const Eigen::Vector3d a_W = (now.v_WB - v_before) / backend->scene().dt + kGravity * Eigen::Vector3d::UnitZ();
-      odometry.update(measured(now, trial, random), measured_force(now.X_WB.R.conjugate() * a_W, trial, random));
-      comparison.add(backend->state(), odometry.sample());
-    }
-    if (tick % kTicksOfWay == 0) comparison.walk_to(backend->state().X_WB.p);
-    fell = fell || has_fallen(backend->state(), robot->fall);
-  }
-  OdometryError error = comparison.error();
-  error.fell = fell;
+  Episode episode;
+  episode.start = robot->standing_state();
+  episode.fall = robot->fall;
+  episode.ticks = ticks_of(trial.seconds);
+  const Rollout rollout = roll_out(episode, engine, *controller, source);
+  OdometryError error = engine.error();
+  error.walked = walked_way(rollout.recording.robot);
+  error.fell = rollout.recording.outcome != Outcome::kOk;
   return error;
 }
 
