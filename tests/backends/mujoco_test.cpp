@@ -1,4 +1,5 @@
-// MuJoCo against closed forms: fall, one joint under the torque law, stops, and the repeatability of runs.
+// MuJoCo: its law against the shared one, its options and what they change. What holds in every engine is in
+// engine_*_test.cpp.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -30,60 +31,16 @@ struct Mujoco : ::testing::Test {
   }
 };
 
-constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
-
-TEST_F(Mujoco, ReportsVelocitiesInOurFrames) {
-  const auto backend = make(test::sledge());
-  RobotState state = test::state_of(*backend->scene().robot, {0.0, 0.0, 50.0});
-  state.X_WB.R = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, -1.0).normalized());
-  state.w_WB_B = {0.0, 0.0, 2.0};  // about a principal axis: constant in B
-  backend->reset(state);
-  for (int i = 0; i < 100; ++i) backend->step(test::no_torque(*backend->scene().robot));
-  const Eigen::Quaterniond turned = state.X_WB.R * yaw_rotation(2.0 * backend->time());
-  EXPECT_NEAR(backend->state().X_WB.R.angularDistance(turned), 0.0, 1e-7);
-  EXPECT_NEAR((backend->state().w_WB_B - state.w_WB_B).norm(), 0.0, kAlgebra);
-}
-
-struct Wheel : Mujoco {
-  void SetUp() override {
-    Mujoco::SetUp();
-    if (IsSkipped()) return;
-    backend = make(test::wheel());
-    backend->reset(test::state_of(*backend->scene().robot, {0.0, 0.0, 1000.0}));
-    command = test::no_torque(*backend->scene().robot);
-  }
-  std::unique_ptr<Backend> backend;
-  JointCommand command;
-};
-
-TEST_F(Wheel, StopsAtItsLimit) {
-  command.tau_ff[0] = 10.0;
-  double highest = 0.0;
-  for (int i = 0; i < 1000; ++i) {
-    backend->step(command);
-    highest = std::max(highest, backend->state().q[0]);
-  }
-  EXPECT_LT(highest, 1.0 + 0.1);  // arrives at 16 rad/s
-  EXPECT_NEAR(backend->state().q[0], 1.0, 0.005);
-  EXPECT_NEAR(backend->state().v[0], 0.0, 1e-3);
-}
-
-TEST_F(Mujoco, DivergenceIsAValueAndFinalUntilReset) {
+TEST_F(Mujoco, LeavesNoLogOfADivergedRun) {
   auto robot = test::wheel();
   robot->joints[0].effort = 1e300;
   const auto backend = make(robot);
-  const RobotState state = test::state_of(*robot, {0.0, 0.0, 1000.0});
-  backend->reset(state);
+  backend->reset(test::state_of(*robot, {0.0, 0.0, 1000.0}));
   JointCommand command = test::no_torque(*robot);
   command.tau_ff[0] = 1e6;
   Outcome outcome = Outcome::kOk;
   for (int i = 0; i < 2000 && outcome == Outcome::kOk; ++i) outcome = backend->step(command);
   EXPECT_EQ(outcome, Outcome::kDiverged);
-  EXPECT_TRUE(backend->state().q.allFinite());
-  command = test::no_torque(*robot);
-  EXPECT_EQ(backend->step(command), Outcome::kDiverged);
-  backend->reset(state);
-  EXPECT_EQ(backend->step(command), Outcome::kOk);
   EXPECT_FALSE(std::filesystem::exists("MUJOCO_LOG.TXT"));
 }
 
@@ -92,37 +49,6 @@ TEST_F(Mujoco, RefusesAModelThatItCannotCompileWithItsMessage) {
   robot->links[1].inertia = Eigen::Vector3d(1.0, 1.0, 5.0).asDiagonal();  // no body has this
   EXPECT_NE(test::thrown_message<std::runtime_error>([&] { make(robot); }).find("mujoco: refuses the scene"),
             std::string::npos);
-}
-
-TEST_F(Mujoco, AccelerationsAgreeWithOurDynamics) {
-  const auto backend = make(test::g1(), 1e-6);
-  const RobotModel& robot = *backend->scene().robot;
-  Random random(1, 2);
-  for (int trial = 0; trial < 3; ++trial) {
-    RobotState state = test::state_of(robot, {0.0, 0.0, 50.0});
-    state.X_WB.R = Eigen::AngleAxisd(1.0, Eigen::Vector3d(0.1, 0.7, -0.3).normalized());
-    state.w_WB_B = {random.normal(), random.normal(), random.normal()};
-    state.v_WB = {random.normal(), random.normal(), random.normal()};
-    for (int i = 0; i < robot.dof(); ++i) {
-      state.q[i] = std::clamp(0.3 * random.normal(), robot.joints[i].lower + 0.05, robot.joints[i].upper - 0.05);
-      state.v[i] = random.normal();
-    }
-    JointCommand command = test::no_torque(robot);
-    for (int i = 0; i < robot.dof(); ++i) command.tau_ff[i] = random.normal();
-    const int n = 6 + robot.dof();
-    Eigen::VectorXd bias(n), force = Eigen::VectorXd::Zero(n);
-    Eigen::MatrixXd mass(n, n);
-    bias_forces(robot, state, bias);
-    mass_matrix(robot, state, mass);
-    force.tail(robot.dof()) = command.tau_ff;
-    const Eigen::VectorXd expected = mass.llt().solve(force - bias);
-    backend->reset(state);
-    backend->step(command);
-    Eigen::VectorXd found(n);
-    found << backend->state().v_WB - state.v_WB, backend->state().w_WB_B - state.w_WB_B, backend->state().v - state.v;
-    found /= backend->scene().dt;
-    EXPECT_LT((found - expected).norm() / expected.norm(), 1e-6);
-  }
 }
 
 // The G1 far from stops, thrown and turning, all its targets 0.6 rad away: most joints are at their effort.
