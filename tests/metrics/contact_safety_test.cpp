@@ -1,92 +1,30 @@
+// Forces over time against their limits: closed forms, spans, sums, steps, pressure.
 #include "duet/metrics/contact_safety.h"
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <numbers>
-#include <span>
 #include <utility>
 
-#include "duet/metrics/catalogue.h"
-#include "tests/robots/allocations.h"
-#include "tests/support.h"
+#include "tests/metrics/contact_scene.h"
 
 namespace duet {
 namespace {
 
 using Eigen::Vector3d;
-using test::thrown_message;
-using ::testing::HasSubstr;
-using ::testing::Key;
-using ::testing::UnorderedElementsAre;
-
-constexpr double kRounding = 1e-9;  // of sums over some thousand steps
-
-// Capsules of the test's body.
-enum Capsule { kChestA, kChestB, kHead, kHandLeft, kHandRight, kFoot };
-
-HumanBody body() {
-  HumanBody human;
-  const auto add = [&](const char* name, const char* region, double radius) {
-    HumanCapsule capsule;
-    capsule.name = name;
-    capsule.region = region;
-    capsule.radius = radius;
-    human.capsules.push_back(capsule);
-  };
-  add("upper_chest", "chest", 0.12);
-  add("lower_chest", "chest", 0.12);
-  add("head", "head", 0.1);
-  add("left_hand", "hand", 0.03);
-  add("right_hand", "hand", 0.03);
-  add("left_foot", "foot", 0.035);
-  return human;
-}
-
-// Nothing is stated for the foot.
-ContactLimits table() {
-  return {.name = "table",
-          .source = "test",
-          .verified_by = "",
-          .regions = {{.region = "chest", .quasi_static_n = 140.0, .transient_n = 280.0, .pressure_n_cm2 = 120.0},
-                      {.region = "head", .quasi_static_n = 65.0, .transient_allowed = false, .pressure_n_cm2 = 110.0},
-                      {.region = "hand", .quasi_static_n = 140.0, .transient_n = 280.0},
-                      {.region = "foot"}}};
-}
-
-constexpr double kDepth = 0.02;  // wide patches: no pressure near its limit
-
-Contact touch(int capsule, const Vector3d& force, int link = 0, double depth = kDepth) {
-  return {.link = link, .side = ContactSide::kHuman, .other = capsule, .f_W = force, .depth = depth};
-}
-
-Contact touch(int capsule, double force, int link = 0, double depth = kDepth) {
-  return touch(capsule, Vector3d(force, 0.0, 0.0), link, depth);
-}
-
-using ContactsAt = std::function<std::vector<Contact>(double)>;  // by time in the middle of a step
-
-ContactSafetyResult fed(double duration, const ContactsAt& contacts, double dt = 0.002,
-                        const ContactSafetyOptions& options = {}, const ContactLimits& limits = table()) {
-  ContactSafety safety(body(), limits, dt, options);
-  const int steps = static_cast<int>(std::lround(duration / dt));
-  for (int k = 0; k < steps; ++k) safety.add(contacts((k + 0.5) * dt));
-  return safety.result();
-}
-
-// `force` on one capsule within [begin, end).
-ContactsAt pulse(int capsule, double force, double begin, double end) {
-  return [=](double t) { return t > begin && t < end ? std::vector{touch(capsule, force)} : std::vector<Contact>(); };
-}
-
-const RegionContact& region(const ContactSafetyResult& result, std::string_view name) {
-  for (const RegionContact& entry : result.regions)
-    if (entry.region == name) return entry;
-  throw std::out_of_range("no region");
-}
+using test::contact_table;
+using test::ContactsAt;
+using test::fed;
+using test::kChestA;
+using test::kChestB;
+using test::kFoot;
+using test::kHandLeft;
+using test::kHead;
+using test::kRounding;
+using test::pulse;
+using test::region;
+using test::touch;
 
 TEST(ContactSafety, AConstantForceHasItsClosedForm) {
   const ContactSafetyResult result = fed(2.0, pulse(kChestA, 50.0, 0.5, 1.5));
@@ -298,7 +236,7 @@ TEST(ContactSafety, FiguresDoNotDependOnTheStep) {
 TEST(ContactSafety, ALimitThatIsReachedIsKeptAndTheNextNumberIsOver) {
   for (int tenths = 1; tenths <= 100; ++tenths) {  // the mean over a window may round
     const double limit = 0.1 * tenths;
-    ContactLimits limits = table();
+    ContactLimits limits = contact_table();
     limits.regions[0] = {.region = "chest", .quasi_static_n = limit, .transient_n = limit};
     const RegionContact at = fed(1.0, pulse(kChestA, limit, 0.1, 0.9), 0.002, {}, limits).regions[0];
     EXPECT_EQ(at.verdict, ContactVerdict::kWithin) << limit;
@@ -357,172 +295,6 @@ TEST(ContactSafety, PressureIsHeldAgainstItsLimit) {
   const ContactSafetyResult result = fed(0.1, [](double) { return std::vector{touch(kChestA, 130.0, 0, 0.0)}; });
   EXPECT_NEAR(*region(result, "chest").pressure_ratio, 130.0 / 120.0, kRounding);
   EXPECT_EQ(region(result, "chest").verdict, ContactVerdict::kOver);
-}
-
-TEST(ContactSafety, NothingHappenedWithoutContact) {
-  Contact ground = touch(-1, 400.0);
-  ground.side = ContactSide::kGround;
-  const ContactSafetyResult result = fed(1.0, [&](double) {
-    return std::vector{ground, touch(kChestA, 0.0), touch(kHead, 1e-6)};
-  });
-  EXPECT_EQ(result.peak_force, 0.0);
-  EXPECT_EQ(result.impulse, 0.0);
-  EXPECT_EQ(result.worst_ratio, 0.0);
-  EXPECT_EQ(result.verdict, ContactVerdict::kWithin);
-  EXPECT_TRUE(result.events.empty());
-  EXPECT_EQ(result.regions.size(), 4u);
-  for (const RegionContact& entry : result.regions) EXPECT_EQ(entry.contacts, 0);
-  EXPECT_EQ(fed(0.0, [](double) { return std::vector<Contact>(); }).duration, 0.0);
-}
-
-TEST(ContactSafety, EventsPastTheCapAreCounted) {
-  const ContactsAt taps = [](double t) {
-    return std::fmod(t, 0.1) < 0.05 ? std::vector{touch(kChestA, 50.0)} : std::vector<Contact>();
-  };
-  const ContactSafetyResult result = fed(1.0, taps, 0.002, {.max_events = 4});
-  EXPECT_EQ(result.events.size(), 4u);
-  EXPECT_EQ(result.events_left_out, 6);
-  EXPECT_EQ(region(result, "chest").contacts, 10);
-}
-
-TEST(ContactSafety, PairsPastTheCapStillPressOnTheirRegion) {
-  const ContactsAt two = [](double) { return std::vector{touch(kChestA, 50.0, 1), touch(kHandLeft, 70.0, 2)}; };
-  const ContactSafetyResult result = fed(1.0, two, 0.002, {.max_pairs = 1});
-  EXPECT_EQ(result.contacts_unfollowed, 500);
-  EXPECT_EQ(result.events.size(), 1u);
-  EXPECT_EQ(region(result, "hand").quasi_static_force, 70.0);
-  EXPECT_GT(region(result, "hand").pressure_n_cm2, 0.0);
-}
-
-TEST(ContactSafety, ForcesThatAreNotFiniteAreCountedAndIgnored) {
-  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
-  const ContactSafetyResult result = fed(0.002, [&](double) {
-    return std::vector{touch(kChestA, nan), touch(kChestA, infinity), touch(kChestA, 5.0, 0, nan), touch(kChestA, 5.0)};
-  });
-  EXPECT_EQ(result.contacts_not_finite, 3);
-  EXPECT_EQ(result.peak_force, 5.0);
-}
-
-TEST(ContactSafety, ResultMayBeAskedForAtAnyTime) {
-  ContactSafety asked(body(), table(), 0.002), left_alone(body(), table(), 0.002);
-  for (int k = 0; k < 400; ++k) {
-    const std::vector<Contact> contacts{touch(kChestA, 50.0 + k % 3)};
-    asked.add(contacts);
-    left_alone.add(contacts);
-    if (k == 100) {
-      const ContactSafetyResult now = asked.result();
-      EXPECT_EQ(region(now, "chest").transient_contacts, 1);
-      ASSERT_EQ(now.events.size(), 1u);
-      EXPECT_NEAR(now.events[0].duration, 101 * 0.002, kRounding);
-    }
-  }
-  EXPECT_EQ(contact_forces(asked.result()), contact_forces(left_alone.result()));
-  EXPECT_EQ(asked.result().events.size(), 1u);
-}
-
-TEST(ContactSafety, AddDoesNotAllocate) {
-  if (!test::counts_allocations()) GTEST_SKIP() << "not run: a sanitizer replaces malloc";
-  ContactSafety safety(body(), table(), 0.002, {.max_events = 8});
-  std::array<Contact, 3> contacts{touch(kChestA, 50.0, 1), touch(kChestB, 20.0, 2), touch(kHead, 20.0, 3)};
-  const long before = test::allocations();
-  for (int k = 0; k < 3000; ++k)
-    safety.add(std::span(contacts).first(k % 100 < 50 ? static_cast<std::size_t>(k % 4) : 0));
-  EXPECT_EQ(test::allocations(), before);
-}
-
-TEST(ContactSafety, EveryRegionOfTheBodyNeedsAnEntry) {
-  ContactLimits limits = table();
-  limits.regions.pop_back();
-  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { ContactSafety(body(), limits, 0.002); }),
-            "contact limits 'table': expected an entry for the region 'foot', found chest, head, hand");
-  limits = table();
-  limits.regions[1].quasi_static_n.reset();
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { ContactSafety(body(), limits, 0.002); }),
-              HasSubstr("region 'head': a transient limit of 'not_allowed' needs a quasi-static one"));
-}
-
-TEST(ContactSafety, MisuseIsRefused) {
-  const auto message = [](const ContactSafetyOptions& options, double dt = 0.002) {
-    return thrown_message<std::invalid_argument>([&] { ContactSafety(body(), table(), dt, options); });
-  };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(message({}, 0.0), "contact safety: 'dt': expected a finite number > 0, found 0");
-  EXPECT_EQ(message({}, nan), "contact safety: 'dt': expected a finite number > 0, found nan");
-  EXPECT_EQ(message({}, 0.6), "contact safety: 'dt': expected at most 'hold', found 0.6");
-  EXPECT_THAT(message({.hold = -1.0}), HasSubstr("'hold': expected a finite number > 0, found -1"));
-  EXPECT_THAT(message({.bridge = -1.0}), HasSubstr("'bridge': expected a finite number >= 0, found -1"));
-  EXPECT_THAT(message({.bridge = 0.7}), HasSubstr("'bridge': expected at most 'hold', found 0.7"));
-  EXPECT_THAT(message({.mean_window = 0.0}), HasSubstr("'mean_window'"));
-  EXPECT_THAT(message({.least_force = nan}), HasSubstr("'least_force'"));
-  EXPECT_THAT(message({.least_patch = 0.0}), HasSubstr("'least_patch'"));
-  EXPECT_THAT(message({.link_radius = {0.1, -0.1}}),
-              HasSubstr("'link_radius': expected a finite number >= 0, found -0.1"));
-  EXPECT_THAT(message({.default_link_radius = 0.0}), HasSubstr("'default_link_radius'"));
-  EXPECT_THAT(message({.max_events = -1}), HasSubstr("'max_events': expected a number >= 0, found -1"));
-  EXPECT_THAT(message({.max_pairs = -1}), HasSubstr("'max_pairs'"));
-  for (const int capsule : {-1, 6})
-    EXPECT_THAT(thrown_message<std::invalid_argument>(
-                    [&] { fed(0.002, [&](double) { return std::vector{touch(capsule, 1.0)}; }); }),
-                HasSubstr("expected a capsule below 6, found"));
-}
-
-TEST(ContactSafety, LinkRadiusIsTheSmallestOfTheLinksShapes) {
-  RobotModel robot;
-  robot.links.resize(3);
-  for (const auto& [link, radius] : {std::pair(0, 0.1), std::pair(2, 0.05), std::pair(2, 0.02)}) {
-    RobotShape& shape = robot.shapes.emplace_back();
-    shape.link = link;
-    shape.radius = radius;
-  }
-  EXPECT_EQ(link_radii(robot), (std::vector{0.1, 0.0, 0.02}));
-}
-
-TEST(ContactForces, NameWhatWasTouched) {
-  const ContactSafetyResult result = fed(1.0, [](double) {
-    return std::vector{touch(kChestA, 50.0, 0, 0.01), touch(kFoot, 30.0, 1)};
-  });
-  const std::map<std::string, double> forces = contact_forces(result);
-  EXPECT_THAT(forces, UnorderedElementsAre(Key("human.peak_n"), Key("human.impulse_ns"), Key("human.worst_ratio"),
-                                           Key("human.limits_verified"), Key("human.chest.peak_n"),
-                                           Key("human.chest.quasi_static_n"), Key("human.chest.transient_n"),
-                                           Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"),
-                                           Key("human.chest.worst_ratio"), Key("human.foot.peak_n"),
-                                           Key("human.foot.quasi_static_n"), Key("human.foot.transient_n"),
-                                           Key("human.foot.impulse_ns"), Key("human.foot.pressure_n_cm2")));
-  EXPECT_EQ(forces.at("human.peak_n"), 50.0);
-  EXPECT_NEAR(forces.at("human.impulse_ns"), 80.0, kRounding);
-  EXPECT_EQ(forces.at("human.foot.quasi_static_n"), 30.0);
-  EXPECT_EQ(forces.at("human.worst_ratio"), forces.at("human.chest.worst_ratio"));
-}
-
-TEST(ContactSafetyMetrics, AreInTheCatalogue) {
-  const std::map<std::string, double> metrics = contact_safety_metrics(fed(1.0, pulse(kChestA, 70.0, 0.0, 1.0)));
-  EXPECT_EQ(metrics.at("contact_peak_force"), 70.0);
-  EXPECT_EQ(metrics.at("contact_quasi_static_force"), 70.0);
-  EXPECT_NEAR(metrics.at("contact_impulse"), 70.0, kRounding);
-  EXPECT_NEAR(metrics.at("contact_limit_ratio"), 0.5, kRounding);
-  for (const auto& [name, value] : metrics) EXPECT_EQ(metric_info(name).group, MetricGroup::kEpisode) << name;
-  EXPECT_EQ(metric_info("contact_limit_ratio").direction, Direction::kLower);
-  EXPECT_EQ(metric_info("contact_limit_ratio").unit, "1");
-}
-
-TEST(ContactSafety, OutputsSayWhetherTheLimitsAreVerified) {
-  const ContactsAt press = [](double) {
-    return std::vector{touch(kChestA, 70.0, 0, 0.02), touch(kFoot, 10.0, 0, 0.02)};
-  };
-  const ContactSafetyResult result = fed(1.0, press);
-  EXPECT_EQ(result.limits, "table (unverified limits)");
-  EXPECT_EQ(contact_forces(result).at("human.limits_verified"), 0.0);
-  EXPECT_THAT(contact_safety_text(result), HasSubstr("limits table (unverified limits): unlimited\n"));
-  EXPECT_THAT(contact_safety_text(result), HasSubstr("  chest: peak 70.0 N, held 70.0 N, 70.00 N s, about 2.3 N/cm2, "
-                                                     "0.50 of the limit, within\n"));
-  EXPECT_THAT(contact_safety_text(result), HasSubstr(" N/cm2, unlimited\n"));
-
-  ContactLimits limits = table();
-  limits.verified_by = "A. Person";
-  const ContactSafetyResult verified = fed(1.0, press, 0.002, {}, limits);
-  EXPECT_EQ(verified.limits, "table (limits verified by A. Person)");
-  EXPECT_EQ(contact_forces(verified).at("human.limits_verified"), 1.0);
 }
 
 }  // namespace

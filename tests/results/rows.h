@@ -119,4 +119,12 @@ inline EpisodeRow engine_episode(const std::string& engine, const std::string& p
   return row;
 }
 
+// The root at (x, 0, 0) mm in each frame, a hand at its side.
+inline EpisodeRow traced(const std::string& engine, int number, const std::vector<int>& x_mm) {
+  EpisodeRow row = engine_episode(engine, "replay", number, true);
+  row.trace.points = {"root", "left_hand"};
+  for (const int x : x_mm) row.trace.mm.push_back({x, 0, 0, 0, 300, 900});
+  return row;
+}
+
 }  // namespace duet::test
