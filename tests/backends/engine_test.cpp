@@ -103,6 +103,23 @@ TEST_P(EngineWheel, ClampsTheWholeLawNotItsSpring) {
   EXPECT_NEAR(backend->state().v[0], 20.0 - 10.0 / kInertia * backend->scene().dt, 1e-5);
 }
 
+// At a stop the joint is stopped within a step: what is reported is the law at the end of that step all the same.
+TEST_P(EngineWheel, TheLawHoldsInTheStepOfAStop) {
+  command.q_target[0] = 1.5;
+  command.kp[0] = 4.0;
+  command.kd[0] = 0.4;
+  const double dt = backend->scene().dt;
+  double hardest = 0.0;
+  for (int i = 0; i < 400; ++i) {
+    const double q = backend->state().q[0], before = backend->state().v[0];
+    ASSERT_EQ(backend->step(command), Outcome::kOk);
+    const double v = backend->state().v[0];
+    hardest = std::max(hardest, before - v);
+    EXPECT_NEAR(backend->torques()[0], 4.0 * (1.5 - q - dt * v) - 0.4 * v, 1e-4) << i;
+  }
+  EXPECT_GT(hardest, 1.0);
+}
+
 // ODE's own motor of the hinge explodes here: it turns its bound into a raw torque at a stop.
 TEST_P(EngineWheel, HoldsStillAtItsStopUnderStiffGains) {
   command.q_target[0] = 3.0;  // 2 rad beyond the stop

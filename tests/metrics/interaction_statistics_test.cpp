@@ -1,5 +1,6 @@
 #include "duet/metrics/interaction_statistics.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -140,6 +141,42 @@ TEST(InteractionStatistics, RateIsThatOfTheRecording) {
   EXPECT_DOUBLE_EQ(interaction_statistics(clip).source_rate_hz, 15.0);
   clip.source["source_rate_hz"] = "no number";
   EXPECT_DOUBLE_EQ(interaction_statistics(clip).source_rate_hz, 50.0);
+}
+
+// Upper arms of 0.3 m, forearms of 0.2 m, straight down.
+void give_arms(HumanMotion& person) {
+  for (int t = 0; t < person.frames(); ++t)
+    for (const auto& [shoulder, elbow, wrist] :
+         {std::array{kLeftShoulder, kLeftElbow, kLeftWrist}, std::array{kRightShoulder, kRightElbow, kRightWrist}}) {
+      const Eigen::Vector3d at = person.joints.at(t, shoulder);
+      person.joints.at(t, elbow) = at - Eigen::Vector3d(0.0, 0.0, 0.3);
+      person.joints.at(t, wrist) = at - Eigen::Vector3d(0.0, 0.0, 0.5);
+    }
+}
+
+TEST(InteractionStatistics, ArmsAreHeldAgainstTheirOwnMedian) {
+  InteractionClip clip = meeting(20, 70);
+  give_arms(clip.a);
+  give_arms(clip.b);
+  const InteractionStatistics still = interaction_statistics(clip);
+  EXPECT_NEAR(still.arm_length, 0.5, 1e-12);
+  EXPECT_NEAR(still.arm_change_p95, 0.0, 1e-12);
+  EXPECT_EQ(still.arm_occluded, 0.0);
+  for (int t = 0; t < 44; ++t) clip.a.joints.at(t, kLeftWrist).z() -= 0.1;  // half as long again
+  const InteractionStatistics lost = interaction_statistics(clip);
+  EXPECT_NEAR(lost.arm_change_p95, 0.5, 1e-9);  // 44 of 800 bones
+  EXPECT_DOUBLE_EQ(lost.arm_occluded, 0.11);
+}
+
+TEST(InteractionStatistics, NoiseIsWhatIsLeftOfTheMiddleBetweenBeforeAndAfter) {
+  InteractionClip clip = meeting(20, 70);
+  for (HumanMotion* person : {&clip.a, &clip.b})
+    for (int t = 0; t < 100; ++t) person->joints.frame(t).row(1).array() += 0.01 * t;
+  EXPECT_NEAR(interaction_statistics(clip).noise, 0.0, 1e-12);  // who walks straight has none
+  const int step = static_cast<int>(std::lround(kNoiseStep * 50.0));
+  for (HumanMotion* person : {&clip.a, &clip.b})
+    for (int t = 0; t < 100; ++t) person->joints.frame(t).row(0).array() += t / step % 2 == 0 ? 0.004 : -0.004;
+  EXPECT_NEAR(interaction_statistics(clip).noise, 0.008, 1e-12);
 }
 
 TEST(InteractionStatistics, TooShortAClipIsRefused) {

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
+#include "duet/robots/yaml_range.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -30,6 +31,21 @@ TEST(Yaml, EmptyAndBrokenTextsAreToldApart) {
   EXPECT_THAT(thrown_message<InputError>([] { parse_yaml("a: [1, 2\n", "a.yaml"); }),
               StartsWith("a.yaml:2: expected YAML"));
   EXPECT_THAT(thrown_message<InputError>([] { parse_yaml("a: *nobody\n", "a.yaml"); }), HasSubstr("a.yaml:1: "));
+}
+
+TEST(InRange, RefusesWhatIsBelowAndWhatIsAboveAndAnEndThatIsLeftOut) {
+  const auto read = [](const char* text, bool with_low) {
+    return in_range(YamlSection("a.yaml", parse_yaml(text, "a.yaml"), "range", {"x"}), "x", 7.0, {1.0, 2.0, with_low});
+  };
+  EXPECT_EQ(read("x: 1.5", true), 1.5);
+  EXPECT_EQ(read("x: 1", true), 1.0);
+  EXPECT_EQ(read("x: 2", false), 2.0);
+  EXPECT_EQ(thrown_message<InputError>([&] { read("x: 0.5", true); }),
+            "a.yaml:1: range: x: expected a number from 1, at most 2, found 0.5");
+  EXPECT_EQ(thrown_message<InputError>([&] { read("\nx: 2.5", true); }),
+            "a.yaml:2: range: x: expected a number from 1, at most 2, found 2.5");
+  EXPECT_EQ(thrown_message<InputError>([&] { read("x: 1", false); }),
+            "a.yaml:1: range: x: expected a number above 1, at most 2, found 1");
 }
 
 }  // namespace

@@ -89,5 +89,15 @@ TEST(Normaliser, ClipsWhatIsFarOff) {
   EXPECT_EQ(x(0, 1), -5.0F);
 }
 
+TEST(Normaliser, TakesTheMeanOffAndDividesByTheDeviation) {
+  Normaliser normaliser(2);
+  normaliser.mean << 3.0F, -2.0F;
+  normaliser.set_deviation(Eigen::Vector2f(0.5F, 4.0F));
+  Eigen::MatrixXf x(2, 2);
+  x << 4.0F, 3.0F, 2.0F, -6.0F;
+  normaliser.apply(x);
+  EXPECT_LT((x - (Eigen::MatrixXf(2, 2) << 2.0F, 0.0F, 1.0F, -1.0F).finished()).norm(), 1e-5F);
+}
+
 }  // namespace
 }  // namespace duet
