@@ -116,6 +116,24 @@ TEST(PeopleFormat, LabelsOfOthersAreTasks) {
   EXPECT_EQ(task_of_label(""), std::nullopt);
 }
 
+// "wrist_x", "wrist.x", "wristX".
+TEST(PeopleFormat, AnAxisMayBeSetOffByACapitalLetterOrAPoint) {
+  const Standin usual = test::csv_pair_standin();
+  const SourceClip expected = read_standin(usual, options_of(usual));
+  for (const auto& [x, y, z] : {std::tuple{"X", "Y", "Z"}, std::tuple{".x", ".y", ".z"}}) {
+    Standin other = usual;
+    for (test::StandinFile& file : other.files) {
+      std::string header = file.bytes.substr(0, file.bytes.find('\n'));
+      const std::string rest = file.bytes.substr(header.size());
+      for (const auto& [from, to] : {std::pair{"_x,", x}, std::pair{"_y,", y}, std::pair{"_z,", z}})
+        for (std::size_t at = 0; (at = header.find(from, at)) != std::string::npos;)
+          header.replace(at, 3, std::string(to) + ",");
+      file.bytes = header + rest;
+    }
+    EXPECT_TRUE(read_standin(other, options_of(other)).clip.a.joints == expected.clip.a.joints) << x;
+  }
+}
+
 TEST(PeopleFormat, ManyClipsOfAFolderAreFound) {
   const ScratchFolder folder;
   for (const char* name : {"x.npz", "y.npz"}) write_file(folder / name, test::kinect_standin().files[0].bytes);
