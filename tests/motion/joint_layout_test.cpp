@@ -122,6 +122,19 @@ TEST(JointLayout, NamesOfOthersAreMatched) {
   EXPECT_EQ(layout.smpl[kRightWrist].parts[0].column, 10);
 }
 
+// From below: thorax, shoulder centre, neck 1.
+TEST(JointLayout, TheLowestOfSeveralSecondNecksCounts) {
+  std::vector<std::string> names = {"Thorax", "Head", "Neck1"};
+  for (const char* side : {"L_", "R_"})
+    for (const char* part : {"Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle"})
+      names.push_back(std::string(side) + part);
+  EXPECT_EQ(layout_of_names("mine", names).smpl[kNeck].parts[0].column, 0);
+  names[0] = "Neck";
+  EXPECT_EQ(layout_of_names("mine", names).smpl[kNeck].parts[0].column, 0);
+  names[0] = "Tail";
+  EXPECT_EQ(layout_of_names("mine", names).smpl[kNeck].parts[0].column, 2);
+}
+
 TEST(JointLayout, MissingAndDoubledPartsAreNamed) {
   const auto refusal = [](const std::vector<std::string>& names) {
     return thrown_message<InputError>([&] { (void)layout_of_names("mine", names); });

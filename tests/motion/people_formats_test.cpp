@@ -134,6 +134,17 @@ TEST(PeopleFormat, AnAxisMayBeSetOffByACapitalLetterOrAPoint) {
   }
 }
 
+TEST(PeopleFormat, TwoFilesOfInterXAreNamedAfterTheirFolderOrThemselves) {
+  for (const PeopleFormat& format : people_formats()) {
+    if (format.name != "inter-x") continue;
+    const std::vector<std::string> bare = {"P1.npz", "other.npz"}, below = {"G001/P1.npz", "G001/P2.npz"};
+    EXPECT_EQ(format.find(bare, {}).at(0).id, "P1-other");
+    EXPECT_EQ(format.find(below, {}).at(0).id, "G001");
+    return;
+  }
+  FAIL() << "no format inter-x";
+}
+
 TEST(PeopleFormat, ManyClipsOfAFolderAreFound) {
   const ScratchFolder folder;
   for (const char* name : {"x.npz", "y.npz"}) write_file(folder / name, test::kinect_standin().files[0].bytes);

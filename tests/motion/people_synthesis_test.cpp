@@ -88,6 +88,17 @@ TEST(PeopleSynthesis, BeforeAndAfterShowPeopleWhoStand) {
   }
 }
 
+TEST(PeopleSynthesis, AClipThatIsCroppedToTheActShowsTheTouchBeginAndEnd) {
+  for (const Task task : {Task::kHandshake, Task::kHighFive}) {
+    for (int index = 0; index < 8; ++index) {
+      const InteractionClip clip = people(task, {.seed = 7, .index = index, .outcome = ActOutcome::kComplete});
+      ASSERT_FALSE(clip.contacts.empty()) << clip.id;
+      EXPECT_GT(clip.contacts[0].begin, 0) << clip.id;
+      EXPECT_LT(clip.contacts[0].end, clip.frames()) << clip.id;
+    }
+  }
+}
+
 TEST(PeopleSynthesis, OptionsChangeTheirQuantity) {
   EXPECT_EQ(people(Task::kHandshake, {.side = Side::kLeft}).source.at("side"), "left");
   EXPECT_EQ(people(Task::kHandshake, {.height_a = 1.9}).source.at("a.height"), "1.9");

@@ -60,6 +60,14 @@ TEST(Pictures, PlotsOfSuccess) {
   expect_picture("engine_plot", engine_plot_svg(cross_engine(rows_of_two_engines(), {})));
 }
 
+// Without physics stands below the engines, as far from the last as they are from each other.
+TEST(Pictures, PlaybackBelowTheEngines) {
+  std::vector<EpisodeRow> rows = rows_of_two_engines();
+  for (int number = 0; number < 6; ++number)
+    rows.push_back(engine_episode("playback", "replay", number, number > 0, "none"));
+  expect_picture("engine_plot_playback", engine_plot_svg(cross_engine(rows, {})));
+}
+
 // A person with one hand up and another who bows; the first has a head.
 TEST(Pictures, KeyFrames) {
   const std::vector<std::pair<int, int>> bones = {{0, 1}, {1, 2}, {0, 3}, {0, 4}, {1, 5}, {1, 6}};
