@@ -48,6 +48,21 @@ TEST(Walker, ItsTargetsAreInsideTheJointsLimits) {
   }
 }
 
+// A robot that is held back is led from where it is, wherever on the floor that may be.
+TEST(Walker, LeadsFromWhereTheRobotIs) {
+  const auto last_targets = [](double x, double y) {
+    Walker walker("wbc_sim", {}, test::g1());
+    RobotState state = test::g1()->standing_state();
+    state.X_WB.p.head<2>() += Eigen::Vector2d(x, y);
+    walker.begin(state);
+    JointCommand command;
+    for (int tick = 0; tick < 100; ++tick)  // 0.6 m, of which it may be led by a quarter
+      command = walker.update(state, {0.3, 0.0, 0.0, 0.74}, test::g1()->neutral);
+    return command.q_target;
+  };
+  EXPECT_LT((last_targets(5.0, -3.0) - last_targets(0.0, 0.0)).norm(), 1e-4);
+}
+
 // Stands, and from 1 s on wants to be `goal` ahead; everything between controller and body passes guard and limiter.
 class Ahead final : public ReferenceSource {
  public:
