@@ -57,7 +57,7 @@ TEST(Walker, LeadsFromWhereTheRobotIs) {
     walker.begin(state);
     JointCommand command;
     for (int tick = 0; tick < 100; ++tick)  // 0.6 m, of which it may be led by a quarter
-      command = walker.update(state, {0.3, 0.0, 0.0, 0.74}, test::g1()->neutral);
+      command = walker.update(state, {0.29, 0.05, 0.0, 0.74}, test::g1()->neutral);
     return command.q_target;
   };
   EXPECT_LT((last_targets(5.0, -3.0) - last_targets(0.0, 0.0)).norm(), 1e-4);
