@@ -2,6 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
+
+#include "duet/core/random.h"
+#include "duet/robots/kinematics.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
 
@@ -19,6 +24,41 @@ TEST(BodyDistance, FallsByAsMuchAsThePersonComesNearer) {
   const double second = distance.measure(state.X_WB, state.q, &near, 0.1, false).person;
   EXPECT_LT(second, first - 0.4);
   EXPECT_GT(second, 0.5);
+}
+
+// The least gap between points along the robot's capsules and points along the person's.
+double sampled_gap(const RobotState& state, const HumanJoints& person, const HumanBody& body) {
+  const RobotModel& robot = *test::g1();
+  Kinematics kinematics(robot);
+  kinematics.update(state.X_WB, state.q);
+  double least = 1e9;
+  for (const RobotShape& shape : robot.shapes)
+    for (const HumanCapsule& capsule : body.capsules) {
+      const std::array<Eigen::Vector3d, 2> ends = capsule.ends(person);
+      for (double u = -1.0; u < 1.01; u += 0.1)
+        for (double v = 0.0; v < 1.01; v += 0.05) {
+          const Eigen::Vector3d on_link = shape.X_LS * Eigen::Vector3d(0.0, 0.0, u * shape.half_length);
+          const Eigen::Vector3d p = kinematics.p_WL(shape.link) + kinematics.R_WL(shape.link) * on_link;
+          least = std::min(least, (p - (1.0 - v) * ends[0] - v * ends[1]).norm() - shape.radius - capsule.radius);
+        }
+    }
+  return least;
+}
+
+TEST(BodyDistance, IsThatOfTheNearestPointsOfAllCapsules) {
+  BodyDistance distance(test::g1(), test::adult_body(), {});
+  Random random(5, 1);
+  for (int trial = 0; trial < 8; ++trial) {
+    RobotState state = test::g1()->standing_state();
+    for (int j = 0; j < test::g1()->dof(); ++j)
+      state.q[j] = std::clamp(0.6 * random.normal(), test::g1()->joints[j].lower, test::g1()->joints[j].upper);
+    const double side = random.uniform(-0.4, 0.4);
+    const HumanJoints person = test::standing_adult({trial % 2 == 0 ? 0.7 : -0.7, side, 0.95});
+    const double found = distance.measure(state.X_WB, state.q, &person, 0.0, false).person;
+    const double sampled = sampled_gap(state, person, distance.human());
+    EXPECT_LE(found, sampled + kRounding) << trial;
+    EXPECT_GT(found, sampled - 0.01) << trial;
+  }
 }
 
 TEST(BodyDistance, UncertaintyIsTakenOff) {
