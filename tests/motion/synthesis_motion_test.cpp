@@ -270,5 +270,27 @@ TEST(SynthesisMotion, TheReactorFollowsTheActor) {
     }
 }
 
+// How far a hand goes from where it hangs, seen from the root, in frames [begin, end).
+double hand_way(const HumanMotion& person, int begin, int end) {
+  double way = 0.0;
+  for (int t = begin; t < end; ++t)
+    for (const int hand : {kLeftHand, kRightHand}) {
+      const auto of_root = [&](int at) { return Vector3d(person.joints.at(at, hand) - person.joints.at(at, kPelvis)); };
+      way = std::max(way, (of_root(t) - of_root(begin)).norm());
+    }
+  return way;
+}
+
+TEST(SynthesisMotion, OnlyWhoIsKissedCatchesTheKiss) {
+  int caught = 0;
+  for (int index = 0; index < 12; ++index) {
+    const InteractionClip clip = synthesize(Task::kFlyKiss, {.index = index});
+    if (clip.source.at("b.catches") != "yes") continue;
+    ++caught;
+    EXPECT_LT(hand_way(clip.a, clip.phases.act_begin - 50, clip.phases.act_begin), 0.28) << clip.id;  // swings as he walks
+  }
+  EXPECT_GT(caught, 1);
+}
+
 }  // namespace
 }  // namespace duet

@@ -103,6 +103,7 @@ TEST(OnnxMovement, ConcatJoinsAlongAnyAxis) {
   expect_node("Concat", {a, b}, {0, 2, 3, 1, 4, 5}, {{"axis", std::int64_t{1}}});
   expect_node("Concat", {a, a}, {0, 1, 0, 1}, {{"axis", std::int64_t{-2}}});
   expect_node("Concat", {a}, {0, 1}, {{"axis", std::int64_t{0}}});
+  expect_node("Concat", {{{2}, {6, 7}}, {{1}, {8}}}, {6, 7, 8}, {{"axis", std::int64_t{0}}});  // as lists of numbers
 }
 
 std::vector<std::vector<float>> parts(int opset, const Attributes& attributes, const Whole& sizes) {
