@@ -123,6 +123,13 @@ TEST(Pickle, NearlyUnitQuaternionsAreRenormalisedAndReported) {
                           "x.pkl");
   for (const Pose& X_WB : read.motion.root) EXPECT_NEAR(X_WB.R.norm(), 1.0, 1e-15);
   EXPECT_THAT(read.verdict, Contains(HasSubstr("renormalised, worst length off by 0.0500 in frame 1")));
+  const PickledMotion tied =
+      parse_motion_pickle(pickle({.root_rot =
+                                      [](PickleWriter& out) {
+                                        out.doubles({3, 4}, {0, 0, 0, 1, 0, 0, 0, 0.95, 0, 0, 0.95, 0});
+                                      }}),
+                          "x.pkl");
+  EXPECT_THAT(tied.verdict, Contains(HasSubstr("off by 0.0500 in frame 1")));  // the first of those
 }
 
 TEST(Pickle, BodiesAreReadInTheirOrder) {

@@ -125,6 +125,13 @@ TEST(Degradation, ThePapersCurveStandsBesideOurs) {
   EXPECT_THAT(degradation_markdown(result), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
 }
 
+TEST(Degradation, TheTableSaysItsLevel) {
+  PolicyTableOptions options;
+  EXPECT_THAT(degradation_markdown(degradation(jittered(), options)), HasSubstr("with 95 % Wilson intervals"));
+  options.level = 0.9;
+  EXPECT_THAT(degradation_markdown(degradation(jittered(), options)), HasSubstr("with 90 % Wilson intervals"));
+}
+
 TEST(Degradation, CleanAloneSaysSo) {
   std::vector<EpisodeRow> rows;
   add_episodes({}, rows);
