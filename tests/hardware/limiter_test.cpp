@@ -263,6 +263,20 @@ TEST(Limiter, TheFenceHasTwoSides) {
   EXPECT_NEAR(robot.out.root.lateral, 0.0, 1e-6);
 }
 
+// The way that it takes to stop lies inside the fence; where that way begins it is stopped already.
+TEST(Limiter, TheFenceBeginsWhereStoppingTakesThePlace) {
+  const LimiterSetup setup = test::nobody_near();
+  const HardwareLimits& limits = setup.limits;
+  const double begin = limits.fence_x - limits.forward * (limits.reaction_time + limits.stopping_time);
+  for (const auto& [place, stopped] : {std::pair{begin, 1}, std::pair{std::nextafter(begin, 0.0), 0}}) {
+    LimitedRobot robot(setup);
+    robot.input.state.X_WB.p.x() = place;
+    robot.command.root.forward = 0.2;
+    robot.tick();
+    EXPECT_EQ(robot.counted(ClampReason::kFence), stopped);
+  }
+}
+
 // Both arms are asked through the trunk.
 TEST(Limiter, ArmsStopBeforeTheBody) {
   LimitedRobot robot(test::nobody_near());

@@ -230,6 +230,10 @@ TEST(RootError, RefusesBadInput) {
   bad[1].p.x() = std::nan("");
   EXPECT_THAT(of([&] { (void)root_error(two, bad); }), HasSubstr("reference is not a finite pose at frame 1"));
   EXPECT_THAT(of([&] { (void)root_error(bad, two); }), HasSubstr("X_WB is not a finite pose at frame 1"));
+  for (const Eigen::Quaterniond& R : {Eigen::Quaterniond(std::nan(""), 0, 0, 0), Eigen::Quaterniond(0, 0, 0, 0)}) {
+    bad[1] = {.R = R, .p = Eigen::Vector3d::Zero()};
+    EXPECT_THAT(of([&] { (void)root_error(bad, two); }), HasSubstr("X_WB is not a finite pose at frame 1"));
+  }
 }
 
 TEST(DofErrors, Readings) {
