@@ -47,6 +47,7 @@ void run_in_world(const EpisodeSpec& spec, const Suite& suite, const std::shared
   GuardedWorld world(std::move(episode), robot, link);
   const std::unique_ptr<Policy> leader = policy();
   const Rollout rollout = roll_out(setup, world, *leader, options.engine);
+  run.interrupted = rollout.interrupted;
   run.clamps = world.clamps();
   run.held_ticks = world.held_ticks();
   run.guard_seconds = world.report().now - world.began_at();

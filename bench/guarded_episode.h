@@ -32,6 +32,7 @@ struct GuardedRun {
   int held_ticks = 0;        // in which the guard held
   int missed_reports = 0;    // of the guard, that were lost on their way
   double guard_seconds = 0;  // of the episode, by the guard's clock [s]
+  bool interrupted = false;  // by stop_asked: the row is no result
 };
 
 // The setup's episode through `link`, scored as the suite scores. Whatever ends it is an outcome; a guard that does not

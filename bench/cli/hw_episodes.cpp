@@ -13,6 +13,7 @@
 #include "duet/bench/guarded_episode.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/run_identity.h"
+#include "duet/bench/run_work.h"
 #include "duet/bench/shipped_suites.h"
 #include "duet/bench/suite_actors.h"
 #include "duet/controllers/registry.h"
@@ -94,7 +95,11 @@ class TwinEpisodes {
       if (spec.engine != arguments_.engine || spec.controller != walker_.name || spec.perturbation != kCleanName)
         continue;
       if (arguments_.limit > 0 && done >= arguments_.limit) break;
-      run_both(spec, identity, done++);
+      try {
+        run_both(spec, identity, done++);
+      } catch (const EpisodeInterrupted&) {  // it leaves no row
+        break;
+      }
     }
     print_result();
   }
@@ -159,6 +164,7 @@ class TwinEpisodes {
     const EpisodeRow simulated =
         run_episode(spec, suite_, identity, robot, "", bodies_.policy(spec.controller, spec.policy).make);
     const GuardedRun guarded = run_guarded(spec, identity, index);
+    if (guarded.interrupted) throw EpisodeInterrupted();
     keep(simulated);
     keep(guarded.row);
     episodes_.simulated.push_back(simulated);

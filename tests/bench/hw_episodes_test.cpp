@@ -1,0 +1,43 @@
+// `duet hw episodes` as a user runs it: the built program, the twin within it.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include "duet/backends/factory.h"
+#include "duet/core/file.h"
+#include "tests/bench/program.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+bool mujoco_is_missing() {
+  for (const EngineInfo& engine : engines())
+    if (engine.name == "mujoco") return !engine.available;
+  return true;
+}
+
+// In whichever half of an episode the signal comes, the program ends with its code and the episode leaves no row.
+TEST(HwEpisodes, AnInterruptedEpisodeLeavesNoRow) {
+  if (mujoco_is_missing()) GTEST_SKIP() << "not run: engine mujoco absent";
+  const test::ScratchFolder folder;
+  const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";
+  for (const char* wait : {"0.6", "1.1", "1.9", "3.1"}) {
+    const std::string out = folder / (std::string("out") + wait);
+    write_file(folder / "script.sh", "'" + test::program() + "' hw episodes '" + examples + "twin.yaml' '" + examples +
+                                         "episodes.yaml' -s 'controllers=[wbc_sim]' -s clips.synth.per_task=2 --clock "
+                                         "in-process -q -o '" +
+                                         out + "' >/dev/null 2>&1 & p=$!; sleep " + wait +
+                                         "; kill -INT $p; wait $p; echo $? > '" + (folder / "code") + "'\n");
+    ASSERT_EQ(std::system(("bash '" + (folder / "script.sh") + "'").c_str()), 0);
+    EXPECT_EQ(read_file(folder / "code"), "130\n") << wait;
+    const std::string rows = std::filesystem::exists(out + "/episodes.jsonl") ? read_file(out + "/episodes.jsonl") : "";
+    EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n') % 2, 0) << wait;
+    EXPECT_EQ(rows.find("timed_out"), std::string::npos) << wait;
+  }
+}
+
+}  // namespace
+}  // namespace duet
