@@ -139,6 +139,8 @@ void run_make(Session& session, const DatasetArguments& arguments, bool with_rob
   if (summary.stopped) {
     note(session, "stopped early: the same command goes on");
     session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
+  } else if (summary.failed > 0) {
+    session.exit_code = kExitErrors;
   }
 }
 

@@ -82,6 +82,19 @@ TEST_F(DatasetCommand, RecordingsThatAreCroppedToTheActAreToldHowTheyAreKept) {
   EXPECT_THAT(three.out, HasSubstr("| rejected                   |     0 |"));
 }
 
+TEST_F(DatasetCommand, AClipThatCannotBeReadIsListedAndSeenInTheExitCode) {
+  fs::create_directories(folder_ / "in");
+  fs::copy(kStandIns + "/kinect", folder_ / "in");
+  write_file(folder_ / "in/broken.npz", "PK");
+  const std::string command = "dataset curate " + (folder_ / "in") + " --no-curation -o " + out_;
+  const Answer answer = duet_program(command);
+  EXPECT_EQ(answer.code, 3) << answer.err;
+  EXPECT_THAT(answer.out, testing::AllOf(HasSubstr("broken: "), HasSubstr("| kept                       |     1 |"),
+                                         HasSubstr("| failed                     |     1 |")));
+  fs::remove(folder_ / "in/broken.npz");
+  EXPECT_EQ(duet_program(command + "-whole").code, 0);
+}
+
 TEST_F(DatasetCommand, InspectSaysWhatIsFoundAndWritesNothing) {
   const Answer answer = duet_program("dataset inspect " + kStandIns + "/kinect", "cd " + (folder_ / "") + ";");
   EXPECT_EQ(answer.code, 0) << answer.err;
