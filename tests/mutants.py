@@ -300,17 +300,22 @@ def ask(mutants, arguments, trials, report):
         folder.mkdir(parents=True, exist_ok=True)
         while True:
             with taking:
-                mutant = next(iterator, None) if report.asked() + work.pending < arguments.count else None
+                wanted = report.asked() + work.pending < arguments.count and not work.failed
+                mutant = next(iterator, None) if wanted else None
                 if mutant is None:
                     return
                 work.pending += 1
             reason = known.get((mutant.path, mutant.original, mutant.changed))
-            verdict, by = ('equivalent', reason) if reason else report.earlier(mutant) or trials.verdict(mutant, folder)
+            try:
+                verdict, by = ('equivalent', reason) if reason else report.earlier(mutant) or trials.verdict(mutant, folder)
+            except BaseException:
+                work.failed = True  # the others end too, and it is raised below
+                raise
             with taking:
                 work.pending -= 1
                 report.add(mutant, verdict, by)
 
-    work.pending = 0
+    work.pending, work.failed = 0, False
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         for done in [pool.submit(work, trials.scratch / f'worker{i}') for i in range(arguments.jobs)]:
             done.result()
