@@ -143,9 +143,11 @@ TEST(HomieExecutor, AnotherWhoSteersHomieIsForeign) {
   EXPECT_EQ(executor.foreign_writers(1), 0);  // its own message came back
   LcmBuffer buffer;
   other.send(std::span<const std::byte>(buffer).first(encode(PedalCommand{}, 1, buffer)));
-  executor.poll(1.1);
+  executor.poll(1.25);
   EXPECT_EQ(executor.foreign_writers(1), 1);
-  executor.poll(1.7);
+  executor.poll(1.7421875);
+  EXPECT_EQ(executor.foreign_writers(1), 1);
+  executor.poll(1.75);  // half a second is over
   EXPECT_EQ(executor.foreign_writers(1), 0);
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <set>
@@ -105,6 +106,18 @@ BadStates bad_states(int count, double spacing) {
   BadStates bad;
   for (int k = count - 1; k >= 0; --k) note_bad_states(1, kNow - k * spacing, bad);
   return bad;
+}
+
+TEST(SafetySignals, ABadStateCountsToTheEndOfItsTime) {
+  const SafetyRules rules;
+  const auto level = [&](double oldest) {
+    BadStates bad;
+    for (const double at : {oldest, kNow, kNow}) note_bad_states(1, at, bad);
+    return assess(rules, well(), bad, kNow - 0.002, true).level;
+  };
+  const double end = kNow - rules.hold_bad_time;
+  EXPECT_EQ(level(end), StopLevel::kHold);
+  EXPECT_EQ(level(std::nextafter(end, 0.0)), StopLevel::kWarn);
 }
 
 TEST(SafetySignals, BadStatesWarnHoldAndDampByTheirNumber) {

@@ -202,6 +202,23 @@ TEST(PeopleBadInput, PeopleOfHarmony4dAreTwoAndTheSame) {
               HasSubstr("expected people 'aria01' and 'aria02' as in the first frame"));
 }
 
+TEST(PeopleBadInput, APersonOfHarmony4dHas17JointsOfThreeOrFourNumbers) {
+  const auto person = [](const std::vector<int>& shape) {
+    std::size_t size = 1;
+    for (const int side : shape) size *= static_cast<std::size_t>(side);
+    return refusal(test::harmony4d_standin(), 0, test::object_npy([&](PickleWriter& out) {
+                     out.raw("}(");
+                     for (const char* name : {"aria01", "aria02"})
+                       out.text(name).doubles(shape, std::vector<double>(size, 0.0));
+                     out.raw("u");
+                   }));
+  };
+  EXPECT_THAT(person({18, 3}), HasSubstr("person 'aria01': expected shape (17, 4), found (18, 3)"));
+  EXPECT_THAT(person({17, 2}), HasSubstr("expected shape (17, 4), found (17, 2)"));
+  EXPECT_THAT(person({17, 5}), HasSubstr("expected shape (17, 4), found (17, 5)"));
+  EXPECT_THAT(person({68}), HasSubstr("expected shape (17, 4), found (68)"));
+}
+
 TEST(PeopleBadInput, Chi3dsListsAreJudged) {
   const Standin standin = test::chi3d_standin();
   EXPECT_THAT(refusal(standin, 0, R"({"joints3d_25": [[[[0,0,0]]]]})"),

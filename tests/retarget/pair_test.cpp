@@ -130,6 +130,34 @@ TEST(Pair, PartnerMovesOnlyArmsAndHandsFollowWrists) {
   EXPECT_LT(moved, 0.5);
 }
 
+// Mean error of the distances between the robot's keypoints and those of `partner` against the two people's.
+double distance_error(const PairedMotion& motion, const HumanMotion& partner) {
+  const PairChain chain = make_chain(test::g1(), ContactKeypoints::kNine);
+  ChainPose pose;
+  double sum = 0.0;
+  for (int t = 0; t < motion.frames(); ++t) {
+    forward(chain, motion.robot.root[t].R.toRotationMatrix(), motion.robot.root[t].p, motion.robot.q.col(t), pose);
+    for (int i = 0; i < chain.keys(); ++i)
+      for (int j = 0; j < chain.keys(); ++j) {
+        const double asked = (motion.source_reactor.joints.at(t, chain.key_smpl[i]) -
+                              motion.source_partner.joints.at(t, chain.key_smpl[j]))
+                                 .norm();
+        const double found = (pose.points.col(chain.key_points[i]) - partner.joints.at(t, chain.key_smpl[j])).norm();
+        sum += std::abs(found - asked);
+      }
+  }
+  return sum / (motion.frames() * chain.keys() * chain.keys());
+}
+
+TEST(Pair, AnAdaptedPartnerKeepsTheDistancesBetterThanTheSource) {
+  PairOptions options;
+  options.contact_blocks = ContactBlocks::kCross;
+  options.weights.con = 2.0;
+  options.weights.hum = 0.05;
+  const PairedMotion motion = retarget(test::random_clip(60, 3), test::g1(), options);
+  EXPECT_LT(distance_error(motion, motion.partner), 0.9 * distance_error(motion, motion.source_partner));
+}
+
 TEST(Pair, PartnersRotationsFollowItsBones) {
   const PairedMotion motion = retarget(test::random_clip(30, 7), test::g1());
   const auto bone = [](const HumanMotion& m, int t, int joint, int child) -> Eigen::Vector3d {
