@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "duet/backends/factory.h"
 #include "duet/core/file.h"
@@ -36,6 +37,17 @@ TEST(CommandLine, VersionNamesTheEngines) {
     if (!engine.available) continue;
     EXPECT_THAT(out, HasSubstr(engine.name + " " + engine.version));
   }
+}
+
+// "\\&" keeps roff from taking a line's first point or apostrophe for a request; elsewhere it does not belong.
+TEST(CommandLine, TheManualPageEscapesWhatWouldBeARequest) {
+  std::istringstream page(duet_program("man").out);
+  int lines = 0;
+  for (std::string line; std::getline(page, line); ++lines) {
+    const bool escaped = line.starts_with("\\&");
+    EXPECT_TRUE(!escaped || line.substr(2, 1) == "." || line.substr(2, 1) == "'") << line;
+  }
+  EXPECT_GT(lines, 300);
 }
 
 TEST(CommandLine, UsageErrorsAreTwo) {

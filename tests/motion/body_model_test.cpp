@@ -161,6 +161,10 @@ TEST(BodyModel, FaultsAreNamed) {
   EXPECT_THAT(with("shapedirs", std::vector<double>(48 * 30), {48, 30}), HasSubstr("expected shape (48, 3, B)"));
   EXPECT_THAT(with("v_template", std::vector<double>(48 * 3, NAN), {48, 3}),
               HasSubstr("expected finite numbers, found nan at row 0"));
+  std::vector<double> one_is_none(48 * 3, 0.0);
+  one_is_none[5 * 3 + 2] = NAN;
+  EXPECT_THAT(with("v_template", one_is_none, {48, 3}),
+              HasSubstr("expected finite numbers, found nan at row 5, number 2"));
   const std::string good = small.pickle(SmallModel::Matrix::kColumns);
   for (std::size_t size = 0; size < good.size(); size += 97)
     EXPECT_THAT(refusal(good.substr(0, size)), HasSubstr("m.bin")) << size;
