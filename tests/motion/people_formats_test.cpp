@@ -7,6 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/motion/people/inter_x_actions.h"
 #include "duet/motion/people/people_files.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"
@@ -132,6 +133,16 @@ TEST(PeopleFormat, AnAxisMayBeSetOffByACapitalLetterOrAPoint) {
     }
     EXPECT_TRUE(read_standin(other, options_of(other)).clip.a.joints == expected.clip.a.joints) << x;
   }
+}
+
+TEST(PeopleFormat, OnlyNamesOfInterXTellItsActions) {
+  EXPECT_EQ(inter_x_action("G001T000A001R010"), "Handshake");
+  EXPECT_EQ(inter_x_action("G001T000A001R01"), std::nullopt);
+  EXPECT_EQ(inter_x_action("X001T000A001R010"), std::nullopt);
+  EXPECT_EQ(inter_x_action("G001T000B001R010"), std::nullopt);
+  EXPECT_EQ(inter_x_action("G001T00A0001R010"), std::nullopt);
+  EXPECT_EQ(inter_x_action("G001T000A0x1R010"), std::nullopt);
+  EXPECT_EQ(inter_x_action("G001T000A999R010"), std::nullopt);
 }
 
 TEST(PeopleFormat, TwoFilesOfInterXAreNamedAfterTheirFolderOrThemselves) {

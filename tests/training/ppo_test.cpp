@@ -57,6 +57,18 @@ TEST_F(PpoInMujoco, AnIterationCountsItsStepsAndMovesTheWeights) {
   EXPECT_NE(before.layers[0].W, ppo.state().agent.actor.layers[0].W);
 }
 
+// No episode that ended can have lasted longer than what was simulated.
+TEST_F(PpoInMujoco, EpisodesAreAsLongAsTheirTicks) {
+  PpoOptions options = small();
+  options.horizon = 150;
+  options.epochs = 1;
+  Ppo ppo(g1(), wbc_stage("stand"), options, fresh());
+  const IterationReport report = ppo.iterate();
+  ASSERT_GT(report.episodes, 0);
+  EXPECT_GT(report.episode_seconds, 0.02);
+  EXPECT_LE(report.episode_seconds, 150 * 0.02);
+}
+
 TEST(Ppo, OptionsThatDoNotDivideAreRefused) {
   PpoOptions options = small();
   options.environments = 5;
