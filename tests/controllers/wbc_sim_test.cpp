@@ -128,6 +128,20 @@ TEST(Gait, AFootOnTheGroundStaysWhereItIs) {
   }
 }
 
+TEST(Gait, AFootPassesUnderTheRootInTheMiddleOfItsSwing) {
+  Gait gait;
+  for (int tick = 0; tick < 300; ++tick) gait.update({0.4, 0.0, 0.0}, Eigen::Vector3d::Zero());
+  int behind = 0, before = 0;
+  for (int tick = 0; tick < 200; ++tick) {
+    gait.update({0.4, 0.0, 0.0}, Eigen::Vector3d::Zero());
+    const double x = gait.feet()[gait.swing_foot()].x, progress = gait.swing_progress();
+    if (std::abs(progress - 0.5) < 1e-6) continue;
+    EXPECT_EQ(x < 0.0, progress < 0.5) << progress;
+    ++(progress < 0.5 ? behind : before);
+  }
+  EXPECT_GT(std::min(behind, before), 80);
+}
+
 TEST(Gait, EachFootSwingsOncePerCycleAndAsHighAsAsked) {
   Gait gait;
   double top[2] = {0.0, 0.0};

@@ -43,5 +43,17 @@ TEST(Mlp, SizesAreThoseAskedFor) {
   EXPECT_EQ(random_mlp({4, 3, 2}, 1.0F, random).sizes(), (std::vector<int>{4, 3, 2}));
 }
 
+TEST(RandomMlp, TheLastLayerHasAScaleOfItsOwn) {
+  Random random(3, 1);
+  const Mlp mlp = random_mlp({50, 80, 60, 40}, 0.01F, random);
+  ASSERT_EQ(mlp.layers.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Eigen::MatrixXf& W = mlp.layers[i].W;
+    const float deviation = std::sqrt(W.squaredNorm() / static_cast<float>(W.size()));
+    const float expected = (i == 2 ? 0.01F : 1.3F) / std::sqrt(static_cast<float>(W.cols()));
+    EXPECT_NEAR(deviation, expected, 0.1F * expected) << i;
+  }
+}
+
 }  // namespace
 }  // namespace duet
