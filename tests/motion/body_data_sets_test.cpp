@@ -230,6 +230,17 @@ TEST(Wham, TheLongestStretchInCommonIsTaken) {
     EXPECT_LT((raw.joints[0].frame(t) - whole.joints[t + 3]).cwiseAbs().maxCoeff(), kSameJoint);
 }
 
+TEST(Wham, TwoFramesInCommonAreEnough) {
+  const ScratchFolder folder;
+  const BodyParameters a = test::body_parameters(4, 0.4, 23), b = test::body_parameters(4, 1.9, 23, {1.0, 0.0, 0.0});
+  PeopleOptions options;
+  options.align = Alignment::kFloor;
+  write_file(folder / "w.pkl", test::wham_pkl({{0, 0, a}, {1, 2, b}}));
+  const RawPeople raw = wham_format().read({.id = "x", .files = {folder / "w.pkl"}, .entry = ""}, options);
+  EXPECT_EQ(raw.joints[0].frames(), 2);
+  EXPECT_THAT(raw.evidence, Contains(HasSubstr("frames 2 to 3 of the video")));
+}
+
 TEST(Wham, OnePersonAndPeopleWhoNeverMeetAreRefused) {
   const ScratchFolder folder;
   const BodyParameters a = test::body_parameters(4, 0.4, 23);
