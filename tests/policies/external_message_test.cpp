@@ -1,11 +1,17 @@
 #include <gmock/gmock.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "duet/core/require.h"
 #include "duet/policies/external/message.h"
+#include "duet/policies/external/message_socket.h"
 #include "tests/deep_json.h"
 #include "tests/policies/external_fixtures.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {
@@ -100,6 +106,23 @@ TEST(PolicyMessage, DuetSpeaksJson) {
   const json last = hello["channels"].back();
   EXPECT_EQ(last["name"], "root_orientation");
   EXPECT_EQ(last["first"].get<int>() + last["size"].get<int>(), kObservationSize);
+}
+
+// "host:port" is TCP; with a slash it is a path, colons and all.
+TEST(PolicySocket, APathMayHaveAColon) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "a:1";
+  const int listener = socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  ASSERT_LT(path.size(), sizeof(address.sun_path));
+  path.copy(address.sun_path, path.size());
+  ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  ASSERT_EQ(listen(listener, 1), 0);
+  const int connected = connect_to(path, std::chrono::steady_clock::now() + std::chrono::seconds(5));
+  EXPECT_GE(connected, 0);
+  close(connected);
+  close(listener);
 }
 
 }  // namespace

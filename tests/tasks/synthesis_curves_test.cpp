@@ -87,5 +87,16 @@ TEST(SynthesisBurst, IsZeroOutsideAndBoundedInside) {
   EXPECT_LE(most, 1.0);
 }
 
+TEST(SynthesisBurst, SwingsAtItsRate) {
+  for (const double rate : {1.0, 2.5}) {
+    const Burst burst{1.0, 5.0, rate, 0.3};
+    for (double t = 1.5; t < 4.0; t += 1.0 / rate) {
+      EXPECT_NEAR(burst.at(t + 1.0 / rate), burst.at(t), 1e-9);
+      EXPECT_NEAR(burst.at(t + 0.5 / rate), -burst.at(t), 1e-9);
+    }
+    EXPECT_NEAR(burst.at(1.0 + 2.25 / rate), 1.0, 1e-9);
+  }
+}
+
 }  // namespace
 }  // namespace duet::synthesis
