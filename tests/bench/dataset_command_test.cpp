@@ -55,6 +55,7 @@ TEST_F(DatasetCommand, RecordingsBecomeAllRobotsAndGoOn) {
   const Answer converted = duet_program("dataset convert " + out_ + " --to gmr -o " + (folder_ / "gmr"));
   EXPECT_EQ(converted.code, 0) << converted.err;
   EXPECT_THAT(converted.out, HasSubstr("motions in format 'gmr'"));
+  EXPECT_THAT(converted.err, testing::Not(HasSubstr("objects")));  // nobody carried one
 }
 
 // Most recordings of SBU are so.

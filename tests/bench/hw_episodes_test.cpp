@@ -39,5 +39,15 @@ TEST(HwEpisodes, AnInterruptedEpisodeLeavesNoRow) {
   }
 }
 
+TEST(HwEpisodes, AClockThatIsNoneIsRefused) {
+  const test::ScratchFolder folder;
+  const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";
+  const test::Answer answer = test::duet_program("hw episodes " + examples + "twin.yaml " + examples +
+                                                 "episodes.yaml --clock real-tim -o " + (folder / "out"));
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_NE(answer.err.find("clock of the twin 'real-tim': did you mean 'real-time'?"), std::string::npos)
+      << answer.err;
+}
+
 }  // namespace
 }  // namespace duet

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "duet/motion/synthesis.h"
 
@@ -47,10 +48,26 @@ const std::array<Case, 12> kRecords = {{
     {Task::kFlyKiss, 7, {197, 697, 1016, -0.014864837, -0.003097514}},
 }};
 
-TEST(SynthesisOfRecord, ClipsAreWhatTheyWere) {
-  for (const Case& c : kRecords) {
+const std::array<Case, 12> kPeopleRecords = {{
+    {Task::kHug, 0, {0, 63, 110, 0.021911116, 0.131747048}},
+    {Task::kHug, 7, {0, 62, 105, 0.449931057, 0.542531810}},
+    {Task::kHandshake, 0, {0, 68, 101, 0.034691291, 0.060231349}},
+    {Task::kHandshake, 7, {0, 105, 141, 0.260787794, 0.415838993}},
+    {Task::kHighFive, 0, {44, 178, 190, -0.041317520, -0.034467632}},
+    {Task::kHighFive, 7, {44, 137, 158, 0.289118275, 0.538915267}},
+    {Task::kWave, 0, {63, 252, 274, 0.250124261, 0.327020352}},
+    {Task::kWave, 7, {36, 300, 310, 0.153902345, 0.379227771}},
+    {Task::kBend, 0, {35, 306, 322, 0.086462429, 0.124218148}},
+    {Task::kBend, 7, {32, 305, 323, -0.000169700, 0.030138763}},
+    {Task::kFlyKiss, 0, {68, 254, 269, 0.032169743, 0.031974538}},
+    {Task::kFlyKiss, 7, {24, 214, 226, 0.008355419, -0.052087041}},
+}};
+
+void expect_records(std::span<const Case> cases, Likeness like) {
+  for (const Case& c : cases) {
     SynthesisOptions options;
     options.index = c.index;
+    options.like = like;
     const InteractionClip clip = synthesize(c.task, options);
     EXPECT_EQ(clip.phases.act_begin, c.record.act_begin) << to_string(c.task) << " " << c.index;
     EXPECT_EQ(clip.phases.act_end, c.record.act_end) << to_string(c.task) << " " << c.index;
@@ -59,6 +76,9 @@ TEST(SynthesisOfRecord, ClipsAreWhatTheyWere) {
     EXPECT_NEAR(mark(clip.b), c.record.b, kSame) << to_string(c.task) << " " << c.index;
   }
 }
+
+TEST(SynthesisOfRecord, ClipsAreWhatTheyWere) { expect_records(kRecords, Likeness::kRehearsed); }
+TEST(SynthesisOfRecord, ClipsLikePeopleAreWhatTheyWere) { expect_records(kPeopleRecords, Likeness::kPeople); }
 
 }  // namespace
 }  // namespace duet

@@ -7,9 +7,12 @@
 
 #include "duet/motion/foot_contact.h"
 #include "duet/motion/synthesis.h"
+#include "duet/retarget/body_spheres.h"
 #include "duet/retarget/leg_pose.h"
 #include "duet/retarget/pair.h"
 #include "duet/retarget/pair_solver.h"
+#include "duet/retarget/upright_chain.h"
+#include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/roles.h"
 #include "tests/retarget/fixtures.h"
@@ -339,6 +342,24 @@ TEST(FootContact, SeesAStepAndPassesOverNoise) {
   EXPECT_TRUE(stance.stands[0][40] && stance.stands[0][160]);
   EXPECT_FALSE(stance.stands[0][100]);
   EXPECT_TRUE(stance.both(20));
+}
+
+TEST(BodySpheres, AreInThePersonWhomTheyStandFor) {
+  const HumanMotion partner = test::random_clip(20, 3).b;
+  UprightChain upright = make_upright_chain(test::g1(), make_chain(test::g1(), ContactKeypoints::kNine));
+  const BodySpheres spheres = make_body_spheres(test::g1(), upright, partner);
+  const HumanBody body = make_human_body(bone_lengths(partner));
+  ASSERT_GT(spheres.human.points(), 10);
+  for (int t = 0; t < partner.frames(); t += 5)
+    for (int i = 0; i < spheres.human.points(); ++i) {
+      double nearest = 1.0;  // to the middle or an end of one of the person's capsules
+      for (const HumanCapsule& capsule : body.capsules) {
+        const auto [a, b] = capsule.ends(partner.joints.frame(t));
+        for (const Eigen::Vector3d& p : {a, b, Eigen::Vector3d(0.5 * (a + b))})
+          nearest = std::min(nearest, (spheres.human.at(t, i) - p).norm());
+      }
+      EXPECT_LT(nearest, 1e-9) << t << " " << i;
+    }
 }
 
 }  // namespace
