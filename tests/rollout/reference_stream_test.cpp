@@ -30,6 +30,29 @@ TEST(ReferenceStream, IsSmoothAndWithinTheLimits) {
   }
 }
 
+// Backwards it goes at most at 0.55 of the highest speed.
+TEST(ReferenceStream, GoesForwardsFasterThanBackwards) {
+  const StreamOptions options = wbc_stage("walk").stream;
+  ReferenceStream stream(g1(), options);
+  Random random(5, 3);
+  double fastest = 0.0, slowest = 0.0;
+  for (int episode = 0; episode < 60; ++episode) {
+    stream.reset(random);
+    Pose before = stream.reference().X_WB;
+    for (int t = 0; t < 500; ++t) {
+      stream.advance(random);
+      const Pose& now = stream.reference().X_WB;
+      const double forward = (yaw_rotation(yaw_of(before.R)).inverse() * (now.p - before.p)).x() / 0.02;
+      fastest = std::max(fastest, forward);
+      slowest = std::min(slowest, forward);
+      before = now;
+    }
+  }
+  EXPECT_NEAR(fastest, options.max_speed, 0.05 * options.max_speed);
+  EXPECT_LT(slowest, -0.3 * options.max_speed);
+  EXPECT_GT(slowest, -0.61 * options.max_speed);  // 0.6: sideways at an angle
+}
+
 TEST(ReferenceStream, TheSameGeneratorGivesTheSameReferences) {
   ReferenceStream a(g1(), wbc_stage("walk").stream), b(g1(), wbc_stage("walk").stream);
   Random ra(3, 3), rb(3, 3);
