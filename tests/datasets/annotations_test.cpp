@@ -46,6 +46,11 @@ TEST(Annotations, APersonsTimesBecomeTheClipsPhases) {
   EXPECT_EQ(clip.source.at("phases"), "annotated");
 }
 
+TEST(Annotations, AnActMayBeginWithTheClip) {
+  const Annotations read = parse_annotations(std::string(kHeader) + "a,hug,B,0,2,\n", "f");
+  EXPECT_EQ(read.at("a").act_begin, 0.0);
+}
+
 TEST(Annotations, EmptyFieldsKeepWhatTheClipHas) {
   InteractionClip clip = synthesize(Task::kHug, {.seed = 3});
   const InteractionClip before = clip;
