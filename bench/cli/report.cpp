@@ -1,8 +1,10 @@
 // duet report: tables, database and HTML from the rows of runs.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <iterator>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
@@ -13,7 +15,6 @@
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/results/certificate.h"
 #include "duet/results/database.h"
 #include "duet/results/html_report.h"
 #include "duet/results/interval_plot.h"
@@ -65,13 +66,6 @@ void check_formats(const std::vector<std::string>& formats) {
 // Writes a file of a format into the folder, with what has to be said of the runs.
 using Writer = std::function<void(const std::string& name, const std::string& text, const std::string& format)>;
 
-void write_leaderboard(const std::string& format, const std::vector<LeaderboardEntry>& entries, const Writer& write) {
-  if (format == "md") write("leaderboard.md", leaderboard_markdown(entries), format);
-  if (format == "csv") write("leaderboard.csv", leaderboard_csv(entries), format);
-  if (format == "json") write("leaderboard.json", leaderboard_json(entries).dump(2) + "\n", format);
-  if (format == "tex") write("leaderboard.tex", leaderboard_latex(entries), format);
-}
-
 // Pages beside the report; a viewer that is not there is named, and the report does without them.
 std::vector<ReportReplay> replays_of(const Run& run, const ReportArguments& arguments, const Writer& write,
                                      std::vector<std::string>& notes, Progress& progress) {
@@ -101,51 +95,6 @@ std::string html_text(const Run& run, const std::vector<std::string>& notes, con
   return html_report(content);
 }
 
-// What changes when only the engine does, and what the robot's contacts do to people, where there is anything to say.
-void write_tables(const Tables& tables, const std::string& format, const Writer& write) {
-  if (tables.has_people()) {
-    if (format == "md") write("people.md", people_table_markdown(tables.people), format);
-    if (format == "csv") write("people.csv", people_table_csv(tables.people), format);
-    if (format == "json") write("people.json", people_table_json(tables.people).dump(2) + "\n", format);
-    if (format == "tex") write("people.tex", people_table_latex(tables.people), format);
-  }
-  if (tables.has_levels()) {
-    if (format == "md") write("levels.md", levels_markdown(tables.levels), format);
-    if (format == "csv") write("levels.csv", levels_csv(tables.levels), format);
-    if (format == "json") write("levels.json", levels_json(tables.levels).dump(2) + "\n", format);
-    if (format == "tex") write("levels.tex", levels_latex(tables.levels), format);
-  }
-  if (tables.has_engines()) {
-    if (format == "md")
-      write("engines.md",
-            cross_engine_markdown(tables.engines) + "\n" +
-                certificate_markdown(tables.certificate, tables.engines.engines),
-            format);
-    if (format == "csv") write("engines.csv", cross_engine_csv(tables.engines), format);
-    if (format == "json") write("engines.json", cross_engine_json(tables.engines).dump(2) + "\n", format);
-    if (format == "tex") write("engines.tex", cross_engine_latex(tables.engines), format);
-    if (format == "html") write("engines.svg", engine_plot_svg(tables.engines), "svg");
-  }
-  if (tables.has_controllers()) {
-    if (format == "md") write("controllers.md", controller_table_markdown(tables.controllers), format);
-    if (format == "csv") write("controllers.csv", controller_table_csv(tables.controllers), format);
-    if (format == "json") write("controllers.json", controller_table_json(tables.controllers).dump(2) + "\n", format);
-    if (format == "tex") write("controllers.tex", controller_table_latex(tables.controllers), format);
-  }
-  if (tables.has_walking()) {
-    if (format == "md") write("walking.md", walk_table_markdown(tables.walking), format);
-    if (format == "csv") write("walking.csv", walk_table_csv(tables.walking), format);
-    if (format == "json") write("walking.json", walk_table_json(tables.walking).dump(2) + "\n", format);
-    if (format == "tex") write("walking.tex", walk_table_latex(tables.walking), format);
-  }
-  if (tables.has_contacts()) {
-    if (format == "md") write("contacts.md", contact_table_markdown(tables.contacts), format);
-    if (format == "csv") write("contacts.csv", contact_table_csv(tables.contacts), format);
-    if (format == "json") write("contacts.json", contact_table_json(tables.contacts).dump(2) + "\n", format);
-    if (format == "tex") write("contacts.tex", contact_table_latex(tables.contacts), format);
-  }
-}
-
 void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
   const std::vector<Run> runs = load_runs(arguments.runs);
@@ -168,22 +117,22 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     write_file(path, format == "html" ? text : with_notes(format, text, notes));
     wrote(path);
   };
+  std::vector<Analysis> analyses = analyses_of(tables);
+  std::ranges::move(policy_analyses(policies), std::back_inserter(analyses));
   for (const std::string& format : arguments.formats) {
-    write_leaderboard(format, tables.leaderboard, write);
     if (format == "html") {
       std::vector<std::string> own = notes;
       std::vector<ReportReplay> replays = replays_of(run, arguments, write, own, progress);
       write("report.html", html_text(run, own, policies, std::move(replays), arguments, progress), format);
+      if (tables.has_engines()) write("engines.svg", engine_plot_svg(tables.engines), "svg");
     }
     if (format == "sqlite") {
       write_database(run.rows, inside(folder, "results.sqlite"), notes);
       wrote(inside(folder, "results.sqlite"));
     }
-    write_tables(tables, format, write);
-    for (const auto& [file, text] : policy_report_files(policies, format)) write(file, text, format);
+    for (const auto& [file, text] : analysis_files(analyses, format)) write(file, text, format);
   }
-  add_tables(tables, json);
-  add_policy_report(policies, json);
+  add_analyses(analyses, json);
   print(session, with_notes("md", tables_text(tables) + policy_report_text(policies), notes), json);
   if (arguments.replays.scenes == 0)
     suggest_next(session, fmt::format("duet replay {} -o {}/replay.html", arguments.runs.front(), folder));

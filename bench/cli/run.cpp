@@ -127,7 +127,7 @@ void run_suite_command(Session& session, RunArguments arguments) {
                          {"complete", summary.end == RunEnd::kComplete},
                          {"notes", notes}};
   if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
-  add_tables(tables, json);
+  add_analyses(analyses_of(tables), json);
   print_result(session, summary.end, with_notes("md", tables_text(tables), notes), json);
   suggest_next(session, summary.end == RunEnd::kComplete ? fmt::format("duet report {} --replays 3", arguments.output)
                                                          : fmt::format("{}", fmt::join(session.argv, " ")));

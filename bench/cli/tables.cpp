@@ -43,14 +43,35 @@ std::string tables_text(const Tables& tables) {
   return fmt::format("{}", fmt::join(parts, "\n"));
 }
 
-void add_tables(const Tables& tables, nlohmann::json& json) {
-  json["leaderboard"] = leaderboard_json(tables.leaderboard);
-  if (tables.has_people()) json["people"] = people_table_json(tables.people);
-  if (tables.has_levels()) json["levels"] = levels_json(tables.levels);
-  if (tables.has_engines()) json["engines"] = cross_engine_json(tables.engines);
-  if (tables.has_controllers()) json["controllers"] = controller_table_json(tables.controllers);
-  if (tables.has_walking()) json["walking"] = walk_table_json(tables.walking);
-  if (tables.has_contacts()) json["contacts"] = contact_table_json(tables.contacts);
+std::vector<Analysis> analyses_of(const Tables& tables) {
+  std::vector<Analysis> analyses = {{.name = "leaderboard",
+                                     .markdown = [&] { return leaderboard_markdown(tables.leaderboard); },
+                                     .csv = [&] { return leaderboard_csv(tables.leaderboard); },
+                                     .latex = [&] { return leaderboard_latex(tables.leaderboard); },
+                                     .json = [&] { return leaderboard_json(tables.leaderboard); }}};
+  if (tables.has_people())
+    analyses.push_back(analysis_of("people", tables.people, people_table_markdown, people_table_csv, people_table_latex,
+                                   people_table_json));
+  if (tables.has_levels())
+    analyses.push_back(analysis_of("levels", tables.levels, levels_markdown, levels_csv, levels_latex, levels_json));
+  if (tables.has_engines()) {
+    analyses.push_back(analysis_of("engines", tables.engines, cross_engine_markdown, cross_engine_csv,
+                                   cross_engine_latex, cross_engine_json));
+    analyses.back().markdown = [&] {
+      return cross_engine_markdown(tables.engines) + "\n" +
+             certificate_markdown(tables.certificate, tables.engines.engines);
+    };
+  }
+  if (tables.has_controllers())
+    analyses.push_back(analysis_of("controllers", tables.controllers, controller_table_markdown, controller_table_csv,
+                                   controller_table_latex, controller_table_json));
+  if (tables.has_walking())
+    analyses.push_back(
+        analysis_of("walking", tables.walking, walk_table_markdown, walk_table_csv, walk_table_latex, walk_table_json));
+  if (tables.has_contacts())
+    analyses.push_back(analysis_of("contacts", tables.contacts, contact_table_markdown, contact_table_csv,
+                                   contact_table_latex, contact_table_json));
+  return analyses;
 }
 
 }  // namespace duet::cli

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/results/analysis.h"
 #include "duet/results/board.h"
 #include "duet/results/contact_table.h"
 #include "duet/results/controller_table.h"
@@ -41,7 +42,8 @@ Tables make_tables(const std::vector<EpisodeRow>& rows, const nlohmann::json& ce
 // command how they do, and nothing of acts; else, with several engines the metrics of each are left to the files; their
 // drift is shown.
 std::string tables_text(const Tables& tables);
-// "leaderboard", and where there are any "people", "levels", "engines", "contacts" and "controllers", added to `json`.
-void add_tables(const Tables& tables, nlohmann::json& json);
+// "leaderboard", and where there are any "people", "levels", "engines", "controllers", "walking" and "contacts". They
+// refer to the tables.
+std::vector<Analysis> analyses_of(const Tables& tables);
 
 }  // namespace duet::cli

@@ -159,6 +159,18 @@ TEST(CommandLine, JsonIsOneDocumentOnStandardOutput) {
   }
 }
 
+TEST(CommandLine, ThePlotOfEnginesStandsBesideThePageAlone) {
+  const test::ScratchFolder folder;
+  const std::string report = "report -q --no-clips " + std::string(DUET_SOURCE_DIR) + "/results/published/policies -o ";
+  ASSERT_EQ(duet_program(report + (folder / "page") + " -f html").code, 0);
+  ASSERT_EQ(duet_program(report + (folder / "text") + " -f md,csv").code, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder / "page/engines.svg"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "text/engines.svg"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "page/engines.md"));
+  for (const char* name : {"leaderboard", "engines", "controllers", "policies"})
+    EXPECT_TRUE(std::filesystem::exists(folder / ("text/" + std::string(name) + ".md"))) << name;
+}
+
 // The whole way of a clip through the program, without physics.
 TEST(CommandLine, SynthRetargetScoreRunReportVerify) {
   const test::ScratchFolder folder;
@@ -188,6 +200,7 @@ TEST(CommandLine, SynthRetargetScoreRunReportVerify) {
   for (const char* name :
        {"leaderboard.md", "leaderboard.csv", "leaderboard.json", "leaderboard.tex", "report.html", "results.sqlite"})
     EXPECT_TRUE(std::filesystem::exists(folder / ("report/" + std::string(name)))) << name;
+  EXPECT_FALSE(std::filesystem::exists(folder / "report/engines.svg"));  // of one engine there is nothing to draw
   EXPECT_THAT(read_file(folder / "report/report.html"), HasSubstr("<svg"));
   EXPECT_THAT(read_file(folder / "report/report.html"),
               AllOf(::testing::Not(HasSubstr("id=\"training\"")), HasSubstr("It is no upper bound"),

@@ -35,7 +35,8 @@ TEST(PublishedTables, AreWhatTheRowsSay) {
   expect_same_lines("leaderboard.csv", leaderboard_csv(leaderboard(rows)));
   expect_same_lines("engines.csv", cross_engine_csv(cross_engine(rows, {})));
   expect_same_lines("controllers.csv", controller_table_csv(controller_table(rows)));
-  for (const auto& [file, text] : policy_report_files(policy_report(rows), "csv")) expect_same_lines(file, text);
+  const PolicyReport report = policy_report(rows);
+  for (const auto& [file, text] : analysis_files(policy_analyses(report), "csv")) expect_same_lines(file, text);
 }
 
 }  // namespace
