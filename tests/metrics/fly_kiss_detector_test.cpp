@@ -28,6 +28,13 @@ TEST(FlyKissDetector, NeedsTheHandAtTheHeadAndAForwardMotion) {
   EXPECT_FALSE(judge(kiss(0.2, -0.03, 6)).success);  // backwards
 }
 
+TEST(FlyKissDetector, MarginsAreWhatIsLeftOfEachThreshold) {
+  const DetectorResult result = judge(kiss(0.25, 0.03125, 8), {{"hand2head", 0.5}, {"forward_thresh", 0.125}});
+  EXPECT_NEAR(result.margins.at("hand2head"), 0.25, 1e-12);
+  EXPECT_NEAR(result.margins.at("forward_thresh"), 0.125, 1e-12);
+  EXPECT_EQ(result.margins.at("min_forward"), result.values.at("consecutive_forward") - 5.0);
+}
+
 TEST(FlyKissDetector, BoundariesAreIncluded) {
   EXPECT_TRUE(judge(kiss(0.25, 0.03125, 8), {{"hand2head", 0.25}}).success);
   EXPECT_FALSE(judge(kiss(0.25, 0.03125, 8), {{"hand2head", 0.2499}}).success);
