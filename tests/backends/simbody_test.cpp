@@ -1,5 +1,5 @@
-// Simbody: stiff servos, ways back from beyond a stop, options, standing at three steps. What holds in every engine is in
-// engine_*_test.cpp.
+// Simbody: stiff servos, ways back from beyond a stop, options, standing at three steps. What holds in every engine is
+// in engine_*_test.cpp.
 #include <cmath>
 
 #include "duet/backends/factory.h"

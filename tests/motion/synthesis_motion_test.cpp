@@ -287,7 +287,8 @@ TEST(SynthesisMotion, OnlyWhoIsKissedCatchesTheKiss) {
     const InteractionClip clip = synthesize(Task::kFlyKiss, {.index = index});
     if (clip.source.at("b.catches") != "yes") continue;
     ++caught;
-    EXPECT_LT(hand_way(clip.a, clip.phases.act_begin - 50, clip.phases.act_begin), 0.28) << clip.id;  // swings as he walks
+    EXPECT_LT(hand_way(clip.a, clip.phases.act_begin - 50, clip.phases.act_begin), 0.28)
+        << clip.id;  // swings as he walks
   }
   EXPECT_GT(caught, 1);
 }
