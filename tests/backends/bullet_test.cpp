@@ -3,6 +3,7 @@
 
 #include "duet/backends/factory.h"
 #include "tests/backends/contact_scene.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -10,24 +11,8 @@
 namespace duet {
 namespace {
 
-bool bullet_is_here() {
-  for (const EngineInfo& info : engines())
-    if (info.name == "bullet") return info.available;
-  return false;
-}
-
-struct Bullet : ::testing::Test {
-  void SetUp() override {
-    if (!bullet_is_here()) GTEST_SKIP() << "not run: engine bullet absent";
-  }
-  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    scene.self_collision = false;
-    return make_backend("bullet", scene);
-  }
+struct Bullet : test::OnEngine<::testing::Test> {
+  Bullet() : OnEngine("bullet") {}
 };
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
@@ -85,13 +70,6 @@ TEST_F(Bullet, TumblingBoxDriftsAtFirstOrderInAngularMomentumOnly) {
   EXPECT_NEAR(drift[1] / drift[0], 0.5, 0.05);
 }
 
-double largest_violation(const RobotModel& robot, const RobotState& state) {
-  double largest = 0.0;
-  for (int i = 0; i < robot.dof(); ++i)
-    largest = std::max({largest, robot.joints[i].lower - state.q[i], state.q[i] - robot.joints[i].upper});
-  return largest;
-}
-
 // Bullet leaves out a joint limit between links without colliders, as these are.
 TEST_F(Bullet, AWristHoldsAtItsStop) {
   const auto robot = test::g1();
@@ -126,7 +104,7 @@ TEST_F(Bullet, EffortAndStopsHoldInThrashing) {
       command.q_target[k] = robot.neutral[k] + 1.2 * std::sin(2.0 * M_PI * 1.5 * i * scene.dt + 1.7 * k);
     ASSERT_EQ(backend->step(command), Outcome::kOk);
     ASSERT_LT(backend->state().v.cwiseAbs().maxCoeff(), 200.0);
-    violation = std::max(violation, largest_violation(robot, backend->state()));
+    violation = std::max(violation, test::largest_violation(robot, backend->state()));
     for (int k = 0; k < robot.dof(); ++k) {
       ASSERT_LE(std::abs(backend->torques()[k]), robot.joints[k].effort);
       if (std::abs(backend->torques()[k]) == robot.joints[k].effort) ++saturated;

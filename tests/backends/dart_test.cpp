@@ -6,6 +6,7 @@
 #include "duet/backends/factory.h"
 #include "duet/backends/implicit_law.h"
 #include "duet/core/random.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -13,23 +14,8 @@
 namespace duet {
 namespace {
 
-bool dart_is_here() {
-  for (const EngineInfo& info : engines())
-    if (info.name == "dart") return info.available;
-  return false;
-}
-
-struct Dart : ::testing::Test {
-  void SetUp() override {
-    if (!dart_is_here()) GTEST_SKIP() << "not run: engine dart absent";
-  }
-  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    return make_backend("dart", scene);
-  }
+struct Dart : test::OnEngine<::testing::Test> {
+  Dart() : OnEngine("dart") {}
 };
 
 // In flight, where no contact asks for a second look: some joints at their limits, the others not.

@@ -6,7 +6,7 @@
 #include "duet/core/random.h"
 #include "duet/robots/dynamics.h"
 #include "duet/robots/kinematics.h"
-#include "tests/backends/engine_names.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -38,21 +38,8 @@ const Accuracy& accuracy_of(const std::string& engine) {
   return rows.at(engine);
 }
 
-struct EngineDynamics : ::testing::TestWithParam<std::string> {
-  void SetUp() override {
-    if (!test::is_here(engine)) GTEST_SKIP() << "not run: engine " << engine << " absent";
-  }
-  [[nodiscard]] std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002,
-                                              const Eigen::Vector3d& gravity = Scene().gravity) const {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    scene.gravity = gravity;
-    scene.self_collision = false;
-    return make_backend(engine, scene);
-  }
-  const std::string engine = GetParam();
+struct EngineDynamics : test::OnEngine<::testing::TestWithParam<std::string>> {
+  EngineDynamics() : OnEngine(GetParam()) {}
 };
 INSTANTIATE_TEST_SUITE_P(Engines, EngineDynamics, ::testing::ValuesIn(test::engine_names()), test::engine_of);
 
@@ -213,13 +200,6 @@ TEST_P(EngineDynamics, FlightsConvergeToOurDynamicsAtFirstOrder) {
   EXPECT_LT(errors[1], 0.65 * errors[0]);
 }
 
-double largest_violation(const RobotModel& robot, const RobotState& state) {
-  double largest = 0.0;
-  for (int i = 0; i < robot.dof(); ++i)
-    largest = std::max({largest, robot.joints[i].lower - state.q[i], state.q[i] - robot.joints[i].upper});
-  return largest;
-}
-
 TEST_P(EngineDynamics, AllJointsHoldAtTheirStops) {
   const auto robot = test::g1();
   const auto backend = make(robot);
@@ -228,7 +208,7 @@ TEST_P(EngineDynamics, AllJointsHoldAtTheirStops) {
   backend->reset(state);
   const JointCommand command = robot->default_command(robot->upper() + Eigen::VectorXd::Constant(robot->dof(), 0.3));
   for (int i = 0; i < 500; ++i) ASSERT_EQ(backend->step(command), Outcome::kOk);
-  EXPECT_LT(largest_violation(*robot, backend->state()), accuracy_of(engine).joint_stops);
+  EXPECT_LT(test::largest_violation(*robot, backend->state()), accuracy_of(engine).joint_stops);
   EXPECT_LT(backend->state().v.cwiseAbs().maxCoeff(), accuracy_of(engine).joint_stop_speed);
 }
 

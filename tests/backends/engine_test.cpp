@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "duet/backends/factory.h"
-#include "tests/backends/engine_names.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/backends/trace.h"
@@ -20,17 +20,8 @@ constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
 // Of a constant torque as it is reported: MuJoCo and Simbody give it exactly, the others as their step solves for it.
 double torque_rounding(const std::string& engine) { return engine == "mujoco" || engine == "simbody" ? 0.0 : kAlgebra; }
 
-struct Engine : ::testing::TestWithParam<std::string> {
-  void SetUp() override {
-    if (!test::is_here(engine)) GTEST_SKIP() << "not run: engine " << engine << " absent";
-  }
-  [[nodiscard]] std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot) const {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    return make_backend(engine, scene);
-  }
-  const std::string engine = GetParam();
+struct Engine : test::OnEngine<::testing::TestWithParam<std::string>> {
+  Engine() : OnEngine(GetParam()) {}
 };
 INSTANTIATE_TEST_SUITE_P(Engines, Engine, ::testing::ValuesIn(test::engine_names()), test::engine_of);
 

@@ -1,9 +1,11 @@
 // The G1 on the ground, for the tests of what no small robot shows.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "duet/backends/scene.h"
+#include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet::test {
@@ -15,6 +17,14 @@ inline Scene g1_scene(PartnerMode partner = PartnerMode::kNone) {
   scene.robot = g1();
   scene.partner = partner;
   return scene;
+}
+
+// By how much a joint is beyond its limits, of all the most [rad].
+inline double largest_violation(const RobotModel& robot, const RobotState& state) {
+  double largest = 0.0;
+  for (int i = 0; i < robot.dof(); ++i)
+    largest = std::max({largest, robot.joints[i].lower - state.q[i], state.q[i] - robot.joints[i].upper});
+  return largest;
 }
 
 }  // namespace duet::test

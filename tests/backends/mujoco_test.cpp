@@ -10,6 +10,7 @@
 #include "duet/core/random.h"
 #include "duet/robots/dynamics.h"
 #include "tests/backends/contact_scene.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -17,18 +18,8 @@
 namespace duet {
 namespace {
 
-struct Mujoco : ::testing::Test {
-  void SetUp() override {
-    if (!engines()[0].available) GTEST_SKIP() << "not run: " << engines()[0].reason;
-  }
-  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    scene.self_collision = false;
-    return make_backend("mujoco", scene);
-  }
+struct Mujoco : test::OnEngine<::testing::Test> {
+  Mujoco() : OnEngine("mujoco") {}
 };
 
 TEST_F(Mujoco, LeavesNoLogOfADivergedRun) {

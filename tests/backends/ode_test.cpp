@@ -9,6 +9,7 @@
 #include "duet/backends/factory.h"
 #include "duet/robots/kinematics.h"
 #include "tests/backends/contact_scene.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/backends/trace.h"
@@ -17,23 +18,8 @@
 namespace duet {
 namespace {
 
-bool ode_is_here() {
-  for (const EngineInfo& info : engines())
-    if (info.name == "ode") return info.available;
-  return false;
-}
-
-struct Ode : ::testing::Test {
-  void SetUp() override {
-    if (!ode_is_here()) GTEST_SKIP() << "not run: engine ode absent";
-  }
-  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    return make_backend("ode", scene);
-  }
+struct Ode : test::OnEngine<::testing::Test> {
+  Ode() : OnEngine("ode") {}
 };
 
 // All joints swing by 0.6 rad, 1.5 times a second, on the ground: the pose of the sole that ODE's own contact point

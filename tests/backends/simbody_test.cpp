@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "duet/backends/factory.h"
+#include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
@@ -10,20 +11,8 @@
 namespace duet {
 namespace {
 
-struct Simbody : ::testing::Test {
-  void SetUp() override {
-    for (const EngineInfo& engine : engines())
-      if (engine.name == "simbody" && !engine.available)
-        GTEST_SKIP() << "not run: engine simbody absent: " << engine.reason;
-  }
-  static std::unique_ptr<Backend> make(std::shared_ptr<const RobotModel> robot, double dt = 0.002) {
-    Scene scene;
-    scene.robot = std::move(robot);
-    scene.partner = PartnerMode::kNone;
-    scene.dt = dt;
-    scene.self_collision = false;
-    return make_backend("simbody", scene);
-  }
+struct Simbody : test::OnEngine<::testing::Test> {
+  Simbody() : OnEngine("simbody") {}
 };
 
 struct SimbodyWheel : Simbody {

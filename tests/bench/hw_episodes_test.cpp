@@ -5,23 +5,17 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "duet/backends/factory.h"
 #include "duet/core/file.h"
+#include "tests/backends/engine_names.h"
 #include "tests/bench/program.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
-bool mujoco_is_missing() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return !engine.available;
-  return true;
-}
-
 // In whichever half of an episode the signal comes, the program ends with its code and the episode leaves no row.
 TEST(HwEpisodes, AnInterruptedEpisodeLeavesNoRow) {
-  if (mujoco_is_missing()) GTEST_SKIP() << "not run: engine mujoco absent";
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
   const test::ScratchFolder folder;
   const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";
   for (const char* wait : {"0.6", "1.1", "1.9", "3.1"}) {

@@ -10,6 +10,7 @@
 #include "duet/backends/factory.h"
 #include "duet/hardware/frame_checksum.h"
 #include "duet/hardware/twin_operator.h"
+#include "tests/backends/engine_names.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
 
@@ -19,13 +20,7 @@ namespace {
 using ::testing::HasSubstr;
 
 #define NEEDS_MUJOCO() \
-  if (!engine_is_here()) GTEST_SKIP() << "not run: mujoco absent"
-
-bool engine_is_here() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return engine.available;
-  return false;
-}
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent"
 
 TwinOptions simulated() { return {.engine = "mujoco"}; }
 

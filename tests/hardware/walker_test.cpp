@@ -5,10 +5,10 @@
 
 #include <cmath>
 
-#include "duet/backends/factory.h"
 #include "duet/core/clock.h"
 #include "duet/hardware/guarded_world.h"
 #include "duet/hardware/twin_in_process.h"
+#include "tests/backends/engine_names.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 
@@ -16,12 +16,6 @@ namespace duet {
 namespace {
 
 using ::testing::HasSubstr;
-
-bool mujoco_is_here() {
-  for (const EngineInfo& engine : engines())
-    if (engine.name == "mujoco") return engine.available;
-  return false;
-}
 
 ControllerOptions homie_options() { return {{"network", test::shared_file("models/homie_deploy.onnx")}}; }
 
@@ -104,7 +98,7 @@ double gone(const Rollout& rollout) {
 }
 
 TEST(Walker, HomieWalksTheTwinBehindTheGuard) {
-  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   if (test::shared_file("models/homie_deploy.onnx").empty()) GTEST_SKIP() << "not run: homie_deploy.onnx absent";
   const Rollout rollout = walk("homie", homie_options(), 0.6);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
@@ -114,7 +108,7 @@ TEST(Walker, HomieWalksTheTwinBehindTheGuard) {
 }
 
 TEST(Walker, WbcSimStandsTheTwinBehindTheGuard) {
-  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   const Rollout rollout = walk("wbc_sim", {}, 0.0);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk) << rollout.recording.message;
   EXPECT_LT(std::abs(gone(rollout)), 0.2);
@@ -123,7 +117,7 @@ TEST(Walker, WbcSimStandsTheTwinBehindTheGuard) {
 
 // It does not fall: in a step its ankles are faster than the envelope lets any joint be, and the guard damps it.
 TEST(Walker, WbcSimsStepsAreFasterThanTheGuardLetsAJointBe) {
-  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   const Rollout rollout = walk("wbc_sim", {}, 0.6);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
   EXPECT_THAT(rollout.recording.message, HasSubstr("damp (joint_speed)"));
@@ -131,7 +125,7 @@ TEST(Walker, WbcSimsStepsAreFasterThanTheGuardLetsAJointBe) {
 }
 
 TEST(Walker, WithoutAWalkerTheTwinFallsAndTheGuardStops) {
-  if (!mujoco_is_here()) GTEST_SKIP() << "not run: mujoco absent";
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
   GuardedEpisode guarded;
   guarded.joints = test::arms_of(*test::g1()).joints;
   guarded.most_wait = 30.0;
