@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "duet/metrics/detector_catalogue.h"
+#include "duet/results/json_fields.h"
 #include "duet/results/text_table.h"
 
 namespace duet {
@@ -71,12 +72,6 @@ Row of_task(const std::vector<DetectorScore>& scores, Task task) {
   return row;
 }
 
-nlohmann::json finite_or_null(const std::map<std::string, double>& values) {
-  nlohmann::json json = nlohmann::json::object();
-  for (const auto& [name, value] : values) json[name] = std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
-  return json;
-}
-
 }  // namespace
 
 std::vector<DetectorView> robot_views(const Recording& recording, const RobotModel& robot) {
@@ -127,9 +122,9 @@ nlohmann::json detectors_json(const std::vector<DetectorScore>& scores) {
     json[std::string(to_string(score.task))][score.view] = {
         {"success", result.success},
         {"parts", result.parts},
-        {"values", finite_or_null(result.values)},
-        {"thresholds", finite_or_null(thresholds(score.task, score.thresholds))},
-        {"margins", finite_or_null(result.margins)},
+        {"values", numbers_or_null(result.values)},
+        {"thresholds", numbers_or_null(thresholds(score.task, score.thresholds))},
+        {"margins", numbers_or_null(result.margins)},
         {"evidence_frames", std::count(result.frames.begin(), result.frames.end(), true)}};
   }
   return json;

@@ -10,6 +10,7 @@
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
+#include "duet/results/json_fields.h"
 #include "duet/results/text_table.h"
 #include "duet/robots/kinematics.h"
 #include "duet/rollout/play_back.h"
@@ -31,12 +32,6 @@ PointTracks pair_tracks(const RobotMotion& motion, const RobotModel& robot) {
   std::vector<int> frames;
   for (const RetargetPair& pair : robot.pairs) frames.push_back(pair.frame);
   return frame_tracks(robot, motion, frames);
-}
-
-nlohmann::json finite_or_null(const std::map<std::string, double>& values) {
-  nlohmann::json json = nlohmann::json::object();
-  for (const auto& [name, value] : values) json[name] = std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
-  return json;
 }
 
 // Mean over the clips that have a value.
@@ -209,14 +204,14 @@ nlohmann::json score_json(const std::vector<ClipScore>& scores,
   for (const ClipScore& score : scores) {
     json["clips"].push_back({{"clip", score.clip},
                              {"task", score.task},
-                             {"metrics", finite_or_null(score.metrics)},
+                             {"metrics", numbers_or_null(score.metrics)},
                              {"source_detected", score.source_detected},
                              {"robot_detected", score.robot_detected},
                              {"paper_detected", score.paper_detected}});
-    if (!score.all_readings.empty()) json["clips"].back()["all_readings"] = finite_or_null(score.all_readings);
+    if (!score.all_readings.empty()) json["clips"].back()["all_readings"] = numbers_or_null(score.all_readings);
     if (!score.detectors.empty()) json["clips"].back()["detectors"] = detectors_json(score.detectors);
   }
-  for (const auto& [group, values] : summary) json["summary"][group] = finite_or_null(values);
+  for (const auto& [group, values] : summary) json["summary"][group] = numbers_or_null(values);
   return json;
 }
 

@@ -34,14 +34,14 @@ polyline{fill:none;stroke-width:1.6}
 @media(prefers-color-scheme:dark){text{fill:#a6adb6}text.title{fill:#e7e8ea}.grid{stroke:#3a4048}}
 )css";
 
-struct Axis {
+struct CurveAxis {
   double low, high;  // log10, whole decades
   double from, to;   // [px]
 
   [[nodiscard]] double at(double value) const { return from + (std::log10(value) - low) / (high - low) * (to - from); }
 };
 
-Axis axis_over(const std::vector<double>& values, double from, double to) {
+CurveAxis axis_over(const std::vector<double>& values, double from, double to) {
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
   double low = std::floor(std::log10(*least)), high = std::ceil(std::log10(*most));
   if (high - low < 1.0) high = low + 1.0;
@@ -63,7 +63,7 @@ std::string decade_label(double exponent) {
                                              : fmt::format("1e{:g}", exponent);
 }
 
-std::string grid_svg(const Axis& x, const Axis& y) {
+std::string grid_svg(const CurveAxis& x, const CurveAxis& y) {
   std::string svg;
   const double step_y = y.high - y.low > 8.0 ? 2.0 : 1.0;
   for (double e = x.low; e <= x.high; ++e) {
@@ -83,8 +83,8 @@ std::string grid_svg(const Axis& x, const Axis& y) {
   return svg;
 }
 
-std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const Axis& x,
-                      const Axis& y) {
+std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const CurveAxis& x,
+                      const CurveAxis& y) {
   std::string points, dots;
   for (const conformance::AccuracyPoint& point : curve.points) {
     if (!plottable(point)) continue;
@@ -230,7 +230,7 @@ std::string accuracy_plot_svg(const std::vector<CertifiedEngine>& engines, const
     }
   }
   if (errors.empty()) return "";
-  const Axis x = axis_over(costs, kLeft, kRight), y = axis_over(errors, kBottom, kTop);
+  const CurveAxis x = axis_over(costs, kLeft, kRight), y = axis_over(errors, kBottom, kTop);
   std::string svg =
       fmt::format(R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}: error against cost">)", kWidth,
                   kHeight, escape_html(scene));

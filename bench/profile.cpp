@@ -18,7 +18,7 @@
 namespace duet {
 namespace {
 
-constexpr std::string_view kSchema = "duet.profile/1";
+constexpr std::string_view kProfileSchema = "duet.profile/1";
 constexpr double kShortestStep = 1e-6;  // [s]; 20,000 steps a control period, far below what any engine asks for
 
 std::vector<std::string> physics_engines() {
@@ -79,8 +79,8 @@ EngineSettings Profile::settings(const std::string& engine) const {
 
 Profile read_profile(const YAML::Node& document, const std::string& file) {
   const YamlSection top(file, document, "profile", {"schema", "name", "about", "engines"});
-  if (top.has("schema") && top.text("schema") != kSchema)
-    top.fail(top.line("schema"), fmt::format("schema: expected '{}', found '{}'", kSchema, top.text("schema")));
+  if (top.has("schema") && top.text("schema") != kProfileSchema)
+    top.fail(top.line("schema"), fmt::format("schema: expected '{}', found '{}'", kProfileSchema, top.text("schema")));
   Profile profile{.name = top.text("name"), .about = top.has("about") ? top.text("about") : "", .engines = {}};
   const YAML::Node node = top.node("engines");
   if (!node.IsMap())
@@ -100,7 +100,7 @@ Profile load_profile(const std::string& profile) {
   const auto load = [](const std::string& file) {
     const YAML::Node document = parse_yaml(read_text(file), file);
     if (!document.IsMap() || !document["schema"])
-      throw InputError(fmt::format("{}:1: expected an engine profile with 'schema: {}', found {}", file, kSchema,
+      throw InputError(fmt::format("{}:1: expected an engine profile with 'schema: {}', found {}", file, kProfileSchema,
                                    document.IsMap() ? "no schema" : describe(document)));
     return read_profile(document, file);
   };

@@ -68,7 +68,7 @@ endif()
 # Compiles several sources of a target at once: half of a room's compilation is headers that its files share. File-local
 # names are therefore unique among neighbours.
 function(duet_unite target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${DUET_UNITY} UNITY_BUILD_BATCH_SIZE 8)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${DUET_UNITY} UNITY_BUILD_BATCH_SIZE 20)
 endfunction()
 
 function(duet_add_module room)

@@ -14,7 +14,7 @@ namespace duet {
 namespace {
 
 // A swing is from where the foot rises above 1.5 cm until it is below 1 cm again.
-constexpr double kLifted = 0.015, kDown = 0.01;
+constexpr double kLifted = 0.015, kDownward = 0.01;
 
 void add_speeds(const Recording& recording, std::map<std::string, double>& metrics) {
   const int first = static_cast<int>(std::lround(kWalkSettles * recording.rate_hz));
@@ -36,7 +36,7 @@ class SwingMeter {
  public:
   void add(double height) {
     if (height > kLifted) top_ = std::max(top_, height);
-    if (height > kDown || top_ == 0.0) return;
+    if (height > kDownward || top_ == 0.0) return;
     sum_ += top_;
     ++swings_;
     top_ = 0.0;

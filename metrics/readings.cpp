@@ -41,7 +41,7 @@ constexpr Option option(std::string_view name, std::string_view values, int firs
 }
 
 constexpr auto kMetrics = &Readings::metrics;
-constexpr auto kDetectors = &Readings::detectors;
+constexpr auto kDetectorRules = &Readings::detectors;
 constexpr auto kDiagnostics = &Readings::diagnostics;
 using M = MetricReadings;
 using D = DetectorReadings;
@@ -61,25 +61,25 @@ constexpr Option kOptions[] = {
     option<kMetrics, &M::ddof>("metrics.ddof", "0 1"),
     option<kMetrics, &M::jerk_scheme>("metrics.jerk_scheme", "diff central gradient"),
 
-    option<kDetectors, &D::hug_single>("hug.single", "any_hand same_hand exactly_one off"),
-    option<kDetectors, &D::hug_shoulder>("hug.shoulder", "both_hands any_hand torso_both torso_any off"),
-    option<kDetectors, &D::handshake_distance>("handshake.distance", "hand_to_root agent_roots"),
-    option<kDetectors, &D::handshake_active>("handshake.active", "performer_hand partner_hand"),
-    option<kDetectors, &D::handshake_stability>("handshake.stability", "whole rolling_all rolling_any"),
-    option<kDetectors, &D::handshake_stability_frames>("handshake.stability_frames", "raw validated"),
-    option<kDetectors, &D::handshake_ddof>("handshake.ddof", "0 1"),
-    option<kDetectors, &D::high_five_height>(
+    option<kDetectorRules, &D::hug_single>("hug.single", "any_hand same_hand exactly_one off"),
+    option<kDetectorRules, &D::hug_shoulder>("hug.shoulder", "both_hands any_hand torso_both torso_any off"),
+    option<kDetectorRules, &D::handshake_distance>("handshake.distance", "hand_to_root agent_roots"),
+    option<kDetectorRules, &D::handshake_active>("handshake.active", "performer_hand partner_hand"),
+    option<kDetectorRules, &D::handshake_stability>("handshake.stability", "whole rolling_all rolling_any"),
+    option<kDetectorRules, &D::handshake_stability_frames>("handshake.stability_frames", "raw validated"),
+    option<kDetectorRules, &D::handshake_ddof>("handshake.ddof", "0 1"),
+    option<kDetectorRules, &D::high_five_height>(
         "high_five.height", "closest_pair performer_closest partner_closest any_hand performer_any off"),
-    option<kDetectors, &D::wave_plane>("wave.plane", "xy lateral_up pca"),
-    option<kDetectors, &D::wave_displacement>("wave.displacement", "step both_steps since_last none"),
-    option<kDetectors, &D::wave_amplitude>("wave.amplitude", "max_axis diagonal diameter horizontal"),
-    option<kDetectors, &D::wave_height>("wave.height", "any_hand_max active_max active_mean active_median"),
-    option<kDetectors, &D::wave_frame>("wave.frame", "world root"),
-    option<kDetectors, &D::bend_frames>("bend.frames", "count consecutive"),
-    option<kDetectors, &D::bend_direction>("bend.direction", "any forward"),
-    option<kDetectors, &D::fly_kiss_order>("fly_kiss.order", "whole after_closest after_first_close"),
-    option<kDetectors, &D::fly_kiss_dir>("fly_kiss.dir", "space horizontal"),
-    option<kDetectors, &D::fly_kiss_frame>("fly_kiss.frame", "world root"),
+    option<kDetectorRules, &D::wave_plane>("wave.plane", "xy lateral_up pca"),
+    option<kDetectorRules, &D::wave_displacement>("wave.displacement", "step both_steps since_last none"),
+    option<kDetectorRules, &D::wave_amplitude>("wave.amplitude", "max_axis diagonal diameter horizontal"),
+    option<kDetectorRules, &D::wave_height>("wave.height", "any_hand_max active_max active_mean active_median"),
+    option<kDetectorRules, &D::wave_frame>("wave.frame", "world root"),
+    option<kDetectorRules, &D::bend_frames>("bend.frames", "count consecutive"),
+    option<kDetectorRules, &D::bend_direction>("bend.direction", "any forward"),
+    option<kDetectorRules, &D::fly_kiss_order>("fly_kiss.order", "whole after_closest after_first_close"),
+    option<kDetectorRules, &D::fly_kiss_dir>("fly_kiss.dir", "space horizontal"),
+    option<kDetectorRules, &D::fly_kiss_frame>("fly_kiss.frame", "world root"),
 
     option<kDiagnostics, &G::velocity>("diagnostics.velocity", "diff gradient given"),
     option<kDiagnostics, &G::spectrum>("diagnostics.spectrum", "periodogram hann welch butterworth"),

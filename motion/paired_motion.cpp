@@ -9,8 +9,8 @@
 namespace duet {
 namespace {
 
-constexpr const char* kSchema = "duet.paired_motion";
-constexpr std::int64_t kSchemaVersion = 1;
+constexpr const char* kPairedSchema = "duet.paired_motion";
+constexpr std::int64_t kPairedVersion = 1;
 constexpr const char* kLossPrefix = "loss_";
 
 void check_same_time(const PairedMotion& motion) {
@@ -64,7 +64,7 @@ RobotMotion get_robot(const Npz& npz, double rate_hz) {
 }  // namespace
 
 PairedMotion read_paired_motion(const Npz& npz) {
-  check_schema(npz, kSchema, kSchemaVersion,
+  check_schema(npz, kPairedSchema, kPairedVersion,
                {"clip_id",
                 "task",
                 "reactor",
@@ -121,7 +121,7 @@ void validate(const PairedMotion& motion) {
 std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method) {
   validate(motion);
   Npz npz;
-  put_schema(npz, kSchema, kSchemaVersion);
+  put_schema(npz, kPairedSchema, kPairedVersion);
   npz.set_text("clip_id", motion.clip_id);
   put_task(npz, motion.task, motion.reactor, motion.phases, motion.robot.rate_hz);
   put_robot(npz, motion.robot);

@@ -12,7 +12,7 @@
 namespace duet {
 namespace {
 
-constexpr std::int64_t kExactInteger = 1 << 24;
+constexpr std::int64_t kExactInFloat = 1 << 24;
 
 const OnnxOperator* find_operator(std::string_view name) {
   for (const auto table : {elementwise_operators(), movement_operators(), shape_operators(), linear_operators(),
@@ -231,7 +231,7 @@ void OnnxBuilder::step(OnnxStep step) {
     if (found == plan_.values.end() || found->second.type == ElementType::kFloat) continue;
     OnnxValue& value = found->second;  // what is constant and whole is kept as int64
     for (std::int64_t k = 0; k < value.count(); ++k)
-      value.integers.push_back(std::abs(value.data[k]) <= kExactInteger ? static_cast<std::int64_t>(value.data[k]) : 0);
+      value.integers.push_back(std::abs(value.data[k]) <= kExactInFloat ? static_cast<std::int64_t>(value.data[k]) : 0);
     value.data = nullptr;
   }
 }

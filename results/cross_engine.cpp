@@ -15,12 +15,6 @@ namespace {
 
 constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
 
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return values.empty() ? kUndefined : sum / static_cast<double>(values.size());
-}
-
 double sample_sd(const std::vector<double>& values) {
   if (values.size() < 2) return kUndefined;
   const double mean = mean_of(values);
@@ -226,6 +220,12 @@ std::vector<RunEngine> engine_infos(const std::vector<EpisodeRow>& rows, const s
 }
 
 }  // namespace
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? kUndefined : sum / static_cast<double>(values.size());
+}
 
 EngineRows::EngineRows(const std::vector<EpisodeRow>& rows, const std::string& arm) {
   for (const EpisodeRow* row : distinct_episodes(rows)) {

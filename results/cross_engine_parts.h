@@ -52,6 +52,7 @@ class ClipNumbers {
   std::map<std::pair<std::string, std::string>, int> numbers_;
 };
 
+double mean_of(const std::vector<double>& values);  // NaN of none
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options);
 std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success);
 // Sets what rank_stability leaves: violation, change of the winner, all intervals.

@@ -31,12 +31,6 @@ void gather_drift(const EpisodeRow& row, const EpisodeRow& playback, const std::
   }
 }
 
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
-
 // Places of the points that both traces have, in a and in b.
 std::vector<std::pair<std::size_t, std::size_t>> shared_points(const StateTrace& a, const StateTrace& b) {
   std::vector<std::pair<std::size_t, std::size_t>> places;

@@ -17,13 +17,13 @@
 namespace duet {
 namespace {
 
-constexpr const char* kSchema = "duet.golden/1";
+constexpr const char* kGoldenSchema = "duet.golden/1";
 // A mean over episodes moves by this much between processors (vector width, library versions), far less than a change
 // of behaviour moves it. Whoever keeps a baseline edits the file where a figure needs another tolerance.
 constexpr double kMetricRtol = 0.02;
 constexpr double kMetricAtol = 1e-9;
 
-struct Figure {
+struct GoldenFigure {
   double value = 0.0, atol = 0.0, rtol = 0.0;
   [[nodiscard]] double tolerance() const { return atol + rtol * std::abs(value); }
 };
@@ -35,8 +35,8 @@ std::string place(const LeaderboardEntry& entry) {
 }
 
 // Everything that a baseline holds of an entry, by name.
-std::map<std::string, Figure> figures_of(const LeaderboardEntry& entry) {
-  std::map<std::string, Figure> figures;
+std::map<std::string, GoldenFigure> figures_of(const LeaderboardEntry& entry) {
+  std::map<std::string, GoldenFigure> figures;
   figures["episodes"] = {.value = static_cast<double>(entry.n)};
   // One episode of many may fall on the other side of a threshold on another processor.
   const double one_episode = entry.n >= kFewEpisodes ? 1.0 / static_cast<double>(entry.n) + 1e-12 : 1e-12;
@@ -47,13 +47,13 @@ std::map<std::string, Figure> figures_of(const LeaderboardEntry& entry) {
   return figures;
 }
 
-std::map<std::string, Figure> read_figures(const nlohmann::json& json, const std::string& where) {
+std::map<std::string, GoldenFigure> read_figures(const nlohmann::json& json, const std::string& where) {
   if (!json.is_object())
     throw InputError(fmt::format("{}: expected an object of figures, found {}", where, json.type_name()));
-  std::map<std::string, Figure> figures;
+  std::map<std::string, GoldenFigure> figures;
   for (const auto& [name, value] : json.items()) {
     JsonFields fields(value, fmt::format("{}: {}", where, name));
-    const Figure figure{.value = fields.number("value"), .atol = fields.number("atol"), .rtol = fields.number("rtol")};
+    const GoldenFigure figure{.value = fields.number("value"), .atol = fields.number("atol"), .rtol = fields.number("rtol")};
     fields.refuse_unknown();
     if (figure.atol < 0.0 || figure.rtol < 0.0) {
       throw InputError(fmt::format("{}: {}: expected tolerances of at least 0, found atol {}, rtol {}", where, name,
@@ -98,12 +98,12 @@ void require_suite(const RunInfo& expected, const RunInfo& found, const std::str
                                differing));
 }
 
-std::map<std::string, std::map<std::string, Figure>> read_baseline(const std::string& text, const RunInfo& run) {
+std::map<std::string, std::map<std::string, GoldenFigure>> read_baseline(const std::string& text, const RunInfo& run) {
   const std::string what = "golden baseline";
   const nlohmann::json json = parse_json(text, what);
   JsonFields fields(json, what);
-  if (const std::string schema = fields.text("schema"); schema != kSchema) {
-    throw InputError(fmt::format("{}: expected schema {}, found {}", what, kSchema, shown(schema)));
+  if (const std::string schema = fields.text("schema"); schema != kGoldenSchema) {
+    throw InputError(fmt::format("{}: expected schema {}, found {}", what, kGoldenSchema, shown(schema)));
   }
   RunInfo blessed;
   blessed.suite = fields.text("suite");
@@ -114,7 +114,7 @@ std::map<std::string, std::map<std::string, Figure>> read_baseline(const std::st
   const nlohmann::json& entries = fields.at("entries");
   fields.refuse_unknown();
   if (!entries.is_object()) throw InputError(fmt::format("{}: key 'entries': expected an object", what));
-  std::map<std::string, std::map<std::string, Figure>> baseline;
+  std::map<std::string, std::map<std::string, GoldenFigure>> baseline;
   for (const auto& [where, figures] : entries.items()) {
     baseline[where] = read_figures(figures, fmt::format("{}: {}", what, where));
   }
@@ -129,7 +129,7 @@ std::string policy_of(const std::string& where) {
 std::string combination_of(const std::string& where) { return where.substr(0, where.rfind(' ')); }
 
 // What of the run is missing: the whole policy, its combination with an engine and a controller, or a task of it.
-std::string missing_part(const std::string& where, const std::map<std::string, std::map<std::string, Figure>>& found) {
+std::string missing_part(const std::string& where, const std::map<std::string, std::map<std::string, GoldenFigure>>& found) {
   const auto has = [&](const auto& name_of, const std::string& name) {
     return std::ranges::any_of(found, [&](const auto& entry) { return name_of(entry.first) == name; });
   };
@@ -163,7 +163,7 @@ std::string bless(const std::vector<LeaderboardEntry>& entries, const RunInfo& r
       figures[name] = {{"value", figure.value}, {"atol", figure.atol}, {"rtol", figure.rtol}};
     }
   }
-  const nlohmann::json json = {{"schema", kSchema},
+  const nlohmann::json json = {{"schema", kGoldenSchema},
                                {"suite", run.suite},
                                {"suite_version", run.suite_version},
                                {"suite_hash", run.suite_hash},
@@ -174,7 +174,7 @@ std::string bless(const std::vector<LeaderboardEntry>& entries, const RunInfo& r
 
 std::vector<GoldenDifference> check(const std::string& golden_json, const std::vector<LeaderboardEntry>& entries,
                                     const RunInfo& run_info) {
-  std::map<std::string, std::map<std::string, Figure>> found;
+  std::map<std::string, std::map<std::string, GoldenFigure>> found;
   for (const LeaderboardEntry& entry : entries) found[place(entry)] = figures_of(entry);
   std::vector<GoldenDifference> differences;
   for (const auto& [where, figures] : read_baseline(golden_json, run_info)) {
@@ -183,7 +183,7 @@ std::vector<GoldenDifference> check(const std::string& golden_json, const std::v
       add_missing(missing_part(where, found), figures.size(), differences);
       continue;
     }
-    const std::map<std::string, Figure>& run = entry->second;
+    const std::map<std::string, GoldenFigure>& run = entry->second;
     for (const auto& [name, figure] : figures) {
       GoldenDifference difference{.where = fmt::format("{} {}", where, name),
                                   .expected = figure.value,

@@ -16,6 +16,12 @@ nlohmann::json number_or_null(double value) {
   return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
+nlohmann::json numbers_or_null(const std::map<std::string, double>& values) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [name, value] : values) json[name] = number_or_null(value);
+  return json;
+}
+
 nlohmann::json json_of(const Interval& interval) {
   return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
 }

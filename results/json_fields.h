@@ -16,6 +16,7 @@ namespace duet {
 
 // null for a number that is not finite: JSON has no NaN.
 nlohmann::json number_or_null(double value);
+nlohmann::json numbers_or_null(const std::map<std::string, double>& values);  // an object, likewise
 nlohmann::json json_of(const Interval& interval);  // [low, high]
 
 // As text. Bytes that are no valid UTF-8 (a file's name, an engine's message) become one replacement character.

@@ -12,7 +12,7 @@
 namespace duet {
 namespace {
 
-constexpr double kLeft = 62.0, kRight = 584.0, kTop = 26.0, kBottom = 190.0;
+constexpr double kLeft = 62.0, kRight = 584.0, kLineTop = 26.0, kBottom = 190.0;
 constexpr int kWidth = 600, kHeight = 232, kKeyWidth = 140, kKeyLine = 17, kColours = 9;
 
 struct Axis {
@@ -43,7 +43,7 @@ struct Frame {
     return kLeft + (kRight - kLeft) * (value - x.low) / (x.high - x.low);
   }
   [[nodiscard]] double at_y(double value) const {
-    return kBottom - (kBottom - kTop) * (value - y.low) / (y.high - y.low);
+    return kBottom - (kBottom - kLineTop) * (value - y.low) / (y.high - y.low);
   }
 };
 

@@ -16,7 +16,7 @@ using Differences = std::vector<FieldDifference>;
 constexpr std::size_t kLongestValue = 80;  // characters
 constexpr std::size_t kMostNamed = 5;      // fields
 
-std::string shown(const nlohmann::json* value) {
+std::string shown_field(const nlohmann::json* value) {
   if (value == nullptr) return "nothing";
   const std::string text = dumped(*value);
   return text.size() <= kLongestValue ? text : text.substr(0, kLongestValue) + "...";
@@ -53,7 +53,7 @@ void compare(const std::string& field, const nlohmann::json* first, const nlohma
     if (is_list_of_objects(*first) && is_list_of_objects(*second)) return compare_items(field, *first, *second, found);
     if (dumped(*first) == dumped(*second)) return;
   }
-  found.push_back({field, shown(first), shown(second)});
+  found.push_back({field, shown_field(first), shown_field(second)});
 }
 
 nlohmann::json repeatable(const EpisodeRow& row) {

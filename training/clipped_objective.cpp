@@ -6,7 +6,7 @@
 namespace duet {
 namespace {
 
-constexpr float kFarthest = 4.0F;     // standard deviations
+constexpr float kFarthestAction = 4.0F;     // standard deviations
 constexpr float kLargestLog = 10.0F;  // of a ratio: e^10 is beyond every clip, and finite
 
 }  // namespace
@@ -21,7 +21,7 @@ float log_probability(const Eigen::VectorXf& inverse_std, float sum_log_std, con
 }
 
 LikelihoodGradient likelihood_gradient(float action, float mean, float inverse_std) {
-  const float z = std::clamp((action - mean) * inverse_std, -kFarthest, kFarthest);
+  const float z = std::clamp((action - mean) * inverse_std, -kFarthestAction, kFarthestAction);
   return {.z = z, .log_std = z * z - 1.0F};
 }
 

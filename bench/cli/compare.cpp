@@ -29,7 +29,7 @@ void add_other_digests(const char* kind, const Digests& a, const Digests& b, std
           fmt::format("{} '{}' is {} in A and {} in B", kind, name, short_digest(digest), short_digest(other->second)));
 }
 
-std::vector<std::string> notes_of(const CompareArguments& arguments, const Run& a, const Run& b) {
+std::vector<std::string> comparison_notes(const CompareArguments& arguments, const Run& a, const Run& b) {
   std::vector<std::string> notes = completeness_notes({arguments.a, arguments.b}, {a, b});
   if (a.info.suite_hash != b.info.suite_hash)
     notes.push_back(fmt::format("the suite's hash is {} in A and {} in B: other settings, clips or detectors",
@@ -47,7 +47,7 @@ std::vector<std::string> notes_of(const CompareArguments& arguments, const Run& 
 void run_compare(const Session& session, const CompareArguments& arguments) {
   const Run a = open_run(arguments.a);
   const Run b = open_run(arguments.b);
-  const std::vector<std::string> notes = notes_of(arguments, a, b);
+  const std::vector<std::string> notes = comparison_notes(arguments, a, b);
   const std::vector<Comparison> comparisons = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
     return compare_runs(a.rows, b.rows, arguments.options);
   });

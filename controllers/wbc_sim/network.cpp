@@ -54,9 +54,9 @@ void round_to_half(Mlp& mlp) {
 }
 
 // Reading, with every message in one form.
-class Reader {
+class NetworkReader {
  public:
-  Reader(const SafeTensors& tensors, const std::string& file) : tensors_(tensors), file_(file) {}
+  NetworkReader(const SafeTensors& tensors, const std::string& file) : tensors_(tensors), file_(file) {}
 
   [[nodiscard]] std::string text(const std::string& key) const {
     const auto found = tensors_.metadata.find(key);
@@ -85,13 +85,13 @@ class Reader {
   const std::string& file_;
 };
 
-nlohmann::json parse_list(const Reader& reader, const std::string& key, const std::string& file) {
+nlohmann::json parse_list(const NetworkReader& reader, const std::string& key, const std::string& file) {
   nlohmann::json json = parse_json(reader.text(key), fmt::format("{}: '{}' in the header", file, key));
   if (!json.is_array()) throw InputError(fmt::format("{}: '{}' in the header is not a list", file, key));
   return json;
 }
 
-void check_joints(const Reader& reader, const RobotModel& robot, const std::string& file) {
+void check_joints(const NetworkReader& reader, const RobotModel& robot, const std::string& file) {
   const nlohmann::json joints = parse_list(reader, "joints", file);
   if (joints.size() != robot.joints.size())
     throw InputError(
@@ -102,14 +102,14 @@ void check_joints(const Reader& reader, const RobotModel& robot, const std::stri
   }
 }
 
-void check_channels(const Reader& reader, WbcKind kind, int joints, const std::string& file) {
+void check_channels(const NetworkReader& reader, WbcKind kind, int joints, const std::string& file) {
   const nlohmann::json found = parse_list(reader, "observation", file), expected = channels_of(kind, joints);
   for (size_t i = 0; i < std::max(found.size(), expected.size()); ++i)
     reader.expect(fmt::format("observation channel {}", i), i < expected.size() ? expected[i].dump() : "nothing",
                   i < found.size() ? found[i].dump() : "nothing");
 }
 
-void check_golden(const Reader& reader, const WbcNetwork& network, const std::string& file) {
+void check_golden(const NetworkReader& reader, const WbcNetwork& network, const std::string& file) {
   const Eigen::VectorXf input = reader.vector("golden.input", network.mean.size());
   const Eigen::VectorXf output = reader.vector("golden.output", network.mlp.outputs());
   WbcPolicy policy(network);
@@ -121,7 +121,7 @@ void check_golden(const Reader& reader, const WbcNetwork& network, const std::st
                     file, error, kGoldenError));
 }
 
-long whole_number(const Reader& reader, const std::string& key, const std::string& file) {
+long whole_number(const NetworkReader& reader, const std::string& key, const std::string& file) {
   const std::string text = reader.text(key);
   try {
     return std::stol(text);
@@ -191,7 +191,7 @@ bool is_wbc_network(const SafeTensors& tensors) {
 
 WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   const SafeTensors tensors = read_safetensors(path);
-  const Reader reader(tensors, path);
+  const NetworkReader reader(tensors, path);
   reader.expect("the format", kFormat, reader.text("format"));
   WbcNetwork network;
   const std::string kind = reader.text("kind");

@@ -18,7 +18,7 @@ std::array<LegChain, 2> two_legs(const RobotModel& robot, const Stance& stance) 
   return {LegChain(robot, stance.legs()[0]), LegChain(robot, stance.legs()[1])};
 }
 
-double wrapped(double angle) { return std::remainder(angle, 2.0 * M_PI); }
+double wrapped_yaw(double angle) { return std::remainder(angle, 2.0 * M_PI); }
 
 struct Attitude {
   double roll, pitch, yaw;  // R = Rz(yaw) Ry(pitch) Rx(roll)
@@ -78,10 +78,10 @@ void WbcTracker::update(const RobotState& state, const Reference& reference) {
   const Pose target = within(reference.X_WB, bounds_);
   const double yaw = yaw_of(target.R);
   root_velocity_.head<2>() = kTickRate * in_heading(yaw, target.p - last_root_.p);
-  root_velocity_.z() = kTickRate * wrapped(yaw - yaw_of(last_root_.R));
+  root_velocity_.z() = kTickRate * wrapped_yaw(yaw - yaw_of(last_root_.R));
   Eigen::Vector3d deviation;
   deviation.head<2>() = in_heading(yaw, state.X_WB.p - target.p);
-  deviation.z() = wrapped(yaw_of(state.X_WB.R) - yaw);
+  deviation.z() = wrapped_yaw(yaw_of(state.X_WB.R) - yaw);
   gait_.update(root_velocity_, deviation);
   track(reference);
   v_ = kTickRate * (q_ - last_q_);

@@ -14,7 +14,7 @@
 namespace duet {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
 constexpr const char* kWhat = "configuration of D-STAR";
 
@@ -92,14 +92,14 @@ std::vector<std::string> known_names() {
   throw InputError(fmt::format("{}: {}: {}", file, kWhat, problem));
 }
 
-const Json& field(const Json& json, const char* name, const std::string& file) {
+const OrderedJson& json_field(const OrderedJson& json, const char* name, const std::string& file) {
   const auto found = json.find(name);
   if (found == json.end()) refuse(file, fmt::format("expected a field '{}', found none", name));
   return *found;
 }
 
-int parse_size(const Json& json, const Size& size, const std::string& file) {
-  const Json& value = field(json, size.name, file);
+int parse_size(const OrderedJson& json, const Size& size, const std::string& file) {
+  const OrderedJson& value = json_field(json, size.name, file);
   const bool fits = value.is_number_integer() && value >= size.least && value <= size.most;
   if (!fits)
     refuse(file, fmt::format("'{}': expected a whole number from {} to {}, found {}", size.name, size.least, size.most,
@@ -107,8 +107,8 @@ int parse_size(const Json& json, const Size& size, const std::string& file) {
   return value.get<int>();
 }
 
-bool parse_switch(const Json& json, const Switch& one, const std::string& file) {
-  const Json& value = field(json, one.name, file);
+bool parse_switch(const OrderedJson& json, const Switch& one, const std::string& file) {
+  const OrderedJson& value = json_field(json, one.name, file);
   if (!value.is_boolean())
     refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, shown(value.dump())));
   return value.get<bool>();
@@ -134,14 +134,14 @@ std::string config_problem(const DstarConfig& config) {
 }
 
 std::string to_json_text(const DstarConfig& config) {
-  Json json = Json::object();
+  OrderedJson json = OrderedJson::object();
   for (const Size& size : kSizes) json[size.name] = config.*size.value;
   for (const Switch& one : kSwitches) json[one.name] = config.*one.value;
   return json.dump();
 }
 
 DstarConfig parse_dstar_config(const std::string& text, const std::string& file) {
-  const Json json = parse_json(text, fmt::format("{}: {}", file, kWhat));
+  const OrderedJson json = parse_json(text, fmt::format("{}: {}", file, kWhat));
   if (!json.is_object()) refuse(file, fmt::format("expected a JSON object, found {}", json.type_name()));
   const std::vector<std::string> known = known_names();
   for (const auto& item : json.items())

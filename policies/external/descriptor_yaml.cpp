@@ -64,9 +64,9 @@ std::vector<double> numbers_or(const YamlSection& section, const char* key, doub
 }
 
 // Reads one descriptor; its members are the state that the steps share.
-class Reader {
+class DescriptorReader {
  public:
-  Reader(const std::string& text, const std::string& file)
+  DescriptorReader(const std::string& text, const std::string& file)
       : root_(file, parse_yaml(text, file), "policy descriptor",
               {"schema", "name", "about", "kind", "joints", "tasks", "frame_of_reference", "output", "network",
                "inputs", "command", "socket", "deadline_ms", "hang_ms", "start_ms"}) {
@@ -235,7 +235,7 @@ class Reader {
 }  // namespace
 
 PolicyDescriptor parse_policy_descriptor(const std::string& text, const std::string& file) {
-  return Reader(text, file).read();
+  return DescriptorReader(text, file).read();
 }
 
 }  // namespace duet

@@ -21,15 +21,15 @@ using Json = nlohmann::json;
 
 constexpr std::size_t kLengthBytes = 4;
 constexpr std::size_t kExcerpt = 40;  // of a value, in our message
-constexpr const char* kWhat = "message of the policy";
+constexpr const char* kMessage = "message of the policy";
 
-[[noreturn]] void refuse(const std::string& message) { throw InputError(fmt::format("{}: {}", kWhat, message)); }
+[[noreturn]] void refuse(const std::string& message) { throw InputError(fmt::format("{}: {}", kMessage, message)); }
 
 std::string excerpt(std::string_view text) { return shown(text, kExcerpt); }
 
 Json parse_text(std::string_view text) {
   try {
-    return parse_json(text, kWhat);
+    return parse_json(text, kMessage);
   } catch (const InputError&) {
     for (const char* word : {"NaN", "Infinity"})
       if (text.find(word) != std::string_view::npos) refuse(fmt::format("expected finite numbers, found {}", word));

@@ -43,19 +43,19 @@ bool poll_until(int descriptor, short events, Deadline deadline, const std::func
   }
 }
 
-[[noreturn]] void refuse(const std::string& address, const std::string& reason) {
+[[noreturn]] void refuse_connection(const std::string& address, const std::string& reason) {
   throw MissingError(fmt::format("cannot connect to '{}': {}", address, reason));
 }
 
 void connect_socket(int descriptor, const sockaddr* name, socklen_t size, const std::string& address,
                     Deadline deadline) {
   if (connect(descriptor, name, size) == 0) return;
-  if (errno != EINPROGRESS) refuse(address, std::strerror(errno));
-  if (!poll_until(descriptor, POLLOUT, deadline, {})) refuse(address, "no answer in time");
+  if (errno != EINPROGRESS) refuse_connection(address, std::strerror(errno));
+  if (!poll_until(descriptor, POLLOUT, deadline, {})) refuse_connection(address, "no answer in time");
   int error = 0;
   socklen_t length = sizeof error;
   getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &length);
-  if (error != 0) refuse(address, std::strerror(error));
+  if (error != 0) refuse_connection(address, std::strerror(error));
 }
 
 // Closes the descriptor unless it is released.
@@ -63,7 +63,7 @@ class OpenSocket {
  public:
   OpenSocket(int family, const std::string& address)
       : descriptor_(socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
-    if (descriptor_ < 0) refuse(address, std::strerror(errno));
+    if (descriptor_ < 0) refuse_connection(address, std::strerror(errno));
   }
   ~OpenSocket() {
     if (descriptor_ >= 0) close(descriptor_);
@@ -80,7 +80,7 @@ class OpenSocket {
 int connect_local(const std::string& path, Deadline deadline) {
   sockaddr_un name{.sun_family = AF_UNIX, .sun_path = {}};
   if (path.size() >= sizeof name.sun_path)
-    refuse(path, fmt::format("expected a path of less than {} bytes", sizeof name.sun_path));
+    refuse_connection(path, fmt::format("expected a path of less than {} bytes", sizeof name.sun_path));
   std::ranges::copy(path, std::begin(name.sun_path));
   OpenSocket opened(AF_UNIX, path);
   connect_socket(opened.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name, path, deadline);
@@ -92,7 +92,7 @@ int connect_tcp(const std::string& host, const std::string& port, const std::str
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (const int error = getaddrinfo(host.c_str(), port.c_str(), &hints, &found); error != 0)
-    refuse(address, gai_strerror(error));
+    refuse_connection(address, gai_strerror(error));
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> addresses(found, freeaddrinfo);
   for (const addrinfo* entry = found;; entry = entry->ai_next) try {
       OpenSocket opened(entry->ai_family, address);

@@ -11,7 +11,7 @@ namespace duet {
 namespace {
 
 constexpr int kStatisticsWindows = 4000;
-constexpr float kLeastDeviation = 0.01F;
+constexpr float kLeastWindowDeviation = 0.01F;
 
 int clamped(const Demonstration& entry, int frame) { return entry.begin + std::clamp(frame, 0, entry.frames - 1); }
 
@@ -212,8 +212,8 @@ WindowStatistics window_statistics(WindowMaker& maker, const std::vector<Window>
   statistics.plan_mean = batch.plan.rowwise().mean();
   statistics.plan_deviation = (batch.plan.colwise() - statistics.plan_mean).rowwise().norm() /
                               std::sqrt(static_cast<float>(kStatisticsWindows));
-  statistics.frame_deviation = statistics.frame_deviation.cwiseMax(kLeastDeviation);
-  statistics.plan_deviation = statistics.plan_deviation.cwiseMax(kLeastDeviation);
+  statistics.frame_deviation = statistics.frame_deviation.cwiseMax(kLeastWindowDeviation);
+  statistics.plan_deviation = statistics.plan_deviation.cwiseMax(kLeastWindowDeviation);
   return statistics;
 }
 
