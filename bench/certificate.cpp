@@ -8,8 +8,8 @@
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/core/version.h"
-#include "duet/results/environment.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/environment.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {

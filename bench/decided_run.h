@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "duet/bench/episode.h"
-#include "duet/results/decision.h"
+#include "duet/results/statistics/decision.h"
 
 namespace duet {
 

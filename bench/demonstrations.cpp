@@ -14,7 +14,7 @@
 #include "duet/motion/clip_digest.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/registry.h"
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 #include "duet/rollout/act_episode.h"
 
 namespace duet {

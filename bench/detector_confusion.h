@@ -12,8 +12,8 @@
 #include "duet/datasets/clip_labels.h"
 #include "duet/metrics/detector.h"
 #include "duet/motion/people/people_options.h"
-#include "duet/results/statistics.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
+#include "duet/results/statistics/statistics.h"
 
 namespace duet {
 

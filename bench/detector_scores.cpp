@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "duet/metrics/detector_catalogue.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {

@@ -8,7 +8,7 @@
 #include "duet/controllers/registry.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
-#include "duet/results/walk_table.h"
+#include "duet/results/analyses/walk_table.h"
 #include "duet/robots/robot_cards.h"
 
 namespace duet {

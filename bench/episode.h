@@ -11,8 +11,8 @@
 #include "duet/bench/suite.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/phase_adaptation.h"
-#include "duet/results/episode_row.h"
-#include "duet/results/run_info.h"
+#include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/run_info.h"
 
 namespace duet {
 

@@ -9,7 +9,7 @@
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/motion/npz_fields.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {

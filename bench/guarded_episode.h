@@ -12,7 +12,7 @@
 #include "duet/hardware/guarded_world.h"
 #include "duet/hardware/log_recording.h"
 #include "duet/hardware/robot_config.h"
-#include "duet/results/statistics.h"
+#include "duet/results/statistics/statistics.h"
 
 namespace duet {
 

@@ -13,9 +13,9 @@
 #include "duet/bench/suite_names.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/folder_lock.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/run_union.h"
+#include "duet/results/rows/folder_lock.h"
+#include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/run_union.h"
 
 namespace duet {
 namespace {
@@ -247,7 +247,7 @@ nlohmann::json hosts_json(const MergeInputs& inputs, const MergedRows& rows) {
   return {{"schema", "duet.hosts/1"}, {"nodes", nodes}, {"pairs", pairs}};
 }
 
-constexpr std::uint64_t kMerging = 2;  // byte of the run's lock file (results/run_directory.cpp)
+constexpr std::uint64_t kMerging = 2;  // byte of the run's lock file (results/rows/run_directory.cpp)
 
 void merge_in_place(const std::string& run, const MergeOptions& options, MergeSummary& summary) {
   FolderLock lock(inside(run, "lock"));

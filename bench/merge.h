@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/results/row_merge.h"
+#include "duet/results/rows/row_merge.h"
 
 namespace duet {
 

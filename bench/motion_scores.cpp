@@ -10,8 +10,8 @@
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/kinematics.h"
 #include "duet/rollout/play_back.h"
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/results/escape_html.h"
-#include "duet/results/report_parts.h"
+#include "duet/results/report/escape_html.h"
+#include "duet/results/report/report_parts.h"
 
 namespace duet {
 namespace {

@@ -11,7 +11,7 @@
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/diagnostics.h"
 #include "duet/metrics/onset.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
 #include "duet/robots/robot_cards.h"
 
 namespace duet {

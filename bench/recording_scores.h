@@ -10,7 +10,7 @@
 
 #include "duet/bench/episode_recording.h"
 #include "duet/bench/motion_scores.h"
-#include "duet/results/row_identity.h"
+#include "duet/results/rows/row_identity.h"
 
 namespace duet {
 

@@ -10,7 +10,7 @@
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
 #include "duet/retarget/pair.h"
 
 namespace duet {

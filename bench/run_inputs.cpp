@@ -16,7 +16,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/card_reader.h"
 
 namespace duet {

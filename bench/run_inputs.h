@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "duet/bench/run_identity.h"
-#include "duet/results/published.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/published.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

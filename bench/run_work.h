@@ -11,7 +11,7 @@
 
 #include "duet/bench/progress.h"
 #include "duet/bench/stop_sign.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

@@ -12,7 +12,7 @@
 #include "duet/bench/run_work.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/environment.h"
+#include "duet/results/rows/environment.h"
 
 namespace duet {
 namespace {

@@ -17,7 +17,7 @@
 #include "duet/bench/run_work.h"
 #include "duet/bench/stop_sign.h"
 #include "duet/bench/suite.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

@@ -4,7 +4,7 @@
 
 #include "duet/bench/suite.h"
 #include "duet/metrics/readings.h"
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 #include "duet/rollout/act_episode.h"
 
 namespace duet {

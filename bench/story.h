@@ -7,9 +7,9 @@
 
 #include "duet/bench/motion_scores.h"
 #include "duet/bench/suite.h"
-#include "duet/results/cross_engine.h"
-#include "duet/results/html_report.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/report/html_report.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

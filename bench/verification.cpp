@@ -19,8 +19,8 @@
 #include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/metrics/detector.h"
-#include "duet/results/name_digests.h"
-#include "duet/results/published.h"
+#include "duet/results/rows/name_digests.h"
+#include "duet/results/rows/published.h"
 
 namespace duet {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "duet/bench/progress.h"
-#include "duet/results/row_identity.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/row_identity.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

@@ -9,7 +9,7 @@
 #include "duet/core/number.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
 
 namespace duet {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "duet/core/require.h"
-#include "duet/results/report_parts.h"
+#include "duet/results/report/report_parts.h"
 
 namespace duet {
 namespace {

@@ -22,7 +22,7 @@
 #include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
 #include "duet/motion/people/people_formats.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/retarget/pair.h"
 
 namespace duet {

@@ -15,7 +15,7 @@
 #include "duet/datasets/dataset_files.h"
 #include "duet/datasets/dataset_folder.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {

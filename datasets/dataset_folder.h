@@ -12,7 +12,7 @@
 
 #include "duet/core/file.h"
 #include "duet/datasets/entry.h"
-#include "duet/results/folder_lock.h"
+#include "duet/results/rows/folder_lock.h"
 
 namespace duet {
 

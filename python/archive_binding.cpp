@@ -23,7 +23,7 @@
 #include "duet/motion/phase_proposal.h"
 #include "duet/motion/synthesis.h"
 #include "duet/python/bindings.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/robot_model.h"
 

@@ -12,8 +12,8 @@
 #include "duet/bench/shipped_suites.h"
 #include "duet/core/require.h"
 #include "duet/python/bindings.h"
-#include "duet/results/episode_row.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet::python {
 namespace {

@@ -23,12 +23,12 @@
 #include "duet/core/require.h"
 #include "duet/policies/registry.h"
 #include "duet/python/bindings.h"
-#include "duet/results/contact_table.h"
-#include "duet/results/controller_table.h"
-#include "duet/results/cross_engine.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/leaderboard_rows.h"
+#include "duet/results/analyses/contact_table.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/analyses/leaderboard_rows.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet::python {
 namespace {

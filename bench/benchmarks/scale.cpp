@@ -19,9 +19,9 @@
 #include "duet/bench/run_episode.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/merge_files.h"
-#include "duet/results/row_merge.h"
+#include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/merge_files.h"
+#include "duet/results/rows/row_merge.h"
 
 namespace duet {
 namespace {

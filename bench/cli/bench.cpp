@@ -11,7 +11,7 @@
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/core/version.h"
-#include "duet/results/environment.h"
+#include "duet/results/rows/environment.h"
 
 namespace duet::cli {
 namespace {

@@ -4,11 +4,11 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/core/naming_file.h"
-#include "duet/results/distinct_episodes.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/name_digests.h"
-#include "duet/results/resolution.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/rows/distinct_episodes.h"
+#include "duet/results/rows/name_digests.h"
+#include "duet/results/rows/run_directory.h"
+#include "duet/results/statistics/resolution.h"
 
 namespace duet::cli {
 namespace {

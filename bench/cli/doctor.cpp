@@ -13,7 +13,7 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/core/version.h"
-#include "duet/results/environment.h"
+#include "duet/results/rows/environment.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/robot_cards.h"
 #include "duet/robots/robot_model.h"

@@ -1,5 +1,5 @@
 // duet bless, duet check: golden baselines.
-#include "duet/results/golden.h"
+#include "duet/results/rows/golden.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "duet/bench/cli/run_notes.h"
 #include "duet/core/file.h"
 #include "duet/core/naming_file.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet::cli {
 namespace {

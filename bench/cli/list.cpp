@@ -28,7 +28,7 @@
 #include "duet/motion/people/people_formats.h"
 #include "duet/policies/policy.h"
 #include "duet/policies/registry.h"
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 #include "duet/retarget/options.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/robot_cards.h"

@@ -6,8 +6,8 @@
 #include "duet/bench/run_inputs.h"
 #include "duet/bench/suite.h"
 #include "duet/core/file.h"
-#include "duet/results/published.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/published.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet::cli {
 namespace {

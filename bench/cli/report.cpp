@@ -15,13 +15,13 @@
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/results/database.h"
-#include "duet/results/html_report.h"
-#include "duet/results/interval_plot.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/policy_report.h"
-#include "duet/results/resolution.h"
-#include "duet/results/run_union.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/report/html_report.h"
+#include "duet/results/report/interval_plot.h"
+#include "duet/results/report/policy_report.h"
+#include "duet/results/rows/database.h"
+#include "duet/results/rows/run_union.h"
+#include "duet/results/statistics/resolution.h"
 
 namespace duet::cli {
 namespace {

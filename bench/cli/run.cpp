@@ -17,7 +17,7 @@
 #include "duet/core/number.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/results/leaderboard_rows.h"
+#include "duet/results/analyses/leaderboard_rows.h"
 
 namespace duet::cli {
 namespace {

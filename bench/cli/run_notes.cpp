@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "duet/core/require.h"
-#include "duet/results/distinct_episodes.h"
+#include "duet/results/rows/distinct_episodes.h"
 
 namespace duet::cli {
 namespace {

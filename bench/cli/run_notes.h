@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "duet/bench/cli/command.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet::cli {
 

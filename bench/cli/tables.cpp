@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "duet/bench/story.h"
-#include "duet/results/certificate.h"
+#include "duet/results/rows/certificate.h"
 
 namespace duet::cli {
 

@@ -5,15 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "duet/results/analysis.h"
-#include "duet/results/board.h"
-#include "duet/results/contact_table.h"
-#include "duet/results/controller_table.h"
-#include "duet/results/cross_engine.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/level_table.h"
-#include "duet/results/people_table.h"
-#include "duet/results/walk_table.h"
+#include "duet/results/analyses/analysis.h"
+#include "duet/results/analyses/board.h"
+#include "duet/results/analyses/contact_table.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/analyses/level_table.h"
+#include "duet/results/analyses/people_table.h"
+#include "duet/results/analyses/walk_table.h"
 
 namespace duet::cli {
 

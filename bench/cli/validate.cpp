@@ -12,7 +12,7 @@
 #include "duet/bench/profile.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/text_table.h"
+#include "duet/results/analyses/text_table.h"
 
 namespace duet::cli {
 namespace {

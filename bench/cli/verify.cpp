@@ -6,7 +6,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/verification.h"
 #include "duet/core/parallel.h"
-#include "duet/results/environment.h"
+#include "duet/results/rows/environment.h"
 
 namespace duet::cli {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "duet/core/file.h"
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 
 namespace duet {
 

@@ -10,7 +10,7 @@
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
 #include "duet/core/task.h"
-#include "duet/results/name_digests.h"
+#include "duet/results/rows/name_digests.h"
 
 namespace duet {
 namespace {

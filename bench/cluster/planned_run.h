@@ -9,7 +9,7 @@
 #include "duet/bench/cluster/shard_plan.h"
 #include "duet/bench/episode.h"
 #include "duet/bench/run_identity.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

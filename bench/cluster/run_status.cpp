@@ -10,8 +10,8 @@
 #include "duet/bench/cluster/attempt.h"
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/progress.h"
-#include "duet/results/merge_files.h"
-#include "duet/results/row_scan.h"
+#include "duet/results/rows/merge_files.h"
+#include "duet/results/rows/row_scan.h"
 
 namespace duet {
 namespace {

@@ -12,9 +12,9 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/results/episode_row.h"
-#include "duet/results/json_fields.h"
-#include "duet/results/name_digests.h"
+#include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/name_digests.h"
 
 namespace duet {
 namespace {

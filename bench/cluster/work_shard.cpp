@@ -18,8 +18,8 @@
 #include "duet/core/file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/results/merge_files.h"
-#include "duet/results/row_scan.h"
+#include "duet/results/rows/merge_files.h"
+#include "duet/results/rows/row_scan.h"
 
 namespace duet {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 
 namespace duet {
 

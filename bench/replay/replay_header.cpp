@@ -7,7 +7,7 @@
 
 #include "duet/bench/replay/detector_trace.h"
 #include "duet/motion/human_motion.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/human_body.h"
 
 namespace duet {

@@ -12,7 +12,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/mcap.h"
 #include "duet/motion/human_motion.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 

@@ -11,8 +11,8 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/results/escape_html.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/report/escape_html.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {

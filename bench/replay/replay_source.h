@@ -8,7 +8,7 @@
 #include "duet/bench/progress.h"
 #include "duet/bench/replay/replay_choice.h"
 #include "duet/bench/replay/replay_content.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 

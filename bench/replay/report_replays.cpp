@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "duet/results/leaderboard_rows.h"
+#include "duet/results/analyses/leaderboard_rows.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "duet/bench/replay/replay_page.h"
 #include "duet/bench/replay/replay_source.h"
-#include "duet/results/report_content.h"
+#include "duet/results/report/report_content.h"
 
 namespace duet {
 

@@ -8,7 +8,7 @@
 #include "duet/bench/runner.h"
 #include "duet/core/require.h"
 #include "duet/metrics/catalogue.h"
-#include "duet/results/row_identity.h"
+#include "duet/results/rows/row_identity.h"
 #include "duet/rollout/play_back.h"
 #include "tests/bench/fixtures.h"
 #include "tests/support.h"

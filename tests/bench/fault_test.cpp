@@ -9,7 +9,7 @@
 #include <map>
 
 #include "duet/core/file.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/bench/program.h"
 #include "tests/support.h"
 

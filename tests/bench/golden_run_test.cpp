@@ -5,7 +5,7 @@
 #include "duet/bench/profile.h"
 #include "duet/bench/runner.h"
 #include "duet/core/file.h"
-#include "duet/results/golden.h"
+#include "duet/results/rows/golden.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -7,7 +7,7 @@
 
 #include "duet/core/require.h"
 #include "duet/policies/external/child_process.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/bench/program.h"
 
 namespace duet {

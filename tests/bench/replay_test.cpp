@@ -16,7 +16,7 @@
 #include "duet/core/npz.h"
 #include "duet/core/require.h"
 #include "duet/hardware/mcap.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/kinematics.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"

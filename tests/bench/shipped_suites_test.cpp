@@ -5,7 +5,7 @@
 #include "duet/bench/demonstrations.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/training_motions.h"
-#include "duet/results/level_table.h"
+#include "duet/results/analyses/level_table.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -6,8 +6,8 @@
 
 #include "duet/bench/runner.h"
 #include "duet/bench/suite_reference.h"
-#include "duet/results/run_directory.h"
-#include "duet/results/walk_table.h"
+#include "duet/results/analyses/walk_table.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/backends/engine_names.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"

@@ -3,11 +3,11 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/core/digest.h"
-#include "duet/results/golden.h"
-#include "duet/results/published.h"
-#include "duet/results/row_scan.h"
-#include "duet/results/run_directory.h"
-#include "duet/results/training_curves.h"
+#include "duet/results/report/training_curves.h"
+#include "duet/results/rows/golden.h"
+#include "duet/results/rows/published.h"
+#include "duet/results/rows/row_scan.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/fuzz/reader.h"
 #include "tests/results/rows.h"
 

@@ -1,4 +1,4 @@
-#include "duet/results/analysis.h"
+#include "duet/results/analyses/analysis.h"
 
 #include <gmock/gmock.h>
 

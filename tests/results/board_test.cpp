@@ -1,8 +1,8 @@
-#include "duet/results/board.h"
+#include "duet/results/analyses/board.h"
 
 #include <gmock/gmock.h>
 
-#include "duet/results/report_parts.h"
+#include "duet/results/report/report_parts.h"
 
 namespace duet {
 namespace {

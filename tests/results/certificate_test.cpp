@@ -1,4 +1,4 @@
-#include "duet/results/certificate.h"
+#include "duet/results/rows/certificate.h"
 
 #include <gmock/gmock.h>
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "duet/core/require.h"
-#include "duet/results/leaderboard.h"
+#include "duet/results/analyses/leaderboard.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

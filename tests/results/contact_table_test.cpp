@@ -1,4 +1,4 @@
-#include "duet/results/contact_table.h"
+#include "duet/results/analyses/contact_table.h"
 
 #include <gmock/gmock.h>
 

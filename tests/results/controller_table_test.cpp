@@ -1,11 +1,11 @@
-#include "duet/results/controller_table.h"
+#include "duet/results/analyses/controller_table.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/results/controller_table_parts.h"
+#include "duet/results/analyses/controller_table_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

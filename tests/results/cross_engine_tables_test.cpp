@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "duet/results/cross_engine.h"
-#include "duet/results/interval_plot.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/report/interval_plot.h"
 #include "tests/results/rows.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "duet/results/cross_engine.h"
+#include "duet/results/analyses/cross_engine.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 
 #include "duet/core/require.h"
-#include "duet/results/cross_engine_parts.h"
+#include "duet/results/analyses/cross_engine_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "duet/results/database.h"
+#include "duet/results/rows/database.h"
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>
@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "duet/core/require.h"
-#include "duet/results/leaderboard.h"
+#include "duet/results/analyses/leaderboard.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "duet/results/decision.h"
+#include "duet/results/statistics/decision.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

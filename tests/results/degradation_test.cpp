@@ -1,4 +1,4 @@
-#include "duet/results/degradation.h"
+#include "duet/results/analyses/degradation.h"
 
 #include <gmock/gmock.h>
 

@@ -1,10 +1,10 @@
-#include "duet/results/distinct_episodes.h"
+#include "duet/results/rows/distinct_episodes.h"
 
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/policy_groups.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/analyses/policy_groups.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -1,6 +1,6 @@
 // When the same episode in two engines parts: frame, points, falls, quartiles.
-#include "duet/results/cross_engine.h"
-#include "duet/results/cross_engine_parts.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/cross_engine_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

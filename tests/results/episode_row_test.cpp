@@ -1,4 +1,4 @@
-#include "duet/results/episode_row.h"
+#include "duet/results/rows/episode_row.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "duet/results/golden.h"
+#include "duet/results/rows/golden.h"
 
 #include <gmock/gmock.h>
 

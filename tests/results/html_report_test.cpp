@@ -1,4 +1,4 @@
-#include "duet/results/html_report.h"
+#include "duet/results/report/html_report.h"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <limits>
 #include <regex>
 
-#include "duet/results/escape_html.h"
-#include "duet/results/report_parts.h"
+#include "duet/results/report/escape_html.h"
+#include "duet/results/report/report_parts.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

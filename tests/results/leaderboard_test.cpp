@@ -1,4 +1,4 @@
-#include "duet/results/leaderboard.h"
+#include "duet/results/analyses/leaderboard.h"
 
 #include <gmock/gmock.h>
 
@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/results/interval_plot.h"
-#include "duet/results/leaderboard_rows.h"
+#include "duet/results/analyses/leaderboard_rows.h"
+#include "duet/results/report/interval_plot.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

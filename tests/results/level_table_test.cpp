@@ -1,9 +1,9 @@
-#include "duet/results/level_table.h"
+#include "duet/results/analyses/level_table.h"
 
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/results/html_report.h"
+#include "duet/results/report/html_report.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 

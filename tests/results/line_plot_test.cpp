@@ -1,11 +1,11 @@
-#include "duet/results/line_plot.h"
+#include "duet/results/report/line_plot.h"
 
 #include <gmock/gmock.h>
 
 #include <limits>
 
 #include "duet/core/require.h"
-#include "duet/results/training_curves.h"
+#include "duet/results/report/training_curves.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "duet/results/controller_table.h"
-#include "duet/results/degradation.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/policy_table.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/degradation.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/analyses/policy_table.h"
 #include "tests/results/policy_rows.h"
 
 namespace duet {

@@ -1,10 +1,10 @@
-#include "duet/results/people_table.h"
+#include "duet/results/analyses/people_table.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/results/html_report.h"
+#include "duet/results/report/html_report.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 

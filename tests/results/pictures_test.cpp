@@ -5,10 +5,10 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
-#include "duet/results/cross_engine.h"
-#include "duet/results/interval_plot.h"
-#include "duet/results/line_plot.h"
-#include "duet/results/report_parts.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/report/interval_plot.h"
+#include "duet/results/report/line_plot.h"
+#include "duet/results/report/report_parts.h"
 #include "tests/results/rows.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "duet/results/policy_table.h"
+#include "duet/results/analyses/policy_table.h"
 
 #include <gmock/gmock.h>
 

@@ -5,11 +5,11 @@
 #include <sstream>
 
 #include "duet/core/file.h"
-#include "duet/results/controller_table.h"
-#include "duet/results/cross_engine.h"
-#include "duet/results/leaderboard.h"
-#include "duet/results/policy_report.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/report/policy_report.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet {
 namespace {

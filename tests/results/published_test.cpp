@@ -1,4 +1,4 @@
-#include "duet/results/published.h"
+#include "duet/results/rows/published.h"
 
 #include <gmock/gmock.h>
 
@@ -6,7 +6,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"

@@ -1,4 +1,4 @@
-#include "duet/results/reactivity.h"
+#include "duet/results/analyses/reactivity.h"
 
 #include <gmock/gmock.h>
 

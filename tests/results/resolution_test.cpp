@@ -1,8 +1,8 @@
-#include "duet/results/resolution.h"
+#include "duet/results/statistics/resolution.h"
 
 #include <gmock/gmock.h>
 
-#include "duet/results/comparison_parts.h"
+#include "duet/results/analyses/comparison_parts.h"
 #include "tests/support.h"
 
 namespace duet {

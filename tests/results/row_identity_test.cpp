@@ -1,4 +1,4 @@
-#include "duet/results/row_identity.h"
+#include "duet/results/rows/row_identity.h"
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // A merge is a set union: order, grouping and repetition of its sources do not matter, however little memory it has.
-#include "duet/results/row_merge.h"
+#include "duet/results/rows/row_merge.h"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +9,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/random.h"
-#include "duet/results/json_fields.h"
+#include "duet/results/rows/json_fields.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

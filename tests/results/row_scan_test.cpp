@@ -1,9 +1,9 @@
-#include "duet/results/row_scan.h"
+#include "duet/results/rows/row_scan.h"
 
 #include <gmock/gmock.h>
 
-#include "duet/results/json_fields.h"
-#include "duet/results/row_identity.h"
+#include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/row_identity.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <string>
 
-#include "duet/results/episode_row.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet::test {
 

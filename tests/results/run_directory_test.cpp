@@ -1,4 +1,4 @@
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "duet/core/require.h"
-#include "duet/results/environment.h"
+#include "duet/results/rows/environment.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"

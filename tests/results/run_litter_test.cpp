@@ -1,4 +1,4 @@
-#include "duet/results/run_litter.h"
+#include "duet/results/rows/run_litter.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -12,7 +12,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/results/run_directory.h"
+#include "duet/results/rows/run_directory.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "duet/results/run_union.h"
+#include "duet/results/rows/run_union.h"
 
 #include <gmock/gmock.h>
 

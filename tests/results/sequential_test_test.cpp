@@ -1,4 +1,4 @@
-#include "duet/results/sequential_test.h"
+#include "duet/results/statistics/sequential_test.h"
 
 #include <gmock/gmock.h>
 

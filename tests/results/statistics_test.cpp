@@ -1,4 +1,4 @@
-#include "duet/results/statistics.h"
+#include "duet/results/statistics/statistics.h"
 
 #include <gmock/gmock.h>
 

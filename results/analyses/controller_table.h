@@ -1,0 +1,81 @@
+// What a controller adds to a reference and how well it follows it, per controller and engine: the figures of the
+// supplement's Table S4 (A.4.6) before and after the controller, survival and faults. From the rows of one arm in
+// physics engines; playback has no controller and is left out. Nothing depends on the order of rows.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/results/rows/episode_row.h"
+#include "duet/results/statistics/statistics.h"
+
+namespace duet {
+
+struct ControllerTableOptions {
+  double level = 0.95;
+  int resamples = 10000;
+  std::uint64_t seed = 1;
+  std::string arm = "main";
+};
+
+// A metric of rows and how tables call it; `before`: of the reference, that is before the controller ("" where it is of
+// both).
+struct ControllerFigure {
+  std::string_view metric, before, title, unit;
+};
+inline constexpr std::array<ControllerFigure, 7> kControllerFigures = {
+    {{"hf_ratio", "hf_ratio_reference", "HF ratio", "1"},
+     {"dof_jerk", "dof_jerk_reference", "DOF jerk", "rad/s^3"},
+     {"root_jerk", "root_jerk_reference", "Root jerk", "m/s^3"},
+     {"root_error", "", "e_root", "m"},
+     {"root_angle_error", "", "e_root", "deg"},
+     {"dof_error", "", "e_dof", "rad"},
+     {"dof_velocity_error", "", "e_dof", "rad/s"}}};
+
+struct Estimate {
+  long n = 0;  // episodes that have it
+  double mean = std::numeric_limits<double>::quiet_NaN();
+  // NaN where there are fewer than two clips: one clip drawn again is always itself.
+  Interval interval = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+};
+
+// One (controller, engine, policy, perturbation).
+struct ControllerEntry {
+  std::string policy, perturbation, controller, engine;
+  long n = 0;         // episodes, without those that are unsupported
+  long survived = 0;  // ended as planned: not fallen, diverged, out of time or with an error
+  Interval survival;  // Wilson
+  long faulty = 0;    // episodes in which the controller met a number that is not finite
+  long stopped = 0;   // of them, those that it ended with its safe stop
+  long unsupported = 0;
+  std::map<std::string, Estimate, std::less<>> figures;  // by metric; mean over episodes, bootstrap over clips
+};
+
+struct ControllerTable {
+  double level = 0.95;
+  std::vector<ControllerEntry> entries;  // by perturbation (clean first), policy, controller, engine
+};
+
+// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
+ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const ControllerTableOptions& options = {});
+
+// A row of Table S4 as the supplement prints it; `values` as in kControllerFigures, `before` its first three.
+struct PaperController {
+  std::string_view policy, controller;
+  std::array<double, 7> values;
+  std::array<double, 3> before;
+};
+std::span<const PaperController> paper_controllers();
+
+// For a table without entries: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
+std::string controller_table_markdown(const ControllerTable& table);  // headings of level 3
+std::string controller_table_csv(const ControllerTable& table);       // one figure per line, not rounded
+std::string controller_table_latex(const ControllerTable& table);
+nlohmann::json controller_table_json(const ControllerTable& table);
+
+}  // namespace duet

@@ -1,0 +1,29 @@
+// What changes when only the physics engine does: success, ranks, metrics against kinematic playback, when states part
+// and contact forces. From the rows of one arm; "playback" is no physics engine, it is shown apart and is in no mean.
+// Nothing depends on the order of rows (docs/reading-the-leaderboard.md, "Across engines").
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/results/analyses/cross_engine_result.h"
+#include "duet/results/analyses/metric_column.h"
+#include "duet/results/rows/episode_row.h"
+
+namespace duet {
+
+// `metrics`: those whose drift is of interest (the 18 of retargeting). Throws InputError: rows of two suites or suite
+// versions, an episode that is there twice.
+CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<MetricColumn>& metrics,
+                         const CrossEngineOptions& options = {});
+
+std::string cross_engine_markdown(const CrossEngine& result);  // headings of level 3
+std::string cross_engine_csv(const CrossEngine& result);       // one figure per line, not rounded
+std::string cross_engine_latex(const CrossEngine& result);     // one tabular per table
+nlohmann::json cross_engine_json(const CrossEngine& result);
+
+// Unit of a force by the ending of its name: "N", "N s", "s", "N/cm^2", "" for another.
+std::string force_unit(std::string_view name);
+
+}  // namespace duet

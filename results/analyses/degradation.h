@@ -1,0 +1,66 @@
+// What perturbations cost a policy: success under each beside the clean episodes of the same run, paired episode by
+// episode, and as curves where perturbations of one name differ in size ("jitter_1cm", "jitter_5cm"), with the
+// supplement's Table S9 beside them. Every engine alone, playback too; the null arm is left out.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/results/analyses/policy_groups.h"
+#include "duet/results/report/line_plot.h"
+
+namespace duet {
+
+// A perturbation's name as family and size.
+struct PerturbationSize {
+  std::string family;  // "jitter"
+  double x = 0.0;      // in SI units
+  std::string unit;    // "m", "s", ...; as written where it is no known one; "" for none
+};
+// "jitter_1cm": jitter, 0.01 m; "dropout_0.05"; "shift_-0.5s"; "push60". Empty for a name that ends otherwise.
+std::optional<PerturbationSize> perturbation_size(std::string_view name);
+
+struct PerturbedSuccess {
+  PolicyKey key;
+  std::string perturbation;     // clean first, then by family, size and name
+  Rate success, paper;          // headline; detector paper/paper, n = 0 where no row has it
+  PairedDifference difference;  // to the clean episodes; no pairs for clean itself
+};
+
+struct CurvePoint {
+  double x = 0.0, success = 0.0;
+};
+
+// One family in one (engine, controller, arm, policy); clean is the point at 0.
+struct DegradationCurve {
+  PolicyKey key;
+  std::string family, unit;
+  std::vector<CurvePoint> points;  // by x, at least two
+  // Mean of success over the span of x (trapezia) over that of clean: 1 = no loss. NaN where clean never succeeds.
+  double normalised_area = 0.0;
+  double largest = 0.0;         // the x that is furthest from 0
+  PairedDifference difference;  // there, to clean; the paper's: no interval
+};
+
+struct Degradation {
+  double level = 0.95;
+  std::vector<PerturbedSuccess> success;  // empty: no policy ran both clean and perturbed
+  std::vector<DegradationCurve> curves;
+  std::vector<DegradationCurve> paper;  // Table S9, of the families that occur in `curves`
+};
+
+// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
+Degradation degradation(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
+
+// For one without entries: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
+std::vector<TitledTable> degradation_tables(const Degradation& result);
+std::vector<LinePlot> degradation_plots(const Degradation& result);  // per family, engine and controller
+std::string degradation_markdown(const Degradation& result);         // headings of level 3
+std::string degradation_csv(const Degradation& result);              // one figure per line, not rounded
+std::string degradation_latex(const Degradation& result);
+nlohmann::json degradation_json(const Degradation& result);
+
+}  // namespace duet

@@ -1,0 +1,184 @@
+#include "duet/results/analyses/level_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <map>
+
+#include "duet/core/require.h"
+#include "duet/results/rows/json_fields.h"
+
+namespace duet {
+namespace {
+
+struct LevelCounts {
+  long n = 0, k = 0;
+};
+using CountsByLevel = std::map<int, LevelCounts>;
+
+// The headline; whom a commanded velocity leads has to follow it by half, so that standing is no walking.
+bool passes(const EpisodeRow& row) {
+  const auto metric = [&](const char* name) {
+    const auto found = row.metrics.find(name);
+    return found == row.metrics.end() ? 0.0 : found->second;
+  };
+  const double command = metric("command_forward");
+  return headline_success(row) && (command <= 0.0 || metric("speed_forward") >= 0.5 * command);
+}
+
+// Of its perturbation or of its clip, whichever is higher.
+std::optional<LevelName> level_of_row(std::string_view word, const EpisodeRow& row) {
+  const std::optional<LevelName> perturbed = level_of(word, row.perturbation), clip = level_of(word, row.clip);
+  if (perturbed && clip) return std::max(*perturbed, *clip);
+  if (perturbed || (clip && row.perturbation == kClean)) return perturbed ? perturbed : clip;
+  return row.perturbation == kClean ? std::optional(LevelName{0, std::string(kClean)}) : std::nullopt;
+}
+
+void add_level_name(const Ladder& ladder, const LevelName& found, std::map<int, std::string>& names) {
+  const auto [known, is_new] = names.emplace(found.level, found.name);
+  if (!is_new && known->second != found.name)
+    throw InputError(
+        fmt::format("two names of {} {}: '{}' and '{}'", ladder.word, found.level, known->second, found.name));
+}
+
+LevelEntry level_entry(const PolicyKey& key, const CountsByLevel& counts, const LevelTable& table) {
+  LevelEntry entry{.key = key, .levels = {}, .reached = {}};
+  bool passed = true;
+  int run = 0;
+  for (const LevelName& name : table.levels) {
+    const auto found = counts.find(name.level);
+    const Rate rate = found == counts.end() ? Rate{} : make_rate(found->second.k, found->second.n, table.level);
+    entry.levels.push_back(rate);
+    passed = passed && rate.n > 0 && rate.rate >= table.ladder.pass;
+    if (passed) entry.reached = name.level;
+    if (rate.n == 0) continue;
+    entry.mean += rate.rate;
+    ++run;
+  }
+  entry.mean /= run;
+  return entry;
+}
+
+LevelTable ladder_table(const Ladder& ladder, const std::map<PolicyKey, PerturbedRows>& policies, double level) {
+  LevelTable table{.ladder = ladder, .level = level, .levels = {}, .entries = {}};
+  std::map<int, std::string> names;
+  std::map<PolicyKey, CountsByLevel> counts;
+  for (const auto& [key, perturbed] : policies) {
+    for (const auto& [perturbation, episodes] : perturbed) {
+      for (const auto& [id, row] : episodes) {
+        const std::optional<LevelName> found = level_of_row(ladder.word, *row);
+        if (!found) continue;
+        add_level_name(ladder, *found, names);
+        LevelCounts& of_level = counts[key][found->level];
+        ++of_level.n;
+        of_level.k += passes(*row) ? 1 : 0;
+      }
+    }
+  }
+  for (const auto& [number, name] : names) table.levels.push_back({number, name});
+  for (const auto& [key, by_level] : counts) table.entries.push_back(level_entry(key, by_level, table));
+  return table;
+}
+
+std::string level_title(const LevelName& level) {
+  std::string words = level.name;
+  std::ranges::replace(words, '_', ' ');
+  return words.empty() ? fmt::format("{}", level.level) : fmt::format("{} {}", level.level, words);
+}
+
+TitledTable titled_ladder(const LevelTable& table) {
+  TitledTable titled = labelled_table(std::string(table.ladder.title), labels_of(table.entries));
+  for (const LevelName& level : table.levels) titled.table.header.push_back(level_title(level));
+  titled.table.header.insert(titled.table.header.end(), {"Mean [%]", "Reached"});
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    const LevelEntry& entry = table.entries[i];
+    std::vector<std::string>& cells = titled.table.rows[i];
+    for (const Rate& rate : entry.levels) cells.push_back(rate_cell(rate));
+    cells.push_back(percent(entry.mean));
+    cells.push_back(entry.reached ? fmt::format("{}", *entry.reached) : "none");
+  }
+  titled.notes = {
+      fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals. Mean: over the {0}s, "
+                  "each counting the "
+                  "same. Reached: the last {0} up to which success is {2:g} % or more at each.",
+                  table.ladder.word, 100.0 * table.level, 100.0 * table.ladder.pass)};
+  return titled;
+}
+
+nlohmann::json json_of(const LevelTable& table) {
+  nlohmann::json levels = nlohmann::json::array(), entries = nlohmann::json::array();
+  for (const LevelName& level : table.levels) levels.push_back({{"level", level.level}, {"name", level.name}});
+  for (const LevelEntry& entry : table.entries) {
+    nlohmann::json json = json_of(entry.key);
+    for (const Rate& rate : entry.levels) json["success"].push_back(json_of(rate));
+    json["mean"] = entry.mean;
+    json["reached"] = entry.reached ? nlohmann::json(*entry.reached) : nlohmann::json();
+    entries.push_back(std::move(json));
+  }
+  return {{"ladder", table.ladder.word}, {"pass", table.ladder.pass}, {"levels", levels}, {"entries", entries}};
+}
+
+}  // namespace
+
+std::optional<LevelName> level_of(std::string_view word, std::string_view name) {
+  if (!name.starts_with(word) || name.size() <= word.size() || name[word.size()] != '_') return std::nullopt;
+  name.remove_prefix(word.size() + 1);
+  name = name.substr(0, name.find('-'));
+  LevelName found;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), found.level);
+  if (error != std::errc() || found.level < 0) return std::nullopt;
+  name.remove_prefix(static_cast<std::size_t>(end - name.data()));
+  if (!name.empty() && name.front() != '_') return std::nullopt;
+  if (!name.empty()) found.name = name.substr(1);
+  return found;
+}
+
+std::vector<LevelTable> level_tables(const std::vector<EpisodeRow>& rows, double level) {
+  const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);
+  std::vector<LevelTable> tables;
+  for (const Ladder& ladder : kLadders) {
+    LevelTable table = ladder_table(ladder, policies, level);
+    if (table.levels.size() > 1) tables.push_back(std::move(table));
+  }
+  return tables;
+}
+
+std::vector<TitledTable> titled_levels(const std::vector<LevelTable>& tables) {
+  std::vector<TitledTable> titled;
+  titled.reserve(tables.size());
+  for (const LevelTable& table : tables) titled.push_back(titled_ladder(table));
+  return titled;
+}
+
+std::string levels_markdown(const std::vector<LevelTable>& tables) { return tables_markdown(titled_levels(tables)); }
+
+std::string levels_latex(const std::vector<LevelTable>& tables) {
+  return tables.empty() ? "" : tables_latex(titled_levels(tables));
+}
+
+std::string levels_csv(const std::vector<LevelTable>& tables) {
+  TextTable lines = figure_lines("level");
+  for (const LevelTable& table : tables) {
+    for (const LevelEntry& entry : table.entries) {
+      for (std::size_t i = 0; i < entry.levels.size(); ++i) {
+        const Rate& rate = entry.levels[i];
+        add_figure_line("duet", entry.key, fmt::format("{}_{}", table.ladder.word, table.levels[i].level), "success",
+                        rate.n, rate.rate, rate.interval, lines);
+      }
+      const std::string all(table.ladder.word);
+      const auto levels = static_cast<long>(entry.levels.size());
+      add_figure_line("duet", entry.key, all, "mean", levels, entry.mean, kNoInterval, lines);
+      if (entry.reached) add_figure_line("duet", entry.key, all, "reached", levels, *entry.reached, kNoInterval, lines);
+    }
+  }
+  return csv_table(lines);
+}
+
+nlohmann::json levels_json(const std::vector<LevelTable>& tables) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const LevelTable& table : tables) json.push_back(json_of(table));
+  return {{"schema", "duet.levels/1"}, {"tables", std::move(json)}};
+}
+
+}  // namespace duet

@@ -1,0 +1,40 @@
+// Recorded and synthetic people side by side: what each policy achieves with the one and with the other, from the rows
+// of a run whose clips are of both kinds (suites/real.yaml). Clean episodes only; the null arm has lines of its own.
+// Which clips are synthetic their ids say (core/synthetic_id.h). Nothing depends on the order of rows.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "duet/results/analyses/policy_groups.h"
+
+namespace duet {
+
+struct PeopleRates {
+  Rate success, falls;  // the suite's headline verdict; episodes with a fall
+};
+
+struct PeopleEntry {
+  PolicyKey key;
+  std::string task;  // "all": over the tasks that both kinds have
+  PeopleRates recorded, synthetic;
+  double difference = 0.0;  // success with recorded people minus that with synthetic ones
+  Interval interval;        // Newcombe's method 10 for two independent shares
+};
+
+struct PeopleTable {
+  double level = 0.95;
+  std::vector<PeopleEntry> entries;  // by engine, controller, arm, policy, task; none where one kind is absent
+};
+
+// Throws InputError: rows of two suites or suite versions.
+PeopleTable people_table(const std::vector<EpisodeRow>& rows, double level = 0.95);
+
+// For a table without entries: one sentence that says so (a comment in LaTeX), the header alone, an empty list.
+std::vector<TitledTable> people_tables(const PeopleTable& table);
+std::string people_table_markdown(const PeopleTable& table);  // a heading of level 3
+std::string people_table_csv(const PeopleTable& table);       // one figure per line, not rounded
+std::string people_table_latex(const PeopleTable& table);
+nlohmann::json people_table_json(const PeopleTable& table);
+
+}  // namespace duet

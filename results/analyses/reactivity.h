@@ -1,0 +1,75 @@
+// Whether a robot acts when and where its partner does. When: the shift of the robot's onset against that of its
+// partner's, each episode of a run whose perturbations move the partner in time beside its clean one. Where: success
+// by the hand and height that the partner offers (Table S10). Every engine alone, playback too; the null arm is left
+// out.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/results/analyses/policy_groups.h"
+#include "duet/results/report/line_plot.h"
+
+namespace duet {
+
+inline constexpr double kPartnerShift = 0.1;  // from here on the partner's onset counts as moved [s]
+
+// Means over the episodes of one perturbation in which the partner's onset moved.
+struct OnsetShift {
+  std::string perturbation;
+  long n = 0;
+  double partner = 0.0, robot = 0.0;  // [s], later is positive
+};
+
+struct Reactivity {
+  PolicyKey key;
+  long n = 0;          // episodes with a moved partner in which both onsets are known, perturbed and clean
+  long without = 0;    // with a moved partner in which the robot's is not: it did not act
+  double slope = 0.0;  // of robot's over partner's shift, through the origin: 1 follows, 0 plays its clip. NaN: n = 0
+  Interval interval;   // bootstrap over clips; NaN for fewer than two
+  double delay_clean = 0.0, delay_moved = 0.0;  // median of robot's minus partner's onset [s]; NaN: none
+  long n_clean = 0;                             // clean episodes with both onsets
+  std::vector<OnsetShift> shifts;               // by partner's shift
+};
+
+// Success by the clip's variant, clean.
+struct SpatialCells {
+  PolicyKey key;
+  std::string task;
+  std::array<Rate, 4> cells;  // as in kSpatialCells
+};
+struct SpatialCell {
+  std::string_view variant, title;
+  double paper;  // Table S10, handshake
+};
+inline constexpr std::array<SpatialCell, 4> kSpatialCells = {{{"left_high", "Left, high", 0.8},
+                                                              {"right_high", "Right, high", 1.0},
+                                                              {"left_low", "Left, low", 0.4},
+                                                              {"right_low", "Right, low", 0.6}}};
+
+struct ReactivityTable {
+  double level = 0.95;
+  std::vector<Reactivity> timing;     // empty: no perturbation moved a partner's onset
+  std::vector<SpatialCells> spatial;  // empty: no clip names a variant
+
+  [[nodiscard]] bool empty() const { return timing.empty() && spatial.empty(); }
+};
+
+// Place in kSpatialCells of the variant that a clip's id names between hyphens or at its end
+// ("handshake-0003-left_high"); -1 for none.
+int spatial_cell(std::string_view clip);
+
+// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
+ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
+
+// For an empty one: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
+std::vector<TitledTable> reactivity_tables(const ReactivityTable& table);
+std::vector<LinePlot> reactivity_plots(const ReactivityTable& table);  // per engine and controller, as Figure S4
+std::string reactivity_markdown(const ReactivityTable& table);         // headings of level 3
+std::string reactivity_csv(const ReactivityTable& table);              // one figure per line, not rounded
+std::string reactivity_latex(const ReactivityTable& table);
+nlohmann::json reactivity_json(const ReactivityTable& table);
+
+}  // namespace duet

@@ -1,0 +1,161 @@
+#include "duet/results/analyses/text_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "duet/core/text.h"
+
+namespace duet {
+namespace {
+
+// Characters, not bytes, so that columns with accents align.
+std::size_t width(std::string_view text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
+// A '<' opens a tag only before these; "<0.001" stays readable as text.
+bool opens_tag(std::string_view rest) {
+  if (rest.size() < 2) return false;
+  const char next = rest[1];
+  return (next >= 'a' && next <= 'z') || (next >= 'A' && next <= 'Z') || next == '/' || next == '!' || next == '?';
+}
+
+// Line breaks become spaces, other control characters are spelt out.
+std::string one_line(std::string_view text) {
+  std::string line(text);
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return shown(line, std::string::npos);
+}
+
+std::string escape_markdown_cell(std::string_view text) {
+  std::string escaped;
+  for (const char c : escape_markdown(text)) escaped += c == '|' ? std::string("\\|") : std::string{c};
+  return escaped;
+}
+
+std::string escape_csv(std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string padded(const std::string& cell, std::size_t to, bool left) {
+  const std::string space(to - std::min(to, width(cell)), ' ');
+  return left ? cell + space : space + cell;
+}
+
+std::string markdown_line(const std::vector<std::string>& cells, const std::vector<std::size_t>& widths,
+                          std::size_t label_columns) {
+  std::string line = "|";
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    line.append(" ").append(padded(cells[i], widths[i], i < label_columns)).append(" |");
+  return line + "\n";
+}
+
+template <typename Escape>
+std::vector<std::vector<std::string>> escaped_lines(const TextTable& table, Escape escape) {
+  std::vector<std::vector<std::string>> lines = {table.header};
+  lines.insert(lines.end(), table.rows.begin(), table.rows.end());
+  for (std::vector<std::string>& line : lines) {
+    for (std::string& cell : line) cell = escape(cell);
+  }
+  return lines;
+}
+
+std::string joined(const std::vector<std::string>& cells, const char* separator) {
+  std::string line;
+  for (std::size_t i = 0; i < cells.size(); ++i) line.append(i == 0 ? "" : separator).append(cells[i]);
+  return line;
+}
+
+}  // namespace
+
+std::string escape_markdown(std::string_view text) {
+  const std::string line = one_line(text);
+  std::string escaped;
+  for (std::size_t i = 0; i < line.size(); ++i)
+    escaped +=
+        line[i] == '<' && opens_tag(std::string_view(line).substr(i)) ? std::string("&lt;") : std::string{line[i]};
+  return escaped;
+}
+
+std::string latex_comment(std::string_view text) { return "% " + one_line(text) + "\n"; }
+
+std::string markdown_table(const TextTable& table) {
+  const auto lines = escaped_lines(table, escape_markdown_cell);
+  std::vector<std::size_t> widths(table.header.size(), 3);
+  for (const auto& line : lines) {
+    for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], width(line[i]));
+  }
+  std::string rule = "|";
+  for (std::size_t i = 0; i < widths.size(); ++i) {
+    const bool left = i < table.label_columns;
+    rule.append(left ? " :" : " ").append(widths[i] - 1, '-').append(left ? " |" : ": |");
+  }
+  std::string text = markdown_line(lines.front(), widths, table.label_columns) + rule + "\n";
+  for (std::size_t i = 1; i < lines.size(); ++i) text += markdown_line(lines[i], widths, table.label_columns);
+  return text;
+}
+
+std::string csv_table(const TextTable& table) {
+  std::string text;
+  for (const auto& line : escaped_lines(table, escape_csv)) text += joined(line, ",") + "\r\n";
+  return text;
+}
+
+std::string escape_latex(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '\\':
+        escaped += "\\textbackslash{}";
+        break;
+      case '~':
+        escaped += "\\textasciitilde{}";
+        break;
+      case '^':
+        escaped += "\\textasciicircum{}";
+        break;
+      case '&':
+      case '%':
+      case '$':
+      case '#':
+      case '_':
+      case '{':
+      case '}':
+        escaped += '\\';
+        escaped += c;
+        break;
+      case '\n':
+      case '\r':
+        escaped += ' ';
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string number_cell(double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; }
+
+std::string latex_table(const TextTable& table) {
+  const auto lines = escaped_lines(table, [](const std::string& cell) { return escape_latex(cell); });
+  std::string columns;
+  for (std::size_t i = 0; i < table.header.size(); ++i) columns += i < table.label_columns ? 'l' : 'r';
+  std::string text =
+      "\\begin{tabular}{" + columns + "}\n\\toprule\n" + joined(lines.front(), " & ") + " \\\\\n\\midrule\n";
+  // A bracket at the start of a row would be read as the argument of the line break before it.
+  for (std::size_t i = 1; i < lines.size(); ++i) text += "{}" + joined(lines[i], " & ") + " \\\\\n";
+  return text + "\\bottomrule\n\\end{tabular}\n";
+}
+
+}  // namespace duet

@@ -1,0 +1,70 @@
+// All that a report shows.
+#pragma once
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "duet/results/analyses/board.h"
+#include "duet/results/analyses/contact_table.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/analyses/level_table.h"
+#include "duet/results/analyses/metric_column.h"
+#include "duet/results/analyses/people_table.h"
+#include "duet/results/analyses/walk_table.h"
+#include "duet/results/report/line_plot.h"
+#include "duet/results/report/policy_report.h"
+#include "duet/results/report/training_curves.h"
+
+namespace duet {
+
+struct StickFigure {
+  std::string label;                       // "human", "robot", "source"
+  std::vector<Eigen::Vector3d> points;     // [m], frame W
+  std::vector<std::pair<int, int>> bones;  // indices in points
+};
+struct KeyFrame {
+  std::string label;  // "start", "act", "end", with its time
+  std::vector<StickFigure> figures;
+};
+struct ClipStory {  // one retargeted clip or rolled-out episode
+  std::string title, task;
+  std::vector<KeyFrame> frames;
+  std::map<std::string, std::vector<double>> loss;  // term -> value per iteration
+  std::map<std::string, double> metrics;            // catalogue names
+};
+// A clip that a replay page shows.
+struct ReportReplay {
+  std::string file, scene, name;  // address of the page as seen from the report, "hug/hug_000/0/clean", "Hug, hug_000"
+  int successes = 0, judged = 0;  // of the main arm
+  std::vector<std::string> keys;  // of its episodes
+};
+struct ReportContent {
+  std::string title;
+  Board board;                        // the first screen
+  std::vector<EpisodeRow> episodes;   // section "Episodes"
+  std::vector<ReportReplay> replays;  // in that section
+  nlohmann::json environment;
+  std::vector<std::string> notes;  // options and caveats printed with the tables
+  std::vector<LeaderboardEntry> entries;
+  std::vector<MetricColumn> columns;                                 // how to head metric columns
+  std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
+  std::vector<ClipStory> stories;
+  std::optional<CrossEngine> cross_engine;  // section "Across engines"
+  PeopleTable people;                       // section "Recorded and synthetic people", where it has entries
+  std::vector<LevelTable> levels;           // section "Levels", likewise
+  WalkTable walking;                        // section "Walking by command", likewise
+  ContactTable contacts;                    // section "Contact with people", where it has groups
+  ControllerTable controllers;              // section "Controllers", where it has entries
+  std::vector<LinePlot> foot_plots;         // in that section
+  PolicyReport policies;                    // sections "Policies", "Perturbations", "Reactivity"
+  std::vector<TrainingCurves> curves;       // section "Training"
+  nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
+};
+
+}  // namespace duet

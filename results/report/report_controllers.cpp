@@ -1,0 +1,81 @@
+// The sections "Controllers" and "Training" of the HTML report: Table S4, foot heights of walking episodes, curves.
+#include <fmt/format.h>
+
+#include <map>
+
+#include "duet/results/analyses/controller_table_parts.h"
+#include "duet/results/report/escape_html.h"
+#include "duet/results/report/html_report.h"
+#include "duet/results/report/report_parts.h"
+#include "duet/results/report/training_curves.h"
+#include "duet/results/statistics/row_groups.h"
+
+namespace duet {
+namespace {
+
+std::vector<double> metres(const std::vector<int>& millimetres) {
+  std::vector<double> values;
+  values.reserve(millimetres.size());
+  for (const int value : millimetres) values.push_back(value / 1000.0);
+  return values;
+}
+
+// An episode that ended well before one that did not, a clean one before a perturbed one; else the first.
+bool shows_better(const EpisodeRow& a, const EpisodeRow& b) {
+  const auto rank = [](const EpisodeRow& row) {
+    return (row.outcome == Outcome::kOk ? 0 : 2) + (row.perturbation == "clean" ? 0 : 1);
+  };
+  return rank(a) < rank(b);
+}
+
+}  // namespace
+
+std::string plots_html(const std::vector<LinePlot>& plots) {
+  std::string html = R"(<div class="plots">)";
+  for (const LinePlot& plot : plots)
+    if (const std::string svg = line_plot_svg(plot); !svg.empty())
+      html += fmt::format(R"(<figure><figcaption>{}</figcaption>{}</figure>)", escape_html(plot.title), svg);
+  return html + "</div>\n";
+}
+
+std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
+  std::map<std::string, const EpisodeRow*> shown;  // by controller
+  for (const EpisodeRow* row : in_episode_order(rows)) {
+    if (row->feet.left_mm.empty() || row->arm != "main") continue;
+    const auto [found, is_new] = shown.try_emplace(row->controller, row);
+    if (!is_new && shows_better(*row, *found->second)) found->second = row;
+  }
+  std::vector<LinePlot> plots;
+  for (const auto& [controller, row] : shown) {
+    std::vector<double> seconds;
+    for (std::size_t i = 0; i < row->feet.left_mm.size(); ++i)
+      seconds.push_back(static_cast<double>(i) / row->feet.rate_hz);
+    plots.push_back({.title = fmt::format("{}: {} in {}, {} policy{}", controller, row->clip, row->engine, row->policy,
+                                          row->perturbation == "clean" ? "" : ", " + row->perturbation),
+                     .x_label = "time [s]",
+                     .y_label = "height of the sole [m]",
+                     .series = {{"left foot", seconds, metres(row->feet.left_mm)},
+                                {"right foot", seconds, metres(row->feet.right_mm)}}});
+  }
+  return plots;
+}
+
+std::string controllers_html(const ReportContent& content) {
+  std::string html;
+  for (const TitledTable& titled : controller_tables(content.controllers)) html += titled_table_html(titled);
+  if (!content.foot_plots.empty())
+    html +=
+        "<h3>Steps</h3><p>The lowest point of each sole over the ground, one episode of each controller that "
+        "walks.</p>" +
+        plots_html(content.foot_plots);
+  return html;
+}
+
+std::string training_html(const ReportContent& content) {
+  std::string html;
+  for (const TrainingCurves& curves : content.curves)
+    html += fmt::format("<h3>{}</h3>", escape_html(curves.title)) + plots_html(curve_plots(curves));
+  return html;
+}
+
+}  // namespace duet

@@ -1,0 +1,72 @@
+// The pieces of the HTML report, each a fragment of HTML or SVG: internal to html_report.cpp and its tests.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "duet/results/report/escape_html.h"
+#include "duet/results/report/report_content.h"
+
+namespace duet {
+
+struct TitledTable;  // results/analyses/cross_engine_tables.h
+
+// Style sheet and script of the report.
+std::string_view report_style();
+std::string_view report_script();
+
+// The first screen; "" for a board without rows.
+std::string verdict_html(const Board& board);
+std::string board_html(const Board& board);
+// Success by task (columns) and combination, in the board's order.
+std::string task_map_html(const Board& board, const std::vector<LeaderboardEntry>& entries);
+
+// "" where there are none.
+std::string replays_html(const std::vector<ReportReplay>& replays);
+std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays);
+
+// A table cell's drawing: the interval as a bar on [0, 1], the rate as a dot, the null arm (NaN: none) as a tick.
+std::string interval_bar_svg(double rate, const Interval& interval, double null_rate, int width_px);
+
+// The key frames of a clip side by side, seen at right angles to the line between the two agents; "" where there are
+// no points. Points that are not finite are left out, with their bones.
+std::string key_frames_svg(const std::vector<KeyFrame>& frames);
+
+// Loss terms over iterations, on a logarithmic axis where the positive values span more than a factor 20; "" where
+// there are none.
+std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss);
+
+// Heading of level 3, table and notes. A cell that ends with an asterisk is over a limit and stands out.
+std::string titled_table_html(const TitledTable& titled);
+
+// The drawing of engine_plot_svg within the report, styled by it.
+std::string engine_plot_html(const CrossEngine& result);
+// Tables, plot and parity certificate; "" where the content has no comparison of engines.
+std::string cross_engine_html(const ReportContent& content);
+
+// Mark of the limits, notes and tables; "" for a table without groups.
+std::string contacts_html(const ContactTable& table);
+
+std::string walking_html(const WalkTable& table);  // "" for a table without entries
+
+// Plots side by side, each under its title; those without a point are left out.
+std::string plots_html(const std::vector<LinePlot>& plots);
+
+// Tables and plots. "" where there are none.
+std::string policies_html(const PolicyTable& table);
+std::string degradation_html(const Degradation& result);
+std::string reactivity_html(const ReactivityTable& table);
+std::string people_html(const PeopleTable& table);
+std::string levels_html(const std::vector<LevelTable>& tables);
+
+// Tables and foot heights; the curves. "" where there are none.
+std::string controllers_html(const ReportContent& content);
+std::string training_html(const ReportContent& content);
+
+std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
+std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts
+std::string episode_metrics_html(const ReportContent& content);                 // "" without metrics
+std::string retargeting_html(const ReportContent& content);                     // "" without metrics
+std::string story_html(const ClipStory& story, const std::vector<MetricColumn>& columns);
+
+}  // namespace duet

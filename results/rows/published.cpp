@@ -1,0 +1,95 @@
+#include "duet/results/rows/published.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/run_directory.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRows = "episodes.jsonl";
+constexpr const char* kInputs = "inputs";  // what the run was made from, where it keeps it
+constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // where they are
+
+std::string in(const std::string& folder, const std::string& name) { return (fs::path(folder) / name).string(); }
+
+std::string lean_rows(const Run& run) {
+  std::string text;
+  for (EpisodeRow row : run.rows) {
+    row.trace = {};
+    row.feet = {};
+    text += dumped(to_json(row)) + "\n";
+  }
+  return text;
+}
+
+// A run names files by their places on its machine; what is published names them from the folder that it is published
+// from.
+std::string without_places(std::string text) {
+  for (std::size_t at = 0; (at = text.find("\"/", at)) != std::string::npos;) {
+    const std::size_t begin = at + 1, end = text.find('"', begin);
+    if (end == std::string::npos) break;
+    const fs::path place = text.substr(begin, end - begin);
+    const std::string from_here = place.lexically_proximate(fs::current_path()).string();
+    text.replace(begin, place.string().size(), from_here);
+    at = begin + from_here.size() + 1;
+  }
+  return text;
+}
+
+nlohmann::json description_of(const Run& run) {
+  return {{"suite", run.info.suite},
+          {"suite_version", run.info.suite_version},
+          {"suite_hash", run.info.suite_hash},
+          {"rows", run.rows.size()},
+          {"without", {"trace", "feet"}}};
+}
+
+// Copies what the run keeps of its inputs, but for what is withheld.
+void copy_inputs(const std::string& source, const std::string& folder, const Withheld& withheld) {
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(in(source, kInputs))) {
+    const std::string name = entry.path().lexically_relative(source).generic_string();
+    if (!entry.is_regular_file() || withheld.files.contains(name)) continue;
+    fs::create_directories(fs::path(in(folder, name)).parent_path());
+    fs::copy_file(entry.path(), in(folder, name));
+  }
+  for (const auto& [name, text] : withheld.replaced) write_file(in(folder, name), text);
+}
+
+void fill(const std::string& folder, const std::string& source, const Run& run, const Withheld& withheld) {
+  write_file(in(folder, kRows), lean_rows(run));
+  for (const char* name : kFiles)
+    if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
+  if (fs::exists(in(source, kInputs))) copy_inputs(source, folder, withheld);
+  write_manifest(folder, description_of(run));
+}
+
+}  // namespace
+
+void publish_run(const std::string& run, const std::string& folder, const Withheld& withheld) {
+  if (fs::exists(folder))
+    throw InputError(fmt::format("'{}' is there already: what is published stays; choose another folder", folder));
+  const Run loaded = load_run(run);
+  if (loaded.rows.empty()) throw InputError(fmt::format("'{}' has no rows to publish", run));
+  const std::string partial = fs::path(folder).lexically_normal().string() + ".partial";
+  fs::remove_all(partial);
+  try {
+    fill(partial, run, loaded, withheld);
+    fs::rename(partial, folder);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(partial, ignored);
+    throw;
+  }
+}
+
+}  // namespace duet

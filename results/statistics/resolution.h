@@ -1,0 +1,34 @@
+// What a run was large enough to tell: verdict words for tests on a fixed number of pairs, and how many episodes a
+// claimed difference needs.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/statistics/sequential_test.h"
+
+namespace duet {
+
+inline constexpr double kFivePoints = 0.05;  // the margin where nobody names one
+
+// The same where Newcombe's interval lies inside (-margin, margin); else better or worse where p (Holm) is at most
+// 1 - level; else undecided.
+PairVerdict verdict_of(const Comparison& comparison, double margin);
+
+// The smallest number of pairs, or of episodes per arm, that shows the difference in 80 % of runs. difference in (0,
+// 1); throws std::invalid_argument.
+long needed_pairs(double discordance, double difference, double alpha = 0.05);
+long needed_episodes(double rate, double difference, double alpha = 0.05);
+
+// A sentence for the undecided comparisons that are too small for the margin, with the pairs that they need; none where
+// none is.
+std::vector<std::string> resolution_notes(const std::vector<Comparison>& comparisons, double margin);
+// The same for arms over all tasks, unpaired: with the episodes that they need.
+std::vector<std::string> resolution_notes(const std::vector<LeaderboardEntry>& entries, double margin);
+
+// As in results/analyses/leaderboard.h, with a margin of one's own.
+std::string comparison_markdown(const std::vector<Comparison>& comparisons, double margin);
+nlohmann::json comparison_json(const std::vector<Comparison>& comparisons, double margin);
+
+}  // namespace duet
