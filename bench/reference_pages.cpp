@@ -9,6 +9,7 @@
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/io/channel.h"
+#include "duet/results/rows/row_field_list.h"
 #include "duet/retarget/options.h"
 #include "duet/rollout/perturbation_kinds.h"
 
@@ -139,6 +140,29 @@ std::string train_options_page() {
                      train_option_sections());
 }
 
+std::string row_fields_page() {
+  std::string text =
+      head(
+          "Fields of an episode row", "row-fields",
+          "A line of `episodes.jsonl` ([file-formats.md](../file-formats.md#episode-row)). The last column says in "
+          "which "
+          "columns of the table `episodes` a field stands in `results.sqlite`; mappings and lists have tables of their "
+          "own.") +
+      "| key | type | meaning | SQLite |\n|---|---|---|---|\n";
+  std::string parts;
+  for (const RowFieldInfo& info : row_field_list()) {
+    std::string columns;
+    for (const std::string& column : info.columns) columns += (columns.empty() ? "" : ", ") + code(column);
+    text +=
+        fmt::format("| `{}` | {} | {} | {} |\n", info.name, info.type, info.meaning, columns.empty() ? "-" : columns);
+    if (info.members.empty()) continue;
+    parts += fmt::format("\n## {}\n\n| key | type | meaning |\n|---|---|---|\n", info.name);
+    for (const RowFieldInfo& member : info.members)
+      parts += fmt::format("| `{}` | {} | {} |\n", member.name, member.type, member.meaning);
+  }
+  return text + parts;
+}
+
 constexpr PageMaker kPages[] = {{"suite-keys", suite_page},
                                 {"perturbations", perturbation_page},
                                 {"pair-options", pair_page},
@@ -147,7 +171,8 @@ constexpr PageMaker kPages[] = {{"suite-keys", suite_page},
                                 {"policy-options", policy_options_page},
                                 {"engine-options", engine_options_page},
                                 {"synth-options", synth_options_page},
-                                {"train-options", train_options_page}};
+                                {"train-options", train_options_page},
+                                {"row-fields", row_fields_page}};
 
 }  // namespace
 

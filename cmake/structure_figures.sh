@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Figures of the structure: circles of units, places that step a robot under a controller, what one robot, task, metric
-# and perturbation kind touch, lines of each room. `structure_figures.sh [COMMIT]` also counts the lines at that commit.
+# Figures of the structure: circles of units, places that step a robot under a controller, what one robot, task, metric,
+# perturbation kind and field of a row touch, lines of each room. `structure_figures.sh [COMMIT]` also counts the lines at that commit.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -30,6 +30,7 @@ echo "  robot 't1': the folder robots/t1, and $(sources | xargs grep -lE '"t1"' 
 touched "task 'fist_bump' (and a row of tasks/list.cmake)" 'fist_bump'
 touched "metric 'jerk'" '"jerk"'
 touched "perturbation 'kick' (and a row of rollout/perturbation_kinds.cpp)" 'kick_kind|\bKick\b|"kick"'
+touched "row field 'policy_ms' (bench/scoring gives it its value)" '\bpolicy_ms\b'
 
 lines_now() { find "$1" \( -name '*.h' -o -name '*.cpp' \) -exec cat {} + 2>/dev/null | wc -l; }
 lines_then() { { git grep -c "" "$1" -- "$2/*.h" "$2/*.cpp" || true; } | awk -F: '{ sum += $NF } END { print sum + 0 }'; }

@@ -29,6 +29,7 @@
 #include "duet/policies/policy.h"
 #include "duet/policies/registry.h"
 #include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/row_field_list.h"
 #include "duet/retarget/options.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/robot_cards.h"
@@ -214,6 +215,20 @@ std::vector<Listed> list_channels() {
   return list;
 }
 
+std::vector<Listed> list_row_fields() {
+  std::vector<Listed> list;
+  for (const RowFieldInfo& info : row_field_list()) {
+    Listed entry{info.name, fmt::format("{}; {}", info.type, info.meaning)};
+    entry.more = {{"type", info.type}, {"meaning", info.meaning}, {"columns", info.columns}};
+    for (const RowFieldInfo& member : info.members) {
+      entry.options.push_back(fmt::format("{}: {}; {}", member.name, member.type, member.meaning));
+      entry.more["members"].push_back({{"name", member.name}, {"type", member.type}, {"meaning", member.meaning}});
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
 std::vector<Listed> list_curation_criteria() {
   std::vector<Listed> list;
   for (const CriterionInfo& info : curation_criteria())
@@ -333,6 +348,7 @@ const std::vector<std::pair<std::string, Listing>>& listings() {
       {"joint-layouts", list_joint_layouts},
       {"curation-criteria", list_curation_criteria},
       {"robots", list_robots},
+      {"row-fields", list_row_fields},
       {"benchmarks", list_benchmarks},
       {"robot-formats", list_robot_formats},
   };

@@ -1,12 +1,17 @@
 #include "duet/results/rows/database.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sqlite3.h>
 #include <unistd.h>
 
 #include <cmath>
+#include <concepts>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <type_traits>
+#include <variant>
 
 #include "duet/core/require.h"
 #include "duet/results/statistics/row_groups.h"
@@ -14,31 +19,15 @@
 namespace duet {
 namespace {
 
-constexpr const char* kSchemaSql = R"sql(
-CREATE TABLE episodes (
-  key TEXT PRIMARY KEY, suite TEXT NOT NULL, suite_version TEXT NOT NULL, suite_hash TEXT NOT NULL,
-  task TEXT NOT NULL, clip TEXT NOT NULL, episode INTEGER NOT NULL, seed TEXT NOT NULL,
-  engine TEXT NOT NULL, engine_version TEXT NOT NULL, engine_profile TEXT NOT NULL, profile_digest TEXT NOT NULL,
-  controller TEXT NOT NULL, controller_digest TEXT NOT NULL, policy TEXT NOT NULL, policy_digest TEXT NOT NULL,
-  perturbation TEXT NOT NULL, robot_digest TEXT NOT NULL, arm TEXT NOT NULL,
-  outcome TEXT NOT NULL, message TEXT NOT NULL, detectors TEXT NOT NULL, success INTEGER, headline INTEGER NOT NULL,
-  fell INTEGER NOT NULL, frames INTEGER NOT NULL, sim_s REAL, wall_s REAL,
-  contact_peak_n REAL, contact_impulse_ns REAL, contacts_total INTEGER NOT NULL, late_plans INTEGER NOT NULL,
-  faults_observations INTEGER NOT NULL, faults_actions INTEGER NOT NULL, faults_stopped INTEGER NOT NULL,
-  policy_late INTEGER NOT NULL, policy_invalid INTEGER NOT NULL, policy_dead INTEGER NOT NULL,
-  policy_message TEXT NOT NULL, policy_ms_p50 REAL, policy_ms_p95 REAL, policy_ms_max REAL,
-  state_hash TEXT NOT NULL, started_at TEXT NOT NULL);
+constexpr const char* kTables = R"sql(
 CREATE TABLE metrics (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE forces (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE contacts (
-  key TEXT NOT NULL REFERENCES episodes(key), number INTEGER NOT NULL,
-  link TEXT NOT NULL, region TEXT NOT NULL, capsule TEXT NOT NULL, begin_s REAL, duration_s REAL,
-  peak_n REAL, impulse_ns REAL, depth_m REAL, windowed_mean_n REAL, PRIMARY KEY (key, number));
+  key TEXT NOT NULL REFERENCES episodes(key), number INTEGER NOT NULL, {}, PRIMARY KEY (key, number));
 CREATE TABLE verdicts (
-  key TEXT NOT NULL REFERENCES episodes(key), version TEXT NOT NULL, thresholds TEXT NOT NULL,
-  success INTEGER NOT NULL, frames INTEGER NOT NULL, PRIMARY KEY (key, version, thresholds));
+  key TEXT NOT NULL REFERENCES episodes(key), {}, PRIMARY KEY (key, version, thresholds));
 CREATE TABLE verdict_values (
   key TEXT NOT NULL, version TEXT NOT NULL, thresholds TEXT NOT NULL,
   kind TEXT NOT NULL CHECK (kind IN ('part', 'value', 'margin')), name TEXT NOT NULL, value REAL,
@@ -52,6 +41,78 @@ CREATE VIEW leaderboard AS
          SUM(outcome = 'unsupported') AS unsupported
   FROM episodes GROUP BY engine, controller, policy, perturbation, arm, task;
 )sql";
+
+template <typename T, typename... Types>
+concept OneOf = (std::same_as<T, Types> || ...);
+
+template <typename T>
+concept ColumnValue = OneOf<T, std::string, int, long, std::uint64_t, double, bool, std::optional<bool>, Outcome>;
+
+// Calls use(name, value) for each member that is a column; lists and mappings have tables of their own.
+template <RowPart Part, typename Use>
+void each_column(const Part& part, const std::string& prefix, const Use& use) {
+  for (const JsonMember<Part>& known : part_members<Part>())
+    std::visit(
+        [&](auto member) {
+          if constexpr (ColumnValue<std::remove_cvref_t<decltype(part.*member)>>)
+            use(prefix + std::string(known.name), part.*member);
+        },
+        known.member);
+}
+
+// Of one field of a row: as it is, or a column for each member.
+template <typename Use>
+void each_column(const RowField& field, const EpisodeRow& row, const Use& use) {
+  const std::string name(field.json.name);
+  if (field.use.heavy) return;
+  // Also where only the outcome says so.
+  if (name == "fell") return use(name, row.fell || row.outcome == Outcome::kFell);
+  std::visit(
+      [&](auto member) {
+        using Value = std::remove_cvref_t<decltype(row.*member)>;
+        if constexpr (ColumnValue<Value>) use(name, row.*member);
+        if constexpr (RowPart<Value>)
+          each_column(row.*member, (field.use.columns.empty() ? name : std::string(field.use.columns)) + "_", use);
+      },
+      field.json.member);
+  if (name == "success") use("headline", headline_success(row));
+}
+
+template <typename Use>
+void each_column(const EpisodeRow& row, const Use& use) {
+  for (const RowField& field : row_fields()) each_column(field, row, use);
+}
+
+template <ColumnValue Value>
+constexpr const char* sql_type() {
+  // A seed has 64 bits without a sign, more than SQLite's integers hold.
+  if constexpr (OneOf<Value, std::string, Outcome, std::uint64_t>) return "TEXT NOT NULL";
+  if constexpr (std::same_as<Value, double>) return "REAL";
+  if constexpr (std::same_as<Value, std::optional<bool>>) return "INTEGER";
+  return "INTEGER NOT NULL";
+}
+
+// Columns of a table as SQL declares them, in their order.
+class DeclaredColumns {
+ public:
+  template <ColumnValue Value>
+  void operator()(const std::string& name, const Value&) {
+    declared_.push_back(fmt::format("{} {}", name, name == "key" ? "TEXT PRIMARY KEY" : sql_type<Value>()));
+  }
+  [[nodiscard]] std::string text() const { return fmt::format("{}", fmt::join(declared_, ", ")); }
+
+ private:
+  std::vector<std::string> declared_;
+};
+
+std::string schema_sql() {
+  DeclaredColumns episodes, contacts, verdicts;
+  each_column(EpisodeRow(), std::ref(episodes));
+  each_column(RowContact(), "", std::ref(contacts));
+  each_column(Verdict(), "", std::ref(verdicts));
+  return fmt::format("CREATE TABLE episodes ({});", episodes.text()) +
+         fmt::format(fmt::runtime(kTables), contacts.text(), verdicts.text());
+}
 
 struct Close {
   void operator()(sqlite3* database) const { sqlite3_close(database); }
@@ -74,12 +135,13 @@ class Database {
     if (code != SQLITE_OK) fail(shown_path_, sqlite3_errmsg(database));
   }
 
-  void execute(const char* sql) { check(sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr)); }
+  void execute(const std::string& sql) { check(sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr)); }
 
-  StatementHandle prepare(const char* sql) {
-    sqlite3_stmt* statement = nullptr;
-    check(sqlite3_prepare_v2(database_.get(), sql, -1, &statement, nullptr));
-    return StatementHandle(statement);
+  // Of a row of a table: a parameter for each of its columns.
+  StatementHandle insertion(const std::string& table) {
+    const int columns = sqlite3_column_count(prepare(fmt::format("SELECT * FROM {}", table)).get());
+    const std::vector<std::string> marks(columns, "?");
+    return prepare(fmt::format("INSERT INTO {} VALUES ({})", table, fmt::join(marks, ",")));
   }
 
   void step(sqlite3_stmt* statement) {
@@ -88,6 +150,11 @@ class Database {
   }
 
  private:
+  StatementHandle prepare(const std::string& sql) {
+    sqlite3_stmt* statement = nullptr;
+    check(sqlite3_prepare_v2(database_.get(), sql.c_str(), -1, &statement, nullptr));
+    return StatementHandle(statement);
+  }
   void check(int code) {
     if (code != SQLITE_OK) fail(shown_path_, sqlite3_errmsg(database_.get()));
   }
@@ -101,23 +168,28 @@ class Parameters {
  public:
   explicit Parameters(sqlite3_stmt* statement) : statement_(statement) {}
 
-  Parameters& text(const std::string& value) {
+  Parameters& add(const std::string& value) {
     sqlite3_bind_text(statement_, ++place_, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
     return *this;
   }
-  Parameters& integer(std::int64_t value) {
+  Parameters& add(std::int64_t value) {
     sqlite3_bind_int64(statement_, ++place_, value);
     return *this;
   }
-  Parameters& number(double value) {  // NULL where it is not finite
+  Parameters& add(int value) { return add(std::int64_t{value}); }
+  Parameters& add(bool value) { return add(std::int64_t{value ? 1 : 0}); }
+  Parameters& add(std::uint64_t value) { return add(fmt::format("{}", value)); }
+  Parameters& add(Outcome value) { return add(std::string(to_string(value))); }
+  Parameters& add(double value) {  // NULL where it is not finite
     std::isfinite(value) ? sqlite3_bind_double(statement_, ++place_, value) : sqlite3_bind_null(statement_, ++place_);
     return *this;
   }
-  Parameters& optional_flag(const std::optional<bool>& value) {
+  Parameters& add(const std::optional<bool>& value) {
     value.has_value() ? sqlite3_bind_int(statement_, ++place_, *value ? 1 : 0)
                       : sqlite3_bind_null(statement_, ++place_);
     return *this;
   }
+  Parameters& add(const char* value) { return add(std::string(value)); }
 
  private:
   sqlite3_stmt* statement_;
@@ -128,14 +200,12 @@ class RowWriter {
  public:
   explicit RowWriter(Database& database)
       : database_(database),
-        episode_(database.prepare(
-            "INSERT INTO episodes VALUES "
-            "(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)")),
-        metric_(database.prepare("INSERT INTO metrics VALUES (?,?,?)")),
-        force_(database.prepare("INSERT INTO forces VALUES (?,?,?)")),
-        contact_(database.prepare("INSERT INTO contacts VALUES (?,?,?,?,?,?,?,?,?,?,?)")),
-        verdict_(database.prepare("INSERT INTO verdicts VALUES (?,?,?,?,?)")),
-        value_(database.prepare("INSERT INTO verdict_values VALUES (?,?,?,?,?,?)")) {}
+        episode_(database.insertion("episodes")),
+        metric_(database.insertion("metrics")),
+        force_(database.insertion("forces")),
+        contact_(database.insertion("contacts")),
+        verdict_(database.insertion("verdicts")),
+        value_(database.insertion("verdict_values")) {}
 
   void write(const EpisodeRow& row) {
     write_episode(row);
@@ -146,99 +216,42 @@ class RowWriter {
   }
 
  private:
+  // To add what a column holds.
+  static auto into(Parameters& parameters) {
+    return [&parameters](const std::string&, const auto& value) { parameters.add(value); };
+  }
+
   void write_episode(const EpisodeRow& row) {
-    // The seed has 64 bits without a sign, more than SQLite's integers hold.
-    Parameters(episode_.get())
-        .text(row.key)
-        .text(row.suite)
-        .text(row.suite_version)
-        .text(row.suite_hash)
-        .text(row.task)
-        .text(row.clip)
-        .integer(row.episode)
-        .text(fmt::format("{}", row.seed))
-        .text(row.engine)
-        .text(row.engine_version)
-        .text(row.engine_profile)
-        .text(row.profile_digest)
-        .text(row.controller)
-        .text(row.controller_digest)
-        .text(row.policy)
-        .text(row.policy_digest)
-        .text(row.perturbation)
-        .text(row.robot_digest)
-        .text(row.arm)
-        .text(std::string(to_string(row.outcome)))
-        .text(row.message)
-        .text(row.detectors)
-        .optional_flag(row.success)
-        .integer(headline_success(row) ? 1 : 0)
-        .integer(row.fell || row.outcome == Outcome::kFell ? 1 : 0)
-        .integer(row.frames)
-        .number(row.sim_s)
-        .number(row.wall_s)
-        .number(row.contact_peak_n)
-        .number(row.contact_impulse_ns)
-        .integer(row.contacts_total)
-        .integer(row.late_plans)
-        .integer(row.faults.observations)
-        .integer(row.faults.actions)
-        .integer(row.faults.stopped ? 1 : 0)
-        .integer(row.policy_faults.late)
-        .integer(row.policy_faults.invalid)
-        .integer(row.policy_faults.dead ? 1 : 0)
-        .text(row.policy_faults.message)
-        .number(row.policy_ms.p50)
-        .number(row.policy_ms.p95)
-        .number(row.policy_ms.max)
-        .text(row.state_hash)
-        .text(row.started_at);
+    Parameters parameters(episode_.get());
+    each_column(row, into(parameters));
     database_.step(episode_.get());
   }
 
   void write_finite(const std::string& key, const std::map<std::string, double>& values, sqlite3_stmt* statement) {
     for (const auto& [name, value] : values) {
       if (!std::isfinite(value)) continue;
-      Parameters(statement).text(key).text(name).number(value);
+      Parameters(statement).add(key).add(name).add(value);
       database_.step(statement);
     }
   }
 
   void write_contacts(const EpisodeRow& row) {
-    std::int64_t number = 0;
+    int number = 0;
     for (const RowContact& contact : row.contacts) {
-      Parameters(contact_.get())
-          .text(row.key)
-          .integer(number++)
-          .text(contact.link)
-          .text(contact.region)
-          .text(contact.capsule)
-          .number(contact.begin_s)
-          .number(contact.duration_s)
-          .number(contact.peak_n)
-          .number(contact.impulse_ns)
-          .number(contact.depth_m)
-          .number(contact.windowed_mean_n);
+      Parameters parameters(contact_.get());
+      parameters.add(row.key).add(number++);
+      each_column(contact, "", into(parameters));
       database_.step(contact_.get());
     }
   }
 
   void write_verdict(const std::string& key, const Verdict& verdict) {
-    Parameters(verdict_.get())
-        .text(key)
-        .text(verdict.version)
-        .text(verdict.thresholds)
-        .integer(verdict.success ? 1 : 0)
-        .integer(verdict.frames);
+    Parameters parameters(verdict_.get());
+    parameters.add(key);
+    each_column(verdict, "", into(parameters));
     database_.step(verdict_.get());
     const auto write = [&](const char* kind, const std::string& name, double value) {
-      Parameters(value_.get())
-          .text(key)
-          .text(verdict.version)
-          .text(verdict.thresholds)
-          .text(kind)
-          .text(name)
-          .number(value);
+      Parameters(value_.get()).add(key).add(verdict.version).add(verdict.thresholds).add(kind).add(name).add(value);
       database_.step(value_.get());
     };
     for (const auto& [name, holds] : verdict.parts) write("part", name, holds ? 1.0 : 0.0);
@@ -251,9 +264,9 @@ class RowWriter {
 };
 
 void write_notes(const std::vector<std::string>& notes, Database& database) {
-  const StatementHandle insert = database.prepare("INSERT INTO notes VALUES (?)");
+  const StatementHandle insert = database.insertion("notes");
   for (const std::string& note : notes) {
-    Parameters(insert.get()).text(note);
+    Parameters(insert.get()).add(note);
     database.step(insert.get());
   }
 }
@@ -262,7 +275,7 @@ void fill(const std::vector<EpisodeRow>& rows, const std::vector<std::string>& n
           const std::string& shown_path) {
   Database database(file, shown_path);
   database.execute("PRAGMA foreign_keys = ON; BEGIN");
-  database.execute(kSchemaSql);
+  database.execute(schema_sql());
   {
     RowWriter writer(database);
     for (const EpisodeRow* row : in_episode_order(rows)) writer.write(*row);
@@ -272,6 +285,12 @@ void fill(const std::vector<EpisodeRow>& rows, const std::vector<std::string>& n
 }
 
 }  // namespace
+
+std::vector<std::string> database_columns(const RowField& field) {
+  std::vector<std::string> names;
+  each_column(field, EpisodeRow(), [&](const std::string& name, const auto&) { names.push_back(name); });
+  return names;
+}
 
 void write_database(const std::vector<EpisodeRow>& rows, const std::string& path,
                     const std::vector<std::string>& notes) {

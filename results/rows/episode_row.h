@@ -3,15 +3,16 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "duet/core/outcome.h"
+#include "duet/results/rows/row_objects.h"
 
 namespace duet {
 
@@ -20,65 +21,8 @@ inline constexpr int kRowSchema = 5;  // the only one that is read
 // In the place of an engine's name: motion without physics (rollout/play_back.h).
 inline constexpr std::string_view kPlaybackEngine = "playback";
 
-struct Verdict {           // of one detector
-  std::string version;     // "paper", "robot"
-  std::string thresholds;  // "paper", "strict"
-  bool success = false;
-  std::map<std::string, bool> parts;
-  std::map<std::string, double> values;   // NaN where undefined (null in JSON, as for any other that is not finite)
-  std::map<std::string, double> margins;  // likewise
-  int frames = 0;                         // number of evidence frames
-};
-
-// Where a few points were, to tell when two engines part on one episode.
-struct StateTrace {
-  double rate_hz = 10.0;             // frame i is at i / rate_hz [s]
-  std::vector<std::string> points;   // "root", "left_hand", "right_hand"
-  std::vector<std::vector<int>> mm;  // per frame x, y, z of each point in turn [mm], frame W; empty: not recorded
-};
-
-// How often the controller met a number that is not finite, and what it did.
-struct RowFaults {
-  int observations = 0;  // ticks on which the state or the reference was not finite
-  int actions = 0;       // ticks on which the command was not finite
-  bool stopped = false;  // the safe stop was entered
-
-  [[nodiscard]] bool any() const { return observations > 0 || actions > 0 || stopped; }
-};
-
-// What went wrong with a policy's plans.
-struct RowPolicyFaults {
-  int late = 0, invalid = 0;  // plans that did not come in time, or were not finite, of the wrong size, not unit
-  bool dead = false;          // it gave no plan any more
-  std::string message;        // of the first fault
-
-  [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
-};
-
-// Wall time of the policy's plans [ms]; NaN where none was asked for. Differs from run to run.
-struct RowPolicyTime {
-  double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
-};
-
-// Height of the lowest point of each sole over the ground, of a robot whose controller walks.
-struct FootTrace {
-  double rate_hz = 25.0;               // frame i is at i / rate_hz [s]
-  std::vector<int> left_mm, right_mm;  // as long as one another [mm]; empty: not recorded
-};
-
-// One contact of one robot link with one capsule of a solid human.
-struct RowContact {
-  std::string link, region, capsule;  // "left_wrist_yaw_link", "upper_arm", "right_upper_arm"
-  double begin_s = 0.0;               // from the episode's begin [s]
-  double duration_s = 0.0;            // [s]
-  double peak_n = 0.0;                // [N]
-  double impulse_ns = 0.0;            // of the force's magnitude [N s]
-  double depth_m = 0.0;               // largest [m]
-  double windowed_mean_n = 0.0;       // largest mean over the window of the measurement, 0.1 s [N]
-};
-
-inline constexpr std::size_t kMostRowContacts = 16;
-
+// A field stands here and in the table of episode_row.cpp, and nowhere else: JSON, what is compared and published, the
+// columns of results.sqlite and docs/reference/row-fields.md come from the table.
 struct EpisodeRow {
   std::string key;  // episode_key of the row
   std::string suite, suite_version, suite_hash;
@@ -115,6 +59,25 @@ struct EpisodeRow {
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
 };
+
+// What is done with a field beside reading and writing it.
+struct RowFieldUse {
+  bool scanned = false;           // found without reading the row (results/rows/row_scan.h)
+  bool repeats = true;            // false: a wall time, in which equal rows differ (results/rows/row_identity.h)
+  bool heavy = false;             // a trace: it stands in rows only, and not in published ones
+  std::string_view columns = "";  // of a part: what its columns in results.sqlite begin with; "" for its name
+  void (*check)(const EpisodeRow&) = nullptr;  // throws InputError for a value that the type allows and the field not
+};
+
+struct RowField {
+  JsonMember<EpisodeRow, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace, RowFaults,
+             RowPolicyFaults, RowPolicyTime>
+      json;
+  RowFieldUse use = {};
+};
+
+// All of them, in the order of the columns of results.sqlite.
+std::span<const RowField> row_fields();
 
 // SHA-256 over what makes the episode what it is: suite hash, detectors, task, clip, episode, arm, policy and
 // controller with their digests, engine and perturbation. What the profile says of the engine is in the suite hash.

@@ -70,9 +70,23 @@ std::uint64_t JsonFields::unsigned_integer(const std::string& key) {
   return value.get<std::uint64_t>();
 }
 
+int JsonFields::count(const std::string& key) {
+  const std::int64_t value = integer(key);
+  if (value < 0 || value > std::numeric_limits<int>::max())
+    throw InputError(fmt::format("{}: key '{}': expected a whole number of at least 0, found {}", what_, key, value));
+  return static_cast<int>(value);
+}
+
 double JsonFields::number(const std::string& key) { return number_of(key, at(key), false); }
 
 double JsonFields::number_or_nan(const std::string& key) { return number_of(key, at(key), true); }
+
+const nlohmann::json& JsonFields::list(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_array())
+    throw InputError(fmt::format("{}: key '{}': expected a list, found {}", what_, key, value.type_name()));
+  return value;
+}
 
 std::map<std::string, double> JsonFields::numbers(const std::string& key, bool null_is_nan) {
   const nlohmann::json& object = at(key);

@@ -33,13 +33,16 @@ class JsonFields {
   bool boolean(const std::string& key);
   std::int64_t integer(const std::string& key);
   std::uint64_t unsigned_integer(const std::string& key);
+  int count(const std::string& key);             // a whole number of at least 0
   double number(const std::string& key);         // finite by JSON's grammar
   double number_or_nan(const std::string& key);  // null reads as NaN
+  const nlohmann::json& list(const std::string& key);
   std::map<std::string, double> numbers(const std::string& key, bool null_is_nan);
   std::map<std::string, bool> booleans(const std::string& key);
 
   // Throws InputError for a key that nobody asked for, with the nearest known one.
   void refuse_unknown() const;
+  [[nodiscard]] const std::string& what() const { return what_; }
 
  private:
   [[noreturn]] void wrong_type(const std::string& key, std::string_view expected, const nlohmann::json& found) const;

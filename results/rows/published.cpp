@@ -25,8 +25,8 @@ std::string in(const std::string& folder, const std::string& name) { return (fs:
 std::string lean_rows(const Run& run) {
   std::string text;
   for (EpisodeRow row : run.rows) {
-    row.trace = {};
-    row.feet = {};
+    for (const RowField& field : row_fields())
+      if (field.use.heavy) std::visit([&](auto member) { row.*member = {}; }, field.json.member);
     text += dumped(to_json(row)) + "\n";
   }
   return text;
@@ -47,11 +47,14 @@ std::string without_places(std::string text) {
 }
 
 nlohmann::json description_of(const Run& run) {
+  nlohmann::json without = nlohmann::json::array();
+  for (const RowField& field : row_fields())
+    if (field.use.heavy) without.push_back(field.json.name);
   return {{"suite", run.info.suite},
           {"suite_version", run.info.suite_version},
           {"suite_hash", run.info.suite_hash},
           {"rows", run.rows.size()},
-          {"without", {"trace", "feet"}}};
+          {"without", without}};
 }
 
 // Copies what the run keeps of its inputs, but for what is withheld.

@@ -58,7 +58,8 @@ void compare(const std::string& field, const nlohmann::json* first, const nlohma
 
 nlohmann::json repeatable(const EpisodeRow& row) {
   nlohmann::json json = to_json(row);
-  for (const char* wall_time : {"started_at", "wall_s", "policy_ms"}) json.erase(wall_time);
+  for (const RowField& field : row_fields())
+    if (!field.use.repeats) json.erase(std::string(field.json.name));
   return json;
 }
 

@@ -14,7 +14,7 @@ struct FieldDifference {
   std::string first, second;  // the values as JSON; "nothing" where one has no such field; a long one is cut
 };
 
-// Of all fields but started_at, wall_s and policy_ms, which tell when and how fast an episode ran. NaN equals NaN; two
+// Of all fields that repeat (episode_row.h); the others tell when and how fast an episode ran. NaN equals NaN; two
 // values of numbers are equal where they are the same number.
 std::vector<FieldDifference> row_differences(const EpisodeRow& first, const EpisodeRow& second);
 

@@ -3,11 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bitset>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -17,29 +20,32 @@
 namespace duet {
 namespace {
 
-using ScannedText = std::string EpisodeRow::*;
+// A field that a scan knows. One of `text`, `whole` and `outcome` is set where it is looked at.
+struct ScanField {
+  std::string_view name;
+  std::string EpisodeRow::*text = nullptr;
+  int EpisodeRow::*whole = nullptr;
+  Outcome EpisodeRow::*outcome = nullptr;
+  bool scanned = false, wall_time = false;
+};
 
-// In the order in which rows are written, which is alphabetical.
-constexpr std::array<std::pair<std::string_view, ScannedText>, 19> kScannedTexts = {
-    {{"arm", &EpisodeRow::arm},
-     {"clip", &EpisodeRow::clip},
-     {"controller", &EpisodeRow::controller},
-     {"controller_digest", &EpisodeRow::controller_digest},
-     {"detectors", &EpisodeRow::detectors},
-     {"engine", &EpisodeRow::engine},
-     {"engine_profile", &EpisodeRow::engine_profile},
-     {"key", &EpisodeRow::key},
-     {"perturbation", &EpisodeRow::perturbation},
-     {"policy", &EpisodeRow::policy},
-     {"policy_digest", &EpisodeRow::policy_digest},
-     {"profile_digest", &EpisodeRow::profile_digest},
-     {"robot_digest", &EpisodeRow::robot_digest},
-     {"started_at", &EpisodeRow::started_at},
-     {"state_hash", &EpisodeRow::state_hash},
-     {"suite", &EpisodeRow::suite},
-     {"suite_hash", &EpisodeRow::suite_hash},
-     {"suite_version", &EpisodeRow::suite_version},
-     {"task", &EpisodeRow::task}}};
+// By name: rows are written in that order.
+const std::vector<ScanField>& scan_fields() {
+  static const std::vector<ScanField> fields = [] {
+    std::vector<ScanField> made = {{.name = "schema"}};
+    for (const RowField& field : row_fields()) {
+      ScanField& known = made.emplace_back(
+          ScanField{.name = field.json.name, .scanned = field.use.scanned, .wall_time = !field.use.repeats});
+      if (!field.use.scanned) continue;
+      if (const auto* text = std::get_if<std::string EpisodeRow::*>(&field.json.member)) known.text = *text;
+      if (const auto* whole = std::get_if<int EpisodeRow::*>(&field.json.member)) known.whole = *whole;
+      if (const auto* outcome = std::get_if<Outcome EpisodeRow::*>(&field.json.member)) known.outcome = *outcome;
+    }
+    std::ranges::sort(made, {}, &ScanField::name);
+    return made;
+  }();
+  return fields;
+}
 
 [[noreturn]] void fail_scan(std::string_view expected) {
   throw InputError(fmt::format("episode row: expected {}", expected));
@@ -181,7 +187,14 @@ int scanned_integer(std::string_view name, std::string_view value) {
   return number;
 }
 
-bool is_wall_time(std::string_view name) { return name == "started_at" || name == "wall_s" || name == "policy_ms"; }
+Outcome scanned_outcome(std::string_view value) {
+  const std::string name = scanned_text("outcome", value);
+  try {
+    return parse_outcome(name);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(fmt::format("episode row: key 'outcome': {}", error.what()));
+  }
+}
 
 // Two chains over words of eight bytes. It tells rows apart that differ by accident, at a tenth of what SHA-256 costs:
 // each step is one to one in the word and in what came before.
@@ -225,53 +238,54 @@ class RowReading {
 
  private:
   void take(const MemberScanner::Member& member) {
-    const auto known =
-        std::ranges::lower_bound(kScannedTexts, member.name, {}, &std::pair<std::string_view, ScannedText>::first);
-    if (known != kScannedTexts.end() && known->first == member.name) {
-      scanned_.row.*known->second = scanned_text(member.name, member.value);
-      found_ |= 1U << (known - kScannedTexts.begin());
-    } else if (member.name == "outcome") {
-      outcome(scanned_text(member.name, member.value));
-    } else if (member.name == "episode") {
-      scanned_.row.episode = scanned_integer(member.name, member.value);
-      has_episode_ = true;
+    const ScanField* known = find(member.name);
+    if (known == nullptr) return;
+    if (known->text != nullptr) {
+      scanned_.row.*known->text = scanned_text(member.name, member.value);
+    } else if (known->whole != nullptr) {
+      scanned_.row.*known->whole = scanned_integer(member.name, member.value);
+    } else if (known->outcome != nullptr) {
+      scanned_.row.*known->outcome = scanned_outcome(member.value);
     } else if (member.name == "schema") {
       schema_ = scanned_integer(member.name, member.value);
     }
-    if (!is_wall_time(member.name)) return;
+    found_.set(static_cast<std::size_t>(known - fields_.data()));
+    if (!known->wall_time) return;
     const auto begin = static_cast<std::size_t>(member.value.data() - line_.data());
     print_.update(line_.substr(done_, begin - done_));
     done_ = begin + member.value.size();
   }
 
-  void outcome(const std::string& name) {
-    try {
-      scanned_.row.outcome = parse_outcome(name);
-    } catch (const std::invalid_argument& error) {
-      throw InputError(fmt::format("episode row: key 'outcome': {}", error.what()));
-    }
-    has_outcome_ = true;
+  // The one after the last, as a rule.
+  const ScanField* find(std::string_view name) {
+    if (next_ < fields_.size() && fields_[next_].name == name) return &fields_[next_++];
+    const auto known = std::ranges::lower_bound(fields_, name, {}, &ScanField::name);
+    if (known == fields_.end() || known->name != name) return nullptr;
+    next_ = static_cast<std::size_t>(known - fields_.begin()) + 1;
+    return &*known;
   }
 
   void finish() {
     if (schema_ != kRowSchema) fail_scan(fmt::format("schema {}, found {}", kRowSchema, schema_));
-    for (std::size_t i = 0; i < kScannedTexts.size(); ++i)
-      if ((found_ & (1U << i)) == 0) fail_scan(fmt::format("the key '{}', found none", kScannedTexts[i].first));
-    if (!has_outcome_ || !has_episode_) fail_scan("the keys 'episode' and 'outcome'");
+    for (std::size_t i = 0; i < fields_.size(); ++i)
+      if (fields_[i].scanned && !found_.test(i)) fail_scan(fmt::format("the key '{}', found none", fields_[i].name));
     if (const std::string key = episode_key(scanned_.row); key != scanned_.row.key)
-      throw InputError(fmt::format("key 'key': expected {}, of what the row says, found {}: the row was changed", key,
-                                   shown(scanned_.row.key)));
+      throw InputError(
+          fmt::format("key 'key': expected {}, of what the row "
+                      "says, found {}: the row was changed",
+                      key, shown(scanned_.row.key)));
     print_.update(line_.substr(done_));
     scanned_.fingerprint = print_.bytes();
   }
 
+  const std::vector<ScanField>& fields_ = scan_fields();
   std::string_view line_;
   ScannedRow scanned_;
   Fingerprint print_;
   std::size_t done_ = 0;
-  unsigned found_ = 0;
+  std::size_t next_ = 0;   // in fields_
+  std::bitset<64> found_;  // of fields_
   int schema_ = 0;
-  bool has_outcome_ = false, has_episode_ = false;
 };
 
 }  // namespace

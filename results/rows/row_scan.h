@@ -11,11 +11,11 @@
 namespace duet {
 
 struct ScannedRow {
-  // Suite, task, clip, episode, engine and its profile, controller, policy, perturbation, detectors, arm, outcome,
-  // their digests, key and started_at; all else as in a new row.
+  // The fields that the table of a row's fields calls scanned: what names the episode and its parts, their digests,
+  // key, outcome and started_at; all else as in a new row.
   EpisodeRow row;
-  // Of the line's bytes but for the values of started_at, wall_s and policy_ms. Equal: the rows agree in every other
-  // field. Different: they may still agree, written in two ways (row_differences knows).
+  // Of the line's bytes but for the values of wall times. Equal: the rows agree in every other field. Different: they
+  // may still agree, written in two ways (row_differences knows).
   std::array<unsigned char, 16> fingerprint{};
 };
 

@@ -74,6 +74,35 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
       testing::ElementsAre("margin|overall|-0.25", "part|contact|1.0", "part|duration|0.0", "value|distance|0.1"));
 }
 
+TEST(Database, ColumnsOfAnEpisodeAreThoseOfTheFields) {
+  const ScratchFolder scratch;
+  write_database({full_row()}, scratch / "r.sqlite");
+  std::vector<std::string> expected;
+  for (const RowField& field : row_fields())
+    for (const std::string& column : database_columns(field)) expected.push_back(column);
+  EXPECT_EQ(query(scratch / "r.sqlite", "SELECT name FROM pragma_table_info('episodes') ORDER BY cid"), expected);
+  EXPECT_THAT(query(scratch / "r.sqlite",
+                    "SELECT name, type, \"notnull\", pk FROM pragma_table_info('episodes') WHERE name IN "
+                    "('key', 'seed', 'episode', 'success', 'headline', 'sim_s', 'policy_dead') ORDER BY cid"),
+              testing::ElementsAre("key|TEXT|0|1", "episode|INTEGER|1|0", "seed|TEXT|1|0", "success|INTEGER|0|0",
+                                   "headline|INTEGER|1|0", "sim_s|REAL|0|0", "policy_dead|INTEGER|1|0"));
+}
+
+TEST(Database, AFieldIsAColumnAPartAColumnForEachMemberATraceNone) {
+  const auto columns_of = [](std::string_view name) {
+    for (const RowField& field : row_fields())
+      if (field.json.name == name) return database_columns(field);
+    return std::vector<std::string>{"no such field"};
+  };
+  EXPECT_THAT(columns_of("sim_s"), testing::ElementsAre("sim_s"));
+  EXPECT_THAT(columns_of("success"), testing::ElementsAre("success", "headline"));
+  EXPECT_THAT(columns_of("faults"), testing::ElementsAre("faults_observations", "faults_actions", "faults_stopped"));
+  EXPECT_THAT(columns_of("policy_faults"),
+              testing::ElementsAre("policy_late", "policy_invalid", "policy_dead", "policy_message"));
+  for (const char* name : {"trace", "feet", "metrics", "forces", "contacts", "verdicts"})
+    EXPECT_THAT(columns_of(name), testing::IsEmpty()) << name;
+}
+
 TEST(Database, ViewAgreesWithTheLeaderboard) {
   const ScratchFolder scratch;
   std::vector<EpisodeRow> rows;
