@@ -107,16 +107,17 @@ void check_schema(JsonFields& fields) {
 std::span<const RowField> row_fields() { return kRowFields; }
 
 std::string episode_key(const EpisodeRow& row) {
-  Sha256 hash;
-  const std::string episode = fmt::format("{}", row.episode);
+  const std::string episode = std::to_string(row.episode);
+  std::string parts;
   for (const std::string* part :
        {&row.suite_hash, &row.detectors, &row.task, &row.clip, &episode, &row.arm, &row.policy, &row.policy_digest,
         &row.controller, &row.controller_digest, &row.engine, &row.perturbation}) {
     // The length first, so that no two different lists of parts read the same.
-    hash.update(fmt::format("{}:", part->size()));
-    hash.update(std::string_view(*part));
+    parts += std::to_string(part->size());
+    parts += ':';
+    parts += *part;
   }
-  return hash.hex();
+  return sha256_hex(parts);
 }
 
 nlohmann::json to_json(const EpisodeRow& row) {

@@ -89,21 +89,19 @@ class MergeIndexer {
  private:
   void add(std::uint32_t source, std::string_view line, const LineFile& lines) {
     const auto where = [&] { return fmt::format("{}:{}", sources_[source].path, lines.line()); };
-    ScannedRow scanned = [&] {
-      try {
-        return scan_row(line);
-      } catch (const InputError& error) {
-        throw InputError(fmt::format("{}: {}", where(), error.what()));
-      }
-    }();
-    const EpisodeRow& row = scanned.row;
+    try {
+      scan_row(line, scanned_);
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{}: {}", where(), error.what()));
+    }
+    const EpisodeRow& row = scanned_.row;
     if (row.suite_hash != info_.suite_hash)
       throw InputError(fmt::format("{}: the row is of suite {}, the run of {}", where(),
                                    suite_label(row.suite, row.suite_version, row.suite_hash), suite_label(info_)));
     note_names(row, source);
     entries_.push_back({.place = merge_place(row),
-                        .fingerprint = scanned.fingerprint,
-                        .started_at = std::move(scanned.row.started_at),
+                        .fingerprint = scanned_.fingerprint,
+                        .started_at = row.started_at,
                         .source = source,
                         .length = static_cast<std::uint32_t>(line.size()),
                         .offset = lines.offset(),
@@ -132,6 +130,7 @@ class MergeIndexer {
   const RunInfo& info_;
   std::size_t budget_;
   std::string scratch_;
+  ScannedRow scanned_;  // of the line before
   std::vector<RowEntry> entries_;
   std::vector<std::unique_ptr<EntryStream>> streams_;
   std::unordered_set<std::string> seen_;

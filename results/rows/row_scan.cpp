@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <bitset>
 #include <charconv>
 #include <cstdint>
@@ -51,22 +52,35 @@ const std::vector<ScanField>& scan_fields() {
   throw InputError(fmt::format("episode row: expected {}", expected));
 }
 
-// How many bytes from `place` on are no quote and no bracket, in whole blocks: compilers make vectors of the inner
-// loop.
-std::size_t plain_blocks(std::string_view text, std::size_t place) {
-  constexpr std::size_t kBlock = 32;
-  const std::size_t begin = place;
-  for (; place + kBlock <= text.size(); place += kBlock) {
-    std::array<unsigned char, kBlock> block;
-    std::memcpy(block.data(), text.data() + place, kBlock);
-    unsigned char any = 0;
-    for (const unsigned char c : block) {
-      const auto folded = static_cast<unsigned char>(c | 0x20U);  // a bracket of either kind
-      any |= static_cast<unsigned char>((folded == '{') | (folded == '}') | (c == '"'));
+constexpr std::uint64_t kEachByte = 0x0101010101010101ULL;
+
+// Of eight bytes, read as a word: the lowest bit that is set stands in the first that is `wanted`, none where none is.
+constexpr std::uint64_t byte_marks(std::uint64_t word, char wanted) {
+  const std::uint64_t zero_there = word ^ (kEachByte * static_cast<unsigned char>(wanted));
+  return (zero_there - kEachByte) & ~zero_there & (kEachByte << 7U);
+}
+constexpr std::uint64_t text_marks(std::uint64_t word) { return byte_marks(word, '"') | byte_marks(word, '\\'); }
+constexpr std::uint64_t nested_marks(std::uint64_t word) {
+  const std::uint64_t folded = word | (kEachByte * 0x20U);  // a bracket of either kind becomes a brace
+  return byte_marks(word, '"') | byte_marks(folded, '{') | byte_marks(folded, '}');
+}
+
+constexpr bool is_text_mark(char c) { return c == '"' || c == '\\'; }
+constexpr bool is_nested_mark(char c) { return c == '"' || c == '{' || c == '}' || c == '[' || c == ']'; }
+
+// Where the first mark at or after `place` stands; the text's size where none does. Eight bytes at a time.
+template <std::uint64_t marks(std::uint64_t), bool is_mark(char)>
+std::size_t next_mark(std::string_view text, std::size_t place) {
+  if constexpr (std::endian::native == std::endian::little) {
+    for (; place + sizeof(std::uint64_t) <= text.size(); place += sizeof(std::uint64_t)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, text.data() + place, sizeof word);
+      if (const std::uint64_t found = marks(word); found != 0)
+        return place + static_cast<std::size_t>(std::countr_zero(found)) / 8;
     }
-    if (any != 0) break;
   }
-  return place - begin;
+  while (place < text.size() && !is_mark(text[place])) ++place;
+  return place;
 }
 
 constexpr std::array<bool, 256> bytes_of(std::string_view text) {
@@ -123,8 +137,8 @@ class MemberScanner {
     const std::size_t begin = place_;
     expect('"', "a text in quotes");
     for (;; place_ += 2) {
-      place_ = text_.find_first_of("\"\\", place_);
-      if (place_ == std::string_view::npos) fail_scan("a text that ends");
+      place_ = next_mark<text_marks, is_text_mark>(text_, std::min(place_, text_.size()));
+      if (place_ == text_.size()) fail_scan("a text that ends");
       if (text_[place_] == '"') break;
     }
     return text_.substr(begin, ++place_ - begin);
@@ -144,10 +158,8 @@ class MemberScanner {
   }
 
   void nested() {
-    constexpr std::array<bool, 256> kMarks = bytes_of("{}[]\"");
     for (int depth = 0;;) {
-      place_ += plain_blocks(text_, place_);
-      while (place_ < text_.size() && !kMarks[static_cast<unsigned char>(text_[place_])]) ++place_;
+      place_ = next_mark<nested_marks, is_nested_mark>(text_, place_);
       switch (at()) {
         case '"':
           text();
@@ -171,12 +183,15 @@ class MemberScanner {
   bool first_ = true;
 };
 
-// The text that a JSON value is.
-std::string scanned_text(std::string_view name, std::string_view value) {
+// The text that a JSON value is, to `text`.
+void scan_text(std::string_view name, std::string_view value, std::string& text) {
   if (value.size() < 2 || value.front() != '"')
     fail_scan(fmt::format("a text under the key '{}', found {}", name, shown(value)));
-  if (value.find('\\') == std::string_view::npos) return std::string(value.substr(1, value.size() - 2));
-  return parse_json(value, fmt::format("episode row: key '{}'", name)).get<std::string>();
+  if (value.find('\\') == std::string_view::npos) {
+    text.assign(value.substr(1, value.size() - 2));
+  } else {
+    text = parse_json(value, fmt::format("episode row: key '{}'", name)).get<std::string>();
+  }
 }
 
 int scanned_integer(std::string_view name, std::string_view value) {
@@ -188,7 +203,8 @@ int scanned_integer(std::string_view name, std::string_view value) {
 }
 
 Outcome scanned_outcome(std::string_view value) {
-  const std::string name = scanned_text("outcome", value);
+  std::string name;
+  scan_text("outcome", value, name);
   try {
     return parse_outcome(name);
   } catch (const std::invalid_argument& error) {
@@ -229,19 +245,18 @@ class Fingerprint {
 
 class RowReading {
  public:
-  explicit RowReading(std::string_view line) : line_(line) {
+  RowReading(std::string_view line, ScannedRow& scanned) : line_(line), scanned_(scanned) {
     MemberScanner members(line);
     for (MemberScanner::Member member; members.next(member);) take(member);
     finish();
   }
-  ScannedRow result() { return std::move(scanned_); }
 
  private:
   void take(const MemberScanner::Member& member) {
     const ScanField* known = find(member.name);
     if (known == nullptr) return;
     if (known->text != nullptr) {
-      scanned_.row.*known->text = scanned_text(member.name, member.value);
+      scan_text(member.name, member.value, scanned_.row.*known->text);
     } else if (known->whole != nullptr) {
       scanned_.row.*known->whole = scanned_integer(member.name, member.value);
     } else if (known->outcome != nullptr) {
@@ -270,17 +285,15 @@ class RowReading {
     for (std::size_t i = 0; i < fields_.size(); ++i)
       if (fields_[i].scanned && !found_.test(i)) fail_scan(fmt::format("the key '{}', found none", fields_[i].name));
     if (const std::string key = episode_key(scanned_.row); key != scanned_.row.key)
-      throw InputError(
-          fmt::format("key 'key': expected {}, of what the row "
-                      "says, found {}: the row was changed",
-                      key, shown(scanned_.row.key)));
+      throw InputError(fmt::format("key 'key': expected {}, of what the row says, found {}: the row was changed", key,
+                                   shown(scanned_.row.key)));
     print_.update(line_.substr(done_));
     scanned_.fingerprint = print_.bytes();
   }
 
   const std::vector<ScanField>& fields_ = scan_fields();
   std::string_view line_;
-  ScannedRow scanned_;
+  ScannedRow& scanned_;
   Fingerprint print_;
   std::size_t done_ = 0;
   std::size_t next_ = 0;   // in fields_
@@ -290,6 +303,12 @@ class RowReading {
 
 }  // namespace
 
-ScannedRow scan_row(std::string_view line) { return RowReading(line).result(); }
+void scan_row(std::string_view line, ScannedRow& scanned) { RowReading(line, scanned); }
+
+ScannedRow scan_row(std::string_view line) {
+  ScannedRow scanned;
+  scan_row(line, scanned);
+  return scanned;
+}
 
 }  // namespace duet

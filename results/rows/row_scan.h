@@ -22,5 +22,7 @@ struct ScannedRow {
 // Throws InputError, as row_from_json words it, for a line that is no JSON object as far as it is looked at (values of
 // numbers are not), another schema, a name that is missing or no text, and a key that is not episode_key of the row.
 ScannedRow scan_row(std::string_view line);
+// The same into a row that may be of another line: its memory is used again. After a throw it is of neither.
+void scan_row(std::string_view line, ScannedRow& scanned);
 
 }  // namespace duet

@@ -69,6 +69,31 @@ TEST(RowScan, EachByteOfARowThatRepeatsIsInItsFingerprint) {
   EXPECT_GT(changed, 20);
 }
 
+TEST(RowScan, ARowThatIsUsedAgainKeepsNothingOfTheLineBefore) {
+  EpisodeRow other = test::episode("replay", "hug", 3, true);
+  other.started_at = "2027-01-02T03:04:05Z";
+  ScannedRow again = scan_row(line_of(test::full_row()));
+  scan_row(line_of(other), again);
+  const ScannedRow fresh = scan_row(line_of(other));
+  EXPECT_EQ(to_json(again.row), to_json(fresh.row));
+  EXPECT_EQ(again.fingerprint, fresh.fingerprint);
+}
+
+// Marks are looked for in eight bytes at once: each place of a quote, a bracket and a backslash among them.
+TEST(RowScan, FindsTheEndOfATextAndOfAListWhereverTheyStand) {
+  for (int filler = 0; filler < 40; ++filler) {
+    EpisodeRow row = test::full_row();
+    row.message = std::string(filler, 'x') + "\" ] } \\ \\\" [{" + std::string(filler % 8, '{');
+    row.clip = std::string(filler, 'y') + "\\\"[" + std::string(filler % 8, ']');
+    row.metrics[std::string(filler, 'z') + "}\\"] = filler;
+    row.key = episode_key(row);
+    const ScannedRow scanned = scan_row(line_of(row));
+    EXPECT_EQ(scanned.row.clip, row.clip);
+    EXPECT_EQ(scanned.row.key, row.key);
+    EXPECT_EQ(scanned.row.task, row.task);
+  }
+}
+
 TEST(RowScan, RefusesWhatIsNoRow) {
   const std::string line = line_of(test::full_row());
   EXPECT_THAT(refusal_of(""), HasSubstr("expected a JSON object"));
