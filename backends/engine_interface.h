@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "duet/backends/backend.h"
+#include "duet/backends/engine_deviation.h"
 #include "duet/backends/engine_options.h"
 
 namespace duet {
@@ -92,6 +93,8 @@ inline std::uint64_t engine_interface() {
   digest.add_type(&Snapshot::values);
   digest.add_type(&EngineOption::name, &EngineOption::value, &EngineOption::choices, &EngineOption::low,
                   &EngineOption::high, &EngineOption::whole, &EngineOption::meaning);
+  digest.add_type(&EngineDeviation::scene, &EngineDeviation::quantity, &EngineDeviation::reason,
+                  &EngineDeviation::bound, &EngineDeviation::only_at_full_effort);
   digest.add_type<Backend>();
   digest.add(engine_layout::Digest::first_word(&engine_layout::AfterBackend::after));
   return digest.value();

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "duet/backends/backend.h"
+#include "duet/backends/engine_deviation.h"
 #include "duet/backends/engine_interface.h"
 #include "duet/backends/engine_options.h"
 #include "duet/core/version.h"
@@ -29,6 +30,9 @@ struct EngineModule {
   // and reads the state back. Throws std::invalid_argument for steps < 1.
   double (*bare_step_seconds)(const Scene& scene, const RobotState& state, const JointCommand& command,
                               int steps) = nullptr;
+  // At most so long a step of the G1 standing on its feet is to take, under `duet bench` [us]; 0: nothing is asked.
+  double step_target_us = 0.0;
+  std::span<const EngineDeviation> deviations = {};
 };
 
 }  // namespace duet

@@ -137,6 +137,11 @@ const EngineModule& engine_module(const std::string& engine) {
   return *entry.module;
 }
 
+const EngineModule* find_engine_module(const std::string& engine) {
+  const std::vector<std::string> names = engine_names();
+  return std::ranges::find(names, engine) == names.end() ? nullptr : loaded(engine).module;
+}
+
 std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene) {
   const EngineModule& module = engine_module(engine);
   check_options(engine, scene.options, module.options);

@@ -29,5 +29,7 @@ std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& sc
 
 // Throws as make_backend.
 const EngineModule& engine_module(const std::string& engine);
+// Null where there is none of that name, or where this machine lacks it.
+const EngineModule* find_engine_module(const std::string& engine);
 
 }  // namespace duet

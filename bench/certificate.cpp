@@ -217,10 +217,9 @@ Certificate certify(std::span<const conformance::EngineReport> reports, const st
   for (const conformance::EngineReport& report : reports) {
     if (report.settings.effort == conformance::Effort::kFull) certificate.effort = "full";
     certificate.engines.push_back(certified(report, profile));
-    for (const conformance::Deviation& entry : conformance::deviations())
-      if (entry.engine == report.engine)
-        certificate.deviations.push_back({std::string(entry.engine), std::string(entry.scene),
-                                          std::string(entry.quantity), std::string(entry.reason), entry.bound});
+    for (const EngineDeviation& entry : conformance::deviations(report.engine))
+      certificate.deviations.push_back({report.engine, std::string(entry.scene), std::string(entry.quantity),
+                                        std::string(entry.reason), entry.bound});
   }
   certificate.digest = digest_of(certificate);
   return certificate;

@@ -56,7 +56,8 @@ const EngineModule kModule = {.name = "bullet",
                               .version = engine_version,
                               .make = make,
                               .options = bullet_options(),
-                              .bare_step_seconds = bullet_bare_step_seconds};
+                              .bare_step_seconds = bullet_bare_step_seconds,
+                              .step_target_us = 80.0};
 
 }  // namespace
 }  // namespace duet

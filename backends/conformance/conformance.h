@@ -70,7 +70,7 @@ const ConformanceScene& find_scene(std::string_view name);
 // (unknown, absent).
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);
 
-// kDeviation: outside its tolerance, inside the bound of its entry in deviations().
+// kDeviation: outside its tolerance, inside the bound that its engine's module gives it.
 enum class Verdict { kPass, kFail, kDeviation };
 std::string_view to_string(Verdict verdict);  // "pass", "FAIL", "deviation"
 
@@ -99,8 +99,8 @@ struct Tally {
 };
 Tally tally(const EngineReport& report);
 
-// Entries of deviations() for this engine that deviate no more: the quantity was measured and every one passed. Only
-// for the default options at 2 ms, which the table is about; empty for other settings.
+// Known deviations of this engine that deviate no more: the quantity was measured and every one passed. Only for the
+// default options at 2 ms, which they are about; empty for other settings.
 std::vector<std::string> stale_deviations(const EngineReport& report);
 
 }  // namespace duet::conformance

@@ -123,7 +123,7 @@ std::string_view to_string(Verdict verdict) {
 Verdict verdict_on(const std::string& engine, const Measurement& measurement) {
   const double error = error_of(measurement);
   if (error <= measurement.tolerance) return Verdict::kPass;  // false for NaN
-  const Deviation* known = find_deviation(engine, measurement.scene, measurement.quantity);
+  const EngineDeviation* known = find_deviation(engine, measurement.scene, measurement.quantity);
   if (known == nullptr) return Verdict::kFail;
   const double bound = measurement.of_stand_in ? known->bound : std::numeric_limits<double>::max();
   return error <= bound ? Verdict::kDeviation : Verdict::kFail;
@@ -170,8 +170,8 @@ Tally tally(const EngineReport& report) {
 std::vector<std::string> stale_deviations(const EngineReport& report) {
   if (!report.settings.options.empty() || report.settings.dt != Settings{}.dt) return {};
   std::vector<std::string> stale;
-  for (const Deviation& entry : deviations()) {
-    if (entry.engine != report.engine || entry.shows > report.settings.effort) continue;
+  for (const EngineDeviation& entry : deviations(report.engine)) {
+    if (entry.only_at_full_effort && report.settings.effort != Effort::kFull) continue;
     bool measured = false, deviates = false;
     for_each_measurement(report, [&](const Measurement& measurement) {
       if (measurement.scene != entry.scene || !measurement.quantity.starts_with(entry.quantity)) return;
@@ -182,7 +182,7 @@ std::vector<std::string> stale_deviations(const EngineReport& report) {
       return scene.name == entry.scene && scene.run.skipped.empty();
     });
     if (scene_ran && !(measured && deviates))
-      stale.push_back(fmt::format("deviation of {} in '{}', '{}': {}", entry.engine, entry.scene, entry.quantity,
+      stale.push_back(fmt::format("deviation of {} in '{}', '{}': {}", report.engine, entry.scene, entry.quantity,
                                   measured ? "every measurement passes, remove the entry" : "no such quantity"));
   }
   return stale;

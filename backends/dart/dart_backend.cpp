@@ -63,7 +63,8 @@ const EngineModule kModule = {.name = "dart",
                               .version = engine_version,
                               .make = make,
                               .options = dart_options(),
-                              .bare_step_seconds = dart_bare_step_seconds};
+                              .bare_step_seconds = dart_bare_step_seconds,
+                              .step_target_us = 130.0};
 
 }  // namespace
 }  // namespace duet

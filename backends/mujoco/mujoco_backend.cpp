@@ -196,11 +196,21 @@ class MujocoBackend final : public Backend {
 std::string engine_version() { return mj_versionString(); }
 std::unique_ptr<Backend> make(const Scene& scene) { return std::make_unique<MujocoBackend>(scene); }
 
+constexpr std::array kDeviations = {
+    EngineDeviation{.scene = "incline",
+                    .quantity = "acceleration of sliding",
+                    .reason = "The friction cone is convex: a contact that slides also pushes the bodies apart, the "
+                              "sledge hops down the slope. Slip angle and creep hold.",
+                    .bound = 0.45},
+};
+
 const EngineModule kModule = {.name = "mujoco",
                               .version = engine_version,
                               .make = make,
                               .options = mujoco_options(),
-                              .bare_step_seconds = mujoco_bare_step_seconds};
+                              .bare_step_seconds = mujoco_bare_step_seconds,
+                              .step_target_us = 25.0,
+                              .deviations = kDeviations};
 
 }  // namespace
 }  // namespace duet

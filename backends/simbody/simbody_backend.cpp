@@ -55,7 +55,8 @@ const EngineModule kModule = {.name = "simbody",
                               .version = simbody_version,
                               .make = make,
                               .options = simbody_options(),
-                              .bare_step_seconds = simbody_bare_step_seconds};
+                              .bare_step_seconds = simbody_bare_step_seconds,
+                              .step_target_us = 120.0};
 
 }  // namespace
 }  // namespace duet
