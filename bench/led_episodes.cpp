@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "duet/backends/factory.h"
 #include "duet/bench/clips.h"
-#include "duet/bench/run_episode.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/run_work.h"
 #include "duet/core/names.h"
@@ -65,8 +65,8 @@ const std::shared_ptr<const RobotModel>& LedSuite::robot() const {
   return bodies_->robot(suite_.controllers.front().name);
 }
 
-EpisodeRow LedSuite::run(int episode, const PolicyMaker& policy, const std::function<bool()>& stop_asked) const {
-  return run_episode(plan_->at(episode), suite_, identity_, robot(), "", policy, stop_asked);
+EpisodeRow LedSuite::run(int episode, const EpisodeLead& lead) const {
+  return run_episode(plan_->at(episode), suite_, identity_, robot(), "", lead);
 }
 
 void LedEpisode::start(int episode) {
@@ -76,10 +76,12 @@ void LedEpisode::start(int episode) {
   stop_ = false;
   row_.reset();
   queue_ = PlanQueue::make({.name = kCaller, .patience = 0.0, .share = 1.0});
-  const PolicyMaker maker = queue_->maker(suite_->robot());
-  thread_ = std::thread([this, episode, maker, queue = queue_] {
+  partner_ = led_ == Led::kBoth ? std::make_shared<PointTracks>() : nullptr;
+  const EpisodeLead lead{
+      .policy = queue_->maker(suite_->robot()), .stop_asked = [this] { return stop_.load(); }, .partner = partner_};
+  thread_ = std::thread([this, episode, lead, queue = queue_] {
     try {
-      row_ = suite_->run(episode, maker, [this] { return stop_.load(); });
+      row_ = suite_->run(episode, lead);
     } catch (const EpisodeInterrupted&) {  // it leaves no row
     } catch (const std::exception& error) {
       row_ = EpisodeRow{};
@@ -88,6 +90,25 @@ void LedEpisode::start(int episode) {
     }
     queue->close("the episode is over");
   });
+}
+
+PointTracks LedEpisode::partner_ahead() const {
+  require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
+  PointTracks ahead(kTicksPerPlan, kSmplJoints);
+  for (int i = 0; i < kTicksPerPlan; ++i)
+    ahead.frame(i) = partner_->frame(std::min(question_->tick + 1 + i, partner_->frames() - 1));
+  return ahead;
+}
+
+void LedEpisode::lead_partner(const PointTracks& ahead) {
+  require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
+  require(ahead.frames() == kTicksPerPlan && ahead.points() == kSmplJoints,
+          fmt::format("partner: expected {} frames of {} joints, found {} of {}", kTicksPerPlan, kSmplJoints,
+                      ahead.frames(), ahead.points()));
+  require(std::ranges::all_of(ahead.data(), [](double value) { return std::isfinite(value); }),
+          "partner: expected finite numbers");
+  for (int i = 0; i < kTicksPerPlan && question_->tick + 1 + i < partner_->frames(); ++i)
+    partner_->frame(question_->tick + 1 + i) = ahead.frame(i);
 }
 
 void LedEpisode::answer(std::span<const double> numbers, int rows) {

@@ -14,6 +14,7 @@
 #include "duet/bench/bodies.h"
 #include "duet/bench/episode.h"
 #include "duet/bench/progress.h"
+#include "duet/bench/run_episode.h"
 #include "duet/bench/suite.h"
 #include "duet/policies/plan_queue.h"
 
@@ -38,7 +39,7 @@ class LedSuite {
   [[nodiscard]] EpisodeSpec at(int episode) const { return plan_->at(episode); }
   [[nodiscard]] const std::shared_ptr<const RobotModel>& robot() const;
   // As run_episode: an exception is a row, but StorageError and EpisodeInterrupted.
-  [[nodiscard]] EpisodeRow run(int episode, const PolicyMaker& policy, const std::function<bool()>& stop_asked) const;
+  [[nodiscard]] EpisodeRow run(int episode, const EpisodeLead& lead) const;
 
  private:
   Suite suite_;
@@ -47,10 +48,14 @@ class LedSuite {
   std::unique_ptr<EpisodePlan> plan_;  // likewise the suite
 };
 
+// Who is led: the robot alone, while the partner follows the clip, or both.
+enum class Led { kRobot, kBoth };
+
 // One episode at a time, on a thread of its own. One owner, not thread-safe.
 class LedEpisode {
  public:
-  explicit LedEpisode(std::shared_ptr<const LedSuite> suite) : suite_(std::move(suite)) {}
+  explicit LedEpisode(std::shared_ptr<const LedSuite> suite, Led led = Led::kRobot)
+      : suite_(std::move(suite)), led_(led) {}
   ~LedEpisode() { stop(); }
   LedEpisode(const LedEpisode&) = delete;
   LedEpisode& operator=(const LedEpisode&) = delete;
@@ -71,6 +76,11 @@ class LedEpisode {
   void start(int episode);
   void answer(std::span<const double> numbers, int rows);
   std::shared_ptr<const PlanRequest> next();
+  // Where the partner is to be at the ticks up to the next question, where both are led and the episode is not over: at
+  // first as in the clip, then as it was led. Of kTicksPerPlan frames; past the episode's end the last one stands.
+  [[nodiscard]] PointTracks partner_ahead() const;
+  // Changes it; before the answer. Throws std::invalid_argument for other sizes and for numbers that are not finite.
+  void lead_partner(const PointTracks& ahead);
   [[nodiscard]] bool is_over() const { return question_ == nullptr; }
   // Of the episode that is over; none before the first one was and of one that was stopped.
   [[nodiscard]] const std::optional<EpisodeRow>& row() const { return row_; }
@@ -78,7 +88,9 @@ class LedEpisode {
   void stop();
 
  private:
-  std::shared_ptr<const LedSuite> suite_;        // shared by the episodes of a batch
+  std::shared_ptr<const LedSuite> suite_;  // shared by the episodes of a batch
+  Led led_;
+  std::shared_ptr<PointTracks> partner_;         // with the episode's thread, which waits while a question is open
   std::shared_ptr<PlanQueue> queue_;             // with the episode's thread
   std::shared_ptr<const PlanRequest> question_;  // that waits for its answer
   std::optional<EpisodeRow> row_;

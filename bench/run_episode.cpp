@@ -85,7 +85,7 @@ void simulate_walk(const EpisodeSpec& spec, const Suite& suite, const std::share
                    const std::string& trajectory_folder, const std::function<bool()>& stop_asked, EpisodeRow& row) {
   const SuiteReference& reference = reference_of(suite.references, spec.clip->clip_id);
   StreamReference stream(robot, stream_options(reference), spec.seed);
-  Episode episode{conditions_of(spec, suite, *robot, {}), ticks_of(reference.seconds), {}};
+  Episode episode{conditions_of(spec, suite, *robot, {}), ticks_of(reference.seconds), {}, nullptr};
   if (stop_asked) episode.stop_asked = stop_asked;
   const Rollout rollout = executed(spec, suite, robot, episode, stream, row);
   if (rollout.interrupted) throw EpisodeInterrupted();
@@ -95,15 +95,16 @@ void simulate_walk(const EpisodeSpec& spec, const Suite& suite, const std::share
 }
 
 void simulate(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-              const std::string& trajectory_folder, const PolicyMaker& make, const std::function<bool()>& stop_asked,
-              EpisodeRow& row) {
+              const std::string& trajectory_folder, const EpisodeLead& lead, EpisodeRow& row) {
   if (!suite.references.empty()) {
-    simulate_walk(spec, suite, robot, trajectory_folder, stop_asked, row);
+    simulate_walk(spec, suite, robot, trajectory_folder, lead.stop_asked, row);
     return;
   }
-  const std::unique_ptr<Policy> policy = make ? make() : episode_policy(spec, suite, robot);
+  const std::unique_ptr<Policy> policy = lead.policy ? lead.policy() : episode_policy(spec, suite, robot);
   RolloutSetup setup = episode_setup(spec, suite, *robot);
-  if (stop_asked) setup.stop_asked = stop_asked;
+  if (lead.stop_asked) setup.stop_asked = lead.stop_asked;
+  if (lead.partner) *lead.partner = episode_partner(setup).joints;
+  setup.led_partner = lead.partner;
   const Rollout rollout = executed(spec, suite, robot, setup, *policy, row);
   if (rollout.interrupted) throw EpisodeInterrupted();
   if (const PolicyFaults& faults = rollout.policy_faults; faults.dead) {
@@ -161,12 +162,12 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
 
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
                        const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder,
-                       const PolicyMaker& policy, const std::function<bool()>& stop_asked) {
+                       const EpisodeLead& lead) {
   EpisodeRow row = row_for(spec, suite, identity, *robot);
   row.started_at = utc_now();
   const auto begin = std::chrono::steady_clock::now();
   try {
-    simulate(spec, suite, robot, trajectory_folder, policy, stop_asked, row);
+    simulate(spec, suite, robot, trajectory_folder, lead, row);
   } catch (const StorageError&) {
     throw;
   } catch (const MissingError& error) {

@@ -114,7 +114,8 @@ EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunI
     return unsupported_row(row_for(spec, suite, identity, *robot), absent->second);
   const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
   if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, identity, *robot), policy.refusal);
-  return run_episode(spec, suite, identity, robot, trajectory_folder, policy.make, stop_asked);
+  return run_episode(spec, suite, identity, robot, trajectory_folder,
+                     {.policy = policy.make, .stop_asked = stop_asked});
 }
 
 namespace {

@@ -237,7 +237,7 @@ class Verifier {
       throw MissingError(absent->second);
     const PolicyOnBody& policy = bodies_.policy(spec.controller, spec.policy);
     if (!policy.refusal.empty()) throw MissingError(policy.refusal);
-    return run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), folder, policy.make);
+    return run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), folder, {.policy = policy.make});
   }
 
   const Run& run_;

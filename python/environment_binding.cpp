@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,14 +27,15 @@ struct Part {
 
 class EpisodeBatch {
  public:
-  EpisodeBatch(std::shared_ptr<const LedSuite> suite, int n) : suite_(std::move(suite)) {
+  EpisodeBatch(std::shared_ptr<const LedSuite> suite, int n, Led led) : suite_(std::move(suite)), led_(led) {
     require(n >= 1 && n <= 4096, fmt::format("n: expected 1 to 4096 episodes, found {}", n));
     joints_ = suite_->robot()->dof();
     numbers_ = 91 + 2 * joints_;
-    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(suite_));
+    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(suite_, led));
     frames_.resize(static_cast<std::size_t>(n) * kHistoryFrames * numbers_);
     root_.resize(static_cast<std::size_t>(n) * 7);
     hold_.resize(static_cast<std::size_t>(n) * kAnchors * width());
+    if (led_ == Led::kBoth) partner_ahead_.resize(static_cast<std::size_t>(n) * kAhead);
     over_.assign(n, 1);
     success_.assign(n, 0);
     tick_.assign(n, 0);
@@ -43,7 +45,7 @@ class EpisodeBatch {
   [[nodiscard]] int size() const { return static_cast<int>(episodes_.size()); }
   [[nodiscard]] int joints() const { return joints_; }
   [[nodiscard]] int width() const { return 7 + joints_; }
-  [[nodiscard]] const LedSuite& suite() const { return *suite_; }
+  [[nodiscard]] bool leads_partner() const { return led_ == Led::kBoth; }
 
   // Begins episode numbers[i] at place places[i]; all compute at once.
   void reset(const std::vector<int>& places, const std::vector<int>& numbers) {
@@ -57,12 +59,18 @@ class EpisodeBatch {
     for (const int place : places) show(place, episodes_[place]->next());
   }
 
-  // Answers every episode that is not over; rows of the others are not looked at.
-  void step(const double* plans, int rows) {
+  // Answers every episode that is not over; rows of the others are not looked at. `partners`: as partner_ahead_, or
+  // null.
+  void step(const double* plans, int rows, const double* partners) {
     const std::size_t numbers = static_cast<std::size_t>(rows) * width();
     std::vector<int> led;
     for (int place = 0; place < size(); ++place)
       if (!episodes_[place]->is_over()) led.push_back(place);
+    for (const int place : led)  // before any goes on: after a refusal every episode stands where it stood
+      if (partners != nullptr) {
+        const double* ahead = partners + static_cast<std::size_t>(place) * kAhead;
+        episodes_[place]->lead_partner({kTicksPerPlan, kSmplJoints, std::vector<double>(ahead, ahead + kAhead)});
+      }
     for (const int place : led) episodes_[place]->answer({plans + place * numbers, numbers}, rows);
     for (const int place : led) show(place, episodes_[place]->next());
   }
@@ -77,7 +85,9 @@ class EpisodeBatch {
     over_.assign(over_.size(), 1);
   }
 
+  static constexpr std::size_t kAhead = std::size_t{3} * kTicksPerPlan * kSmplJoints;
   std::vector<double> frames_, root_, hold_;  // (n, 12, numbers), (n, 7), (n, 5, 7 + joints)
+  std::vector<double> partner_ahead_;         // (n, 10, 24, 3) where both are led, else empty
   std::vector<std::uint8_t> over_, success_;
   std::vector<std::int64_t> tick_, episode_;
   int numbers_ = 0;
@@ -104,6 +114,9 @@ class EpisodeBatch {
       std::copy(suite_->robot()->neutral.data(), suite_->robot()->neutral.data() + joints_, out + 7);
     }
     tick_[place] = request->tick;
+    if (!leads_partner()) return;
+    const PointTracks ahead = episodes_[place]->partner_ahead();
+    std::ranges::copy(ahead.data(), partner_ahead_.begin() + static_cast<std::ptrdiff_t>(place * kAhead));
   }
 
   static void put(const Pose& X, double* out) {
@@ -111,6 +124,7 @@ class EpisodeBatch {
   }
 
   std::shared_ptr<const LedSuite> suite_;
+  Led led_;
   std::vector<std::unique_ptr<LedEpisode>> episodes_;
   int joints_ = 0;
 };
@@ -144,11 +158,14 @@ py::array named_view(const py::object& self, const std::string& name) {
   if (name == "frames") return view_of(batch.frames_.data(), {n, kHistoryFrames, batch.numbers_}, self);
   if (name == "root") return view_of(batch.root_.data(), {n, 7}, self);
   if (name == "hold") return view_of(batch.hold_.data(), {n, kAnchors, batch.width()}, self);
+  if (name == "partner_ahead" && batch.leads_partner())
+    return view_of(batch.partner_ahead_.data(), {n, kTicksPerPlan, kSmplJoints, 3}, self);
   if (name == "over") return view_of(batch.over_.data(), {n}, self);
   if (name == "success") return view_of(batch.success_.data(), {n}, self);
   if (name == "tick") return view_of(batch.tick_.data(), {n}, self);
   if (name == "episode") return view_of(batch.episode_.data(), {n}, self);
   std::string known = "frames, root, hold, over, success, tick, episode";
+  if (batch.leads_partner()) known += ", partner_ahead";
   for (const Part& part : parts_of(batch.joints())) {
     if (name == part.name) return part_of(self, part);
     known += std::string(", ") + part.name;
@@ -156,7 +173,7 @@ py::array named_view(const py::object& self, const std::string& name) {
   throw std::invalid_argument(fmt::format("view: expected one of {}, found '{}'", known, name));
 }
 
-void step_batch(EpisodeBatch& batch, const Numbers& plans) {
+void step_batch(EpisodeBatch& batch, const Numbers& plans, const std::optional<Numbers>& partners) {
   const bool fits = plans.ndim() == 3 && plans.shape(0) == batch.size() && plans.shape(2) == batch.width() &&
                     (plans.shape(1) == kAnchors || plans.shape(1) == kDensePlan);
   if (!fits) {
@@ -165,10 +182,19 @@ void step_batch(EpisodeBatch& batch, const Numbers& plans) {
         fmt::format("step: expected plans of shape ({0}, {1}, {3}) or ({0}, {2}, {3}), found ({4})", batch.size(),
                     kAnchors, kDensePlan, batch.width(), fmt::join(shape, ", ")));
   }
+  if (partners) {
+    if (!batch.leads_partner())
+      throw std::invalid_argument("step: expected no partners: in this batch they follow their clips");
+    const std::vector<py::ssize_t> shape(partners->shape(), partners->shape() + partners->ndim());
+    if (shape != std::vector<py::ssize_t>{batch.size(), kTicksPerPlan, kSmplJoints, 3})
+      throw std::invalid_argument(fmt::format("step: expected partners of shape ({}, {}, {}, 3), found ({})",
+                                              batch.size(), kTicksPerPlan, kSmplJoints, fmt::join(shape, ", ")));
+  }
   const double* data = plans.data();
+  const double* ahead = partners ? partners->data() : nullptr;
   const auto rows = static_cast<int>(plans.shape(1));
   const py::gil_scoped_release released;
-  batch.step(data, rows);
+  batch.step(data, rows, ahead);
 }
 
 std::shared_ptr<LedSuite> led_suite(const std::string& suite, const Overrides& overrides, const LedPart& part,
@@ -209,12 +235,13 @@ void add_environment(py::module_& module) {
         return std::vector<double>(upper.begin(), upper.end());
       });
   py::class_<EpisodeBatch>(module, "EpisodeBatch", "Episodes that are led in step.")
-      .def(py::init(
-               [](const std::shared_ptr<LedSuite>& suite, int n) { return std::make_unique<EpisodeBatch>(suite, n); }),
-           py::arg("suite"), py::arg("n"))
+      .def(py::init([](const std::shared_ptr<LedSuite>& suite, int n, bool leads_partner) {
+             return std::make_unique<EpisodeBatch>(suite, n, leads_partner ? Led::kBoth : Led::kRobot);
+           }),
+           py::arg("suite"), py::arg("n"), py::arg("leads_partner") = false)
       .def("__len__", &EpisodeBatch::size)
       .def("reset", &EpisodeBatch::reset, py::arg("places"), py::arg("episodes"), released)
-      .def("step", &step_batch, py::arg("plans"))
+      .def("step", &step_batch, py::arg("plans"), py::arg("partners") = py::none())
       .def("view", &named_view, py::arg("name"), "A live view, read-only.")
       .def("row", &EpisodeBatch::row, py::arg("place"), "JSON; empty while the episode goes on.")
       .def("close", &EpisodeBatch::close, released);

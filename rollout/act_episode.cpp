@@ -8,7 +8,9 @@
 namespace duet {
 namespace {
 
-Episode episode_of(const RolloutSetup& setup) { return {setup, episode_ticks(setup), episode_partner(setup).joints}; }
+Episode episode_of(const RolloutSetup& setup) {
+  return {setup, episode_ticks(setup), episode_partner(setup).joints, setup.led_partner};
+}
 
 PolicyReference reference_of(const RolloutSetup& setup, Policy& policy) {
   const Task task = setup.clip->task;

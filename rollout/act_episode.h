@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -20,6 +21,8 @@ struct RolloutSetup : EpisodeConditions {
   // What the policy sees of a partner in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
   // none.
   PointTracks seen_partner;
+  // Of an episode whose partner is led (Episode::led_partner); null: the partner follows the clip.
+  std::shared_ptr<const PointTracks> led_partner;
   std::uint64_t seed = 0;
   bool foot_trace = false;                                    // whether the row is to have one
   int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions

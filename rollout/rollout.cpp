@@ -172,7 +172,8 @@ void record_tick(Recording& recording, int tick, const World& world, const Human
 Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, std::string_view engine) {
   Rollout rollout;
   Recording& recording = rollout.recording;
-  const bool somebody = !episode.partner.empty();
+  const PointTracks& others = episode.other_person();
+  const bool somebody = !others.empty();
   if (somebody) recording.partner = PointTracks(episode.ticks, kSmplJoints);
   world.begin(episode.start);
   source.begin(episode.start);
@@ -182,7 +183,7 @@ Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, 
 
   int tick = 0;
   for (; tick < episode.ticks && recording.outcome == Outcome::kOk; ++tick) {
-    if (somebody) partner = partner_joints(episode.partner, tick);
+    if (somebody) partner = partner_joints(others, tick);
     const Reference* reference = source.at({tick, world.state(), somebody ? &partner : nullptr});
     deadline.extend(source.waited());
     if (reference == nullptr) {
@@ -192,7 +193,7 @@ Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, 
     const Eigen::VectorXd& target = world.target(*reference);
     record_tick(recording, tick, world, somebody ? &partner : nullptr, *reference, target);
     hash.update(world.state());
-    recording.outcome = world.advance(tick, episode.partner, deadline);
+    recording.outcome = world.advance(tick, others, deadline);
     if (recording.outcome == Outcome::kOk && deadline.passed()) recording.outcome = Outcome::kTimedOut;
     if (deadline.stop_asked()) {
       rollout.interrupted = true;

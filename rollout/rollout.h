@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -48,6 +49,11 @@ struct EpisodeConditions {
 struct Episode : EpisodeConditions {
   int ticks = 0;        // of 20 ms
   PointTracks partner;  // SMPL joints, frame 0 at tick 0, at least one frame more than ticks; empty: nobody
+  // In the place of `partner` where somebody leads the other person too: the ReferenceSource's plan of a tick may
+  // change the frames after it (and none before). Null: nobody does.
+  std::shared_ptr<const PointTracks> led_partner;
+
+  [[nodiscard]] const PointTracks& other_person() const { return led_partner ? *led_partner : partner; }
 };
 
 struct Rollout {

@@ -162,7 +162,7 @@ class TwinEpisodes {
   void run_both(const EpisodeSpec& spec, const RunIdentity& identity, int index) {
     const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
     const EpisodeRow simulated =
-        run_episode(spec, suite_, identity, robot, "", bodies_.policy(spec.controller, spec.policy).make);
+        run_episode(spec, suite_, identity, robot, "", {.policy = bodies_.policy(spec.controller, spec.policy).make});
     const GuardedRun guarded = run_guarded(spec, identity, index);
     if (guarded.interrupted) throw EpisodeInterrupted();
     keep(simulated);

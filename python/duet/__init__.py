@@ -8,7 +8,7 @@ when the first array is asked for, gymnasium and pettingzoo when an environment 
 """
 
 from duet._duet import InputError, MissingError, Observations, StorageError, __version__
-from duet._environment import Batch, Env, VectorEnv, make_env, make_vec_env
+from duet._environment import Batch, Env, ParallelEnv, VectorEnv, make_env, make_parallel_env, make_vec_env
 from duet._evaluate import evaluate
 from duet._motion import (Clip, Paired, Recording, RobotMotion, clip, dataset, detect, load, people_formats, read_people,
                           read_robot_motion, retarget, robot_motion_formats, score, synthesize, write_robot_motion)
@@ -18,7 +18,7 @@ from duet._tools import engines, policies, suites, tasks
 __all__ = [
     "Batch", "Clip", "Comparison", "Env", "InputError", "MissingError", "Observations", "Paired", "Recording",
     "RobotMotion", "Run", "StorageError", "Table", "VectorEnv", "__version__", "clip", "dataset", "detect", "engines",
-    "evaluate", "load", "load_run", "make_env", "make_vec_env", "people_formats", "policies", "read_people",
+    "evaluate", "load", "load_run", "make_env", "make_parallel_env", "make_vec_env", "people_formats", "policies", "read_people",
     "read_robot_motion", "retarget", "robot_motion_formats", "score", "suites", "synthesize", "tasks",
     "write_robot_motion",
 ]

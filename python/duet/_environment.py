@@ -1,4 +1,4 @@
-"""Episodes that Python leads step by step: a batch with live views, and environments in Gymnasium's form.
+"""Episodes that Python leads step by step: a batch with live views, and environments in Gymnasium's and PettingZoo's form.
 
 A step is a plan: it lasts 0.2 s of the episode, and the loop that runs it is that of `duet run`.
 """
@@ -40,9 +40,10 @@ class Batch:
              "hold", "over", "success", "tick", "episode")
 
     def __init__(self, suite: str = "demo", *, n: int, engine: str = "", controller: str = "", perturbation: str = "",
-                 settings: Optional[Mapping[str, Any]] = None, jobs: Optional[int] = None):
+                 settings: Optional[Mapping[str, Any]] = None, jobs: Optional[int] = None, leads_partner: bool = False):
+        """`leads_partner`: the partners are led as well, and there is a view `partner_ahead` more."""
         self._suite = _suite_of(suite, engine, controller, perturbation, settings, jobs)
-        self._batch = _duet.EpisodeBatch(self._suite, n)
+        self._batch = _duet.EpisodeBatch(self._suite, n, leads_partner)
 
     def __len__(self) -> int:
         return len(self._batch)
@@ -58,7 +59,8 @@ class Batch:
 
     def view(self, name: str) -> "Array":
         """(n, ...), read-only: frames (n, 12, 149), q and v (n, 29), partner (n, 24, 3), root (n, 7), hold (n, 5, 36): the
-        null arm's plans, over, success, tick, episode (n,)."""
+        null arm's plans, over, success, tick, episode (n,). Where partners are led, partner_ahead (n, 10, 24, 3): where
+        each is to be at the ticks up to the next step [m, frame W], as in the clip until step() says otherwise."""
         return self._batch.view(name)
 
     def reset(self, episodes: Optional[Iterable[int]] = None, places: Optional[Iterable[int]] = None) -> None:
@@ -67,9 +69,10 @@ class Batch:
         numbers = [place % self.episodes for place in at] if episodes is None else [int(number) for number in episodes]
         self._batch.reset(at, numbers)
 
-    def step(self, plans: Any) -> None:
-        """Plans of shape (n, 5, 36) or (n, 100, 36); those of episodes that are over are not looked at."""
-        self._batch.step(array_of(plans))
+    def step(self, plans: Any, partners: Any = None) -> None:
+        """Plans of shape (n, 5, 36) or (n, 100, 36); those of episodes that are over are not looked at. `partners`, where
+        they are led: (n, 10, 24, 3), in the place of partner_ahead."""
+        self._batch.step(array_of(plans), None if partners is None else array_of(partners))
 
     def row(self, place: int) -> Optional[Dict[str, Any]]:
         """The row of an episode that is over."""
@@ -227,6 +230,95 @@ class VectorEnv:
         return self._batch.view("frames").copy()
 
 
+class ParallelEnv:
+    """One episode in PettingZoo's parallel form: the agents "robot" and "partner" act at once and share the reward.
+
+    Both observe the frames that a policy sees. The robot's action is a plan (5, 36); the partner's says where the 24
+    joints are at the next ten ticks, (10, 24, 3) [m, frame W]. `infos["partner"]["ahead"]` is that of the clip.
+    """
+
+    metadata: Dict[str, Any] = {"name": "duet", "render_modes": [], "is_parallelizable": True, "render_fps": 5}
+    render_mode = None
+
+    def __init__(self, batch: Batch):
+        frames = batch._observation_space()
+        self._batch = batch
+        self.possible_agents = ["robot", "partner"]
+        self.agents: List[str] = []
+        self.observation_spaces = {"robot": frames, "partner": frames}
+        self.action_spaces = {"robot": batch._action_space(), "partner": box(-_FARTHEST, _FARTHEST, (10, 24, 3))}
+        self._random: Any = None
+
+    @property
+    def unwrapped(self) -> "ParallelEnv":
+        return self
+
+    @property
+    def num_agents(self) -> int:
+        return len(self.agents)
+
+    @property
+    def max_num_agents(self) -> int:
+        return len(self.possible_agents)
+
+    def observation_space(self, agent: str) -> Any:
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        return self.action_spaces[agent]
+
+    def reset(self, seed: Optional[int] = None, options: Optional[Mapping[str, Any]] = None) -> Tuple[Dict[str, Any], Dict[str, Any]]:
+        """As of the Gymnasium form."""
+        import numpy
+
+        if seed is not None or self._random is None:
+            self._random = numpy.random.default_rng(seed)
+        chosen = (options or {}).get("episode")
+        episode = int(self._random.integers(self._batch.episodes)) if chosen is None else int(chosen)
+        self._batch.reset([episode], [0])
+        self.agents = list(self.possible_agents)
+        said = {"episode": episode, "clip": self._batch.clip(episode)}
+        return self._observations(), {"robot": said, "partner": {**said, "ahead": self._ahead()}}
+
+    def step(self, actions: Mapping[str, Any]) -> Tuple[Dict[str, Any], Dict[str, float], Dict[str, bool], Dict[str, bool], Dict[str, Any]]:
+        if not self.agents:
+            raise RuntimeError("the episode is over: call reset()")
+        missing = [agent for agent in self.agents if agent not in actions]
+        if missing or len(actions) > len(self.agents):
+            raise ValueError(f"step: expected an action of each of {self.agents}, found {list(actions)}")
+        self._batch.step(array_of(actions["robot"])[None], array_of(actions["partner"])[None])
+        agents, over = self.agents, bool(self._batch.view("over")[0])
+        info = _ended_info(self._batch.row(0)) if over else {"is_success": False}
+        truncated = info.get("outcome") == "timeout"
+        infos = {"robot": info, "partner": info if over else {**info, "ahead": self._ahead()}}
+        if over:
+            self.agents = []
+        return (self._observations(), {agent: float(info["is_success"]) for agent in agents},
+                {agent: over and not truncated for agent in agents}, {agent: truncated for agent in agents}, infos)
+
+    def hold(self, agent: str) -> Any:
+        """The action that stands still."""
+        if agent == "robot":
+            return self._batch.view("hold")[0].copy()
+        return self._batch.view("partner")[0][None].repeat(10, axis=0)
+
+    def render(self) -> None:
+        return None
+
+    def close(self) -> None:
+        self._batch.close()
+
+    def state(self) -> Any:
+        """What is there whoever looks at it: the frames."""
+        return self._batch.view("frames")[0].copy()
+
+    def _observations(self) -> Dict[str, Any]:
+        return {agent: self._batch.view("frames")[0].copy() for agent in self.possible_agents}
+
+    def _ahead(self) -> Any:
+        return self._batch.view("partner_ahead")[0].copy()
+
+
 def make_env(suite: str = "demo", *, engine: str = "", controller: str = "", perturbation: str = "",
              settings: Optional[Mapping[str, Any]] = None, jobs: Optional[int] = None) -> Any:
     """An environment in Gymnasium's form: `make_env("core/handshake", engine="dart")`. Where Gymnasium is installed it is
@@ -240,6 +332,15 @@ def make_vec_env(suite: str = "demo", *, n: int, engine: str = "", controller: s
     """n of them, which compute at once."""
     batch = Batch(suite, n=n, engine=engine, controller=controller, perturbation=perturbation, settings=settings, jobs=jobs)
     return _of_package(VectorEnv, "gymnasium", "vector.VectorEnv")(batch)
+
+
+def make_parallel_env(suite: str = "demo", *, engine: str = "", controller: str = "", perturbation: str = "",
+                      settings: Optional[Mapping[str, Any]] = None, jobs: Optional[int] = None) -> Any:
+    """Robot and partner as two agents, in PettingZoo's parallel form. Where PettingZoo is installed it is one of its
+    environments too. Its rows are no benchmark's: the partner does what it is told."""
+    batch = Batch(suite, n=1, engine=engine, controller=controller, perturbation=perturbation, settings=settings, jobs=jobs,
+                  leads_partner=True)
+    return _of_package(ParallelEnv, "pettingzoo", "ParallelEnv")(batch)
 
 
 def _of_package(kind: Any, package: str, name: str) -> Any:

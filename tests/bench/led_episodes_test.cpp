@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
+
 #include "duet/bench/run_episode.h"
 #include "duet/core/require.h"
 #include "duet/policies/registry.h"
@@ -42,11 +44,65 @@ TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
   EXPECT_GT(questions, 5);
   EXPECT_TRUE(episode.is_over());
   ASSERT_TRUE(episode.row().has_value());
-  const EpisodeRow expected = suite->run(1, policy_maker("null", suite->robot()), [] { return false; });
+  const EpisodeRow expected = suite->run(1, {.policy = policy_maker("null", suite->robot())});
   EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
   EXPECT_EQ(episode.row()->state_hash, expected.state_hash);
   EXPECT_EQ(episode.row()->key, expected.key);
   EXPECT_EQ(episode.row()->seed, expected.seed);
+}
+
+// The partner's joints in the newest frame that a question shows.
+Eigen::MatrixXd partner_in(const PlanRequest& request) {
+  return request.frames.col(kHistoryFrames - 1).segment(3, 3 * kSmplJoints).reshaped(3, kSmplJoints);
+}
+
+TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  LedEpisode episode(suite, Led::kBoth);
+  const auto first = episode.begin(0);
+  ASSERT_NE(first, nullptr);
+  PointTracks ahead = episode.partner_ahead();
+  ASSERT_EQ(ahead.frames(), kTicksPerPlan);
+  for (int i = 0; i < kTicksPerPlan; ++i) ahead.frame(i).row(1).array() += 0.1 * (i + 1);
+  episode.lead_partner(ahead);
+  const auto second = episode.go_on(holding(*first, *suite->robot()), kAnchors);
+  ASSERT_NE(second, nullptr);
+  EXPECT_EQ(partner_in(*second), ahead.frame(kTicksPerPlan - 1));
+  const auto third = episode.go_on(holding(*second, *suite->robot()), kAnchors);  // from here on as in the clip
+  ASSERT_NE(third, nullptr);
+  EXPECT_LT((partner_in(*third) - partner_in(*first)).cwiseAbs().maxCoeff(), 0.5);
+}
+
+TEST(LedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  std::vector<Eigen::MatrixXd> alone, both;
+  for (auto* seen : {&alone, &both}) {
+    LedEpisode episode(suite, seen == &both ? Led::kBoth : Led::kRobot);
+    for (auto request = episode.begin(1); request != nullptr;) {
+      seen->push_back(request->frames);
+      if (seen == &both) episode.lead_partner(episode.partner_ahead());
+      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+    }
+    EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
+  }
+  EXPECT_EQ(alone, both);
+}
+
+TEST(LedEpisode, RefusesToLeadAPartnerWhereItCannot) {
+  LedEpisode alone(led());
+  ASSERT_NE(alone.begin(0), nullptr);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { alone.lead_partner({}); }),
+            "partner: expected an episode under way in which both are led");
+  LedEpisode both(led(), Led::kBoth);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { static_cast<void>(both.partner_ahead()); }),
+            "partner: expected an episode under way in which both are led");
+  ASSERT_NE(both.begin(0), nullptr);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { both.lead_partner(PointTracks(3, kSmplJoints)); }),
+            "partner: expected 10 frames of 24 joints, found 3 of 24");
+  PointTracks ahead = both.partner_ahead();
+  ahead.at(4, 7).x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { both.lead_partner(ahead); }),
+            "partner: expected finite numbers");
 }
 
 TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {

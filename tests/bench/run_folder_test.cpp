@@ -299,7 +299,8 @@ TEST_F(RunFolder, TheStopIsHeardWithinAControlPeriodOfManySteps) {
   const PairedMotion clip = test::paired(Task::kWave, *robot);
   const EpisodeSpec spec{&clip, "mujoco", "pd", "replay", "main", 0, 7};
   int looks = 0;
-  EXPECT_THROW(run_episode(spec, suite, {"hash"}, robot, "", {}, [&] { return ++looks >= 2; }), EpisodeInterrupted);
+  EXPECT_THROW(run_episode(spec, suite, {"hash"}, robot, "", {.stop_asked = [&] { return ++looks >= 2; }}),
+               EpisodeInterrupted);
   EXPECT_EQ(looks, 3);  // twice within the first period, once after it
   suite.wall_limit = 0.001;
   const EpisodeRow row = run_episode(spec, suite, {"hash"}, robot);

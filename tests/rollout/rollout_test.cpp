@@ -211,7 +211,7 @@ TEST(Rollout, ADeadPolicyEndsTheEpisodeAsAnErrorNotAsAFailureToAct) {
   EXPECT_EQ(rollout.recording.message, "its process ended");
   EXPECT_EQ(rollout.recording.frames(), kTicksPerPlan);
   const PolicyMaker maker = [&] { return std::make_unique<DyingPolicy>(make_policy("replay", parts.robot)); };
-  const EpisodeRow row = run_episode(parts.spec, parts.suite, {"hash"}, parts.robot, "", maker);
+  const EpisodeRow row = run_episode(parts.spec, parts.suite, {"hash"}, parts.robot, "", {.policy = maker});
   EXPECT_EQ(row.outcome, Outcome::kError);
   EXPECT_EQ(row.message, "its process ended");
   EXPECT_TRUE(row.policy_faults.dead);
