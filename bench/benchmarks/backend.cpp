@@ -55,15 +55,15 @@ StepTimes time_steps(const std::string& engine, const BenchmarkOptions& options)
   return times;
 }
 
-std::vector<Figure> time_step(const std::string& engine, const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_step(const std::string& engine, const BenchmarkOptions& options) {
   const StepTimes times = time_steps(engine, options);
   const std::string name = "backend/" + engine + "/step";
   const double dt = standing_scene(engine).dt, target = engine_module(engine).step_target_us;
-  return {target > 0.0 ? at_most(name, 1e6 * times.ours, "us", target) : Figure{name, 1e6 * times.ours, "us", "", true},
+  return {target > 0.0 ? at_most(name, 1e6 * times.ours, "us", target) : BenchmarkFigure{name, 1e6 * times.ours, "us", "", true},
           at_least(name + ":real_time_factor", dt / times.ours, "1", 20.0)};
 }
 
-std::vector<Figure> time_overhead(const std::string& engine, const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_overhead(const std::string& engine, const BenchmarkOptions& options) {
   const StepTimes times = time_steps(engine, options);
   const std::string name = "backend/" + engine + "/overhead";
   return {at_most(name, 100.0 * (times.ours / times.bare - 1.0), "%", kOverheadLimit),
@@ -91,7 +91,7 @@ double stand_seconds(const std::string& engine, int episodes, int threads) {
   return wall_seconds() - begin;
 }
 
-std::vector<Figure> time_scaling(const std::string& engine, const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_scaling(const std::string& engine, const BenchmarkOptions& options) {
   constexpr int kEpisodes = 16;
   double one = 1e9, many = 1e9;
   const double begin = wall_seconds();
@@ -101,8 +101,9 @@ std::vector<Figure> time_scaling(const std::string& engine, const BenchmarkOptio
   } while (wall_seconds() - begin < 3.0 * options.seconds);
   const std::string name = "backend/" + engine + "/scaling";
   // The target is for two cores; with another number the figure is printed as it is.
-  return {options.threads == 2 ? at_least(name, one / many, "1", 1.9) : Figure{name, one / many, "1", "", true},
-          {name + ":threads", static_cast<double>(options.threads), "1", "", true}};
+  return {
+      options.threads == 2 ? at_least(name, one / many, "1", 1.9) : BenchmarkFigure{name, one / many, "1", "", true},
+      {name + ":threads", static_cast<double>(options.threads), "1", "", true}};
 }
 
 // What this thread's allocations hold: the heap's used blocks and the large ones beside it.
@@ -112,7 +113,7 @@ double allocated_kib() {
 }
 
 // Memory is that of worlds beyond the first, which also pays for what all share.
-std::vector<Figure> time_world(const std::string& engine, const BenchmarkOptions&) {
+std::vector<BenchmarkFigure> time_world(const std::string& engine, const BenchmarkOptions&) {
   constexpr int kWorlds = 16;
   const Scene scene = standing_scene(engine);
   const RobotState start = scene.robot->standing_state();

@@ -11,7 +11,7 @@
 
 namespace duet {
 
-struct Figure {
+struct BenchmarkFigure {
   std::string name;  // "pair/paper/avx2", or with a suffix "backend/mujoco/step:real_time_factor"
   double value = 0.0;
   std::string unit;    // "frames/s", "us", "1", ...
@@ -27,7 +27,7 @@ struct BenchmarkOptions {
 struct Benchmark {
   std::string name;  // a path: "pair/paper/avx2"
   std::string description;
-  std::function<std::vector<Figure>(const BenchmarkOptions&)> run;
+  std::function<std::vector<BenchmarkFigure>(const BenchmarkOptions&)> run;
 };
 
 // In the order in which they are printed.

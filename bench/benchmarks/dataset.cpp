@@ -58,7 +58,7 @@ double write_recording(const std::string& path, int index) {
   return frames / kRecordedRate;
 }
 
-std::vector<Figure> time_dataset(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_dataset(const BenchmarkOptions& options) {
   const TemporaryFolder folder;
   double recorded = 0.0;
   for (int i = 0; i < kRecordings; ++i)
@@ -74,9 +74,9 @@ std::vector<Figure> time_dataset(const BenchmarkOptions& options) {
   const DatasetSummary summary = make_dataset(plan, folder / "data");
   const double seconds = wall_seconds() - begin;
   const std::string name = "dataset/end_to_end";
-  std::vector<Figure> figures = {at_least(name, recorded / seconds, "h/h", 1000.0),
-                                 at_most(name + ":peak_memory", peak_memory_mib(), "MiB", 2048.0),
-                                 {name + ":clips", static_cast<double>(summary.kept), "1", "", true}};
+  std::vector<BenchmarkFigure> figures = {at_least(name, recorded / seconds, "h/h", 1000.0),
+                                          at_most(name + ":peak_memory", peak_memory_mib(), "MiB", 2048.0),
+                                          {name + ":clips", static_cast<double>(summary.kept), "1", "", true}};
   double all = 0.0;
   for (const auto& [stage, time] : summary.seconds) all += time;
   for (const auto& [stage, time] : summary.seconds)

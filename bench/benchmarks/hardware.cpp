@@ -105,7 +105,7 @@ std::vector<double> tick_seconds(bool person, int count) {
   return seconds;
 }
 
-std::vector<Figure> time_tick(bool person, const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_tick(bool person, const BenchmarkOptions& options) {
   const int count = std::max(500, static_cast<int>(options.seconds * 10000.0));
   const std::vector<double> seconds = tick_seconds(person, count);
   const std::string name = person ? "hardware/tick/person" : "hardware/tick/alone";
@@ -115,7 +115,7 @@ std::vector<Figure> time_tick(bool person, const BenchmarkOptions& options) {
           {name + ":largest", 1e6 * seconds.back(), "us", "", true}};
 }
 
-std::vector<Figure> time_checksum(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_checksum(const BenchmarkOptions& options) {
   LowCommandFrame frame;
   build_damping(kDampingGain, 5, frame);
   volatile std::uint32_t kept = 0;

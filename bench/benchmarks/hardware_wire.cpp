@@ -111,7 +111,7 @@ RoundTrips measure(double seconds) {
   return trips;
 }
 
-std::vector<Figure> time_round_trips(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_round_trips(const BenchmarkOptions& options) {
   constexpr double kLonger = 30.0;  // than other figures: tails are rare
   // On a thread of its own: its priority ends with it.
   const RoundTrips trips = std::async(std::launch::async, measure, kLonger * options.seconds).get();
@@ -130,12 +130,12 @@ std::vector<Figure> time_round_trips(const BenchmarkOptions& options) {
 }
 
 // Forward, sideways and on a curve; clean and with the noise of usual encoders and a usual IMU.
-std::vector<Figure> measure_odometry(const BenchmarkOptions&) {
+std::vector<BenchmarkFigure> measure_odometry(const BenchmarkOptions&) {
   struct Walk {
     const char* name;
     Eigen::Vector3d velocity;
   };
-  std::vector<Figure> figures;
+  std::vector<BenchmarkFigure> figures;
   for (const bool noisy : {false, true})
     for (const Walk& walk :
          {Walk{"forward", {0.3, 0.0, 0.0}}, Walk{"sideways", {0.0, 0.15, 0.0}}, Walk{"curve", {0.25, 0.0, 0.3}}}) {

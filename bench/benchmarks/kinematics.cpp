@@ -6,7 +6,7 @@
 namespace duet {
 namespace {
 
-std::vector<Figure> time_forward(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_forward(const BenchmarkOptions& options) {
   constexpr int kCalls = 100;  // a batch: one call is short against the cost of a std::function
   const RobotModel robot = load_robot(default_card_path());
   Kinematics kinematics(robot);

@@ -7,14 +7,14 @@
 namespace duet {
 namespace {
 
-std::vector<Figure> time_metrics(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_metrics(const BenchmarkOptions& options) {
   const RobotModel robot = load_robot(default_card_path());
   const PairedMotion motion = retarget(benchmark_clip(), robot);
   const double seconds = best_call_seconds([&] { retargeting_metrics(motion, robot); }, options.seconds);
   return {at_most("metrics/retargeting", 1e3 * seconds, "ms", 5.0)};
 }
 
-std::vector<Figure> time_detectors(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_detectors(const BenchmarkOptions& options) {
   const InteractionClip clip = benchmark_clip();
   const Agent a = human_agent(clip.a.joints);
   const Agent b = human_agent(clip.b.joints);

@@ -75,13 +75,13 @@ double bare_seconds(const std::vector<Layer>& layers, double seconds) {
       seconds);
 }
 
-std::vector<Figure> time_policy(const PublishedPolicy& policy, const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_policy(const PublishedPolicy& policy, const BenchmarkOptions& options) {
   const auto network = load_network(find_network(load_descriptor(policy.name)));
   const double ours = network_seconds(*network, options.seconds / 2);
   const double bare = bare_seconds(policy.layers, options.seconds / 2);
   const std::string name = fmt::format("nn/{}", policy.name);
-  const Figure cost =
-      policy.most_us > 0.0 ? at_most(name, 1e6 * ours, "us", policy.most_us) : Figure{name, 1e6 * ours, "us", "", true};
+  const BenchmarkFigure cost = policy.most_us > 0.0 ? at_most(name, 1e6 * ours, "us", policy.most_us)
+                                                    : BenchmarkFigure{name, 1e6 * ours, "us", "", true};
   return {cost, {name + ":over_bare_products", ours / bare, "1", "", true}};
 }
 

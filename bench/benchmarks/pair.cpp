@@ -24,7 +24,7 @@ constexpr Kernel kKernels[] = {{"scalar", KernelKind::kScalar, 0.0},
                                {"avx2", KernelKind::kV3, 25000.0},
                                {"avx512", KernelKind::kV4, 40000.0}};
 
-std::vector<Figure> time_kernel(const Kernel& kernel) {
+std::vector<BenchmarkFigure> time_kernel(const Kernel& kernel) {
   const std::vector<KernelKind> here = available_kernels();
   if (std::find(here.begin(), here.end(), kernel.kind) == here.end())
     throw MissingError(fmt::format("PAIR kernel '{}' does not run on this processor", kernel.name));
@@ -34,19 +34,19 @@ std::vector<Figure> time_kernel(const Kernel& kernel) {
   const PairTiming timing =
       time_pair(benchmark_clip(), robot, options, kernel.kind == KernelKind::kScalar ? 1 : kRounds);
   const std::string name = fmt::format("pair/paper/{}", kernel.name);
-  const Figure solver = kernel.target > 0.0 ? at_least(name, timing.solver, "frames/s", kernel.target)
-                                            : Figure{name, timing.solver, "frames/s", "", true};
+  const BenchmarkFigure solver = kernel.target > 0.0 ? at_least(name, timing.solver, "frames/s", kernel.target)
+                                                     : BenchmarkFigure{name, timing.solver, "frames/s", "", true};
   return {solver, {name + ":retarget", timing.whole, "frames/s", "", true}};
 }
 
 // The modes on the ground, and how L-BFGS compares with Adam on the paper's own objective in the same run.
-std::vector<Figure> time_mode(PairMode mode, KernelKind kind, const std::string& name) {
+std::vector<BenchmarkFigure> time_mode(PairMode mode, KernelKind kind, const std::string& name) {
   const RobotModel robot = load_robot(default_card_path());
   PairOptions options = pair_options_of(mode);
   options.kernel = kind;
   const PairTiming timing = time_pair(benchmark_clip(), robot, options, kRounds);
-  std::vector<Figure> figures = {{name, timing.solver, "frames/s", "", true},
-                                 {name + ":retarget", timing.whole, "frames/s", "", true}};
+  std::vector<BenchmarkFigure> figures = {{name, timing.solver, "frames/s", "", true},
+                                          {name + ":retarget", timing.whole, "frames/s", "", true}};
   if (mode != PairMode::kBest) return figures;
   PairOptions paper;
   paper.kernel = kind;
@@ -62,7 +62,7 @@ std::vector<Figure> time_mode(PairMode mode, KernelKind kind, const std::string&
 }
 
 // The paper's way on the same clip, and how many times our best kernel is faster in the same run.
-std::vector<Figure> time_libtorch(const BenchmarkOptions&) {
+std::vector<BenchmarkFigure> time_libtorch(const BenchmarkOptions&) {
   constexpr int kIterations = 8;  // of 200: each costs the same
   const RobotModel robot = load_robot(default_card_path());
   const InteractionClip clip = benchmark_clip();

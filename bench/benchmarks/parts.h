@@ -20,8 +20,8 @@ void add_scale_benchmarks(std::vector<Benchmark>& list);
 void add_wbc_benchmarks(std::vector<Benchmark>& list);
 
 // A figure with the least or the largest value that it is to reach.
-Figure at_least(const std::string& name, double value, const std::string& unit, double target);
-Figure at_most(const std::string& name, double value, const std::string& unit, double target);
+BenchmarkFigure at_least(const std::string& name, double value, const std::string& unit, double target);
+BenchmarkFigure at_most(const std::string& name, double value, const std::string& unit, double target);
 
 // The clip that figures are timed on: a synthetic handshake of 1,007 frames, the paper's mean length.
 InteractionClip benchmark_clip();

@@ -18,7 +18,7 @@ std::shared_ptr<const DstarNetwork> benchmark_network(const RobotModel& robot) {
   }
 }
 
-std::vector<Figure> time_inference(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_inference(const BenchmarkOptions& options) {
   const auto network = benchmark_network(*load_shared_robot());
   Random random(1, stream_key({"benchmark", "dstar"}));
   DstarFeatures features;

@@ -27,11 +27,11 @@ const std::vector<Benchmark>& benchmarks() {
   return list;
 }
 
-Figure at_least(const std::string& name, double value, const std::string& unit, double target) {
+BenchmarkFigure at_least(const std::string& name, double value, const std::string& unit, double target) {
   return {name, value, unit, fmt::format("at least {:g}", target), value >= target};
 }
 
-Figure at_most(const std::string& name, double value, const std::string& unit, double target) {
+BenchmarkFigure at_most(const std::string& name, double value, const std::string& unit, double target) {
   return {name, value, unit, fmt::format("at most {:g}", target), value <= target};
 }
 

@@ -38,7 +38,7 @@ double run_seconds(const Suite& suite, int threads) {
   return seconds;
 }
 
-std::vector<Figure> time_scaling(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_scaling(const BenchmarkOptions& options) {
   constexpr int kRounds = 2;
   const Suite suite = parse_suite(kSuite, "bench-runner");
   double one = 1e9, many = 1e9;
@@ -46,11 +46,11 @@ std::vector<Figure> time_scaling(const BenchmarkOptions& options) {
     one = std::min(one, run_seconds(suite, 1));
     many = std::min(many, run_seconds(suite, options.threads));
   }
-  std::vector<Figure> figures;
+  std::vector<BenchmarkFigure> figures;
   const std::string name = "runner/scaling";
   // The target is for two cores; with another number the figure is printed as it is.
   figures.push_back(options.threads == 2 ? at_least(name, one / many, "1", 1.9)
-                                         : Figure{name, one / many, "1", "", true});
+                                         : BenchmarkFigure{name, one / many, "1", "", true});
   figures.push_back({name + ":threads", static_cast<double>(options.threads), "1", "", true});
   figures.push_back({name + ":episodes_per_second", kEpisodes / many, "1/s", "", true});
   figures.push_back(at_most(name + ":peak_memory", peak_memory_mib(), "MiB", 1024.0));

@@ -154,7 +154,7 @@ std::vector<RowSource> write_rows(const ScaleRun& run, std::int64_t rows, double
   return sources;
 }
 
-std::vector<Figure> time_merge(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_merge(const BenchmarkOptions& options) {
   ScaleRun run(1);
   const auto rows = static_cast<std::int64_t>(std::clamp(1.0e5 * options.seconds, 1.0e4, 1.0e6));
   double row_bytes = 0.0;
@@ -205,7 +205,7 @@ double overhead_of(const Constants& constants) {
 
 // A hundred million episodes on so many nodes of 32 cores. A file system server that syncs as this disk does would have
 // to sync so many rows a second.
-void project(const Constants& constants, double nodes, std::vector<Figure>& figures) {
+void project(const Constants& constants, double nodes, std::vector<BenchmarkFigure>& figures) {
   constexpr double kEpisodes = 1.0e8, kCores = 32.0;
   const double core = kEpisodes * (constants.episode + constants.record);
   const double shards = core / kShardSeconds;
@@ -219,10 +219,10 @@ void project(const Constants& constants, double nodes, std::vector<Figure>& figu
   figures.push_back({name + ":status", shards * constants.status, "s", "", true});
 }
 
-std::vector<Figure> time_workers(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_workers(const BenchmarkOptions& options) {
   Spent one, two;
   const Constants constants = measure(options, one, two);
-  std::vector<Figure> figures;
+  std::vector<BenchmarkFigure> figures;
   figures.push_back({"scale/worker:start", constants.start, "s", "", true});
   figures.push_back({"scale/worker:record_row", 1.0e3 * constants.record, "ms", "", true});
   figures.push_back({"scale/worker:episode", constants.episode, "s", "", true});

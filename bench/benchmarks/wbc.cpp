@@ -16,7 +16,7 @@ namespace {
 
 using Robot = std::shared_ptr<const RobotModel>;
 
-std::vector<Figure> time_wbc_inference(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_wbc_inference(const BenchmarkOptions& options) {
   const Robot robot = load_shared_robot();
   const std::unique_ptr<Controller> controller = make_controller("wbc_sim", robot);
   const RobotState state = robot->standing_state();
@@ -43,11 +43,11 @@ double training_rate(const Robot& robot, int threads, int iterations) {
   return iterations * static_cast<double>(options.environments * options.horizon) / (wall_seconds() - begin);
 }
 
-std::vector<Figure> time_training(const BenchmarkOptions& options) {
+std::vector<BenchmarkFigure> time_training(const BenchmarkOptions& options) {
   const Robot robot = load_shared_robot();
   const int iterations = options.seconds < 0.1 ? 1 : 4;
   const double many = training_rate(robot, options.threads, iterations);
-  std::vector<Figure> figures = {at_least("wbc/training", many, "steps/s", 6000.0)};
+  std::vector<BenchmarkFigure> figures = {at_least("wbc/training", many, "steps/s", 6000.0)};
   if (options.threads % 2 == 0)
     figures.push_back(at_least("wbc/training:twice_the_cores",
                                many / training_rate(robot, options.threads / 2, iterations), "1", 1.8));

@@ -41,7 +41,7 @@ void check_names(const std::vector<std::string>& names) {
   }
 }
 
-nlohmann::json to_json(const Figure& figure) {
+nlohmann::json to_json(const BenchmarkFigure& figure) {
   nlohmann::json json = {{"name", figure.name}, {"value", figure.value}, {"unit", figure.unit}};
   if (!figure.target.empty()) {
     json["target"] = figure.target;
@@ -50,7 +50,7 @@ nlohmann::json to_json(const Figure& figure) {
   return json;
 }
 
-std::string line(const Figure& figure) {
+std::string line(const BenchmarkFigure& figure) {
   const std::string target =
       figure.target.empty() ? "" : fmt::format("{} ({})", figure.target, figure.reached ? "reached" : "NOT reached");
   return fmt::format("{:<44} {:>12.5g} {:<10} {}\n", figure.name, figure.value, figure.unit, target);
@@ -67,7 +67,7 @@ void run_bench(Session& session, const BenchArguments& arguments) {
   for (const Benchmark& benchmark : benchmarks()) {
     if (!chosen(benchmark.name, arguments.names)) continue;
     note(session, "measuring " + benchmark.name);
-    for (const Figure& figure : benchmark.run(arguments.options)) {
+    for (const BenchmarkFigure& figure : benchmark.run(arguments.options)) {
       json["benchmarks"].push_back(to_json(figure));
       if (arguments.gate && !figure.reached) session.exit_code = kExitGate;
       if (!session.json) fmt::print("{}", line(figure));
