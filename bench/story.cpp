@@ -104,11 +104,13 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
   return story;
 }
 
-CrossEngine across_engines(const std::vector<EpisodeRow>& rows) {
-  std::vector<MetricColumn> columns;
-  for (const MetricInfo& metric : metric_catalogue())
-    if (metric.group == MetricGroup::kRetargeting) columns.push_back(column_of(metric));
-  return cross_engine(rows, columns);
+RunTables tables_of(const Run& run) {
+  RunMetrics metrics;
+  for (const MetricInfo& metric : metric_catalogue()) {
+    metrics.all.push_back(column_of(metric));
+    if (metric.group == MetricGroup::kRetargeting) metrics.drifting.push_back(column_of(metric));
+  }
+  return run_tables(run.rows, std::move(metrics), run.info.certificate);
 }
 
 std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files) {
@@ -118,27 +120,19 @@ std::vector<TrainingCurves> training_curves(const std::vector<std::string>& file
   return curves;
 }
 
-ReportContent report_content(const Run& run, bool with_clips, const std::vector<std::string>& curve_files, int threads,
-                             Progress& progress) {
+ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses, bool with_clips,
+                             const std::vector<std::string>& curve_files, int threads, Progress& progress) {
   ReportContent content;
-  const std::vector<EpisodeRow>& rows = run.rows;
   const Suite suite = parse_suite(run.info.suite_yaml, run.path + "/suite.yaml");
   content.curves = training_curves(curve_files);
   content.title = fmt::format("{} {}", suite.name, suite.version);
   content.environment = run.info.environment;
   content.notes = notes_of(suite);
-  content.entries = leaderboard(rows);
+  content.entries = tables.leaderboard;
+  content.board = tables.board;
+  content.analyses = std::move(analyses);
   content.columns = metric_columns();
-  content.cross_engine = across_engines(rows);
-  content.contacts = contact_table(rows);
-  content.controllers = controller_table(rows);
-  content.foot_plots = foot_plots(rows);
-  content.certificate = run.info.certificate;
-  content.walking = walk_table(rows);
-  content.people = people_table(rows);
-  content.levels = level_tables(rows);
-  content.board = board(rows, content.entries, *content.cross_engine, content.contacts);
-  content.episodes = rows;
+  content.episodes = run.rows;
   if (!with_clips || !suite.references.empty()) return content;
 
   const auto robot = load_shared_robot(suite.robot);

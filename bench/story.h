@@ -7,8 +7,8 @@
 
 #include "duet/bench/motion_scores.h"
 #include "duet/bench/suite.h"
-#include "duet/results/analyses/cross_engine.h"
 #include "duet/results/report/html_report.h"
+#include "duet/results/report/run_analyses.h"
 #include "duet/results/rows/run_directory.h"
 
 namespace duet {
@@ -18,15 +18,15 @@ class Progress;
 // People as in the clip, the adapted partner and the robot at the start, in mid-act and at the end.
 ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot);
 
-// The cross-engine tables of rows, with the 18 retargeting metrics.
-CrossEngine across_engines(const std::vector<EpisodeRow>& rows);
+// What the analyses of a run are made of; the metrics are the catalogue's, and the 18 of retargeting those that drift.
+RunTables tables_of(const Run& run);
 
 // Throws InputError for a file that is broken.
 std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files);
 
-// Everything that the report says of runs: leaderboard, notes, retargeting figures and stories of their clips, which
+// Everything that the report says of runs: their analyses, notes, retargeting figures and stories of their clips, which
 // are made again from the first run's suite (`with_clips`), on `threads` threads.
-ReportContent report_content(const Run& run, bool with_clips, const std::vector<std::string>& curve_files, int threads,
-                             Progress& progress);
+ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses, bool with_clips,
+                             const std::vector<std::string>& curve_files, int threads, Progress& progress);
 
 }  // namespace duet

@@ -66,36 +66,47 @@ def wilson(k, n):
     return [f"{100 * x / (1 + z * z / n):.1f}" for x in (max(middle - spread, 0.0), min(middle + spread, 1 + z * z / n))]
 
 
+def figure(rows, file, **keys):
+    """The only line with these values; a key that is not named has any."""
+    found = [r for r in rows if all(r[key] == value for key, value in keys.items())]
+    if len(found) != 1:
+        raise Refused(f"{file} has {len(found)} lines with {keys}, expected one")
+    return found[0]
+
+
+def with_interval(line):
+    return f"{percent(line['value'])} [{percent(line['low'])}, {percent(line['high'])}]"
+
+
 def success(folder):
     """Success of each policy in MuJoCo, by task, and under the detectors as the paper prints them."""
+    file = f"{folder}/leaderboard.csv"
     rows = [r for r in rows_of(folder, "leaderboard.csv") if r["engine"] == "mujoco"]
     table = []
     for policy, name in POLICIES.items():
-        by_task = {r["task"]: r for r in rows if r["policy"] == policy}
-        if not by_task:
-            raise Refused(f"{folder}/leaderboard.csv has no policy {policy} in mujoco")
-        every = by_task["all"]
-        n, printed = int(every["n"]), float(every["success:paper/paper"])
+        def value(task, name="success", of=""):
+            return figure(rows, file, policy=policy, task=task, name=name, of=of)
+        every, printed = value("all"), float(value("all", of="paper/paper")["value"])
+        n = int(every["n"])
         low, high = wilson(round(printed * n), n)
-        table.append([name, str(n), f"{percent(every['success'])} [{percent(every['ci_low'])}, {percent(every['ci_high'])}]",
-                      *[short(by_task[task]["success"]) for task in TASKS], every["fell"], f"{percent(printed)} [{low}, {high}]"])
-    paper = [r for r in rows_of(folder, "policies.csv") if (r["source"], r["policy"], r["task"], r["figure"]) == ("paper", "D-STAR", "all", "paper_success")]
-    table.append(["the paper's D-STAR", "126", *["-"] * 8, percent(paper[0]["value"])])
+        table.append([name, str(n), with_interval(every), *[short(value(task)["value"]) for task in TASKS],
+                      value("all", "fell")["value"], f"{percent(printed)} [{low}, {high}]"])
+    paper = figure(rows_of(folder, "policies.csv"), f"{folder}/policies.csv", source="paper", policy="D-STAR", task="all", name="paper_success")
+    table.append(["the paper's D-STAR", "126", *["-"] * 8, percent(paper["value"])])
     header = ["Policy", "n", "Overall", *TASKS.values(), "Fell", "printed detectors"]
     return markdown(header, [False] + [True] * 10, table)
 
 
 def engines(folder):
     """Success of each policy that ran in every engine, and the mean over them."""
-    rows = rows_of(folder, "engines.csv")
+    file, rows = f"{folder}/engines.csv", rows_of(folder, "engines.csv")
     table = []
     for policy, name in POLICIES.items():
-        rates = {r["engine"]: r["value"] for r in rows if (r["table"], r["policy"], r["figure"]) == ("success", policy, "rate")}
+        rates = {r["engine"]: r["value"] for r in rows if (r["policy"], r["name"]) == (policy, "success")}
         if set(rates) < set(ENGINES):
             continue
-        mean = next(r for r in rows if (r["table"], r["policy"], r["figure"]) == ("spread", policy, "mean"))
-        table.append([name, *[percent(rates[engine]) for engine in ENGINES],
-                      f"{percent(mean['value'])} [{percent(mean['ci_low'])}, {percent(mean['ci_high'])}]"])
+        mean = figure(rows, file, policy=policy, name="mean_success")
+        table.append([name, *[percent(rates[engine]) for engine in ENGINES], with_interval(mean)])
     return markdown(["Policy", *ENGINES.values(), "mean"], [False] + [True] * 6, table)
 
 

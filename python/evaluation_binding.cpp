@@ -23,12 +23,10 @@
 #include "duet/core/require.h"
 #include "duet/policies/registry.h"
 #include "duet/python/bindings.h"
-#include "duet/results/analyses/contact_table.h"
-#include "duet/results/analyses/controller_table.h"
-#include "duet/results/analyses/cross_engine.h"
-#include "duet/results/analyses/leaderboard.h"
 #include "duet/results/analyses/leaderboard_rows.h"
+#include "duet/results/report/run_analyses.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/results/statistics/resolution.h"
 
 namespace duet::python {
 namespace {
@@ -164,32 +162,12 @@ std::unique_ptr<Evaluation> start(const SuiteQuestion& question, const std::vect
 struct TablePair {
   std::string markdown, json;
 };
-TablePair pair_of(const std::string& markdown, const nlohmann::json& json) { return {markdown, dumped(json)}; }
+TablePair pair_of(const Analysis& analysis) { return {analysis_markdown(analysis), dumped(analysis_json(analysis))}; }
 
 TablePair table_of(const Run& run, const std::string& name) {
-  const std::vector<EpisodeRow>& rows = run.rows;
-  if (name == "leaderboard") {
-    const auto entries = leaderboard(rows);
-    return pair_of(leaderboard_markdown(entries, false), leaderboard_json(entries));
-  }
-  if (name == "metrics") {
-    const auto entries = leaderboard(rows);
-    return pair_of(leaderboard_markdown(entries, true), leaderboard_json(entries));
-  }
-  if (name == "engines") {
-    const CrossEngine engines = across_engines(rows);
-    return pair_of(cross_engine_markdown(engines), cross_engine_json(engines));
-  }
-  if (name == "controllers") {
-    const ControllerTable table = controller_table(rows);
-    return pair_of(controller_table_markdown(table), controller_table_json(table));
-  }
-  if (name == "contacts") {
-    const ContactTable table = contact_table(rows);
-    return pair_of(contact_table_markdown(table), contact_table_json(table));
-  }
-  throw std::invalid_argument(
-      fmt::format("table: expected leaderboard, metrics, engines, controllers or contacts, found '{}'", name));
+  const RunTables tables = tables_of(run);
+  if (name == kLeaderboardName) return pair_of(leaderboard_analysis(tables.leaderboard, tables.metrics.all, false));
+  return pair_of(run_analysis(tables, name == "metrics" ? kLeaderboardName : name));
 }
 
 std::vector<EpisodeRow> rows_of(const Run& run, const std::string& policy) {
@@ -205,8 +183,7 @@ std::vector<EpisodeRow> rows_of(const Run& run, const std::string& policy) {
 }
 
 TablePair comparison_of(const Run& a, const std::string& policy_a, const Run& b, const std::string& policy_b) {
-  const auto comparisons = compare_runs(rows_of(a, policy_a), rows_of(b, policy_b));
-  return pair_of(comparison_markdown(comparisons), comparison_json(comparisons));
+  return pair_of(comparison_analysis(compare_runs(rows_of(a, policy_a), rows_of(b, policy_b))));
 }
 
 std::string rows_json(const Run& run) {

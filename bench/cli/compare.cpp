@@ -16,7 +16,7 @@ namespace {
 struct CompareArguments {
   std::string a, b;
   double min_effect = 100.0 * kFivePoints;  // [points]
-  LeaderboardOptions options;
+  IntervalOptions options;
 };
 
 using Digests = std::map<std::string, std::string>;
@@ -51,14 +51,10 @@ void run_compare(const Session& session, const CompareArguments& arguments) {
   const std::vector<Comparison> comparisons = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
     return compare_runs(a.rows, b.rows, arguments.options);
   });
-  const double margin = arguments.min_effect / 100.0;
-  const std::string text =
-      fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, comparison_markdown(comparisons, margin));
+  const Analysis analysis = comparison_analysis(comparisons, arguments.min_effect / 100.0);
+  const std::string text = fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, terminal_text(analysis));
   print(session, with_notes("md", text, notes),
-        {{"a", arguments.a},
-         {"b", arguments.b},
-         {"comparisons", comparison_json(comparisons, margin)},
-         {"notes", notes}});
+        {{"a", arguments.a}, {"b", arguments.b}, {"comparison", analysis_json(analysis)}, {"notes", notes}});
 }
 
 }  // namespace

@@ -4,21 +4,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
-#include <iterator>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
-#include "duet/bench/cli/tables.h"
 #include "duet/bench/replay/report_replays.h"
 #include "duet/bench/story.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/results/analyses/leaderboard.h"
 #include "duet/results/report/html_report.h"
 #include "duet/results/report/interval_plot.h"
-#include "duet/results/report/policy_report.h"
+#include "duet/results/report/run_analyses.h"
 #include "duet/results/rows/database.h"
 #include "duet/results/rows/run_union.h"
 #include "duet/results/statistics/resolution.h"
@@ -86,10 +83,11 @@ std::vector<ReportReplay> replays_of(const Run& run, const ReportArguments& argu
   }
 }
 
-std::string html_text(const Run& run, const std::vector<std::string>& notes, const PolicyReport& policies,
-                      std::vector<ReportReplay> replays, const ReportArguments& arguments, Progress& progress) {
-  ReportContent content = report_content(run, !arguments.no_clips, arguments.curves, arguments.threads, progress);
-  content.policies = policies;
+std::string html_text(const Run& run, const RunTables& tables, const std::vector<Analysis>& analyses,
+                      const std::vector<std::string>& notes, std::vector<ReportReplay> replays,
+                      const ReportArguments& arguments, Progress& progress) {
+  ReportContent content =
+      report_content(run, tables, analyses, !arguments.no_clips, arguments.curves, arguments.threads, progress);
   content.replays = std::move(replays);
   content.notes.insert(content.notes.begin(), notes.begin(), notes.end());
   return html_report(content);
@@ -99,8 +97,8 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
   const std::vector<Run> runs = load_runs(arguments.runs);
   const Run run = united(runs);
-  const Tables tables = make_tables(run.rows, run.info.certificate);
-  const PolicyReport policies = tables.has_walking() ? PolicyReport{} : policy_report(run.rows);
+  const RunTables tables = tables_of(run);
+  const std::vector<Analysis> analyses = run_analyses(tables);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
   std::vector<std::string> notes = notes_of(arguments.runs, runs, run.rows);
   if (arguments.min_effect > 0.0)
@@ -117,14 +115,12 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     write_file(path, format == "html" ? text : with_notes(format, text, notes));
     wrote(path);
   };
-  std::vector<Analysis> analyses = analyses_of(tables);
-  std::ranges::move(policy_analyses(policies), std::back_inserter(analyses));
   for (const std::string& format : arguments.formats) {
     if (format == "html") {
       std::vector<std::string> own = notes;
       std::vector<ReportReplay> replays = replays_of(run, arguments, write, own, progress);
-      write("report.html", html_text(run, own, policies, std::move(replays), arguments, progress), format);
-      if (tables.has_engines()) write("engines.svg", engine_plot_svg(tables.engines), "svg");
+      write("report.html", html_text(run, tables, analyses, own, std::move(replays), arguments, progress), format);
+      if (tables.engines.engines.size() > 1) write("engines.svg", engine_plot_svg(tables.engines), "svg");
     }
     if (format == "sqlite") {
       write_database(run.rows, inside(folder, "results.sqlite"), notes);
@@ -133,7 +129,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     for (const auto& [file, text] : analysis_files(analyses, format)) write(file, text, format);
   }
   add_analyses(analyses, json);
-  print(session, with_notes("md", tables_text(tables) + policy_report_text(policies), notes), json);
+  print(session, with_notes("md", run_text(tables, analyses), notes), json);
   if (arguments.replays.scenes == 0)
     suggest_next(session, fmt::format("duet replay {} -o {}/replay.html", arguments.runs.front(), folder));
 }

@@ -8,10 +8,10 @@
 #include "duet/bench/certificate.h"
 #include "duet/bench/cli/run_command.h"
 #include "duet/bench/cli/run_notes.h"
-#include "duet/bench/cli/tables.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/runner.h"
+#include "duet/bench/story.h"
 #include "duet/bench/trust.h"
 #include "duet/core/file.h"
 #include "duet/core/number.h"
@@ -113,7 +113,8 @@ void run_suite_command(Session& session, RunArguments arguments) {
   note(session, describe(summary, suite, arguments.output));
   const Run run = open_run(arguments.output);
   const std::vector<std::string> notes = notes_of({arguments.output}, {run}, run.rows);
-  const Tables tables = make_tables(run.rows, run.info.certificate);
+  const RunTables tables = tables_of(run);
+  const std::vector<Analysis> analyses = run_analyses(tables, Extent::kRun);
   for (const std::string& fault : policy_fault_notes(tables.leaderboard)) warn(fault);
   nlohmann::json json = {{"run", arguments.output},
                          {"planned", summary.planned},
@@ -127,8 +128,8 @@ void run_suite_command(Session& session, RunArguments arguments) {
                          {"complete", summary.end == RunEnd::kComplete},
                          {"notes", notes}};
   if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
-  add_analyses(analyses_of(tables), json);
-  print_result(session, summary.end, with_notes("md", tables_text(tables), notes), json);
+  add_analyses(analyses, json);
+  print_result(session, summary.end, with_notes("md", run_text(tables, analyses), notes), json);
   suggest_next(session, summary.end == RunEnd::kComplete ? fmt::format("duet report {} --replays 3", arguments.output)
                                                          : fmt::format("{}", fmt::join(session.argv, " ")));
 }

@@ -52,7 +52,9 @@ std::string with_notes(const std::string& format, const std::string& text, const
   if (notes.empty()) return text;
   if (format == "json") {
     nlohmann::json json = nlohmann::json::parse(text);
-    json["notes"] = notes;
+    nlohmann::json all = notes;
+    for (nlohmann::json& own : json["notes"]) all.push_back(std::move(own));
+    json["notes"] = std::move(all);
     return json.dump(2) + "\n";
   }
   const Frame frame = frame_of(format);

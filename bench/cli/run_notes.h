@@ -19,7 +19,8 @@ std::vector<std::string> completeness_notes(const std::vector<std::string>& path
 std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
                                   const std::vector<EpisodeRow>& rows);
 
-// A file's text with the notes, as its format has them (md, csv, tex, svg; json: key "notes"); unchanged without any.
+// A file's text with the notes, as its format has them (md, csv, tex, svg; json: before its own in the key "notes");
+// unchanged without any.
 std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes);
 
 // Throws InputError for a run whose episodes are not all there, unless `allowed`; `action` is what is refused.

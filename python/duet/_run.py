@@ -12,13 +12,13 @@ from duet._tools import path_of
 
 
 class Table:
-    """A table as text (`print`, a notebook), as rows of values (`rows`), and all that its JSON has (`values`)."""
+    """An analysis as text (`print`, a notebook), its figures in long form (`rows`; docs/file-formats.md, "Analyses"), and all
+    that its JSON has (`values`)."""
 
     def __init__(self, table: "_duet.Table"):
         self.markdown: str = table.markdown
         self.values: Dict[str, Any] = json.loads(table.json)
-        kinds = ("entries", "comparisons", "groups", "success")  # of the tables, in docs/file-formats.md
-        self.rows: List[Dict[str, Any]] = next(self.values[kind] for kind in kinds if kind in self.values)
+        self.rows: List[Dict[str, Any]] = self.values["figures"]
 
     def __str__(self) -> str:
         return self.markdown
@@ -32,9 +32,15 @@ class Table:
     def __len__(self) -> int:
         return len(self.rows)
 
+    def dataframe(self) -> Any:
+        """The figures for pandas, where that is installed."""
+        import pandas  # type: ignore[import]
+
+        return pandas.DataFrame(self.rows)
+
 
 class Comparison(Table):
-    """Two runs or policies on the same episodes: exact paired tests and intervals; `values["margin"]` is that of the
+    """Two runs or policies on the same episodes: exact paired tests and intervals; the figure `margin` is that of the
     verdicts."""
 
 
@@ -73,7 +79,8 @@ class Run:
         return pandas.DataFrame(self.columns(*names))
 
     def table(self, name: str = "leaderboard") -> Table:
-        """leaderboard, metrics, engines, controllers or contacts."""
+        """leaderboard, engines, controllers, policies, degradation, reactivity, contacts, people, levels or walking; metrics: the
+        leaderboard with the means of metrics. Without a figure where the run has not what the table asks for."""
         return Table(self._folder.table(name))
 
     def compare(self, a: Union[str, "Run"], b: Optional[str] = None) -> Comparison:

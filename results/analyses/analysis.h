@@ -1,32 +1,49 @@
-// One analysis in every form that a report has: what it is called, and how it is written in each. A new analysis is one
-// entry in a list; files, JSON and text follow.
+// What one analysis says of a run: figures, and tables of them in words for people. It is written here in every form
+// that a report has (Markdown for files and terminals, LaTeX, CSV, JSON; HTML in results/report/analysis_html.h), so
+// that a new one is a function that returns an Analysis and an entry in a list (results/report/run_analyses.cpp).
 #pragma once
 
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "duet/results/analyses/figure.h"
+#include "duet/results/analyses/text_table.h"
+#include "duet/results/report/line_plot.h"
+
 namespace duet {
 
-struct Analysis {
-  std::string name;  // of its files and of its member in JSON: "policies"
-  std::function<std::string()> markdown, csv, latex;
-  std::function<nlohmann::json()> json;
+// Plots side by side: without a title before the tables, with one below them.
+struct PlotGroup {
+  std::string title = {}, note = {};
+  std::vector<LinePlot> plots = {};
 };
 
-// Of a result and its four functions; refers to the result.
-template <typename Result>
-Analysis analysis_of(const std::string& name, const Result& result, std::string (*markdown)(const Result&),
-                     std::string (*csv)(const Result&), std::string (*latex)(const Result&),
-                     nlohmann::json (*json)(const Result&)) {
-  return {.name = name,
-          .markdown = [&result, markdown] { return markdown(result); },
-          .csv = [&result, csv] { return csv(result); },
-          .latex = [&result, latex] { return latex(result); },
-          .json = [&result, json] { return json(result); }};
-}
+struct Analysis {
+  std::string name;     // of its files, its member in JSON and its section in HTML: "policies"
+  std::string title;    // of that section
+  double level = 0.95;  // of intervals
+  // Before the tables, which then stand one heading below the title. Without tables: why there are none.
+  std::string warning = {};  // what nobody may overlook; it stands out in HTML
+  std::vector<std::string> notes = {};
+  std::vector<TitledTable> tables = {};
+  std::vector<PlotGroup> plots = {};
+  std::string drawing = {};  // HTML in front of the tables
+  std::vector<Figure> figures = {};
+  bool opens = false;       // its section in HTML is among the first, and unfolded
+  bool in_terminal = true;  // false: left to the files
+
+  [[nodiscard]] bool empty() const { return figures.empty(); }
+};
+
+std::string analysis_markdown(const Analysis& analysis);
+// Without the tables that are too long for it.
+std::string terminal_text(const Analysis& analysis);
+std::string analysis_latex(const Analysis& analysis);  // a tabular per table, the rest as comments
+std::string analysis_csv(const Analysis& analysis);
+// duet.analysis/1: `analysis`, `title`, `level`, `notes` (each that stands with a table), `figures`.
+nlohmann::json analysis_json(const Analysis& analysis);
 
 // Names and contents of the files of a format ("md", "csv", "json", "tex"; none for another): "policies.md", ...
 std::vector<std::pair<std::string, std::string>> analysis_files(const std::vector<Analysis>& analyses,

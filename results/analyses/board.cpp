@@ -112,18 +112,17 @@ std::optional<BoardLead> lead_of(const std::vector<EpisodeRow>& rows, const Boar
   }
   std::vector<double> differences;
   std::vector<int> clips;
-  std::map<std::pair<std::string, std::string>, int> places;
+  ClipNumbers numbers;
   for (const auto& [id, pair] : pairs) {
     if (pair.first < 0 || pair.second < 0) continue;
-    const EpisodeId& episode = std::get<1>(id);
     differences.push_back(pair.first - pair.second);
-    clips.push_back(places.try_emplace({episode.task, episode.clip}, static_cast<int>(places.size())).first->second);
+    clips.push_back(numbers.of(std::get<1>(id)));
   }
   if (differences.empty()) return std::nullopt;
   BoardLead lead;
   for (const double difference : differences) lead.difference += difference / static_cast<double>(differences.size());
   lead.interval = cluster_bootstrap(differences, clips, kLeadResamples, kLeadSeed);
-  lead.clips = static_cast<long>(places.size());
+  lead.clips = static_cast<long>(numbers.size());
   return lead;
 }
 

@@ -9,7 +9,6 @@
 
 #include "duet/core/require.h"
 #include "duet/results/analyses/comparison_parts.h"
-#include "duet/results/analyses/leaderboard_rows.h"
 #include "duet/results/rows/distinct_episodes.h"
 #include "duet/results/statistics/row_groups.h"
 
@@ -159,13 +158,12 @@ void PairedRows::add(const EpisodeRow& a, const EpisodeRow& b) {
   const bool of_b = headline_success(b);
   table.add(of_a, of_b);
   differences.push_back(static_cast<double>(of_a) - static_cast<double>(of_b));
-  clusters.push_back(clips.try_emplace({a.task, a.clip}, static_cast<int>(clips.size())).first->second);
+  clusters.push_back(clips.of(a.task, a.clip));
 }
 
-Comparison evaluate(const std::string& name, const PairedRows& gathered, const LeaderboardOptions& options) {
+Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options) {
   const PairedTable& table = gathered.table;
   Comparison result;
-  result.group = name;
   result.pairs = table.pairs();
   result.both = table.both;
   result.only_a = table.only_a;
@@ -193,7 +191,7 @@ void correct_for_family(std::vector<Comparison>& comparisons) {
 }
 
 std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
-                                     const LeaderboardOptions& options) {
+                                     const IntervalOptions& options) {
   require_comparable(a, b);
   const RowList of_a = main_arm(a, "A");
   const RowList of_b = main_arm(b, "B");
@@ -201,7 +199,12 @@ std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std
   std::vector<Comparison> comparisons;
   for (const auto& [key, gathered] : gather(indexed(of_a, pairing), indexed(of_b, pairing))) {
     if (gathered.table.pairs() == 0) continue;
-    comparisons.push_back(evaluate(group_name(std::get<0>(key), std::get<2>(key)), gathered, options));
+    const auto& [group, rank, task] = key;
+    Comparison& comparison = comparisons.emplace_back(evaluate(gathered, options));
+    comparison.group = group_name(group, task);
+    comparison.task = task;
+    std::tie(comparison.engine, comparison.controller, comparison.policy, comparison.perturbation) =
+        std::tie(group[0], group[1], group[2], group[3]);
   }
   if (comparisons.empty()) report_nothing_pairs(of_a, of_b);
   correct_for_family(comparisons);

@@ -1,5 +1,7 @@
 #include "duet/results/analyses/contact_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +10,7 @@
 #include <tuple>
 
 #include "duet/core/order_statistics.h"
-#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/cells.h"
 #include "duet/results/rows/distinct_episodes.h"
 #include "duet/results/statistics/row_groups.h"
 
@@ -123,6 +125,105 @@ ContactGroup contact_group(const std::map<std::string, Episodes>& engines) {
   return group;
 }
 
+std::string force_number(double value) { return short_number(value, 2); }
+
+std::string ratio_cell(double ratio) { return fmt::format("{}{}", force_number(ratio), ratio > 1.0 ? "*" : ""); }
+
+std::string peak_cell(const RegionContacts& contacts) {
+  if (!std::isfinite(contacts.ratio)) return force_number(contacts.peak);
+  return fmt::format("{} ({})", force_number(contacts.peak), ratio_cell(contacts.ratio));
+}
+
+// The name under which a group's tables fold together.
+std::string contact_group_name(const ContactGroup& group) {
+  return fmt::format("Controller {}, policy {}", group.controller, group.policy);
+}
+
+std::string episodes_sentence(const ContactGroup& group) {
+  const long first = group.engines.front().episodes;
+  if (std::all_of(group.engines.begin(), group.engines.end(),
+                  [&](const EngineContacts& engine) { return engine.episodes == first; })) {
+    return fmt::format("{} {}{}", first, first == 1 ? "episode" : "episodes",
+                       group.engines.size() > 1 ? " in each engine" : "");
+  }
+  std::string text = "episodes:";
+  for (const EngineContacts& engine : group.engines) {
+    text += fmt::format("{} {} {}", text.ends_with(':') ? "" : ",", engine.engine, engine.episodes);
+  }
+  return text;
+}
+
+TitledTable peak_table(const ContactGroup& group) {
+  TitledTable titled{.title = "Peak force [N]",
+                     .caption = fmt::format("{}; {}.", contact_group_name(group), episodes_sentence(group)),
+                     .table = {.header = {"Region"}, .rows = {}, .label_columns = 1}};
+  for (const EngineContacts& engine : group.engines) titled.table.header.push_back(engine.engine);
+  for (std::size_t i = 0; i < group.all.regions.size(); ++i) {
+    std::vector<std::string> cells = {group.all.regions[i].region};
+    for (const EngineContacts& engine : group.engines) cells.push_back(peak_cell(engine.regions[i]));
+    titled.table.rows.push_back(std::move(cells));
+  }
+  if (group.diverged > 0) {
+    titled.notes.push_back(
+        fmt::format("Of all episodes {} diverged; what they measured until then counts.", group.diverged));
+  }
+  return titled;
+}
+
+TitledTable contact_figures_table(const ContactGroup& group) {
+  TitledTable titled{.title = group.engines.size() > 1 ? "All engines together" : "Other figures",
+                     .caption = fmt::format("{}{}.", contact_group_name(group),
+                                            group.engines.size() > 1 ? "; an episode counts once in each engine" : ""),
+                     .table = {.header = {"Region", "Touched", "Over limit [%]", "Ratio", "Median peak [N]",
+                                          "Quasi-static [N]", "Transient [N]", "Pressure [N/cm^2]", "Impulse [N s]"},
+                               .rows = {},
+                               .label_columns = 1}};
+  for (const RegionContacts& contacts : group.all.regions) {
+    const long episodes = group.all.episodes;
+    titled.table.rows.push_back({contacts.region, fmt::format("{} of {}", contacts.touched, episodes),
+                                 percent(static_cast<double>(contacts.over) / static_cast<double>(episodes)),
+                                 ratio_cell(contacts.ratio), force_number(contacts.median_peak),
+                                 force_number(contacts.quasi_static), force_number(contacts.transient),
+                                 force_number(contacts.pressure_n_cm2), force_number(contacts.impulse)});
+  }
+  return titled;
+}
+
+struct ContactFigure {
+  const char* name;
+  const char* unit;
+  double RegionContacts::*value;
+};
+constexpr ContactFigure kContactFigures[] = {{"peak", "N", &RegionContacts::peak},
+                                             {"median_peak", "N", &RegionContacts::median_peak},
+                                             {"quasi_static", "N", &RegionContacts::quasi_static},
+                                             {"transient", "N", &RegionContacts::transient},
+                                             {"impulse", "N s", &RegionContacts::impulse},
+                                             {"pressure", "N/cm^2", &RegionContacts::pressure_n_cm2},
+                                             {"ratio", "1", &RegionContacts::ratio}};
+
+void add_contact_figures(const ContactGroup& group, const EngineContacts& engine, std::vector<Figure>& into) {
+  FiguresOf figures{{.engine = engine.engine, .controller = group.controller, .policy = group.policy}, into};
+  for (const RegionContacts& contacts : engine.regions) {
+    figures.keys.of = contacts.region;
+    figures.count("touched", engine.episodes, contacts.touched);
+    figures.count("over", engine.episodes, contacts.over);
+    for (const ContactFigure& figure : kContactFigures)
+      figures.add(figure.name, contacts.touched, contacts.*figure.value, kNoInterval, figure.unit);
+  }
+}
+
+void add_contact_group(const ContactGroup& group, Analysis& analysis) {
+  for (TitledTable titled : {peak_table(group), contact_figures_table(group)}) {
+    titled.group = contact_group_name(group);
+    analysis.tables.push_back(std::move(titled));
+  }
+  for (const EngineContacts& engine : group.engines) add_contact_figures(group, engine, analysis.figures);
+  add_contact_figures(group, group.all, analysis.figures);
+  FiguresOf{{.controller = group.controller, .policy = group.policy}, analysis.figures}.count(
+      "diverged", group.all.episodes, group.diverged);
+}
+
 }  // namespace
 
 bool has_solid_partner(const EpisodeRow& row) {
@@ -161,6 +262,28 @@ ContactTable contact_table(const std::vector<EpisodeRow>& rows, const std::strin
   }
   table.limits_verified = table.limits_verified && !table.groups.empty();
   return table;
+}
+
+Analysis contact_analysis(const ContactTable& table) {
+  Analysis analysis{.name = "contacts", .title = "Contact with people"};
+  if (table.groups.empty()) {
+    analysis.notes = {"No episode has contact forces with a solid partner."};
+    return analysis;
+  }
+  if (!table.limits_verified)
+    analysis.warning = "Limits: unverified (nobody has yet checked the table against ISO/TS 15066)";
+  if (table.limits_verified) analysis.notes.emplace_back("Limits: verified");
+  analysis.notes.insert(
+      analysis.notes.end(),
+      {"The impulse adds up magnitudes of region forces, so opposite pushes do not cancel; pressure is an estimate "
+       "from how deep bodies overlap, not a measurement.",
+       "Forces, pressure and impulse are the largest of any episode, the median is over the episodes that touched "
+       "the region. In brackets, and as ratio: the largest of force and pressure over their limits, with an "
+       "asterisk where a limit is exceeded; without brackets no limit is stated. Over limit: share of all episodes, "
+       "touched or not. \"any\" is the whole body; regions that no episode touched are left out."});
+  FiguresOf{{}, analysis.figures}.count("limits_verified", {}, table.limits_verified ? 1 : 0);
+  for (const ContactGroup& group : table.groups) add_contact_group(group, analysis);
+  return analysis;
 }
 
 }  // namespace duet

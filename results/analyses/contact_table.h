@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/rows/episode_row.h"
 
 namespace duet {
@@ -53,13 +54,8 @@ ContactTable contact_table(const std::vector<EpisodeRow>& rows, const std::strin
 bool has_solid_partner(const EpisodeRow& row);  // contacts with one were measured
 bool is_over_limit(const EpisodeRow& row);      // of force or pressure, on any region
 
-// "Limits: unverified (nobody has yet checked the table against ISO/TS 15066)" or "Limits: verified".
-std::string limits_mark(const ContactTable& table);
-
-// For a table without groups: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
-std::string contact_table_markdown(const ContactTable& table);  // headings of level 3 and 4
-std::string contact_table_csv(const ContactTable& table);       // one figure per line, not rounded
-std::string contact_table_latex(const ContactTable& table);     // two tabulars per group
-nlohmann::json contact_table_json(const ContactTable& table);
+// Peak force with the ratio to the limit, a column per engine; the other figures over all engines. Warns where nobody
+// has verified the limits.
+Analysis contact_analysis(const ContactTable& table);
 
 }  // namespace duet

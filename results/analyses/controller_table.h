@@ -11,17 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/rows/episode_row.h"
 #include "duet/results/statistics/statistics.h"
 
 namespace duet {
-
-struct ControllerTableOptions {
-  double level = 0.95;
-  int resamples = 10000;
-  std::uint64_t seed = 1;
-  std::string arm = "main";
-};
 
 // A metric of rows and how tables call it; `before`: of the reference, that is before the controller ("" where it is of
 // both).
@@ -40,8 +34,7 @@ inline constexpr std::array<ControllerFigure, 7> kControllerFigures = {
 struct Estimate {
   long n = 0;  // episodes that have it
   double mean = std::numeric_limits<double>::quiet_NaN();
-  // NaN where there are fewer than two clips: one clip drawn again is always itself.
-  Interval interval = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+  Interval interval = kNoInterval;  // none for fewer than two clips: one clip drawn again is always itself
 };
 
 // One (controller, engine, policy, perturbation).
@@ -62,7 +55,8 @@ struct ControllerTable {
 };
 
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
-ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const ControllerTableOptions& options = {});
+ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {},
+                                 const std::string& arm = "main");
 
 // A row of Table S4 as the supplement prints it; `values` as in kControllerFigures, `before` its first three.
 struct PaperController {
@@ -72,10 +66,7 @@ struct PaperController {
 };
 std::span<const PaperController> paper_controllers();
 
-// For a table without entries: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
-std::string controller_table_markdown(const ControllerTable& table);  // headings of level 3
-std::string controller_table_csv(const ControllerTable& table);       // one figure per line, not rounded
-std::string controller_table_latex(const ControllerTable& table);
-nlohmann::json controller_table_json(const ControllerTable& table);
+// Jitter before and after the controller; tracking, survival and faults. Each with the paper's rows at its end.
+Analysis controller_analysis(const ControllerTable& table);
 
 }  // namespace duet

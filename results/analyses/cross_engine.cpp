@@ -247,10 +247,10 @@ const EpisodeRow* EngineRows::playback(const Combination& combination, const Epi
 }
 
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options) {
-  ClusterBootstrap bootstrap(options.resamples, options.seed);
+  ClusterBootstrap bootstrap(options.intervals.resamples, options.intervals.seed);
   std::vector<EngineSuccess> success;
   for (const auto& [combination, episodes] : rows.physics()) {
-    success.push_back(success_of(combination, episodes, rows, bootstrap, options.level));
+    success.push_back(success_of(combination, episodes, rows, bootstrap, options.intervals.level));
   }
   return success;
 }
@@ -277,7 +277,7 @@ CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<
   CrossEngine result;
   result.engines = engine_infos(rows, options.arm);
   result.has_playback = by_engine.has_playback();
-  result.level = options.level;
+  result.level = options.intervals.level;
   result.parting_distance = options.parting_distance;
   result.metrics = metrics;
   if (result.engines.size() < 2) return result;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/cross_engine_result.h"
 #include "duet/results/analyses/metric_column.h"
 #include "duet/results/rows/episode_row.h"
@@ -18,10 +19,12 @@ namespace duet {
 CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<MetricColumn>& metrics,
                          const CrossEngineOptions& options = {});
 
-std::string cross_engine_markdown(const CrossEngine& result);  // headings of level 3
-std::string cross_engine_csv(const CrossEngine& result);       // one figure per line, not rounded
-std::string cross_engine_latex(const CrossEngine& result);     // one tabular per table
-nlohmann::json cross_engine_json(const CrossEngine& result);
+// Nothing but a note for fewer than two physics engines. The parity certificate (null: none is attached) is its last
+// table, of one engine too.
+Analysis engine_analysis(const CrossEngine& result, const nlohmann::json& certificate = nullptr);
+
+// "Controller" and "Perturbation" as far as they differ, and "Policy". Of all entries in turn.
+RowLabels combination_labels(const std::vector<EngineSuccess>& success);
 
 // Unit of a force by the ending of its name: "N", "N s", "s", "N/cm^2", "" for another.
 std::string force_unit(std::string_view name);

@@ -41,17 +41,6 @@ class EngineRows {
   std::map<std::tuple<std::string, std::string, EpisodeId>, std::map<std::string, const EpisodeRow*>> playback_;
 };
 
-// Numbers for clips, the clusters of every bootstrap here.
-class ClipNumbers {
- public:
-  int of(const EpisodeId& id) {
-    return numbers_.try_emplace({id.task, id.clip}, static_cast<int>(numbers_.size())).first->second;
-  }
-
- private:
-  std::map<std::pair<std::string, std::string>, int> numbers_;
-};
-
 double mean_of(const std::vector<double>& values);  // NaN of none
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options);
 std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success);

@@ -1,7 +1,6 @@
 // What a comparison of engines is asked and what it finds (results/analyses/cross_engine.h).
 #pragma once
 
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,9 +13,7 @@
 namespace duet {
 
 struct CrossEngineOptions {
-  double level = 0.95;
-  int resamples = 10000;
-  std::uint64_t seed = 1;
+  IntervalOptions intervals = {};
   double parting_distance = 0.05;  // two engines have parted where a point of the traces differs by more [m]
   std::string arm = "main";
 };

@@ -1,5 +1,7 @@
 #include "duet/results/analyses/degradation.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -136,6 +138,113 @@ std::vector<DegradationCurve> paper_curves(const std::vector<DegradationCurve>& 
   return curves;
 }
 
+std::string with_unit(double x, const std::string& unit) {
+  return unit.empty() ? fmt::format("{:g}", x) : fmt::format("{:g} {}", x, unit);
+}
+
+std::string paper_curves_sentence(const Degradation& result) {
+  return result.paper.empty()
+             ? ""
+             : "The paper's rows are Table S9 as printed, over all tasks. " + paper_detector_sentence();
+}
+
+TitledTable perturbed_table(const Degradation& result) {
+  TitledTable titled = labelled_table("Perturbations: success and loss", labels_of(result.success));
+  titled.table.header.insert(titled.table.header.end(), {"Perturbation", "n", "Success [%]", "Against clean [points]",
+                                                         "Success, paper's detectors [%]"});
+  ++titled.table.label_columns;
+  for (std::size_t i = 0; i < result.success.size(); ++i) {
+    const PerturbedSuccess& entry = result.success[i];
+    std::vector<std::string>& cells = titled.table.rows[i];
+    cells.insert(cells.end(), {entry.perturbation, count_cell(entry.success.n), rate_cell(entry.success),
+                               points(entry.difference.difference, entry.difference.interval), rate_cell(entry.paper)});
+  }
+  titled.notes = {fmt::format(
+      "Success under the headline detector with {0:g} % Wilson intervals. Against clean: the same episodes perturbed "
+      "minus clean, with Newcombe's paired {0:g} % interval; where it contains 0 these episodes show no loss.",
+      100.0 * result.level)};
+  return titled;
+}
+
+void add_curve_cells(const DegradationCurve& curve, std::vector<std::string>& cells) {
+  cells.insert(cells.end(), {curve.family, decimals(curve.normalised_area, 3), with_unit(curve.largest, curve.unit),
+                             points(curve.difference.difference, curve.difference.interval)});
+}
+
+TitledTable curve_table(const Degradation& result) {
+  TitledTable titled = labelled_table("Perturbations: curves", labels_of(result.curves));
+  for (std::size_t i = 0; i < result.curves.size(); ++i) add_curve_cells(result.curves[i], titled.table.rows[i]);
+  for (const DegradationCurve& curve : result.paper) add_curve_cells(curve, add_paper_row(curve.key.policy, titled));
+  titled.table.header.insert(titled.table.header.end(), {"Family", "Area", "Largest", "Loss there [points]"});
+  ++titled.table.label_columns;
+  titled.notes = {
+      "Area: under success over the size of the perturbation, from the clean episodes to the largest, over "
+      "that of clean throughout; 1 is no loss."};
+  if (!result.paper.empty()) titled.notes.push_back(paper_curves_sentence(result));
+  return titled;
+}
+
+LineSeries series_of(const std::string& name, const DegradationCurve& curve) {
+  LineSeries series{.name = name, .x = {}, .y = {}};
+  for (const CurvePoint& point : curve.points) {
+    series.x.push_back(point.x);
+    series.y.push_back(100.0 * point.success);
+  }
+  return series;
+}
+
+std::vector<LinePlot> degradation_plots(const Degradation& result) {
+  std::map<std::vector<std::string>, LinePlot> plots;
+  for (const DegradationCurve& curve : result.curves) {
+    LinePlot& plot = plots[{curve.family, curve.unit, curve.key.engine, curve.key.controller}];
+    if (plot.series.empty()) {
+      plot.title = fmt::format("{}: {} in {}", curve.family, curve.key.controller, curve.key.engine);
+      plot.x_label = curve.unit.empty() ? curve.family : fmt::format("{} [{}]", curve.family, curve.unit);
+      plot.y_label = "success [%]";
+    }
+    plot.series.push_back(series_of(policy_name(curve.key), curve));
+  }
+  std::vector<LinePlot> list;
+  for (auto& [key, plot] : plots) {
+    for (const DegradationCurve& curve : result.paper)
+      if (curve.family == key[0] && curve.unit == key[1])
+        plot.series.push_back(series_of(curve.key.policy + " (the paper's)", curve));
+    list.push_back(std::move(plot));
+  }
+  return list;
+}
+
+void add_success_figures(const PerturbedSuccess& entry, std::vector<Figure>& into) {
+  FiguresOf figures = figures_of(entry.key, into);
+  figures.keys.perturbation = entry.perturbation;
+  figures.rate("success", entry.success);
+  if (entry.paper.n > 0) figures.rate("paper_success", entry.paper);
+  if (entry.difference.pairs > 0) add_difference("against_clean", entry.difference, figures);
+  const std::optional<PerturbationSize> size = perturbation_size(entry.perturbation);
+  if (!size) return;
+  figures.keys.of = size->family;
+  figures.add("size", {}, size->x, kNoInterval, size->unit);
+}
+
+void add_curve_figures(const DegradationCurve& curve, FiguresOf figures) {
+  figures.keys.of = curve.family;
+  figures.add("normalised_area", static_cast<long>(curve.points.size()), curve.normalised_area);
+  figures.add("largest", {}, curve.largest, kNoInterval, curve.unit);
+  add_difference("loss_at_largest", curve.difference, figures);
+}
+
+// The paper's perturbations are called as ours would be: "jitter_0.01m".
+void add_paper_figures(const DegradationCurve& curve, std::vector<Figure>& into) {
+  FiguresOf figures = paper_figures_of(curve.key.policy, into);
+  add_curve_figures(curve, figures);
+  figures.keys.of = curve.family;
+  for (const CurvePoint& point : curve.points) {
+    figures.keys.perturbation = point.x == 0.0 ? kClean : fmt::format("{}_{:g}{}", curve.family, point.x, curve.unit);
+    figures.add("success", {}, point.success);
+    figures.add("size", {}, point.x, kNoInterval, curve.unit);
+  }
+}
+
 }  // namespace
 
 std::optional<PerturbationSize> perturbation_size(std::string_view name) {
@@ -155,7 +264,7 @@ std::optional<PerturbationSize> perturbation_size(std::string_view name) {
   return in_si(name.substr(0, family_end), std::stod(number.substr(sign)), name.substr(number_end));
 }
 
-Degradation degradation(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options) {
+Degradation degradation(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   Degradation result{.level = options.level, .success = {}, .curves = {}, .paper = {}};
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
     if (perturbed.size() < 2 || !perturbed.contains(kClean)) continue;
@@ -165,6 +274,21 @@ Degradation degradation(const std::vector<EpisodeRow>& rows, const PolicyTableOp
   }
   result.paper = paper_curves(result.curves);
   return result;
+}
+
+Analysis degradation_analysis(const Degradation& result) {
+  Analysis analysis{.name = "degradation", .title = "Perturbations", .level = result.level};
+  if (result.success.empty()) {
+    analysis.notes = {"No policy ran both clean and perturbed."};
+    return analysis;
+  }
+  analysis.tables = {perturbed_table(result)};
+  if (!result.curves.empty()) analysis.tables.push_back(curve_table(result));
+  analysis.plots = {{.plots = degradation_plots(result)}};
+  for (const PerturbedSuccess& entry : result.success) add_success_figures(entry, analysis.figures);
+  for (const DegradationCurve& curve : result.curves) add_curve_figures(curve, figures_of(curve.key, analysis.figures));
+  for (const DegradationCurve& curve : result.paper) add_paper_figures(curve, analysis.figures);
+  return analysis;
 }
 
 }  // namespace duet

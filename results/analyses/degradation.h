@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/policy_groups.h"
-#include "duet/results/report/line_plot.h"
 
 namespace duet {
 
@@ -53,14 +53,9 @@ struct Degradation {
 };
 
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
-Degradation degradation(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
+Degradation degradation(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
-// For one without entries: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
-std::vector<TitledTable> degradation_tables(const Degradation& result);
-std::vector<LinePlot> degradation_plots(const Degradation& result);  // per family, engine and controller
-std::string degradation_markdown(const Degradation& result);         // headings of level 3
-std::string degradation_csv(const Degradation& result);              // one figure per line, not rounded
-std::string degradation_latex(const Degradation& result);
-nlohmann::json degradation_json(const Degradation& result);
+// Tables, and plots per family, engine and controller.
+Analysis degradation_analysis(const Degradation& result);
 
 }  // namespace duet

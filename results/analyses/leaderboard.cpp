@@ -16,9 +16,9 @@ namespace {
 
 using RowList = std::vector<const EpisodeRow*>;
 
-struct LeaderboardKey {
+struct EntryKey {
   std::string engine, controller, policy, perturbation, arm;
-  auto operator<=>(const LeaderboardKey&) const = default;
+  auto operator<=>(const EntryKey&) const = default;
 };
 
 // The null arm's counterpart of an episode: the same but for the policy.
@@ -99,7 +99,7 @@ void add_lift(const RowList& rows, const std::map<Counterpart, const EpisodeRow*
   entry.lift_interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, entry.level);
 }
 
-LeaderboardEntry summarise(const LeaderboardKey& group, const std::string& task, const RowList& rows,
+LeaderboardEntry summarise(const EntryKey& group, const std::string& task, const RowList& rows,
                            const std::map<Counterpart, const EpisodeRow*>& null_rows, double level) {
   LeaderboardEntry entry;
   entry.engine = group.engine;
@@ -120,10 +120,10 @@ LeaderboardEntry summarise(const LeaderboardKey& group, const std::string& task,
 
 }  // namespace
 
-std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options) {
+std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   const RowList sorted = distinct_episodes(rows);
   const std::map<Counterpart, const EpisodeRow*> null_rows = null_arm(sorted);
-  std::map<LeaderboardKey, RowList> groups;
+  std::map<EntryKey, RowList> groups;
   for (const EpisodeRow* row : sorted) {
     RowList& group = groups[{row->engine, row->controller, row->policy, row->perturbation, row->arm}];
     if (!group.empty()) require_distinct(*group.back(), *row);

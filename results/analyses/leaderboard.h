@@ -1,20 +1,16 @@
-// Tables from rows: success per group with intervals beside the null arm, metrics, comparison of two runs.
+// The leaderboard: success per group with intervals beside the null arm, metrics; comparison of two runs.
 #pragma once
 
 #include <map>
 #include <string>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
+#include "duet/results/analyses/metric_column.h"
 #include "duet/results/rows/episode_row.h"
 #include "duet/results/statistics/statistics.h"
 
 namespace duet {
-
-struct LeaderboardOptions {
-  double level = 0.95;
-  int resamples = 10000;
-  std::uint64_t seed = 1;
-};
 
 // Success of one (engine, controller, policy, perturbation) over one task, or over all ("all", micro average).
 struct LeaderboardEntry {
@@ -41,12 +37,13 @@ struct LeaderboardEntry {
 // Sorted by engine, controller, policy, perturbation, task (order of all_tasks(), "all" last); arms of one policy in
 // turn. An episode succeeds where its headline verdict does and its outcome is ok or fell. Throws InputError: rows of
 // two suites or suite versions, an episode that is there twice.
-std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const LeaderboardOptions& options = {});
+std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
-std::string leaderboard_markdown(const std::vector<LeaderboardEntry>& entries, bool with_metrics = true);
-std::string leaderboard_csv(const std::vector<LeaderboardEntry>& entries);
-std::string leaderboard_latex(const std::vector<LeaderboardEntry>& entries);
-nlohmann::json leaderboard_json(const std::vector<LeaderboardEntry>& entries);
+inline constexpr const char* kLeaderboardName = "leaderboard";  // of its analysis
+
+// `columns`: units of metrics. Means of metrics are too long for a terminal where there are several physics engines.
+Analysis leaderboard_analysis(const std::vector<LeaderboardEntry>& entries,
+                              const std::vector<MetricColumn>& columns = {}, bool with_metrics = true);
 
 struct Comparison {
   std::string group;  // "engine/controller/policy task"
@@ -58,6 +55,8 @@ struct Comparison {
   double minimum_detectable = 0.0;
   double level = 0.95;                  // of both intervals
   long unpaired_a = 0, unpaired_b = 0;  // episodes of the group that the other run lacks; left out
+  // Parts of `group`; "replay vs null" where that is what is compared.
+  std::string engine = {}, controller = {}, policy = {}, perturbation = {}, task = {};
 };
 
 // Pairs rows of the main arm by task, clip, episode and the group fields they share; per task and over all. Where A and
@@ -65,8 +64,6 @@ struct Comparison {
 // ("mujoco/vmc/replay vs null hug"). Throws InputError where nothing pairs (it says what differs), for rows of two
 // suite versions and for an episode that is there twice.
 std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
-                                     const LeaderboardOptions& options = {});
-std::string comparison_markdown(const std::vector<Comparison>& comparisons);
-nlohmann::json comparison_json(const std::vector<Comparison>& comparisons);
+                                     const IntervalOptions& options = {});
 
 }  // namespace duet

@@ -28,19 +28,9 @@ std::string policy_label(const LeaderboardRow& row) {
   return row.policy == row.arm ? fmt::format("{} (control)", row.arm) : fmt::format("{} ({} arm)", row.policy, row.arm);
 }
 
-bool is_constant(const std::vector<LeaderboardRow>& rows, std::string LeaderboardRow::*field) {
-  return std::all_of(rows.begin(), rows.end(),
-                     [&](const LeaderboardRow& row) { return row.*field == rows.front().*field; });
-}
-
 std::string joined(const std::vector<std::string>& words, const char* separator) {
   std::string text;
   for (const std::string& word : words) text.append(text.empty() ? "" : separator).append(word);
-  return text;
-}
-
-std::string capitalised(std::string text) {
-  if (!text.empty() && text.front() >= 'a' && text.front() <= 'z') text.front() -= 'a' - 'A';
   return text;
 }
 
@@ -146,25 +136,11 @@ std::vector<std::string> metric_names(const std::vector<LeaderboardEntry>& entri
 }
 
 RowLabels row_labels(const std::vector<LeaderboardRow>& rows) {
-  RowLabels labels;
-  labels.cells.resize(rows.size());
-  std::vector<std::string> constants;
-  const auto add = [&](const char* title, const char* word, std::string LeaderboardRow::*field) {
-    if (rows.empty()) return;
-    if (is_constant(rows, field)) {
-      constants.push_back(fmt::format("{} {}", word, rows.front().*field));
-      return;
-    }
-    labels.columns.emplace_back(title);
-    for (std::size_t i = 0; i < rows.size(); ++i) labels.cells[i].push_back(rows[i].*field);
-  };
-  add("Engine", "engine", &LeaderboardRow::engine);
-  add("Controller", "controller", &LeaderboardRow::controller);
-  add("Perturbation", "perturbation", &LeaderboardRow::perturbation);
-  labels.columns.emplace_back("Policy");
-  for (std::size_t i = 0; i < rows.size(); ++i) labels.cells[i].push_back(policy_label(rows[i]));
-  if (!constants.empty()) labels.caption = capitalised(joined(constants, ", ")) + ".";
-  return labels;
+  LabelColumn policies{"Policy", {}, true};
+  for (const LeaderboardRow& row : rows) policies.values.push_back(policy_label(row));
+  return row_labels({label_column("Engine", rows, &LeaderboardRow::engine),
+                     label_column("Controller", rows, &LeaderboardRow::controller),
+                     label_column("Perturbation", rows, &LeaderboardRow::perturbation), policies});
 }
 
 std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& entries) {
@@ -219,28 +195,5 @@ std::vector<std::string> policy_fault_notes(const std::vector<LeaderboardEntry>&
   }
   return notes;
 }
-
-std::string task_title(const std::string& task) {
-  if (task == "all") return "Overall";
-  std::string title = task;
-  std::replace(title.begin(), title.end(), '_', '-');
-  return capitalised(title);
-}
-
-std::string percent(double fraction) { return std::isfinite(fraction) ? fmt::format("{:.1f}", 100.0 * fraction) : "-"; }
-
-std::string percent(double fraction, const Interval& interval) {
-  if (!std::isfinite(fraction)) return "-";
-  return fmt::format("{:.1f} [{:.1f}, {:.1f}]", 100.0 * fraction, 100.0 * interval.low, 100.0 * interval.high);
-}
-
-std::string points(double difference, const Interval& interval) {
-  if (!std::isfinite(difference)) return "-";
-  // Adding 0.0 turns -0.0 into 0.0, so that no table prints "-0.0".
-  const auto rounded = [](double fraction) { return std::round(1000.0 * fraction) / 10.0 + 0.0; };
-  return fmt::format("{:+.1f} [{:.1f}, {:.1f}]", rounded(difference), rounded(interval.low), rounded(interval.high));
-}
-
-std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-"; }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/cells.h"
 #include "duet/results/analyses/leaderboard.h"
 
 namespace duet {
@@ -31,12 +32,7 @@ std::vector<std::string> leaderboard_tasks(const std::vector<LeaderboardEntry>& 
 std::vector<std::string> other_verdicts(const std::vector<LeaderboardEntry>& entries);
 std::vector<std::string> metric_names(const std::vector<LeaderboardEntry>& entries);
 
-// Columns that tell rows apart; those with one value throughout go into the caption.
-struct RowLabels {
-  std::vector<std::string> columns;             // "Engine", ..., always with "Policy"
-  std::vector<std::vector<std::string>> cells;  // per row
-  std::string caption;                          // "Engine mujoco, controller vmc." or ""
-};
+// "Engine", "Controller" and "Perturbation" as far as they differ, and "Policy".
 RowLabels row_labels(const std::vector<LeaderboardRow>& rows);
 
 // Sentences that belong under a leaderboard: what the figures are, small samples, episodes without a null pair,
@@ -50,11 +46,5 @@ std::string plans_lost(const LeaderboardEntry& entry);  // "13 late, 2 invalid, 
 
 // A sentence for each policy that left out a plan or died, with the first message of it; none where none did.
 std::vector<std::string> policy_fault_notes(const std::vector<LeaderboardEntry>& entries);
-
-std::string task_title(const std::string& task);                  // "high_five" -> "High-five", "all" -> "Overall"
-std::string percent(double fraction);                             // "84.9", "-" for NaN
-std::string percent(double fraction, const Interval& interval);   // "84.9 [77.6, 90.1]"
-std::string points(double difference, const Interval& interval);  // "+12.3 [4.5, 20.1]"
-std::string significant(double value);                            // four significant digits, "-" for NaN
 
 }  // namespace duet

@@ -7,7 +7,6 @@
 #include <map>
 
 #include "duet/core/require.h"
-#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {
@@ -96,7 +95,7 @@ TitledTable titled_ladder(const LevelTable& table) {
     std::vector<std::string>& cells = titled.table.rows[i];
     for (const Rate& rate : entry.levels) cells.push_back(rate_cell(rate));
     cells.push_back(percent(entry.mean));
-    cells.push_back(entry.reached ? fmt::format("{}", *entry.reached) : "none");
+    cells.push_back(entry.reached ? count_cell(*entry.reached) : "none");
   }
   titled.notes = {
       fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals. Mean: over the {0}s, "
@@ -106,17 +105,24 @@ TitledTable titled_ladder(const LevelTable& table) {
   return titled;
 }
 
-nlohmann::json json_of(const LevelTable& table) {
-  nlohmann::json levels = nlohmann::json::array(), entries = nlohmann::json::array();
-  for (const LevelName& level : table.levels) levels.push_back({{"level", level.level}, {"name", level.name}});
+// "level_3_walks_up", as perturbations and clips are called.
+std::string level_key(const Ladder& ladder, const LevelName& level) {
+  return fmt::format("{}_{}{}{}", ladder.word, level.level, level.name.empty() ? "" : "_", level.name);
+}
+
+void add_level_figures(const LevelTable& table, std::vector<Figure>& into) {
+  FiguresOf{{.of = std::string(table.ladder.word)}, into}.add("pass", {}, table.ladder.pass);
   for (const LevelEntry& entry : table.entries) {
-    nlohmann::json json = json_of(entry.key);
-    for (const Rate& rate : entry.levels) json["success"].push_back(json_of(rate));
-    json["mean"] = entry.mean;
-    json["reached"] = entry.reached ? nlohmann::json(*entry.reached) : nlohmann::json();
-    entries.push_back(std::move(json));
+    FiguresOf figures = figures_of(entry.key, into);
+    for (std::size_t i = 0; i < entry.levels.size(); ++i) {
+      figures.keys.of = level_key(table.ladder, table.levels[i]);
+      figures.rate("success", entry.levels[i]);
+    }
+    figures.keys.of = table.ladder.word;
+    const auto levels = static_cast<long>(entry.levels.size());
+    figures.add("mean", levels, entry.mean);
+    if (entry.reached) figures.count("reached", levels, *entry.reached);
   }
-  return {{"ladder", table.ladder.word}, {"pass", table.ladder.pass}, {"levels", levels}, {"entries", entries}};
 }
 
 }  // namespace
@@ -144,41 +150,14 @@ std::vector<LevelTable> level_tables(const std::vector<EpisodeRow>& rows, double
   return tables;
 }
 
-std::vector<TitledTable> titled_levels(const std::vector<LevelTable>& tables) {
-  std::vector<TitledTable> titled;
-  titled.reserve(tables.size());
-  for (const LevelTable& table : tables) titled.push_back(titled_ladder(table));
-  return titled;
-}
-
-std::string levels_markdown(const std::vector<LevelTable>& tables) { return tables_markdown(titled_levels(tables)); }
-
-std::string levels_latex(const std::vector<LevelTable>& tables) {
-  return tables.empty() ? "" : tables_latex(titled_levels(tables));
-}
-
-std::string levels_csv(const std::vector<LevelTable>& tables) {
-  TextTable lines = figure_lines("level");
+Analysis level_analysis(const std::vector<LevelTable>& tables) {
+  Analysis analysis{.name = "levels", .title = "Levels"};
   for (const LevelTable& table : tables) {
-    for (const LevelEntry& entry : table.entries) {
-      for (std::size_t i = 0; i < entry.levels.size(); ++i) {
-        const Rate& rate = entry.levels[i];
-        add_figure_line("duet", entry.key, fmt::format("{}_{}", table.ladder.word, table.levels[i].level), "success",
-                        rate.n, rate.rate, rate.interval, lines);
-      }
-      const std::string all(table.ladder.word);
-      const auto levels = static_cast<long>(entry.levels.size());
-      add_figure_line("duet", entry.key, all, "mean", levels, entry.mean, kNoInterval, lines);
-      if (entry.reached) add_figure_line("duet", entry.key, all, "reached", levels, *entry.reached, kNoInterval, lines);
-    }
+    analysis.level = table.level;
+    analysis.tables.push_back(titled_ladder(table));
+    add_level_figures(table, analysis.figures);
   }
-  return csv_table(lines);
-}
-
-nlohmann::json levels_json(const std::vector<LevelTable>& tables) {
-  nlohmann::json json = nlohmann::json::array();
-  for (const LevelTable& table : tables) json.push_back(json_of(table));
-  return {{"schema", "duet.levels/1"}, {"tables", std::move(json)}};
+  return analysis;
 }
 
 }  // namespace duet

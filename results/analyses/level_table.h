@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/policy_groups.h"
 
 namespace duet {
@@ -49,11 +50,7 @@ struct LevelTable {
 // of one level.
 std::vector<LevelTable> level_tables(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
-// "" and empty for no table.
-std::vector<TitledTable> titled_levels(const std::vector<LevelTable>& tables);
-std::string levels_markdown(const std::vector<LevelTable>& tables);  // headings of level 3
-std::string levels_csv(const std::vector<LevelTable>& tables);       // one figure per line, not rounded
-std::string levels_latex(const std::vector<LevelTable>& tables);
-nlohmann::json levels_json(const std::vector<LevelTable>& tables);
+// A table per ladder.
+Analysis level_analysis(const std::vector<LevelTable>& tables);
 
 }  // namespace duet

@@ -7,12 +7,9 @@
 
 #include "duet/core/synthetic_id.h"
 #include "duet/results/rows/distinct_episodes.h"
-#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {
-
-constexpr const char* kOneKind = "No run with recorded and synthetic people.";
 
 struct PeopleCounts {
   long n = 0, successes = 0, falls = 0;
@@ -58,11 +55,41 @@ void add_people(const PolicyKey& key, const PeopleByTask& tasks, PeopleTable& ta
 }
 
 std::vector<std::string> people_cells(const PeopleRates& rates) {
-  return {fmt::format("{}", rates.success.n), rate_cell(rates.success), percent(rates.falls.rate)};
+  return {count_cell(rates.success.n), rate_cell(rates.success), percent(rates.falls.rate)};
 }
 
-nlohmann::json json_of(const PeopleRates& rates) {
-  return {{"success", json_of(rates.success)}, {"falls", json_of(rates.falls)}};
+TitledTable people_rows(const PeopleTable& table) {
+  TitledTable titled = labelled_table("Recorded and synthetic people", labels_of(table.entries));
+  titled.table.header.insert(titled.table.header.end(), {"Task", "n", "Recorded [%]", "Fell [%]", "n", "Synthetic [%]",
+                                                         "Fell [%]", "Recorded - synthetic [points]"});
+  ++titled.table.label_columns;
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    const PeopleEntry& entry = table.entries[i];
+    std::vector<std::string>& cells = titled.table.rows[i];
+    cells.push_back(task_title(entry.task));
+    for (const PeopleRates* rates : {&entry.recorded, &entry.synthetic})
+      for (std::string& cell : people_cells(*rates)) cells.push_back(std::move(cell));
+    cells.push_back(points(entry.difference, entry.interval));
+  }
+  titled.notes = {
+      fmt::format("Success under the headline detector with {0:g} % Wilson intervals; the difference with Newcombe's "
+                  "{0:g} % interval for independent shares. Where both roles of a clip are run, its two episodes "
+                  "resemble each other and the intervals are too narrow. The leaderboard counts both kinds together.",
+                  100.0 * table.level)};
+  return titled;
+}
+
+void add_people_figures(const PeopleEntry& entry, std::vector<Figure>& into) {
+  FiguresOf figures = figures_of(entry.key, into);
+  figures.keys.task = entry.task;
+  figures.add("recorded_minus_synthetic", entry.recorded.success.n + entry.synthetic.success.n, entry.difference,
+              entry.interval);
+  for (const auto& [people, rates] :
+       {std::pair("recorded", &entry.recorded), std::pair("synthetic", &entry.synthetic)}) {
+    figures.keys.of = people;
+    figures.rate("success", rates->success);
+    figures.rate("falls", rates->falls);
+  }
 }
 
 }  // namespace
@@ -81,64 +108,15 @@ PeopleTable people_table(const std::vector<EpisodeRow>& rows, double level) {
   return table;
 }
 
-std::vector<TitledTable> people_tables(const PeopleTable& table) {
-  if (table.entries.empty()) return {};
-  TitledTable titled = labelled_table("Recorded and synthetic people", labels_of(table.entries));
-  titled.table.header.insert(titled.table.header.end(), {"Task", "n", "Recorded [%]", "Fell [%]", "n", "Synthetic [%]",
-                                                         "Fell [%]", "Recorded - synthetic [points]"});
-  ++titled.table.label_columns;
-  for (std::size_t i = 0; i < table.entries.size(); ++i) {
-    const PeopleEntry& entry = table.entries[i];
-    std::vector<std::string>& cells = titled.table.rows[i];
-    cells.push_back(task_title(entry.task));
-    for (const PeopleRates* rates : {&entry.recorded, &entry.synthetic})
-      for (std::string& cell : people_cells(*rates)) cells.push_back(std::move(cell));
-    cells.push_back(points(entry.difference, entry.interval));
+Analysis people_analysis(const PeopleTable& table) {
+  Analysis analysis{.name = "people", .title = "Recorded and synthetic people", .level = table.level};
+  if (table.entries.empty()) {
+    analysis.notes = {"No run with recorded and synthetic people."};
+    return analysis;
   }
-  titled.notes = {
-      fmt::format("Success under the headline detector with {0:g} % Wilson intervals; the difference with Newcombe's "
-                  "{0:g} % interval for independent shares. Where both roles of a clip are run, its two episodes "
-                  "resemble each other and the intervals are too narrow. The leaderboard counts both kinds together.",
-                  100.0 * table.level)};
-  return {titled};
-}
-
-std::string people_table_markdown(const PeopleTable& table) {
-  return table.entries.empty() ? fmt::format("{}\n", kOneKind) : tables_markdown(people_tables(table));
-}
-
-std::string people_table_csv(const PeopleTable& table) {
-  TextTable lines = figure_lines("task");
-  for (const PeopleEntry& entry : table.entries) {
-    const auto line = [&](const char* figure, const Rate& rate) {
-      add_figure_line("duet", entry.key, entry.task, figure, rate.n, rate.rate, rate.interval, lines);
-    };
-    line("recorded_success", entry.recorded.success);
-    line("recorded_falls", entry.recorded.falls);
-    line("synthetic_success", entry.synthetic.success);
-    line("synthetic_falls", entry.synthetic.falls);
-    add_figure_line("duet", entry.key, entry.task, "recorded_minus_synthetic",
-                    entry.recorded.success.n + entry.synthetic.success.n, entry.difference, entry.interval, lines);
-  }
-  return csv_table(lines);
-}
-
-std::string people_table_latex(const PeopleTable& table) {
-  return table.entries.empty() ? fmt::format("% {}\n", kOneKind) : tables_latex(people_tables(table));
-}
-
-nlohmann::json people_table_json(const PeopleTable& table) {
-  nlohmann::json entries = nlohmann::json::array();
-  for (const PeopleEntry& entry : table.entries) {
-    nlohmann::json json = json_of(entry.key);
-    json["task"] = entry.task;
-    json["recorded"] = json_of(entry.recorded);
-    json["synthetic"] = json_of(entry.synthetic);
-    json["difference"] = number_or_null(entry.difference);
-    json["interval"] = json_of(entry.interval);
-    entries.push_back(std::move(json));
-  }
-  return {{"schema", "duet.people_table/1"}, {"level", table.level}, {"entries", std::move(entries)}};
+  analysis.tables = {people_rows(table)};
+  for (const PeopleEntry& entry : table.entries) add_people_figures(entry, analysis.figures);
+  return analysis;
 }
 
 }  // namespace duet

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/policy_groups.h"
 
 namespace duet {
@@ -30,11 +31,6 @@ struct PeopleTable {
 // Throws InputError: rows of two suites or suite versions.
 PeopleTable people_table(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
-// For a table without entries: one sentence that says so (a comment in LaTeX), the header alone, an empty list.
-std::vector<TitledTable> people_tables(const PeopleTable& table);
-std::string people_table_markdown(const PeopleTable& table);  // a heading of level 3
-std::string people_table_csv(const PeopleTable& table);       // one figure per line, not rounded
-std::string people_table_latex(const PeopleTable& table);
-nlohmann::json people_table_json(const PeopleTable& table);
+Analysis people_analysis(const PeopleTable& table);
 
 }  // namespace duet

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "duet/results/rows/distinct_episodes.h"
-#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {
@@ -30,11 +29,6 @@ std::map<PolicyKey, PerturbedRows> rows_of_policies(const std::vector<EpisodeRow
     if (!is_new) require_distinct(*found->second, *row);
   }
   return policies;
-}
-
-Rate make_rate(long k, long n, double level) {
-  if (n == 0) return {};
-  return {.n = n, .k = k, .rate = static_cast<double>(k) / static_cast<double>(n), .interval = wilson(k, n, level)};
 }
 
 Rate headline_rate(const EpisodeRows& rows, double level) {
@@ -68,30 +62,10 @@ PairedDifference paired_difference(const EpisodeRows& a, const EpisodeRows& b, d
 }
 
 RowLabels policy_labels(const std::vector<PolicyKey>& keys) {
-  RowLabels labels;
-  labels.cells.resize(keys.size());
-  const auto add = [&](const char* title, std::string PolicyKey::*field) {
-    if (std::all_of(keys.begin(), keys.end(),
-                    [&](const PolicyKey& key) { return key.*field == keys.front().*field; })) {
-      if (!keys.empty() && !(keys.front().*field).empty())
-        labels.caption += fmt::format("{}{} {}.", labels.caption.empty() ? "" : " ", title, keys.front().*field);
-      return;
-    }
-    labels.columns.emplace_back(title);
-    for (std::size_t i = 0; i < keys.size(); ++i) labels.cells[i].push_back(keys[i].*field);
-  };
-  add("Engine", &PolicyKey::engine);
-  add("Controller", &PolicyKey::controller);
-  labels.columns.emplace_back("Policy");
-  for (std::size_t i = 0; i < keys.size(); ++i) labels.cells[i].push_back(policy_name(keys[i]));
-  return labels;
-}
-
-TitledTable labelled_table(const std::string& title, const RowLabels& labels) {
-  return {.title = title,
-          .caption = labels.caption,
-          .table = {.header = labels.columns, .rows = labels.cells, .label_columns = labels.columns.size()},
-          .notes = {}};
+  LabelColumn names{"Policy", {}, true};
+  for (const PolicyKey& key : keys) names.values.push_back(policy_name(key));
+  return row_labels({label_column("Engine", keys, &PolicyKey::engine),
+                     label_column("Controller", keys, &PolicyKey::controller), names});
 }
 
 std::vector<std::string>& add_paper_row(const std::string& name, TitledTable& titled) {
@@ -106,38 +80,16 @@ std::string policy_name(const PolicyKey& key) {
 
 std::string rate_cell(const Rate& rate) { return percent(rate.rate, rate.interval); }
 
-std::string tables_markdown(const std::vector<TitledTable>& tables) {
-  std::string text;
-  for (const TitledTable& titled : tables) text.append(text.empty() ? "" : "\n").append(markdown_of(titled));
-  return text;
+FiguresOf figures_of(const PolicyKey& key, std::vector<Figure>& into) {
+  return {{.engine = key.engine, .controller = key.controller, .policy = key.policy, .arm = key.arm}, into};
 }
 
-std::string tables_latex(const std::vector<TitledTable>& tables) {
-  std::string text = "% \\usepackage{booktabs}\n";
-  for (const TitledTable& titled : tables) text.append("\n").append(latex_of(titled));
-  return text;
+FiguresOf paper_figures_of(std::string_view policy, std::vector<Figure>& into) {
+  return {{.source = "paper", .policy = std::string(policy)}, into};
 }
 
-TextTable figure_lines(const std::string& about) {
-  TextTable lines;
-  lines.header = {"source", "engine", "controller", "arm",    "policy", about,
-                  "figure", "n",      "value",      "ci_low", "ci_high"};
-  return lines;
-}
-
-void add_figure_line(const char* source, const PolicyKey& key, const std::string& about, std::string_view figure,
-                     long n, double value, const Interval& interval, TextTable& lines) {
-  lines.rows.push_back({source, key.engine, key.controller, key.arm, key.policy, about, std::string(figure),
-                        fmt::format("{}", n), number_cell(value), number_cell(interval.low),
-                        number_cell(interval.high)});
-}
-
-nlohmann::json json_of(const Rate& rate) {
-  return {{"n", rate.n}, {"k", rate.k}, {"rate", number_or_null(rate.rate)}, {"interval", json_of(rate.interval)}};
-}
-
-nlohmann::json json_of(const PolicyKey& key) {
-  return {{"engine", key.engine}, {"controller", key.controller}, {"arm", key.arm}, {"policy", key.policy}};
+void add_difference(std::string_view name, const PairedDifference& difference, const FiguresOf& figures) {
+  figures.add(name, difference.pairs, difference.difference, difference.interval);
 }
 
 }  // namespace duet

@@ -8,8 +8,7 @@
 #include <tuple>
 
 #include "duet/results/analyses/comparison_parts.h"
-#include "duet/results/analyses/contact_table_parts.h"
-#include "duet/results/analyses/cross_engine.h"
+#include "duet/results/analyses/contact_table.h"
 #include "duet/results/analyses/leaderboard_rows.h"
 
 namespace duet {
@@ -30,7 +29,7 @@ constexpr std::array<PaperTaskRate, 6> rates(double hug, double handshake, doubl
 }
 
 // Source: supplement C.3.3, Table S9.
-constexpr std::array<PaperPolicy, 9> kPaper = {
+constexpr std::array<PaperPolicy, 9> kPaperPolicies = {
     {{"D-STAR", "", 0.0, 84.9, rates(93.3, 77.4, 70.4, 96.3, 93.3, 90.9)},
      {"D-STAR, jitter 1 cm", "jitter", 0.01, 80.2, rates(93.3, 64.5, 63.0, 96.3, 93.3, 90.9)},
      {"D-STAR, jitter 2 cm", "jitter", 0.02, 79.4, rates(100.0, 61.3, 59.3, 96.3, 93.3, 90.9)},
@@ -80,7 +79,7 @@ void add_mean(const std::map<PolicyKey, PerturbedRows>& policies, ClusterBootstr
   if (engines.empty()) return;
   std::vector<double> means;
   std::vector<int> clips;
-  std::map<std::pair<std::string, std::string>, int> numbers;
+  ClipNumbers numbers;
   for (const auto& [id, row] : *engines.front()) {
     double successes = 0.0;
     bool in_all = true;
@@ -91,7 +90,7 @@ void add_mean(const std::map<PolicyKey, PerturbedRows>& policies, ClusterBootstr
     }
     if (!in_all) continue;
     means.push_back(successes / static_cast<double>(engines.size()));
-    clips.push_back(numbers.try_emplace({id.task, id.clip}, static_cast<int>(numbers.size())).first->second);
+    clips.push_back(numbers.of(id));
   }
   if (means.empty()) return;
   line.mean_success = 0.0;
@@ -129,7 +128,7 @@ std::map<LineKey, PolicyLine> lines_of(const std::vector<LeaderboardEntry>& entr
 }
 
 std::optional<Comparison> compared(const PolicyKey& a, const EpisodeRows& of_a, const PolicyKey& b,
-                                   const EpisodeRows& of_b, const LeaderboardOptions& options) {
+                                   const EpisodeRows& of_b, const IntervalOptions& options) {
   PairedRows gathered;
   for (const auto& [id, row] : of_a) {
     const auto found = of_b.find(id);
@@ -137,12 +136,16 @@ std::optional<Comparison> compared(const PolicyKey& a, const EpisodeRows& of_a, 
   }
   if (gathered.table.pairs() == 0) return std::nullopt;
   gathered.unpaired_b = static_cast<long>(of_b.size()) - gathered.table.pairs();
-  return evaluate(fmt::format("{}/{}: {} vs {}", a.engine, a.controller, a.policy, b.policy), gathered, options);
+  Comparison pair = evaluate(gathered, options);
+  pair.group = fmt::format("{}/{}: {} vs {}", a.engine, a.controller, a.policy, b.policy);
+  std::tie(pair.engine, pair.controller, pair.perturbation, pair.task) =
+      std::tuple(a.engine, a.controller, std::string(kClean), "all");
+  pair.policy = fmt::format("{} vs {}", a.policy, b.policy);
+  return pair;
 }
 
 // Every policy with every other of the same engine and controller.
-std::vector<Comparison> all_pairs(const std::map<PolicyKey, PerturbedRows>& policies,
-                                  const LeaderboardOptions& options) {
+std::vector<Comparison> all_pairs(const std::map<PolicyKey, PerturbedRows>& policies, const IntervalOptions& options) {
   std::vector<Comparison> pairs;
   for (auto a = policies.begin(); a != policies.end(); ++a) {
     for (auto b = std::next(a); b != policies.end(); ++b) {
@@ -173,7 +176,7 @@ std::map<std::string, long> policies_that_never_ran(const std::vector<Leaderboar
 
 }  // namespace
 
-std::span<const PaperPolicy> paper_policies() { return kPaper; }
+std::span<const PaperPolicy> paper_policies() { return kPaperPolicies; }
 
 OverEngines over_engines(const PolicyLine& line, const PolicyFigure& figure) {
   OverEngines over{.engines = 0, .mean = kNone, .range = kNone, .worst = ""};
@@ -195,19 +198,18 @@ OverEngines over_engines(const PolicyLine& line, const PolicyFigure& figure) {
   return over;
 }
 
-PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options) {
+PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   PolicyTable table{.level = options.level, .lines = {}, .pairs = {}, .could_not_run = {}, .faults = {}};
-  const LeaderboardOptions paired{options.level, options.resamples, options.seed};
   const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);
   if (std::all_of(policies.begin(), policies.end(), [](const auto& of) { return of.first.policy == kReplay; }))
     return table;
-  const std::vector<LeaderboardEntry> entries = leaderboard(rows, paired);
+  const std::vector<LeaderboardEntry> entries = leaderboard(rows, options);
   ClusterBootstrap bootstrap(options.resamples, options.seed);
   for (auto& [key, line] : lines_of(entries, policies, options.level)) {
     add_mean(policies, bootstrap, options.level, line);
     table.lines.push_back(std::move(line));
   }
-  table.pairs = all_pairs(policies, paired);
+  table.pairs = all_pairs(policies, options);
   table.could_not_run = policies_that_never_ran(entries);
   table.faults = policy_fault_notes(entries);
   return table;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "duet/core/task.h"
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/leaderboard.h"
 #include "duet/results/analyses/policy_groups.h"
 
@@ -71,7 +72,7 @@ struct PolicyTable {
 };
 
 // Empty where the only policy is `replay`, which decides nothing. Throws InputError as leaderboard() does.
-PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
+PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
 struct PaperTaskRate {
   Task task;
@@ -87,11 +88,7 @@ struct PaperPolicy {
 std::span<const PaperPolicy> paper_policies();
 std::string paper_detector_sentence();  // why only one column can be held against it
 
-// For a table without lines: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
-std::vector<TitledTable> policy_tables(const PolicyTable& table);
-std::string policy_table_markdown(const PolicyTable& table);  // headings of level 3
-std::string policy_table_csv(const PolicyTable& table);       // one figure per line, not rounded
-std::string policy_table_latex(const PolicyTable& table);
-nlohmann::json policy_table_json(const PolicyTable& table);
+// Of one engine a column per figure, of several a table per figure; by task with the paper's rows; policies in pairs.
+Analysis policy_analysis(const PolicyTable& table);
 
 }  // namespace duet

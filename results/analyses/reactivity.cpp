@@ -1,5 +1,7 @@
 #include "duet/results/analyses/reactivity.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -28,22 +30,22 @@ Onsets onsets_of(const EpisodeRow& row) {
 }
 
 // What is gathered of one policy before its figures are computed.
-struct Gathered {
+struct GatheredShifts {
   std::vector<double> products, squares;  // robot's times partner's shift, partner's squared
   std::vector<int> clips;
-  std::map<std::pair<std::string, std::string>, int> numbers;
+  ClipNumbers numbers;
   std::vector<double> delays;
   long without = 0;
 
   void add(const EpisodeId& id, double robot, double partner) {
     products.push_back(robot * partner);
     squares.push_back(partner * partner);
-    clips.push_back(numbers.try_emplace({id.task, id.clip}, static_cast<int>(numbers.size())).first->second);
+    clips.push_back(numbers.of(id));
   }
 };
 
 OnsetShift gather(const std::string& perturbation, const EpisodeRows& perturbed, const EpisodeRows& clean,
-                  Gathered& gathered) {
+                  GatheredShifts& gathered) {
   OnsetShift shift{.perturbation = perturbation};
   for (const auto& [id, row] : perturbed) {
     const auto found = clean.find(id);
@@ -86,7 +88,7 @@ Reactivity timing_of(const PolicyKey& key, const PerturbedRows& rows, ClusterBoo
   const EpisodeRows& clean = rows.find(kClean)->second;
   Reactivity of;
   of.key = key;
-  Gathered gathered;
+  GatheredShifts gathered;
   for (const auto& [perturbation, episodes] : rows) {
     if (perturbation == kClean) continue;
     OnsetShift shift = gather(perturbation, episodes, clean, gathered);
@@ -122,6 +124,104 @@ std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& ro
   return spatial;
 }
 
+std::string seconds(double value) { return std::isfinite(value) ? fmt::format("{:+.2f}", value + 0.0) : "-"; }
+
+TitledTable timing_table(const ReactivityTable& table) {
+  TitledTable titled = labelled_table("Reactivity: when the robot acts", labels_of(table.timing));
+  titled.table.header.insert(titled.table.header.end(),
+                             {"n", "Did not act", "Slope", "Delay, clean [s]", "Delay, partner moved [s]"});
+  for (std::size_t i = 0; i < table.timing.size(); ++i) {
+    const Reactivity& of = table.timing[i];
+    titled.table.rows[i].insert(titled.table.rows[i].end(),
+                                {count_cell(of.n), count_cell(of.without), decimals(of.slope, of.interval, 2),
+                                 seconds(of.delay_clean), seconds(of.delay_moved)});
+  }
+  titled.notes = {fmt::format(
+      "n: perturbed episodes whose partner's onset is {:g} s or more from that of the same episode clean. Slope: of "
+      "the "
+      "robot's onset shift over the partner's, least squares through the origin, with a {:g} % interval, clips drawn "
+      "again; 1 follows its partner, 0 plays its clip. Delay: median of the robot's onset minus its partner's. Did not "
+      "act: of such episodes, those without an onset of the robot, here or clean; they are in no slope.",
+      kPartnerShift, 100.0 * table.level)};
+  return titled;
+}
+
+TitledTable spatial_table(const ReactivityTable& table) {
+  TitledTable titled = labelled_table("Reactivity: where the partner's hand is (Table S10)", labels_of(table.spatial));
+  titled.table.header.emplace_back("Task");
+  ++titled.table.label_columns;
+  for (const SpatialCell& cell : kSpatialCells) titled.table.header.push_back(fmt::format("{} [%]", cell.title));
+  for (std::size_t i = 0; i < table.spatial.size(); ++i) {
+    std::vector<std::string>& cells = titled.table.rows[i];
+    cells.push_back(task_title(table.spatial[i].task));
+    for (const Rate& rate : table.spatial[i].cells) cells.push_back(rate_cell(rate));
+  }
+  --titled.table.label_columns;
+  std::vector<std::string>& paper = add_paper_row("D-STAR", titled);
+  ++titled.table.label_columns;
+  paper.push_back(task_title("handshake"));
+  for (const SpatialCell& cell : kSpatialCells) paper.push_back(percent(cell.paper));
+  titled.notes = {fmt::format(
+      "Success in % of clean episodes under the headline detector with {:g} % Wilson intervals, by the hand "
+      "and height that the partner offers. The paper's row is Table S10 as printed: handshakes with a real "
+      "robot, its number of trials not stated.",
+      100.0 * table.level)};
+  return titled;
+}
+
+std::vector<LinePlot> reactivity_plots(const ReactivityTable& table) {
+  std::map<std::pair<std::string, std::string>, LinePlot> plots;
+  for (const Reactivity& of : table.timing) {
+    if (of.shifts.empty()) continue;
+    LinePlot& plot = plots[{of.key.engine, of.key.controller}];
+    plot.title = fmt::format("Onset shifts: {} in {}", of.key.controller, of.key.engine);
+    plot.x_label = "shift of the partner's onset [s]";
+    plot.y_label = "of the robot's [s]";
+    LineSeries& series = plot.series.emplace_back();
+    series.name = policy_name(of.key);
+    for (const OnsetShift& shift : of.shifts) {
+      series.x.push_back(shift.partner);
+      series.y.push_back(shift.robot);
+    }
+  }
+  std::vector<LinePlot> list;
+  list.reserve(plots.size());
+  for (auto& [key, plot] : plots) list.push_back(std::move(plot));
+  return list;
+}
+
+void add_timing_figures(const Reactivity& of, std::vector<Figure>& into) {
+  FiguresOf figures = figures_of(of.key, into);
+  figures.keys.task = "all";
+  figures.add("slope", of.n, of.slope, of.interval);
+  figures.count("did_not_act", of.n + of.without, of.without);
+  figures.add("delay_clean", of.n_clean, of.delay_clean, kNoInterval, "s");
+  figures.add("delay_moved", of.n, of.delay_moved, kNoInterval, "s");
+  for (const OnsetShift& shift : of.shifts) {
+    figures.keys.perturbation = shift.perturbation;
+    figures.add("partner_shift", shift.n, shift.partner, kNoInterval, "s");
+    figures.add("robot_shift", shift.n, shift.robot, kNoInterval, "s");
+  }
+}
+
+void add_spatial_figures(const std::vector<SpatialCells>& spatial, std::vector<Figure>& into) {
+  for (const SpatialCells& of : spatial) {
+    FiguresOf figures = figures_of(of.key, into);
+    figures.keys.task = of.task;
+    for (std::size_t i = 0; i < kSpatialCells.size(); ++i) {
+      figures.keys.of = kSpatialCells[i].variant;
+      figures.rate("success", of.cells[i]);
+    }
+  }
+  if (spatial.empty()) return;
+  FiguresOf figures = paper_figures_of("D-STAR", into);
+  figures.keys.task = "handshake";
+  for (const SpatialCell& cell : kSpatialCells) {
+    figures.keys.of = cell.variant;
+    figures.add("success", {}, cell.paper);
+  }
+}
+
 }  // namespace
 
 int spatial_cell(std::string_view clip) {
@@ -135,7 +235,7 @@ int spatial_cell(std::string_view clip) {
   return -1;
 }
 
-ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options) {
+ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   ReactivityTable table{.level = options.level, .timing = {}, .spatial = {}};
   ClusterBootstrap bootstrap(options.resamples, options.seed);
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
@@ -146,6 +246,17 @@ ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const Poli
     for (SpatialCells& cells : spatial_of(key, clean->second, options.level)) table.spatial.push_back(std::move(cells));
   }
   return table;
+}
+
+Analysis reactivity_analysis(const ReactivityTable& table) {
+  Analysis analysis{.name = "reactivity", .title = "Reactivity", .level = table.level};
+  if (table.empty()) analysis.notes = {"No perturbation moved a partner's onset, and no clip names a spatial variant."};
+  if (!table.timing.empty()) analysis.tables.push_back(timing_table(table));
+  if (!table.spatial.empty()) analysis.tables.push_back(spatial_table(table));
+  analysis.plots = {{.plots = reactivity_plots(table)}};
+  for (const Reactivity& of : table.timing) add_timing_figures(of, analysis.figures);
+  add_spatial_figures(table.spatial, analysis.figures);
+  return analysis;
 }
 
 }  // namespace duet

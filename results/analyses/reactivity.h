@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/policy_groups.h"
-#include "duet/results/report/line_plot.h"
 
 namespace duet {
 
@@ -62,14 +62,9 @@ struct ReactivityTable {
 int spatial_cell(std::string_view clip);
 
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
-ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const PolicyTableOptions& options = {});
+ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
-// For an empty one: one sentence that says so (a comment in LaTeX), the header alone, empty lists.
-std::vector<TitledTable> reactivity_tables(const ReactivityTable& table);
-std::vector<LinePlot> reactivity_plots(const ReactivityTable& table);  // per engine and controller, as Figure S4
-std::string reactivity_markdown(const ReactivityTable& table);         // headings of level 3
-std::string reactivity_csv(const ReactivityTable& table);              // one figure per line, not rounded
-std::string reactivity_latex(const ReactivityTable& table);
-nlohmann::json reactivity_json(const ReactivityTable& table);
+// Tables, and plots per engine and controller as Figure S4.
+Analysis reactivity_analysis(const ReactivityTable& table);
 
 }  // namespace duet

@@ -70,7 +70,7 @@ std::vector<std::vector<std::string>> escaped_lines(const TextTable& table, Esca
   return lines;
 }
 
-std::string joined(const std::vector<std::string>& cells, const char* separator) {
+std::string joined_cells(const std::vector<std::string>& cells, const char* separator) {
   std::string line;
   for (std::size_t i = 0; i < cells.size(); ++i) line.append(i == 0 ? "" : separator).append(cells[i]);
   return line;
@@ -107,7 +107,7 @@ std::string markdown_table(const TextTable& table) {
 
 std::string csv_table(const TextTable& table) {
   std::string text;
-  for (const auto& line : escaped_lines(table, escape_csv)) text += joined(line, ",") + "\r\n";
+  for (const auto& line : escaped_lines(table, escape_csv)) text += joined_cells(line, ",") + "\r\n";
   return text;
 }
 
@@ -152,10 +152,58 @@ std::string latex_table(const TextTable& table) {
   std::string columns;
   for (std::size_t i = 0; i < table.header.size(); ++i) columns += i < table.label_columns ? 'l' : 'r';
   std::string text =
-      "\\begin{tabular}{" + columns + "}\n\\toprule\n" + joined(lines.front(), " & ") + " \\\\\n\\midrule\n";
+      "\\begin{tabular}{" + columns + "}\n\\toprule\n" + joined_cells(lines.front(), " & ") + " \\\\\n\\midrule\n";
   // A bracket at the start of a row would be read as the argument of the line break before it.
-  for (std::size_t i = 1; i < lines.size(); ++i) text += "{}" + joined(lines[i], " & ") + " \\\\\n";
+  for (std::size_t i = 1; i < lines.size(); ++i) text += "{}" + joined_cells(lines[i], " & ") + " \\\\\n";
   return text + "\\bottomrule\n\\end{tabular}\n";
+}
+
+RowLabels row_labels(const std::vector<LabelColumn>& columns) {
+  RowLabels labels;
+  labels.cells.resize(columns.front().values.size());
+  for (const LabelColumn& column : columns) {
+    const std::vector<std::string>& values = column.values;
+    if (!column.always && std::ranges::count(values, values.empty() ? "" : values.front()) == std::ssize(values)) {
+      if (values.empty() || values.front().empty()) continue;
+      std::string title = column.title;
+      if (!labels.caption.empty()) title.front() += 'a' - 'A';
+      labels.caption += fmt::format("{}{} {}", labels.caption.empty() ? "" : ", ", title, values.front());
+      continue;
+    }
+    labels.columns.push_back(column.title);
+    for (std::size_t i = 0; i < values.size(); ++i) labels.cells[i].push_back(values[i]);
+  }
+  if (!labels.caption.empty()) labels.caption += ".";
+  return labels;
+}
+
+TitledTable labelled_table(const std::string& title, const RowLabels& labels) {
+  return {.title = title,
+          .caption = labels.caption,
+          .table = {.header = labels.columns, .rows = labels.cells, .label_columns = labels.columns.size()}};
+}
+
+std::string markdown_of(const TitledTable& titled) {
+  std::string text = titled.title.empty() ? "" : "### " + escape_markdown(titled.title) + "\n\n";
+  if (!titled.caption.empty()) text += escape_markdown(titled.caption) + "\n\n";
+  if (!titled.table.rows.empty()) text += markdown_table(titled.table);
+  if (!titled.table.rows.empty() && !titled.notes.empty()) text += "\n";
+  for (const std::string& note : titled.notes) text += escape_markdown(note) + "\n";
+  return text;
+}
+
+std::string latex_of(const TitledTable& titled) {
+  std::string text;
+  for (const std::string* line : {&titled.title, &titled.caption})
+    if (!line->empty()) text += latex_comment(*line);
+  for (const std::string& note : titled.notes) text += latex_comment(note);
+  if (!titled.table.rows.empty()) text += latex_table(titled.table);
+  return text;
+}
+
+void add_column(const std::string& header, TitledTable& titled, const std::function<std::string(std::size_t)>& cell) {
+  titled.table.header.push_back(header);
+  for (std::size_t i = 0; i < titled.table.rows.size(); ++i) titled.table.rows[i].push_back(cell(i));
 }
 
 }  // namespace duet

@@ -6,16 +6,11 @@
 #include <cmath>
 #include <tuple>
 
-#include "duet/results/analyses/cross_engine_tables.h"
-#include "duet/results/analyses/leaderboard_rows.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/results/analyses/cells.h"
 #include "duet/results/rows/distinct_episodes.h"
-#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {
-
-constexpr const char* kNoWalks = "No episode of these results is led by a commanded velocity.";
 
 struct WalkKey {
   bool perturbed = false;  // clean first
@@ -77,6 +72,46 @@ std::string upright_cell(const WalkEntry& entry) {
   return fmt::format("{} of {}", entry.upright, entry.n);
 }
 
+TitledTable walk_rows(const WalkTable& table) {
+  TitledTable titled{.title = "Walking by command",
+                     .caption = fmt::format("Means over episodes; speeds from 2 s on, in the robot's heading. Upright: "
+                                            "neither fell nor failed, Wilson interval ({:.0f} %).",
+                                            100.0 * table.level),
+                     .table = {.header = {"Perturbation", "Controller", "Command", "Engine", "Upright", "Interval [%]"},
+                               .rows = {},
+                               .label_columns = 4}};
+  for (const WalkFigure& figure : walk_figures())
+    titled.table.header.push_back(fmt::format("{} [{}]", figure.title, figure.unit));
+  for (const WalkEntry& entry : table.entries) {
+    std::vector<std::string> cells = {
+        entry.perturbation,
+        entry.controller,
+        entry.command,
+        entry.engine,
+        upright_cell(entry),
+        entry.n == 0 ? "-" : fmt::format("{} to {}", percent(entry.interval.low), percent(entry.interval.high))};
+    for (const WalkFigure& figure : walk_figures()) cells.push_back(mean_cell(entry, figure));
+    titled.table.rows.push_back(std::move(cells));
+  }
+  return titled;
+}
+
+void add_walk_figures(const WalkEntry& entry, std::vector<Figure>& into) {
+  const FiguresOf figures{{.engine = entry.engine,
+                           .controller = entry.controller,
+                           .perturbation = entry.perturbation,
+                           .task = std::string(kWalkRows),
+                           .of = entry.command},
+                          into};
+  Rate upright{.n = entry.n, .k = entry.upright, .interval = entry.interval};
+  if (entry.n > 0) upright.rate = static_cast<double>(entry.upright) / static_cast<double>(entry.n);
+  figures.rate("upright", upright);
+  figures.count("unsupported", {}, entry.unsupported);
+  for (const WalkFigure& figure : walk_figures())
+    if (const auto found = entry.means.find(figure.metric); found != entry.means.end())
+      figures.add(figure.metric, {}, found->second, kNoInterval, figure.unit);
+}
+
 }  // namespace
 
 std::vector<WalkFigure> walk_figures() {
@@ -95,80 +130,15 @@ WalkTable walk_table(const std::vector<EpisodeRow>& rows, double level) {
   return table;
 }
 
-TitledTable walk_titled(const WalkTable& table) {
-  TitledTable titled{.title = "Walking by command",
-                     .caption = fmt::format("Means over episodes; speeds from 2 s on, in the robot's heading. Upright: "
-                                            "neither fell nor failed, Wilson interval ({:.0f} %).",
-                                            100.0 * table.level),
-                     .table = {.header = {"Perturbation", "Controller", "Command", "Engine", "Upright", "Interval [%]"},
-                               .rows = {},
-                               .label_columns = 4},
-                     .notes = {}};
-  for (const WalkFigure& figure : walk_figures())
-    titled.table.header.push_back(fmt::format("{} [{}]", figure.title, figure.unit));
-  for (const WalkEntry& entry : table.entries) {
-    std::vector<std::string> cells = {
-        entry.perturbation,
-        entry.controller,
-        entry.command,
-        entry.engine,
-        upright_cell(entry),
-        entry.n == 0 ? "-" : fmt::format("{} to {}", percent(entry.interval.low), percent(entry.interval.high))};
-    for (const WalkFigure& figure : walk_figures()) cells.push_back(mean_cell(entry, figure));
-    titled.table.rows.push_back(std::move(cells));
+Analysis walk_analysis(const WalkTable& table) {
+  Analysis analysis{.name = "walking", .title = "Walking by command", .level = table.level, .opens = true};
+  if (table.entries.empty()) {
+    analysis.notes = {"No episode of these results is led by a commanded velocity."};
+    return analysis;
   }
-  return titled;
-}
-
-std::string walk_table_markdown(const WalkTable& table) {
-  return table.entries.empty() ? std::string(kNoWalks) + "\n" : markdown_of(walk_titled(table));
-}
-
-std::string walk_table_latex(const WalkTable& table) {
-  return table.entries.empty() ? latex_comment(kNoWalks) : latex_of(walk_titled(table));
-}
-
-std::string walk_table_csv(const WalkTable& table) {
-  TextTable lines{
-      .header = {"perturbation", "controller", "command", "engine", "n", "upright", "low", "high", "unsupported"},
-      .rows = {},
-      .label_columns = 4};
-  for (const WalkFigure& figure : walk_figures()) lines.header.emplace_back(figure.metric);
-  for (const WalkEntry& entry : table.entries) {
-    std::vector<std::string> cells = {entry.perturbation,
-                                      entry.controller,
-                                      entry.command,
-                                      entry.engine,
-                                      fmt::format("{}", entry.n),
-                                      fmt::format("{}", entry.upright),
-                                      number_cell(entry.interval.low),
-                                      number_cell(entry.interval.high),
-                                      fmt::format("{}", entry.unsupported)};
-    for (const WalkFigure& figure : walk_figures()) {
-      const auto found = entry.means.find(figure.metric);
-      cells.push_back(found == entry.means.end() ? "" : number_cell(found->second));
-    }
-    lines.rows.push_back(std::move(cells));
-  }
-  return csv_table(lines);
-}
-
-nlohmann::json walk_table_json(const WalkTable& table) {
-  nlohmann::json entries = nlohmann::json::array();
-  for (const WalkEntry& entry : table.entries) {
-    nlohmann::json means = nlohmann::json::object();
-    for (const auto& [metric, mean] : entry.means) means[metric] = mean;
-    entries.push_back({{"perturbation", entry.perturbation},
-                       {"controller", entry.controller},
-                       {"command", entry.command},
-                       {"engine", entry.engine},
-                       {"n", entry.n},
-                       {"upright", entry.upright},
-                       {"interval", json_of(entry.interval)},
-                       {"unsupported", entry.unsupported},
-                       {"means", means}});
-  }
-  return {{"schema", "duet.walking/1"}, {"level", table.level}, {"entries", entries}};
+  analysis.tables = {walk_rows(table)};
+  for (const WalkEntry& entry : table.entries) add_walk_figures(entry, analysis.figures);
+  return analysis;
 }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/rows/episode_row.h"
 #include "duet/results/statistics/statistics.h"
 
@@ -38,13 +39,6 @@ struct WalkTable {
 // Throws InputError: rows of two suites or suite versions.
 WalkTable walk_table(const std::vector<EpisodeRow>& rows, double level = 0.95);
 
-struct TitledTable;  // results/analyses/cross_engine_tables.h
-TitledTable walk_titled(const WalkTable& table);
-
-// For a table without entries: one sentence that says so (a comment in LaTeX), the header alone, an empty list.
-std::string walk_table_markdown(const WalkTable& table);  // a heading of level 3
-std::string walk_table_csv(const WalkTable& table);       // not rounded
-std::string walk_table_latex(const WalkTable& table);
-nlohmann::json walk_table_json(const WalkTable& table);
+Analysis walk_analysis(const WalkTable& table);
 
 }  // namespace duet

@@ -8,6 +8,7 @@
 #include "duet/results/analyses/leaderboard_rows.h"
 #include "duet/results/report/escape_html.h"
 #include "duet/results/report/report_parts.h"
+#include "duet/results/report/training_curves.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/statistics/row_groups.h"
 
@@ -84,6 +85,13 @@ std::string stories_section(const ReportContent& content) {
   return html;
 }
 
+std::string training_section(const ReportContent& content) {
+  std::string html;
+  for (const TrainingCurves& curves : content.curves)
+    html += fmt::format("<h3>{}</h3>", escape_html(curves.title)) + plots_html(curve_plots(curves));
+  return html;
+}
+
 std::string environment_section(const ReportContent& content) {
   if (content.environment.is_null() || content.environment.empty()) return "";
   const std::string text = dumped(content.environment, 2);
@@ -105,26 +113,24 @@ namespace {
 
 std::vector<Section> sections_of(const ReportContent& content) {
   std::vector<Section> sections;
-  const auto add = [&](const char* id, const char* title, std::string body, bool open = false) {
+  const auto add = [&](const std::string& id, const std::string& title, std::string body, bool open = false) {
     if (!body.empty()) sections.push_back({id, title, std::move(body), open});
   };
+  const auto add_analyses = [&](bool opens) {
+    for (const Analysis& analysis : content.analyses)
+      if (analysis.opens == opens && analysis.name != kLeaderboardName)
+        add(analysis.name, analysis.title, analysis_html(analysis), opens);
+  };
   add("board", "Board", board_html(content.board), true);
-  add("walking", "Walking by command", walking_html(content.walking), true);
+  add_analyses(true);
   add("tasks", "Tasks", task_map_html(content.board, content.entries), true);
   add("replays", "Replays", replays_html(content.replays), true);
   add("episodes", "Episodes", episodes_html(content.episodes, content.replays));
-  add("engines", "Across engines", cross_engine_html(content));
-  add("controllers", "Controllers", controllers_html(content));
-  add("policies", "Policies", policies_html(content.policies.policies));
-  add("perturbations", "Perturbations", degradation_html(content.policies.degradation));
-  add("reactivity", "Reactivity", reactivity_html(content.policies.reactivity));
-  add("contacts", "Contact with people", contacts_html(content.contacts));
-  add("people", "Recorded and synthetic people", people_html(content.people));
-  add("levels", "Levels", levels_html(content.levels));
+  add_analyses(false);
   add("leaderboard", "Every engine and task", leaderboard_section(content), content.board.rows.empty());
   add("retargeting", "Retargeting", retargeting_html(content));
   add("clips", "Clips", stories_section(content));
-  add("training", "Training", training_html(content));
+  add("training", "Training", training_section(content));
   add("environment", "Environment", environment_section(content));
   return sections;
 }

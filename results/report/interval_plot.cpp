@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/results/analyses/cross_engine_tables.h"
 #include "duet/results/analyses/leaderboard_rows.h"
 #include "duet/results/report/escape_html.h"
 #include "duet/results/report/report_parts.h"
@@ -131,7 +130,7 @@ struct Drawing {
 };
 
 Drawing engine_drawing(const CrossEngine& result) {
-  const CombinationLabels labels = combination_labels(result.success);
+  const RowLabels labels = combination_labels(result.success);
   std::vector<std::string> names;
   std::size_t longest = 0;
   for (const std::vector<std::string>& cells : labels.cells) {

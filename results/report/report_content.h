@@ -3,22 +3,14 @@
 
 #include <Eigen/Core>
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/board.h"
-#include "duet/results/analyses/contact_table.h"
-#include "duet/results/analyses/controller_table.h"
-#include "duet/results/analyses/cross_engine.h"
 #include "duet/results/analyses/leaderboard.h"
-#include "duet/results/analyses/level_table.h"
 #include "duet/results/analyses/metric_column.h"
-#include "duet/results/analyses/people_table.h"
-#include "duet/results/analyses/walk_table.h"
-#include "duet/results/report/line_plot.h"
-#include "duet/results/report/policy_report.h"
 #include "duet/results/report/training_curves.h"
 
 namespace duet {
@@ -52,19 +44,11 @@ struct ReportContent {
   nlohmann::json environment;
   std::vector<std::string> notes;  // options and caveats printed with the tables
   std::vector<LeaderboardEntry> entries;
-  std::vector<MetricColumn> columns;                                 // how to head metric columns
+  std::vector<Analysis> analyses;     // a section each, but for the leaderboard, whose table of entries can be sorted
+  std::vector<MetricColumn> columns;  // how to head metric columns
   std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
   std::vector<ClipStory> stories;
-  std::optional<CrossEngine> cross_engine;  // section "Across engines"
-  PeopleTable people;                       // section "Recorded and synthetic people", where it has entries
-  std::vector<LevelTable> levels;           // section "Levels", likewise
-  WalkTable walking;                        // section "Walking by command", likewise
-  ContactTable contacts;                    // section "Contact with people", where it has groups
-  ControllerTable controllers;              // section "Controllers", where it has entries
-  std::vector<LinePlot> foot_plots;         // in that section
-  PolicyReport policies;                    // sections "Policies", "Perturbations", "Reactivity"
-  std::vector<TrainingCurves> curves;       // section "Training"
-  nlohmann::json certificate;               // parity certificate, shown in that section; null where none is attached
+  std::vector<TrainingCurves> curves;  // section "Training"
 };
 
 }  // namespace duet

@@ -9,8 +9,6 @@
 
 namespace duet {
 
-struct TitledTable;  // results/analyses/cross_engine_tables.h
-
 // Style sheet and script of the report.
 std::string_view report_style();
 std::string_view report_script();
@@ -36,32 +34,13 @@ std::string key_frames_svg(const std::vector<KeyFrame>& frames);
 // there are none.
 std::string loss_plot_svg(const std::map<std::string, std::vector<double>>& loss);
 
-// Heading of level 3, table and notes. A cell that ends with an asterisk is over a limit and stands out.
-std::string titled_table_html(const TitledTable& titled);
+// Notes, plots, tables with headings of level 3. A cell that ends with an asterisk is over a limit and stands out.
+std::string analysis_html(const Analysis& analysis);
 
 // The drawing of engine_plot_svg within the report, styled by it.
 std::string engine_plot_html(const CrossEngine& result);
-// Tables, plot and parity certificate; "" where the content has no comparison of engines.
-std::string cross_engine_html(const ReportContent& content);
-
-// Mark of the limits, notes and tables; "" for a table without groups.
-std::string contacts_html(const ContactTable& table);
-
-std::string walking_html(const WalkTable& table);  // "" for a table without entries
-
 // Plots side by side, each under its title; those without a point are left out.
 std::string plots_html(const std::vector<LinePlot>& plots);
-
-// Tables and plots. "" where there are none.
-std::string policies_html(const PolicyTable& table);
-std::string degradation_html(const Degradation& result);
-std::string reactivity_html(const ReactivityTable& table);
-std::string people_html(const PeopleTable& table);
-std::string levels_html(const std::vector<LevelTable>& tables);
-
-// Tables and foot heights; the curves. "" where there are none.
-std::string controllers_html(const ReportContent& content);
-std::string training_html(const ReportContent& content);
 
 std::string leaderboard_html(const std::vector<LeaderboardEntry>& entries);
 std::string detector_table_html(const std::vector<LeaderboardEntry>& entries);  // "" without other verdicts

@@ -131,7 +131,7 @@ std::string metric_table(const std::string& caption, const std::vector<std::stri
   return html + "</tbody></table></div>";
 }
 
-std::string joined(const std::vector<std::string>& cells) {
+std::string joined_labels(const std::vector<std::string>& cells) {
   std::string text;
   for (const std::string& cell : cells) text.append(text.empty() ? "" : " / ").append(cell);
   return text;
@@ -225,7 +225,7 @@ std::string episode_metrics_html(const ReportContent& content) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const LeaderboardEntry* overall = rows[i].find("all");
       if (overall == nullptr) continue;
-      heads.push_back(joined(labels.cells[i]));
+      heads.push_back(joined_labels(labels.cells[i]));
       sets.push_back(&overall->metrics);
     }
     const std::string table =

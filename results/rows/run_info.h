@@ -33,8 +33,8 @@ struct RunInfo {
   std::string created_at;                                    // UTC, ISO 8601
   nlohmann::json environment;                                // results/rows/environment.h
   std::map<std::string, std::string> policies, controllers;  // name -> digest, "" where its files were not there
-  nlohmann::json
-      certificate;  // parity certificate of the engines (results/rows/certificate.h), null where none is attached
+  nlohmann::json certificate;   // parity certificate of the engines (results/analyses/certificate_table.h), null where
+                                // none is attached
   std::optional<RunPlan> plan;  // none: no clip was ready yet, or the run is of a program that kept no plan
 };
 

@@ -11,7 +11,7 @@
 namespace duet {
 namespace {
 
-struct Differences {
+struct DriftDifferences {
   std::vector<double> playback, values;
   std::vector<int> clips;
 };
@@ -19,12 +19,12 @@ struct Differences {
 using DriftKey = std::tuple<std::string, std::size_t, std::string>;  // controller, place of the metric, engine
 
 void gather_drift(const EpisodeRow& row, const EpisodeRow& playback, const std::vector<MetricColumn>& metrics, int clip,
-                  std::map<DriftKey, Differences>& gathered) {
+                  std::map<DriftKey, DriftDifferences>& gathered) {
   for (std::size_t i = 0; i < metrics.size(); ++i) {
     const auto here = row.metrics.find(metrics[i].name);
     const auto there = playback.metrics.find(metrics[i].name);
     if (here == row.metrics.end() || there == playback.metrics.end()) continue;
-    Differences& differences = gathered[{row.controller, i, row.engine}];
+    DriftDifferences& differences = gathered[{row.controller, i, row.engine}];
     differences.playback.push_back(there->second);
     differences.values.push_back(here->second - there->second);
     differences.clips.push_back(clip);
@@ -108,7 +108,7 @@ std::set<std::string> force_names(const EngineRows& rows) {
 
 std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
                                       const CrossEngineOptions& options) {
-  std::map<DriftKey, Differences> gathered;
+  std::map<DriftKey, DriftDifferences> gathered;
   ClipNumbers clips;
   for (const auto& [combination, episodes] : rows.physics()) {
     for (const auto& [id, row_of] : episodes) {
@@ -117,7 +117,7 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
       for (const auto& [engine, row] : row_of) gather_drift(*row, *playback, metrics, clips.of(id), gathered);
     }
   }
-  ClusterBootstrap bootstrap(options.resamples, options.seed);
+  ClusterBootstrap bootstrap(options.intervals.resamples, options.intervals.seed);
   std::vector<MetricDrift> drift;
   for (const auto& [key, differences] : gathered) {
     const auto& [controller, metric, engine] = key;
@@ -127,7 +127,7 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
                      .pairs = static_cast<long>(differences.values.size()),
                      .playback = mean_of(differences.playback),
                      .mean = mean_of(differences.values),
-                     .interval = bootstrap.mean(differences.values, differences.clips, options.level)});
+                     .interval = bootstrap.mean(differences.values, differences.clips, options.intervals.level)});
   }
   return drift;
 }

@@ -162,9 +162,9 @@ void add_figures(const EngineRows& rows, const CrossEngineOptions& options, Rank
   const RankFigures found = figures_of(all, weights);
   ranks.rank_violation = found.violation;
   ranks.winner_changes = found.winner_changes;
-  Random random(options.seed, stream_key({"rank_reliability", ranks.of}));
+  Random random(options.intervals.seed, stream_key({"rank_reliability", ranks.of}));
   std::vector<double> tau_b, violation, winner_changes;
-  const int resamples = ranks.items < 2 ? 0 : std::min(options.resamples, kMostRankResamples);
+  const int resamples = ranks.items < 2 ? 0 : std::min(options.intervals.resamples, kMostRankResamples);
   for (int i = 0; i < resamples; ++i) {
     std::fill(weights.begin(), weights.end(), 0.0);
     for (const std::vector<std::size_t>& clips : all.clips_of_task)
@@ -175,9 +175,9 @@ void add_figures(const EngineRows& rows, const CrossEngineOptions& options, Rank
     violation.push_back(drawn.violation);
     winner_changes.push_back(drawn.winner_changes);
   }
-  ranks.tau_interval = interval_of(std::move(tau_b), options.level);
-  ranks.violation_interval = interval_of(std::move(violation), options.level);
-  ranks.winner_interval = interval_of(std::move(winner_changes), options.level);
+  ranks.tau_interval = interval_of(std::move(tau_b), options.intervals.level);
+  ranks.violation_interval = interval_of(std::move(violation), options.intervals.level);
+  ranks.winner_interval = interval_of(std::move(winner_changes), options.intervals.level);
 }
 
 }  // namespace

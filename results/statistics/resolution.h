@@ -27,8 +27,7 @@ std::vector<std::string> resolution_notes(const std::vector<Comparison>& compari
 // The same for arms over all tasks, unpaired: with the episodes that they need.
 std::vector<std::string> resolution_notes(const std::vector<LeaderboardEntry>& entries, double margin);
 
-// As in results/analyses/leaderboard.h, with a margin of one's own.
-std::string comparison_markdown(const std::vector<Comparison>& comparisons, double margin);
-nlohmann::json comparison_json(const std::vector<Comparison>& comparisons, double margin);
+// `margin`: of the verdicts.
+Analysis comparison_analysis(const std::vector<Comparison>& comparisons, double margin = kFivePoints);
 
 }  // namespace duet

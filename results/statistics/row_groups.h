@@ -2,8 +2,10 @@
 #pragma once
 
 #include <compare>
+#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "duet/results/rows/episode_row.h"
@@ -32,6 +34,19 @@ std::vector<const EpisodeRow*> in_episode_order(const std::vector<EpisodeRow>& r
 void require_one_suite(const std::vector<EpisodeRow>& rows);
 // Throws InputError where two rows of one group are the same episode.
 void require_distinct(const EpisodeRow& a, const EpisodeRow& b);
+
+// Numbers for clips in the order in which they come, the clusters of every bootstrap over clips.
+class ClipNumbers {
+ public:
+  int of(const std::string& task, const std::string& clip) {
+    return numbers_.try_emplace({task, clip}, static_cast<int>(numbers_.size())).first->second;
+  }
+  int of(const EpisodeId& id) { return of(id.task, id.clip); }
+  [[nodiscard]] std::size_t size() const { return numbers_.size(); }
+
+ private:
+  std::map<std::pair<std::string, std::string>, int> numbers_;
+};
 
 struct PairedTable {
   long both = 0, only_a = 0, only_b = 0, neither = 0;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <string>
@@ -12,6 +13,15 @@ namespace duet {
 
 struct Interval {
   double low = 0.0, high = 0.0;
+};
+inline constexpr Interval kNoInterval = {std::numeric_limits<double>::quiet_NaN(),
+                                         std::numeric_limits<double>::quiet_NaN()};
+
+// Of the intervals of an analysis; the latter two of those that are bootstrapped.
+struct IntervalOptions {
+  double level = 0.95;
+  int resamples = 10000;
+  std::uint64_t seed = 1;
 };
 
 // Wilson score interval of k successes in n. n = 0: [0, 1]. Throws std::invalid_argument for k not in [0, n].

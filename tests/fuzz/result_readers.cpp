@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/core/digest.h"
+#include "duet/results/analyses/leaderboard.h"
 #include "duet/results/report/training_curves.h"
 #include "duet/results/rows/golden.h"
 #include "duet/results/rows/published.h"
@@ -43,7 +44,7 @@ std::string run_folder(std::string_view bytes) {
 
 void read_run(std::string_view bytes) {
   const Run run = load_run(run_folder(bytes));
-  (void)leaderboard_markdown(leaderboard(run.rows));
+  (void)analysis_markdown(leaderboard_analysis(leaderboard(run.rows)));
 }
 
 // A manifest that fits the run of run_sample.

@@ -2,35 +2,155 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
+#include "duet/results/report/report_parts.h"
+
 namespace duet {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::Pair;
 
-std::string markdown(const int& n) { return "md " + std::to_string(n); }
-std::string csv(const int& n) { return "csv " + std::to_string(n); }
-std::string latex(const int&) { return ""; }
-nlohmann::json json(const int& n) { return {{"n", n}}; }
+TitledTable table(const std::string& title, const std::string& group = "") {
+  return {.title = title,
+          .caption = "Of <b>all</b>.",
+          .table = {.header = {"Policy", "n"}, .rows = {{"d_star", "1.5 [1.0, 2.0]"}}},
+          .notes = {"A note."},
+          .group = group};
+}
+
+Analysis example() {
+  Analysis analysis{.name = "two", .title = "Two tables", .tables = {table("First"), table("Second")}};
+  FiguresOf figures{{.engine = "mujoco", .policy = "say \"hi\", d_star"}, analysis.figures};
+  figures.rate("success", {.n = 3, .k = 1, .rate = 1.0 / 3.0, .interval = {.low = 0.1, .high = 0.75}});
+  figures.add("dof_jerk", {}, std::nan(""), kNoInterval, "rad/s^3");
+  figures.word("verdict", "better");
+  return analysis;
+}
+
+TEST(Analysis, MarkdownHasAHeadingPerTable) {
+  EXPECT_EQ(analysis_markdown(example()), R"(### First
+
+Of &lt;b>all&lt;/b>.
+
+| Policy |              n |
+| :----- | -------------: |
+| d_star | 1.5 [1.0, 2.0] |
+
+A note.
+
+### Second
+
+Of &lt;b>all&lt;/b>.
+
+| Policy |              n |
+| :----- | -------------: |
+| d_star | 1.5 [1.0, 2.0] |
+
+A note.
+)");
+}
+
+TEST(Analysis, NotesOfAllTablesStandUnderTheTitleAndTheTablesBelow) {
+  Analysis noted = example();
+  noted.warning = "Beware.";
+  noted.notes = {"How to read them."};
+  EXPECT_THAT(analysis_markdown(noted),
+              testing::StartsWith("### Two tables\n\nBeware.\n\nHow to read them.\n\n#### First\n"));
+  EXPECT_THAT(analysis_latex(noted),
+              testing::StartsWith("% \\usepackage{booktabs}\n% Beware.\n% How to read them.\n\n% First\n"));
+}
+
+TEST(Analysis, WithoutTablesItIsItsNote) {
+  const Analysis nothing{.name = "none", .title = "None", .notes = {"Nothing ran."}};
+  EXPECT_TRUE(nothing.empty());
+  EXPECT_EQ(analysis_markdown(nothing), "Nothing ran.\n");
+  EXPECT_EQ(analysis_latex(nothing), "% Nothing ran.\n");
+  EXPECT_EQ(analysis_json(nothing).at("figures").size(), 0U);
+}
+
+TEST(Analysis, ATerminalDoesWithoutLongTables) {
+  Analysis analysis = example();
+  analysis.tables[1].too_long_for_terminal = true;
+  EXPECT_THAT(terminal_text(analysis), AllOf(HasSubstr("### First"), Not(HasSubstr("### Second"))));
+  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("### Second"));
+}
+
+TEST(Analysis, LatexIsABooktabsTabularPerTableWithEscapedNames) {
+  const std::string text = analysis_latex(example());
+  EXPECT_THAT(text, AllOf(testing::StartsWith("% \\usepackage{booktabs}\n\n% First\n% Of <b>all</b>.\n% A note.\n"),
+                          HasSubstr("\\begin{tabular}{lr}\n\\toprule\nPolicy & n \\\\\n\\midrule\n"),
+                          HasSubstr("{}d\\_star & 1.5 [1.0, 2.0] \\\\\n\\bottomrule"), HasSubstr("% Second\n")));
+}
+
+TEST(Analysis, CsvIsAFigureALineNotRounded) {
+  EXPECT_EQ(
+      analysis_csv(example()),
+      "analysis,source,engine,controller,policy,arm,perturbation,task,of,name,unit,n,k,value,low,high,level,text\r\n"
+      "two,duet,mujoco,,\"say \"\"hi\"\", d_star\",,,,,success,1,3,1,0.3333333333333333,0.1,0.75,0.95,\r\n"
+      "two,duet,mujoco,,\"say \"\"hi\"\", d_star\",,,,,dof_jerk,rad/s^3,,,,,,,\r\n"
+      "two,duet,mujoco,,\"say \"\"hi\"\", d_star\",,,,,verdict,,,,,,,,better\r\n");
+}
+
+TEST(Analysis, JsonHasTheSameNamesAndEveryNoteOnce) {
+  const nlohmann::json json = analysis_json(example());
+  EXPECT_EQ(json.at("schema"), "duet.analysis/1");
+  EXPECT_EQ(json.at("analysis"), "two");
+  EXPECT_EQ(json.at("level"), 0.95);
+  EXPECT_EQ(json.at("notes"), nlohmann::json::array({"A note."}));
+  const nlohmann::json keys = {
+      {"source", "duet"}, {"engine", "mujoco"}, {"policy", "say \"hi\", d_star"}, {"name", "success"}, {"unit", "1"}};
+  nlohmann::json success = keys;
+  success.update({{"n", 3}, {"k", 1}, {"value", 1.0 / 3.0}, {"low", 0.1}, {"high", 0.75}});
+  EXPECT_EQ(json.at("figures").at(0), success);
+  EXPECT_TRUE(json.at("figures").at(1).at("value").is_null());
+  EXPECT_FALSE(json.at("figures").at(1).contains("low"));
+  EXPECT_EQ(json.at("figures").at(2).at("text"), "better");
+}
+
+TEST(Analysis, HtmlFoldsGroupsWhereThereAreSeveral) {
+  Analysis analysis = example();
+  analysis.warning = "Beware <all>.";
+  EXPECT_THAT(analysis_html(analysis),
+              AllOf(HasSubstr("<p class=\"warning\">Beware &lt;all&gt;.</p>"), HasSubstr("<h3>First</h3>"),
+                    HasSubstr("<span class=\"rate\">1.5</span><span class=\"ci\">[1.0, 2.0]</span>"),
+                    Not(HasSubstr("<details"))));
+  analysis.tables = {table("First", "a"), table("Second", "a"), table("Third", "b")};
+  const std::string html = analysis_html(analysis);
+  EXPECT_THAT(html, AllOf(HasSubstr("<details open><summary>a</summary><h3>First</h3>"),
+                          HasSubstr("</details>\n<details><summary>b</summary><h3>Third</h3>")));
+  analysis.tables.pop_back();
+  EXPECT_THAT(analysis_html(analysis), Not(HasSubstr("<details")));
+}
+
+TEST(Analysis, PlotsWithATitleStandBelowTheTables) {
+  const LinePlot plot{.title = "steps", .x_label = "x", .y_label = "y", .series = {{"s", {0.0, 1.0}, {0.0, 1.0}}}};
+  Analysis analysis = example();
+  analysis.plots = {{.plots = {plot}}, {.title = "Steps", .note = "One each.", .plots = {plot}}, {.title = "No plots"}};
+  const std::string html = analysis_html(analysis);
+  EXPECT_LT(html.find("<svg"), html.find("<h3>First"));
+  EXPECT_GT(html.find("<h3>Steps</h3><p>One each.</p>"), html.find("<h3>Second"));
+  EXPECT_THAT(html, Not(HasSubstr("No plots")));
+}
 
 TEST(Analysis, EachFormatIsAFileOfItsName) {
-  const int one = 1, two = 2;
-  const std::vector<Analysis> analyses = {analysis_of("one", one, markdown, csv, latex, json),
-                                          analysis_of("two", two, markdown, csv, latex, json)};
-  EXPECT_THAT(analysis_files(analyses, "md"), ElementsAre(Pair("one.md", "md 1"), Pair("two.md", "md 2")));
-  EXPECT_THAT(analysis_files(analyses, "csv"), ElementsAre(Pair("one.csv", "csv 1"), Pair("two.csv", "csv 2")));
-  EXPECT_THAT(analysis_files(analyses, "json"),
-              ElementsAre(Pair("one.json", "{\n  \"n\": 1\n}\n"), Pair("two.json", "{\n  \"n\": 2\n}\n")));
-  EXPECT_THAT(analysis_files(analyses, "tex"), IsEmpty());  // a file with nothing in it is none
+  const std::vector<Analysis> analyses = {example(), {.name = "bare", .title = ""}};
+  for (const char* format : {"md", "csv", "tex", "json"})
+    EXPECT_EQ(analysis_files(analyses, format).at(0).first, std::string("two.") + format);
+  EXPECT_EQ(analysis_files(analyses, "csv").at(0).second, analysis_csv(example()));
+  EXPECT_THAT(analysis_files(analyses, "tex"), ElementsAre(Pair("two.tex", testing::_)));  // an empty file is none
   EXPECT_THAT(analysis_files(analyses, "html"), IsEmpty());
 }
 
 TEST(Analysis, EachIsAMemberOfItsName) {
-  const int one = 1;
   nlohmann::json found = {{"files", 3}};
-  add_analyses({analysis_of("one", one, markdown, csv, latex, json)}, found);
-  EXPECT_EQ(found, (nlohmann::json{{"files", 3}, {"one", {{"n", 1}}}}));
+  add_analyses({example()}, found);
+  EXPECT_EQ(found, (nlohmann::json{{"files", 3}, {"two", analysis_json(example())}}));
 }
 
 }  // namespace

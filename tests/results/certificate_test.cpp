@@ -1,6 +1,6 @@
-#include "duet/results/rows/certificate.h"
-
 #include <gmock/gmock.h>
+
+#include "duet/results/analyses/certificate_table.h"
 
 namespace duet {
 namespace {
@@ -17,8 +17,12 @@ nlohmann::json certificate() {
     ]})");
 }
 
+std::string certificate_text(const nlohmann::json& certificate, const std::vector<RunEngine>& engines = {}) {
+  return markdown_of(certificate_table(certificate, engines));
+}
+
 TEST(Certificate, IsATableOfEngines) {
-  const std::string text = certificate_markdown(certificate());
+  const std::string text = certificate_text(certificate());
   EXPECT_THAT(text, AllOf(HasSubstr("### Parity certificate\n"),
                           HasSubstr("| mujoco | 2.2.2   | parity  |            20 |                   1 |      0 |"),
                           HasSubstr("| ode    | 0.16.2  | parity  |             2 |                   0 |      0 |"),
@@ -26,29 +30,29 @@ TEST(Certificate, IsATableOfEngines) {
 }
 
 TEST(Certificate, WithoutOneSaysHowToMakeOne) {
-  EXPECT_EQ(certificate_markdown(nullptr),
+  EXPECT_EQ(certificate_text(nullptr),
             "### Parity certificate\n\nNo parity certificate is attached (duet validate makes one).\n");
 }
 
 TEST(Certificate, IsReadTolerantly) {
-  EXPECT_THAT(certificate_markdown({{"schema", "duet.certificate/9"}, {"engines", {{{"name", "dart"}, {"x", 1}}, 3}}}),
+  EXPECT_THAT(certificate_text({{"schema", "duet.certificate/9"}, {"engines", {{{"name", "dart"}, {"x", 1}}, 3}}}),
               AllOf(HasSubstr("| dart   | -       | -       |             - |                   - |      - |"),
                     HasSubstr("Effort -, made -"), HasSubstr("Its schema is duet.certificate/9, expected")));
-  EXPECT_THAT(certificate_markdown({{"engines", "none"}}), HasSubstr("It names no engine."));
-  EXPECT_THAT(certificate_markdown("yes"), HasSubstr("is no JSON object and is not shown"));
-  EXPECT_THAT(certificate_markdown({{"effort", "a\xff"}}), HasSubstr("digest"));
-  EXPECT_THAT(certificate_markdown({{"effort", "<img src=x>\x1b[0m\n# no"}}),
+  EXPECT_THAT(certificate_text({{"engines", "none"}}), HasSubstr("It names no engine."));
+  EXPECT_THAT(certificate_text("yes"), HasSubstr("is no JSON object and is not shown"));
+  EXPECT_THAT(certificate_text({{"effort", "a\xff"}}), HasSubstr("digest"));
+  EXPECT_THAT(certificate_text({{"effort", "<img src=x>\x1b[0m\n# no"}}),
               HasSubstr("Effort &lt;img src=x>\\x1b[0m # no, made"));
 }
 
 TEST(Certificate, NamesEnginesThatItDoesNotCoverAsTheyWereRun) {
-  const std::string text = certificate_markdown(
+  const std::string text = certificate_text(
       certificate(), {{"mujoco", "2.2.2", "parity"}, {"ode", "0.16.2", "fast"}, {"dart", "6.12", "parity"}});
   EXPECT_THAT(text, AllOf(HasSubstr("The certificate does not cover dart."),
                           HasSubstr("These results are of ode 0.16.2 with profile fast, the certificate of 0.16.2 "
                                     "with profile parity."),
                           Not(HasSubstr("are of mujoco"))));
-  EXPECT_THAT(certificate_markdown(certificate(), {{"ode", "", ""}}), Not(HasSubstr("These results")));
+  EXPECT_THAT(certificate_text(certificate(), {{"ode", "", ""}}), Not(HasSubstr("These results")));
 }
 
 }  // namespace

@@ -3,7 +3,8 @@
 #include <algorithm>
 
 #include "duet/core/require.h"
-#include "duet/results/analyses/leaderboard.h"
+#include "duet/results/statistics/resolution.h"
+#include "tests/results/figures.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -11,6 +12,7 @@ namespace duet {
 namespace {
 
 using test::episode;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -64,7 +66,7 @@ TEST(CompareRuns, SharedFieldsMustAgreeAndTheRestIsLeftOut) {
   EXPECT_EQ(comparisons[0].pairs, 8);
   EXPECT_EQ(comparisons[0].unpaired_a, 2);
   EXPECT_EQ(comparisons[0].unpaired_b, 0);
-  EXPECT_THAT(comparison_markdown(comparisons), HasSubstr("up to 2 of A and 0 of B"));
+  EXPECT_THAT(analysis_markdown(comparison_analysis(comparisons)), HasSubstr("up to 2 of A and 0 of B"));
 }
 
 TEST(CompareRuns, PerturbationsAreNamedAndKeptApart) {
@@ -93,9 +95,27 @@ TEST(CompareRuns, OnlyTheMainArmIsCompared) {
 }
 
 TEST(CompareRuns, IsReproducible) {
-  const auto once = comparison_json(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15)));
-  EXPECT_EQ(comparison_json(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15))), once);
-  EXPECT_THAT(once.dump(), Not(HasSubstr("nan")));
+  const auto compared = [] { return comparison_analysis(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15))); };
+  EXPECT_EQ(analysis_json(compared()), analysis_json(compared()));
+}
+
+TEST(CompareRuns, FiguresSayWhatIsComparedWithWhat) {
+  const Analysis analysis = comparison_analysis(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15)), 0.1);
+  const Figure of_all{
+      .engine = "mujoco", .controller = "vmc", .policy = "a vs b", .perturbation = "clean", .task = "all"};
+  const auto named = [&](const char* name) {
+    Figure like = of_all;
+    like.name = name;
+    return figure(analysis, like);
+  };
+  EXPECT_EQ(named("success_a").k, 20);
+  EXPECT_EQ(named("success_b").k, 10);
+  EXPECT_EQ(named("difference").n, 30);
+  EXPECT_DOUBLE_EQ(named("difference").value, 1.0 / 3.0);
+  EXPECT_EQ(named("only_b").value, 0.0);
+  EXPECT_LE(named("p_holm").value, 1.0);
+  EXPECT_EQ(named("verdict").text, "better");
+  EXPECT_EQ(figure(analysis, {.name = "margin"}).value, 0.1);
 }
 
 TEST(CompareRuns, SaysWhatDiffersWhereNothingPairs) {
@@ -135,13 +155,15 @@ TEST(CompareRuns, RefusesAnEpisodeThatIsThereTwice) {
 }
 
 TEST(ComparisonMarkdown, WarnsOfSmallSamples) {
-  const std::string small = comparison_markdown(compare_runs(hugs("a", 10, 0, 9), hugs("b", 10, 0, 3)));
+  const std::string small =
+      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 10, 0, 9), hugs("b", 10, 0, 3))));
   EXPECT_THAT(small, HasSubstr("Warning: fewer than 30 pairs in mujoco/vmc/a vs b hug"));
   EXPECT_THAT(small, HasSubstr("+60.0 ["));
-  const std::string large = comparison_markdown(compare_runs(hugs("a", 60, 0, 50), hugs("b", 60, 0, 20)));
+  const std::string large =
+      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 60, 0, 50), hugs("b", 60, 0, 20))));
   EXPECT_THAT(large,
               AllOf(Not(HasSubstr("Warning")), HasSubstr("<0.001"), HasSubstr("corrected for the 2 comparisons")));
-  EXPECT_EQ(comparison_markdown({}), "Nothing to compare.\n");
+  EXPECT_EQ(analysis_markdown(comparison_analysis({})), "Nothing to compare.\n");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "tests/results/figures.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -13,11 +14,11 @@ namespace duet {
 namespace {
 
 using test::engine_episode;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
-using testing::StartsWith;
 
 struct Touch {
   const char* region;
@@ -101,6 +102,10 @@ TEST(ContactTable, PoolsEnginesAndRegions) {
   EXPECT_EQ(any.ratio, 1.25);
 }
 
+std::string text_of(const ContactTable& table) { return analysis_markdown(contact_analysis(table)); }
+
+nlohmann::json figures_of(const ContactTable& table) { return analysis_json(contact_analysis(table)); }
+
 TEST(ContactTable, ListsRegionsFromTheHeadDown) {
   const std::vector<EpisodeRow> rows = {touched("ode", "replay", 0,
                                                 {{"foot", 1, 0, 1, 1, 1, 0.1},
@@ -116,7 +121,7 @@ TEST(ContactTable, ListsRegionsFromTheHeadDown) {
 TEST(ContactTable, DoesNotDependOnTheOrderOfRows) {
   std::vector<EpisodeRow> rows = benchmark();
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(contact_table_json(contact_table(rows)), contact_table_json(contact_table(benchmark())));
+  EXPECT_EQ(figures_of(contact_table(rows)), figures_of(contact_table(benchmark())));
 }
 
 TEST(ContactTable, LeavesOutPlaybackOtherArmsAndGhosts) {
@@ -125,7 +130,7 @@ TEST(ContactTable, LeavesOutPlaybackOtherArmsAndGhosts) {
   rows.push_back(touched("mujoco", "null", 0, {{"head", 500, 0, 500, 9, 9, 9}}));
   rows.back().arm = "null";
   rows.push_back(engine_episode("bullet", "replay", 0, true));  // ghost
-  EXPECT_EQ(contact_table_json(contact_table(rows)), contact_table_json(contact_table(benchmark())));
+  EXPECT_EQ(figures_of(contact_table(rows)), figures_of(contact_table(benchmark())));
   const ContactTable null_arm = contact_table(rows, "null");
   ASSERT_EQ(null_arm.groups.size(), 1U);
   EXPECT_EQ(null_arm.groups[0].policy, "null");
@@ -144,26 +149,28 @@ TEST(ContactTable, HasAGroupPerControllerAndPolicy) {
   EXPECT_EQ(table.groups[1].policy, "diffuse");
   EXPECT_EQ(table.groups[2].policy, "replay");
   EXPECT_EQ(table.groups[2].diverged, 0);
-  EXPECT_THAT(contact_table_markdown(table),
+  EXPECT_THAT(text_of(table),
               AllOf(HasSubstr("Controller vmc, policy diffuse"), HasSubstr("Of all episodes 1 diverged")));
 }
 
 TEST(ContactTable, ALimitOfExactlyOneIsWithin) {
   const std::vector<EpisodeRow> rows = {touched("ode", "replay", 0, {{"hand", 140, 0, 140, 1, 1, 1.0}})};
   EXPECT_EQ(region(contact_table(rows).groups.at(0).all, "hand").over, 0);
-  EXPECT_THAT(contact_table_markdown(contact_table(rows)), HasSubstr("140 (1.00)"));
+  EXPECT_THAT(text_of(contact_table(rows)), HasSubstr("140 (1.00)"));
 }
 
 TEST(ContactTable, LimitsAreVerifiedOnlyWhereEveryEpisodeSaysSo) {
   std::vector<EpisodeRow> rows = benchmark();
   const char* unverified = "Limits: unverified (nobody has yet checked the table against ISO/TS 15066)";
   for (EpisodeRow& row : rows) row.forces["human.limits_verified"] = 1.0;
-  EXPECT_EQ(limits_mark(contact_table(rows)), "Limits: verified");
+  const Analysis verified = contact_analysis(contact_table(rows));
+  EXPECT_EQ(verified.warning, "");
+  EXPECT_EQ(verified.notes.at(0), "Limits: verified");
+  EXPECT_EQ(figure(verified, {.name = "limits_verified"}).value, 1.0);
   rows[5].forces["human.limits_verified"] = 0.0;
-  EXPECT_EQ(limits_mark(contact_table(rows)), unverified);
+  EXPECT_EQ(contact_analysis(contact_table(rows)).warning, unverified);
   rows[5].forces.erase("human.limits_verified");
-  EXPECT_EQ(limits_mark(contact_table(rows)), unverified);
-  EXPECT_EQ(limits_mark(contact_table({})), unverified);
+  EXPECT_EQ(contact_analysis(contact_table(rows)).warning, unverified);
 }
 
 TEST(ContactTable, RefusesTwoSuitesAndAnEpisodeTwice) {
@@ -175,7 +182,7 @@ TEST(ContactTable, RefusesTwoSuitesAndAnEpisodeTwice) {
 }
 
 TEST(ContactTableMarkdown, IsAsBlessed) {
-  EXPECT_EQ(contact_table_markdown(contact_table(benchmark())), R"md(### Contact with people
+  EXPECT_EQ(text_of(contact_table(benchmark())), R"md(### Contact with people
 
 Limits: unverified (nobody has yet checked the table against ISO/TS 15066)
 
@@ -208,12 +215,12 @@ Controller vmc, policy replay; an episode counts once in each engine.
 }
 
 TEST(ContactTableMarkdown, IsOneSentenceWithoutAnyContactForces) {
-  EXPECT_EQ(contact_table_markdown({}), "No episode has contact forces with a solid partner.\n");
-  EXPECT_EQ(contact_table_latex({}), "% No episode has contact forces with a solid partner.\n");
+  EXPECT_EQ(text_of({}), "No episode has contact forces with a solid partner.\n");
+  EXPECT_EQ(analysis_latex(contact_analysis({})), "% No episode has contact forces with a solid partner.\n");
 }
 
 TEST(ContactTableMarkdown, EpisodesThatTouchNobodyCount) {
-  EXPECT_THAT(contact_table_markdown(contact_table({touched("ode", "replay", 0, {})})),
+  EXPECT_THAT(text_of(contact_table({touched("ode", "replay", 0, {})})),
               AllOf(HasSubstr("Controller vmc, policy replay; 1 episode."), HasSubstr("| any    |   - |"),
                     HasSubstr("|  0 of 1 |"), Not(HasSubstr("nan"))));
 }
@@ -221,42 +228,26 @@ TEST(ContactTableMarkdown, EpisodesThatTouchNobodyCount) {
 TEST(ContactTableMarkdown, UnequalEpisodesAreCountedPerEngine) {
   std::vector<EpisodeRow> rows = benchmark();
   rows.pop_back();
-  EXPECT_THAT(contact_table_markdown(contact_table(rows)), HasSubstr("replay; episodes: mujoco 4, ode 3."));
+  EXPECT_THAT(text_of(contact_table(rows)), HasSubstr("replay; episodes: mujoco 4, ode 3."));
 }
 
-TEST(ContactTableCsv, HasOneFigurePerLine) {
-  const std::string text = contact_table_csv(contact_table(benchmark()));
-  EXPECT_THAT(text, StartsWith("controller,policy,engine,region,limits,unit,figure,n,value\r\n"));
-  EXPECT_THAT(text, AllOf(HasSubstr("\r\nvmc,replay,mujoco,hand,unverified,1,touched,4,3\r\n"),
-                          HasSubstr("\r\nvmc,replay,mujoco,hand,unverified,N,median_peak,3,30\r\n"),
-                          HasSubstr("\r\nvmc,replay,ode,shoulder,unverified,1,ratio,1,\r\n"),
-                          HasSubstr("\r\nvmc,replay,all,any,unverified,N s,impulse,5,38\r\n"), Not(HasSubstr("nan"))));
-}
-
-TEST(ContactTableLatex, HasTwoTabularsAndTheMark) {
-  const std::string text = contact_table_latex(contact_table(benchmark()));
-  EXPECT_THAT(text, AllOf(HasSubstr("% Limits: unverified"), HasSubstr("\\begin{tabular}{lrr}"),
-                          HasSubstr("chest & 150 (1.25*) & - \\\\"), HasSubstr("Pressure [N/cm\\textasciicircum{}2]")));
-}
-
-TEST(ContactTableJson, HasEveryFigureAndNoNan) {
-  const nlohmann::json json = contact_table_json(contact_table(benchmark()));
-  EXPECT_EQ(json.at("schema"), "duet.contact_table/1");
-  EXPECT_EQ(json.at("limits_verified"), false);
-  const nlohmann::json& group = json.at("groups").at(0);
-  EXPECT_EQ(group.at("engines").at(1).at("engine"), "ode");
-  EXPECT_EQ(group.at("engines").at(0).at("regions").at(0), (nlohmann::json{{"region", "chest"},
-                                                                           {"touched", 1},
-                                                                           {"over", 1},
-                                                                           {"peak", 150.0},
-                                                                           {"median_peak", 150.0},
-                                                                           {"quasi_static", 90.0},
-                                                                           {"transient", 140.0},
-                                                                           {"impulse", 30.0},
-                                                                           {"pressure", 80.0},
-                                                                           {"ratio", 1.25}}));
-  EXPECT_TRUE(group.at("engines").at(1).at("regions").at(0).at("peak").is_null());
-  EXPECT_EQ(group.at("all").at("episodes"), 8);
+TEST(ContactTableFigures, AreThereForEveryEngineAndForAllOfThem) {
+  const Analysis analysis = contact_analysis(contact_table(benchmark()));
+  const auto value = [&](const char* engine, const char* region, const char* name) {
+    return figure(analysis, {.engine = engine, .controller = "vmc", .policy = "replay", .of = region, .name = name});
+  };
+  EXPECT_EQ(value("mujoco", "hand", "touched").value, 3.0);
+  EXPECT_EQ(value("mujoco", "hand", "touched").n, 4);
+  EXPECT_EQ(value("mujoco", "hand", "median_peak").value, 30.0);
+  EXPECT_EQ(value("mujoco", "hand", "median_peak").unit, "N");
+  EXPECT_EQ(value("mujoco", "chest", "over").value, 1.0);
+  EXPECT_EQ(value("mujoco", "chest", "ratio").value, 1.25);
+  EXPECT_TRUE(std::isnan(value("ode", "shoulder", "ratio").value));
+  EXPECT_EQ(value("all", "any", "impulse").value, 38.0);
+  EXPECT_EQ(value("all", "any", "impulse").unit, "N s");
+  EXPECT_EQ(value("all", "any", "touched").n, 8);
+  EXPECT_EQ(figure(analysis, {.name = "diverged"}).value, 0.0);
+  EXPECT_EQ(figure(analysis, {.name = "limits_verified"}).value, 0.0);
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/results/analyses/controller_table_parts.h"
+#include "tests/results/figures.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -13,6 +13,7 @@ namespace duet {
 namespace {
 
 using test::engine_episode;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -36,6 +37,8 @@ std::vector<EpisodeRow> two_controllers() {
   return rows;
 }
 
+std::string text_of(const ControllerTable& table) { return analysis_markdown(controller_analysis(table)); }
+
 TEST(ControllerTable, MeansAreOverEpisodesWithTheirInterval) {
   const ControllerTable table = controller_table(two_controllers());
   ASSERT_EQ(table.entries.size(), 2U);
@@ -58,7 +61,7 @@ TEST(ControllerTable, OneClipHasNoInterval) {
       controller_table({controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)});
   EXPECT_DOUBLE_EQ(table.entries[0].figures.at("hf_ratio").mean, 0.375);
   EXPECT_TRUE(std::isnan(table.entries[0].figures.at("hf_ratio").interval.low));
-  EXPECT_THAT(controller_table_markdown(table), HasSubstr("    0.375 |"));
+  EXPECT_THAT(text_of(table), HasSubstr("    0.375 |"));
 }
 
 TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
@@ -81,7 +84,7 @@ TEST(ControllerTable, FaultsAndSafeStopsAreCounted) {
   EXPECT_EQ(table.entries[0].faulty, 2);
   EXPECT_EQ(table.entries[0].stopped, 1);
   EXPECT_EQ(table.entries[1].faulty, 0);
-  EXPECT_THAT(controller_table_markdown(table), HasSubstr("2 (1 stopped)"));
+  EXPECT_THAT(text_of(table), HasSubstr("2 (1 stopped)"));
 }
 
 TEST(ControllerTable, EpisodesThatCouldNotRunAreInNoFigure) {
@@ -96,20 +99,20 @@ TEST(ControllerTable, EpisodesThatCouldNotRunAreInNoFigure) {
   EXPECT_EQ(homie.n, 0);
   EXPECT_EQ(homie.unsupported, 3);
   EXPECT_TRUE(std::isnan(homie.figures.at("hf_ratio").mean));
-  EXPECT_THAT(controller_table_markdown(table), HasSubstr("3 episodes could not run on this machine"));
+  EXPECT_THAT(text_of(table), HasSubstr("3 episodes could not run on this machine"));
 }
 
 TEST(ControllerTable, PlaybackAndOtherArmsAreLeftOut) {
   std::vector<EpisodeRow> rows = {controlled("playback", "vmc", 0, 0.1), controlled("mujoco", "vmc", 0, 0.1)};
   rows.back().arm = "null";
   EXPECT_TRUE(controller_table(rows).entries.empty());
-  EXPECT_EQ(controller_table_markdown(controller_table(rows)), no_controllers() + "\n");
-  EXPECT_EQ(controller_table_json({}).at("entries").size(), 0U);
+  EXPECT_EQ(text_of(controller_table(rows)), "No episode ran under a controller in a physics engine.\n");
+  EXPECT_EQ(controller_analysis({}).figures.size(), 0U);
 }
 
 TEST(ControllerTable, CleanComesBeforePerturbationsAndTheyAreNamed) {
   std::vector<EpisodeRow> rows = two_controllers();
-  EXPECT_THAT(controller_table_markdown(controller_table(rows)),
+  EXPECT_THAT(text_of(controller_table(rows)),
               AllOf(HasSubstr("Perturbation clean."), Not(HasSubstr("| Perturbation |"))));
   EpisodeRow pushed = controlled("bullet", "wbc_sim", 0, 0.75);
   pushed.perturbation = "a_push";
@@ -117,37 +120,41 @@ TEST(ControllerTable, CleanComesBeforePerturbationsAndTheyAreNamed) {
   const ControllerTable table = controller_table(rows);
   ASSERT_EQ(table.entries.size(), 3U);
   EXPECT_EQ(table.entries[2].perturbation, "a_push");
-  EXPECT_THAT(controller_table_markdown(table), HasSubstr("| Perturbation "));
+  EXPECT_THAT(text_of(table), HasSubstr("| Perturbation "));
 }
 
 TEST(ControllerTable, ThePapersRowsStandBesideOursAndSaySo) {
   const ControllerTable table = controller_table(two_controllers());
-  const std::string text = controller_table_markdown(table);
+  const std::string text = text_of(table);
   EXPECT_THAT(text, AllOf(HasSubstr("the paper's"), HasSubstr("D-STAR"), HasSubstr("another experiment")));
   EXPECT_THAT(text, AllOf(HasSubstr("0.614"), HasSubstr("52.6"), HasSubstr("0.446")));
   EXPECT_EQ(paper_controllers().size(), 6U);
-  const nlohmann::json json = controller_table_json(table);
-  EXPECT_EQ(json.at("schema"), "duet.controller_table/1");
-  EXPECT_EQ(json.at("paper").at(0).at("figures").at("hf_ratio"), 0.614);
-  EXPECT_EQ(json.at("paper").at(3).at("figures").at("dof_jerk_reference"), 180.0);
+  const Analysis analysis = controller_analysis(table);
+  const auto printed = [&](const char* policy, const char* controller, const char* name) {
+    return figure(analysis, {.source = "paper", .controller = controller, .policy = policy, .name = name});
+  };
+  EXPECT_EQ(printed("D-STAR", "WBC-Sim", "hf_ratio").value, 0.614);
+  EXPECT_EQ(printed("DP", "WBC-Sim", "dof_jerk_reference").value, 180.0);
+  EXPECT_EQ(printed("DP", "TWIST2", "dof_velocity_error").unit, "rad/s");
 }
 
-TEST(ControllerTable, CsvHasOneFigureALineNotRounded) {
-  const std::string csv = controller_table_csv(controller_table(two_controllers()));
-  EXPECT_THAT(csv, AllOf(HasSubstr("duet,clean,replay,vmc,mujoco,hf_ratio,1,6,0.28125,"),
-                         HasSubstr("duet,clean,replay,wbc_sim,bullet,survival,1,6,1,"),
-                         HasSubstr("paper,,DP,TWIST2,,dof_velocity_error,rad/s,,0.446,,")));
-}
-
-TEST(ControllerTable, LatexEscapesNames) {
-  EXPECT_THAT(controller_table_latex(controller_table(two_controllers())), HasSubstr("wbc\\_sim"));
+TEST(ControllerTable, FiguresAreOfEachControllerAndEngine) {
+  const Analysis analysis = controller_analysis(controller_table(two_controllers()));
+  const Figure ratio =
+      figure(analysis, {.engine = "mujoco", .controller = "vmc", .perturbation = "clean", .name = "hf_ratio"});
+  EXPECT_EQ(ratio.n, 6);
+  EXPECT_DOUBLE_EQ(ratio.value, 0.28125);
+  EXPECT_LT(ratio.interval.low, ratio.interval.high);
+  const Figure survival = figure(analysis, {.engine = "bullet", .controller = "wbc_sim", .name = "survival"});
+  EXPECT_EQ(survival.k, 6);
+  EXPECT_DOUBLE_EQ(survival.value, 1.0);
 }
 
 TEST(ControllerTable, OrderOfRowsDoesNotMatter) {
   std::vector<EpisodeRow> rows = two_controllers();
-  const std::string before = controller_table_csv(controller_table(rows));
+  const std::string before = analysis_csv(controller_analysis(controller_table(rows)));
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(controller_table_csv(controller_table(rows)), before);
+  EXPECT_EQ(analysis_csv(controller_analysis(controller_table(rows))), before);
 }
 
 TEST(ControllerTable, TheSameEpisodeTwiceIsRefused) {

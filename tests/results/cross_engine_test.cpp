@@ -27,7 +27,7 @@ void add_rate(Rows& rows, const std::string& engine, const std::string& policy, 
   for (int i = 0; i < n; ++i) rows.push_back(engine_episode(engine, policy, i, i < k, controller));
 }
 
-CrossEngineOptions few_resamples() { return {.resamples = 200}; }
+CrossEngineOptions few_resamples() { return {.intervals = {.resamples = 200}}; }
 
 CrossEngine compared(const Rows& rows) { return cross_engine(rows, {}, few_resamples()); }
 
@@ -369,10 +369,10 @@ TEST(CrossEngineComparison, DoesNotDependOnTheOrderOfRows) {
     }
   }
   const std::vector<MetricColumn> metrics = {{"jpe", "", "m", "lower"}};
-  const nlohmann::json before = cross_engine_json(cross_engine(rows, metrics, few_resamples()));
-  EXPECT_EQ(cross_engine_json(cross_engine(rows, metrics, few_resamples())), before);
+  const nlohmann::json before = analysis_json(engine_analysis(cross_engine(rows, metrics, few_resamples())));
+  EXPECT_EQ(analysis_json(engine_analysis(cross_engine(rows, metrics, few_resamples()))), before);
   std::shuffle(rows.begin(), rows.end(), random);
-  EXPECT_EQ(cross_engine_json(cross_engine(rows, metrics, few_resamples())), before);
+  EXPECT_EQ(analysis_json(engine_analysis(cross_engine(rows, metrics, few_resamples()))), before);
 }
 
 }  // namespace

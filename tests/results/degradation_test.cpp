@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 
@@ -12,6 +13,7 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -51,6 +53,8 @@ std::vector<EpisodeRow> jittered() {
   add_episodes({.perturbation = "vanish", .successes = "0000"}, rows);
   return rows;
 }
+
+std::string text_of(const Degradation& result) { return analysis_markdown(degradation_analysis(result)); }
 
 TEST(Degradation, LossIsPairedWithTheCleanEpisodes) {
   const Degradation result = degradation(jittered());
@@ -117,19 +121,19 @@ TEST(Degradation, ThePapersCurveStandsBesideOurs) {
   EXPECT_NEAR(result.paper[0].difference.difference, -0.071, 1e-12);
   // (82.55 * 1 + 79.8 * 1 + 78.6 * 3) / 5 / 84.9
   EXPECT_NEAR(result.paper[0].normalised_area, 398.15 / 5.0 / 84.9, 1e-12);
-  const std::vector<LinePlot> plots = degradation_plots(result);
+  const std::vector<LinePlot> plots = degradation_analysis(result).plots.at(0).plots;
   ASSERT_EQ(plots.size(), 1U);
   EXPECT_EQ(plots[0].x_label, "jitter [m]");
   ASSERT_EQ(plots[0].series.size(), 2U);
   EXPECT_EQ(plots[0].series[1].y.back(), 77.8);
-  EXPECT_THAT(degradation_markdown(result), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
+  EXPECT_THAT(text_of(result), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
 }
 
 TEST(Degradation, TheTableSaysItsLevel) {
-  PolicyTableOptions options;
-  EXPECT_THAT(degradation_markdown(degradation(jittered(), options)), HasSubstr("with 95 % Wilson intervals"));
+  IntervalOptions options;
+  EXPECT_THAT(text_of(degradation(jittered(), options)), HasSubstr("with 95 % Wilson intervals"));
   options.level = 0.9;
-  EXPECT_THAT(degradation_markdown(degradation(jittered(), options)), HasSubstr("with 90 % Wilson intervals"));
+  EXPECT_THAT(text_of(degradation(jittered(), options)), HasSubstr("with 90 % Wilson intervals"));
 }
 
 TEST(Degradation, CleanAloneSaysSo) {
@@ -138,17 +142,25 @@ TEST(Degradation, CleanAloneSaysSo) {
   add_episodes({.policy = "dp", .perturbation = "vanish"}, rows);  // never clean
   const Degradation result = degradation(rows);
   EXPECT_TRUE(result.success.empty());
-  EXPECT_TRUE(degradation_tables(result).empty());
-  EXPECT_TRUE(degradation_plots(result).empty());
-  EXPECT_EQ(degradation_markdown(result), "No policy ran both clean and perturbed.\n");
-  EXPECT_EQ(degradation_json(result).at("success").size(), 0U);
+  EXPECT_EQ(text_of(result), "No policy ran both clean and perturbed.\n");
+  EXPECT_TRUE(degradation_analysis(result).empty());
 }
 
-TEST(Degradation, CsvHasOneFigureALineNotRounded) {
-  EXPECT_THAT(degradation_csv(degradation(jittered())),
-              AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,jitter_2cm,against_clean,4,-0.5,"),
-                    HasSubstr("duet,mujoco,vmc,main,dstar,clean,paper_success,4,0,"),
-                    HasSubstr("paper,,,,D-STAR,jitter,loss_at_largest,0,-0.07")));
+TEST(Degradation, FiguresAreOfPerturbationsAndOfFamilies) {
+  const Analysis analysis = degradation_analysis(degradation(jittered()));
+  const Figure loss = figure(analysis, {.policy = "dstar", .perturbation = "jitter_2cm", .name = "against_clean"});
+  EXPECT_EQ(loss.n, 4);
+  EXPECT_EQ(loss.value, -0.5);
+  EXPECT_EQ(figure(analysis, {.policy = "dstar", .perturbation = "clean", .name = "paper_success"}).value, 0.0);
+  const Figure size = figure(analysis, {.perturbation = "jitter_2cm", .of = "jitter", .name = "size"});
+  EXPECT_EQ(size.value, 0.02);
+  EXPECT_EQ(size.unit, "m");
+  EXPECT_NEAR(figure(analysis, {.of = "jitter", .name = "normalised_area"}).value, 0.6, 1e-12);
+  EXPECT_EQ(figure(analysis, {.of = "jitter", .name = "largest"}).value, 0.05);
+  EXPECT_NEAR(figure(analysis, {.source = "paper", .of = "jitter", .name = "loss_at_largest"}).value, -0.071, 1e-12);
+  EXPECT_EQ(
+      figure(analysis, {.source = "paper", .perturbation = "jitter_0.05m", .of = "jitter", .name = "success"}).value,
+      0.778);
 }
 
 TEST(Degradation, TheSameEpisodeTwiceIsRefused) {

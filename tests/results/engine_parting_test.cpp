@@ -86,7 +86,7 @@ TEST(EngineParting, QuartilesAreThoseOfKaplanAndMeier) {
   rows.push_back(traced("ode", 2, std::vector<int>(5, 0)));
   rows.push_back(traced("ode", 3, moved_at(3)));
   rows.push_back(traced("ode", 4, {}));
-  const EngineParting parting = cross_engine(rows, {}, {.resamples = 200}).parting.at(0);
+  const EngineParting parting = cross_engine(rows, {}, {.intervals = {.resamples = 200}}).parting.at(0);
   EXPECT_EQ(parting.pairs, 4);
   EXPECT_EQ(parting.parted, 3);
   EXPECT_EQ(parting.without_trace, 1);

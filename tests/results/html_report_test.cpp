@@ -7,7 +7,9 @@
 #include <regex>
 
 #include "duet/results/report/escape_html.h"
+#include "duet/results/report/foot_plots.h"
 #include "duet/results/report/report_parts.h"
+#include "duet/results/report/run_analyses.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -146,14 +148,16 @@ TEST(HtmlReport, HasASectionAcrossEngines) {
   for (EpisodeRow& row : rows) {
     if (row.engine == "ode") row.engine = evil;
   }
-  across.cross_engine = cross_engine(rows, across.columns, {.resamples = 100});
+  RunTables tables = run_tables(rows, {.all = {}, .drifting = across.columns}, nullptr);
+  across.analyses = {run_analysis(tables, "engines")};
   std::string html = html_report(across);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"engines\""), HasSubstr("Across engines"), HasSubstr("class=\"intervals\""),
                           HasSubstr("Success per engine"), HasSubstr("Time until engines part"),
                           HasSubstr("No parity certificate is attached (duet validate makes one)."),
                           Not(HasSubstr("<script>x")), Not(HasSubstr("http:"))));
-  across.certificate = {{"schema", "duet.certificate/1"}, {"engines", {{{"name", evil}, {"passed", 20}}}}};
+  tables.certificate = {{"schema", "duet.certificate/1"}, {"engines", {{{"name", evil}, {"passed", 20}}}}};
+  across.analyses = {run_analysis(tables, "engines")};
   html = html_report(across);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html,
@@ -161,19 +165,11 @@ TEST(HtmlReport, HasASectionAcrossEngines) {
                     HasSubstr("The certificate does not cover mujoco."), Not(HasSubstr("No parity certificate"))));
 }
 
-TEST(HtmlReport, SaysWhereThereIsOneEngineOnly) {
-  ReportContent alone = content();
-  alone.cross_engine = cross_engine({test::engine_episode("mujoco", "replay", 0, true)}, {});
-  const std::string html = html_report(alone);
-  EXPECT_EQ(unbalanced_tag(html), "");
-  EXPECT_THAT(html, AllOf(HasSubstr("these results have one physics engine, mujoco."), Not(HasSubstr("<h3>Spread"))));
-}
-
 TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
   ReportContent solid = content();
   EXPECT_THAT(html_report(solid), Not(HasSubstr("Contact with people")));
   std::vector<EpisodeRow> rows = two_engines();
-  solid.contacts = contact_table(rows);
+  solid.analyses = {contact_analysis(contact_table(rows))};
   EXPECT_THAT(html_report(solid), Not(HasSubstr("<details open>")));
   const std::string evil = "\"><script>x</script>&'";
   for (EpisodeRow& row : rows) {
@@ -181,7 +177,7 @@ TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
     row.forces["human." + evil + ".worst_ratio"] = 1.5;
     if (row.engine == "ode") row.engine = row.policy = evil;
   }
-  solid.contacts = contact_table(rows);
+  solid.analyses = {contact_analysis(contact_table(rows))};
   const std::string html = html_report(solid);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"contacts\""), HasSubstr("class=\"warning\">Limits: unverified"),
@@ -282,8 +278,7 @@ TEST(HtmlReport, TrainingStandsBelowTheResults) {
 TEST(HtmlReport, ShowsControllersStepsAndTraining) {
   const std::vector<EpisodeRow> rows = {walking("wbc_sim", 0, Outcome::kOk)};
   ReportContent shown = content();
-  shown.controllers = controller_table(rows);
-  shown.foot_plots = foot_plots(rows);
+  shown.analyses = run_analyses(run_tables(rows, {}, nullptr));
   shown.curves = {parse_curves("steps,return\n0,1\n10,2\n", "<curves>.csv")};
   const std::string html = html_report(shown);
   EXPECT_EQ(unbalanced_tag(html), "");
@@ -304,13 +299,13 @@ TEST(HtmlReport, ShowsPoliciesPerturbationsAndReactivity) {
     }
   }
   ReportContent shown = content();
-  shown.policies = policy_report(rows);
+  shown.analyses = run_analyses(run_tables(rows, {}, nullptr));
   const std::string html = html_report(shown);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(
-      html, AllOf(HasSubstr("id=\"policies\""), HasSubstr("id=\"perturbations\""), HasSubstr("id=\"reactivity\""),
+      html, AllOf(HasSubstr("id=\"policies\""), HasSubstr("id=\"degradation\""), HasSubstr("id=\"reactivity\""),
                   HasSubstr("success [%]"), HasSubstr("shift of the partner&#39;s onset"), Not(HasSubstr("<dstar>"))));
-  for (const char* section : {"id=\"policies\"", "id=\"perturbations\"", "id=\"reactivity\""})
+  for (const char* section : {"id=\"policies\"", "id=\"degradation\"", "id=\"reactivity\""})
     EXPECT_THAT(html_report(content()), Not(HasSubstr(section)));
 }
 

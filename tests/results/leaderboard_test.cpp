@@ -8,6 +8,7 @@
 #include "duet/core/require.h"
 #include "duet/results/analyses/leaderboard_rows.h"
 #include "duet/results/report/interval_plot.h"
+#include "tests/results/figures.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -15,6 +16,8 @@ namespace duet {
 namespace {
 
 using test::episode;
+using test::figure;
+using test::figures_like;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -45,6 +48,14 @@ std::vector<EpisodeRow> small_benchmark() {
 
 std::size_t columns(const std::string& line) {
   return static_cast<std::size_t>(std::count(line.begin(), line.end(), '|'));
+}
+
+std::string text_of(const std::vector<LeaderboardEntry>& entries) {
+  return analysis_markdown(leaderboard_analysis(entries));
+}
+
+std::string latex_of(const std::vector<LeaderboardEntry>& entries) {
+  return analysis_latex(leaderboard_analysis(entries));
 }
 
 TEST(Leaderboard, CountsAndIntervalsPerTaskAndOverAll) {
@@ -87,7 +98,7 @@ TEST(Leaderboard, LiftCoversOnlyEpisodesThatTheNullArmHas) {
   std::erase_if(rows, [](const EpisodeRow& row) { return row.arm == "null"; });
   const std::vector<LeaderboardEntry> alone = leaderboard(rows);
   EXPECT_TRUE(std::isnan(entry_of(alone, "replay", "hug").lift));
-  EXPECT_THAT(leaderboard_markdown(alone), HasSubstr("The null arm was not run"));
+  EXPECT_THAT(text_of(alone), HasSubstr("The null arm was not run"));
 }
 
 TEST(Leaderboard, ANullArmUnderAnotherConditionDoesNotPair) {
@@ -118,7 +129,7 @@ TEST(Leaderboard, WhatDidNotEndWellFailsAndIsShown) {
   EXPECT_EQ(entry.unsupported, 1);
   EXPECT_EQ(entry.unjudged, 1);
   EXPECT_DOUBLE_EQ(entry.other_success.at("robot/strict"), 2.0 / 7.0);
-  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)),
+  EXPECT_THAT(text_of(leaderboard(rows)),
               AllOf(HasSubstr("1 episodes were not supported"), HasSubstr("1 episodes have no headline verdict")));
 }
 
@@ -137,9 +148,9 @@ TEST(Leaderboard, MetricsAreMeansOverEpisodesThatHaveThem) {
 TEST(Leaderboard, DoesNotDependOnTheOrderOfRows) {
   std::vector<EpisodeRow> rows = small_benchmark();
   for (std::size_t i = 0; i < rows.size(); ++i) rows[i].metrics = {{"jpe", 0.1 * static_cast<double>(i) + 1e-9}};
-  const nlohmann::json forward = leaderboard_json(leaderboard(rows));
+  const nlohmann::json forward = analysis_json(leaderboard_analysis(leaderboard(rows)));
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(leaderboard_json(leaderboard(rows)), forward);
+  EXPECT_EQ(analysis_json(leaderboard_analysis(leaderboard(rows))), forward);
 }
 
 TEST(Leaderboard, IsSortedWithTasksInTheirOrder) {
@@ -168,7 +179,7 @@ TEST(Leaderboard, RefusesMixedSuitesAndEpisodesThatAreThereTwice) {
 }
 
 TEST(LeaderboardMarkdown, AlignsAndPrintsTheNullArmAsARow) {
-  const std::string text = leaderboard_markdown(leaderboard(small_benchmark()));
+  const std::string text = text_of(leaderboard(small_benchmark()));
   EXPECT_THAT(text, HasSubstr("Engine mujoco, controller vmc, perturbation clean."));
   EXPECT_THAT(text, HasSubstr("Hug (20)"));
   EXPECT_THAT(text, HasSubstr("| replay         |  30 | 83.3 [66.4, 92.7] |"));
@@ -191,11 +202,12 @@ TEST(LeaderboardMarkdown, MetricsOfSeveralEnginesAreATableEach) {
     rows.back().engine = engine;
     rows.back().metrics = {{"jpe", 0.125}};
   }
-  const std::string text = leaderboard_markdown(leaderboard(rows));
-  EXPECT_THAT(text, HasSubstr("all tasks:\n\nEngine mujoco:\n\n| Metric | replay |\n"));
-  EXPECT_THAT(text, HasSubstr("|  0.125 |\n\nEngine ode:\n\n| Metric | replay |\n"));
+  const std::string text = text_of(leaderboard(rows));
+  EXPECT_THAT(text, HasSubstr("all tasks, engine mujoco:\n\n| Metric | replay |\n"));
+  EXPECT_THAT(text, HasSubstr("|  0.125 |\n\nMean over the episodes that have the metric, all tasks, engine ode:\n\n"));
+  EXPECT_THAT(terminal_text(leaderboard_analysis(leaderboard(rows))), Not(HasSubstr("Metric")));
   rows.pop_back();
-  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("all tasks:\n\n| Metric | replay |\n"));
+  EXPECT_THAT(terminal_text(leaderboard_analysis(leaderboard(rows))), HasSubstr("all tasks:\n\n| Metric | replay |\n"));
 }
 
 // A policy that does not play is no policy that scores 0.
@@ -215,7 +227,7 @@ TEST(Leaderboard, PlansThatWereLostStandInEveryTable) {
   EXPECT_EQ(plans_lost(entry_of(entries, "evil", "all")), "3 invalid, dead in 2");
   EXPECT_EQ(plans_lost(entry_of(entries, "late", "all")), "13 late");
   EXPECT_EQ(plans_lost(entry_of(entries, "good", "all")), "0");
-  const std::string text = leaderboard_markdown(entries);
+  const std::string text = text_of(entries);
   EXPECT_THAT(text, AllOf(HasSubstr("Plans lost |"), HasSubstr("3 invalid, dead in 2 |"), HasSubstr("13 late |")));
   EXPECT_THAT(
       text,
@@ -223,77 +235,89 @@ TEST(Leaderboard, PlansThatWereLostStandInEveryTable) {
           "Policy 'evil' lost plans (in 2 episodes: 3 invalid, dead in 2, which are errors and count as failures). "
           "The first fault: policy 'evil': it ended\n"));
   EXPECT_THAT(text, HasSubstr("The first fault: no plan for tick 0\\x1b[31m\n"));
-  EXPECT_THAT(leaderboard_latex(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("% Policy 'late' lost plans")));
-  EXPECT_THAT(leaderboard_csv(entries),
-              AllOf(HasSubstr("plans_late,plans_invalid,policy_dead"), HasSubstr(",0,3,2\r\n")));
-  const nlohmann::json json = leaderboard_json(entries);
-  for (const nlohmann::json& entry : json.at("entries"))
-    if (entry.at("policy") == "evil" && entry.at("task") == "all") {
-      EXPECT_EQ(entry.at("policy_dead"), 2);
-      EXPECT_EQ(entry.at("plans_invalid"), 3);
-      EXPECT_EQ(entry.at("policy_fault"), "policy 'evil': it ended");
-    }
+  EXPECT_THAT(latex_of(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("% Policy 'late' lost plans")));
+  const Analysis analysis = leaderboard_analysis(entries);
+  const auto evil = [&](const char* name) { return figure(analysis, {.policy = "evil", .task = "all", .name = name}); };
+  EXPECT_EQ(evil("policy_dead").value, 2.0);
+  EXPECT_EQ(evil("plans_invalid").value, 3.0);
+  EXPECT_EQ(evil("policy_fault").text, "policy 'evil': it ended");
 }
 
 TEST(Leaderboard, WithoutAFaultThereIsNoColumnForPlans) {
   const std::vector<LeaderboardEntry> entries = leaderboard({episode("good", "hug", 0, true)});
-  EXPECT_THAT(leaderboard_markdown(entries), Not(HasSubstr("lost")));
-  EXPECT_THAT(leaderboard_latex(entries), Not(HasSubstr("lost")));
+  EXPECT_THAT(text_of(entries), Not(HasSubstr("lost")));
+  EXPECT_THAT(latex_of(entries), Not(HasSubstr("lost")));
 }
 
 TEST(LeaderboardMarkdown, CaptionsAndNotesOfRowsAreEscapedToo) {
   EpisodeRow row = episode("p", "hug", 0, true);
   row.engine = "<script>x</script>\x1b[2J";
-  const std::string text = leaderboard_markdown(leaderboard({row}));
+  const std::string text = text_of(leaderboard({row}));
   EXPECT_THAT(text, HasSubstr("Engine &lt;script>x&lt;/script>\\x1b[2J"));
   EXPECT_THAT(text, AllOf(Not(HasSubstr("<script")), Not(HasSubstr("\x1b"))));
   row.controller = "a\n\\end{document}";
-  EXPECT_THAT(leaderboard_latex(leaderboard({row})), Not(HasSubstr("\n\\end{document}")));
+  EXPECT_THAT(latex_of(leaderboard({row})), Not(HasSubstr("\n\\end{document}")));
 }
 
 TEST(LeaderboardMarkdown, EscapesNames) {
   std::vector<EpisodeRow> rows = {episode("a|b\n<c> <5", "hug", 0, true)};
-  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("a\\|b &lt;c> <5"));
+  EXPECT_THAT(text_of(leaderboard(rows)), HasSubstr("a\\|b &lt;c> <5"));
   rows = {episode("a\x1b[31m\r", "hug", 0, true)};
-  EXPECT_THAT(leaderboard_markdown(leaderboard(rows)), HasSubstr("| a\\x1b[31m"));
-  EXPECT_EQ(leaderboard_markdown({}), "No episodes.\n");
+  EXPECT_THAT(text_of(leaderboard(rows)), HasSubstr("| a\\x1b[31m"));
+  EXPECT_EQ(text_of({}), "No episodes.\n");
 }
 
 TEST(LeaderboardMarkdown, NullArmComesAfterThePoliciesOfItsEngine) {
   std::vector<EpisodeRow> rows = {episode("zeta", "hug", 0, true), episode("null", "hug", 0, true, "null"),
                                   episode("clip", "hug", 0, true, "shuffled"), episode("alpha", "hug", 0, true)};
-  const std::string text = leaderboard_markdown(leaderboard(rows));
+  const std::string text = text_of(leaderboard(rows));
   EXPECT_LT(text.find("| alpha"), text.find("| zeta"));
   EXPECT_LT(text.find("| zeta"), text.find("| clip (shuffled arm)"));
   EXPECT_LT(text.find("| clip (shuffled arm)"), text.find("| null (control)"));
 }
 
-TEST(LeaderboardCsv, FollowsRfc4180) {
-  std::vector<EpisodeRow> rows = {episode("say \"hi\", twice", "hug", 0, true)};
+TEST(LeaderboardFigures, AreOfEachTaskAndOfAll) {
+  std::vector<EpisodeRow> rows = small_benchmark();
   rows[0].metrics = {{"jpe", 0.1}};
-  const std::string text = leaderboard_csv(leaderboard(rows));
-  EXPECT_THAT(text, testing::StartsWith("engine,controller,policy,perturbation,arm,task,n,k,success,"));
-  EXPECT_THAT(text, HasSubstr("mujoco,vmc,\"say \"\"hi\"\", twice\",clean,main,hug,1,1,1,"));
-  EXPECT_THAT(text, HasSubstr(",metric:jpe\r\n"));
-  EXPECT_THAT(text, testing::EndsWith(",0.1\r\n"));
-  EXPECT_THAT(text, Not(HasSubstr("nan")));
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 3);
+  const Analysis analysis = leaderboard_analysis(leaderboard(rows), {{"jpe", "Joint position error", "m", "lower"}});
+  const Figure success = figure(analysis, {.engine = "mujoco",
+                                           .controller = "vmc",
+                                           .policy = "replay",
+                                           .arm = "main",
+                                           .perturbation = "clean",
+                                           .task = "all",
+                                           .name = "success"});
+  EXPECT_EQ(success.n, 30);
+  EXPECT_EQ(success.k, 25);
+  EXPECT_DOUBLE_EQ(success.value, 25.0 / 30.0);
+  EXPECT_EQ(success.interval.low, wilson(25, 30).low);
+  EXPECT_EQ(figure(analysis, {.policy = "replay", .task = "all", .name = "lift"}).n, 30);
+  EXPECT_EQ(figure(analysis, {.policy = "replay", .task = "all", .name = "jpe"}).unit, "m");
+  EXPECT_TRUE(figures_like(leaderboard_analysis(leaderboard(rows), {}, false), {.name = "jpe"}).empty());
+}
+
+TEST(LeaderboardFigures, EveryDetectorHasItsSuccess) {
+  std::vector<EpisodeRow> rows = {episode("replay", "hug", 0, true)};
+  Verdict& strict = rows[0].verdicts.emplace_back();
+  strict.version = "paper";
+  strict.thresholds = "strict";
+  const Analysis analysis = leaderboard_analysis(leaderboard(rows));
+  EXPECT_EQ(figure(analysis, {.task = "all", .of = "paper/strict", .name = "success"}).value, 0.0);
 }
 
 TEST(LeaderboardLatex, IsABooktabsTabularWithEscapedNames) {
-  const std::string text = leaderboard_latex(leaderboard({episode("d_star 100% & co", "high_five", 0, true)}));
-  EXPECT_THAT(text,
-              AllOf(HasSubstr("\\begin{tabular}{lrrrrrrrr}"), HasSubstr("\\toprule"), HasSubstr("\\midrule"),
-                    HasSubstr("d\\_star 100\\% \\& co & 1 & 100.0 [20.7, 100.0] & -"), HasSubstr("\\bottomrule")));
+  EXPECT_THAT(latex_of(leaderboard({episode("d_star 100% & co", "high_five", 0, true)})),
+              AllOf(HasSubstr("\\begin{tabular}{lrrrrrrrr}"),
+                    HasSubstr("d\\_star 100\\% \\& co & 1 & 100.0 [20.7, 100.0] & -")));
 }
 
-TEST(LeaderboardJson, HasNullWhereThereIsNoNullArm) {
-  const nlohmann::json json = leaderboard_json(leaderboard({episode("replay", "hug", 0, true)}));
-  const nlohmann::json& entry = json.at("entries").at(0);
-  EXPECT_TRUE(entry.at("null_success").is_null());
-  EXPECT_TRUE(entry.at("lift_interval").at(0).is_null());
-  EXPECT_EQ(entry.at("k"), 1);
-  EXPECT_THAT(json.dump(), Not(HasSubstr("nan")));
+TEST(LeaderboardFigures, ThereIsNoLiftWithoutANullArm) {
+  const Analysis analysis = leaderboard_analysis(leaderboard({episode("replay", "hug", 0, true)}));
+  for (const char* name : {"null_success", "lift"}) {
+    const Figure found = figure(analysis, {.task = "all", .name = name});
+    EXPECT_TRUE(std::isnan(found.value));
+    EXPECT_TRUE(std::isnan(found.interval.low));
+  }
 }
 
 TEST(IntervalPlot, StandsAloneAndEscapes) {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/results/report/html_report.h"
+#include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 
@@ -11,6 +11,8 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
+using test::figure;
+using test::figures_like;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -106,8 +108,7 @@ TEST(LevelTable, RowsWithoutLevelsAreNoTable) {
   add_episodes({.successes = "11"}, rows);
   add_episodes({.perturbation = "push", .successes = "01"}, rows);
   EXPECT_TRUE(level_tables(rows).empty());
-  EXPECT_EQ(levels_markdown({}), "");
-  EXPECT_EQ(levels_latex({}), "");
+  EXPECT_TRUE(level_analysis({}).empty());
 }
 
 TEST(LevelTable, TwoNamesOfOneLevelAreRefused) {
@@ -117,19 +118,18 @@ TEST(LevelTable, TwoNamesOfOneLevelAreRefused) {
               AllOf(HasSubstr("two names of level 1"), HasSubstr("hurries"), HasSubstr("waits")));
 }
 
-TEST(LevelTable, IsPrintedInEveryFormat) {
-  const std::vector<LevelTable> tables = level_tables(ladder());
-  EXPECT_THAT(levels_markdown(tables),
+TEST(LevelTable, SaysWhatWasReached) {
+  const Analysis analysis = level_analysis(level_tables(ladder()));
+  EXPECT_THAT(analysis_markdown(analysis),
               AllOf(HasSubstr("### Levels"), HasSubstr(" 1 waits |"), HasSubstr("25.0 [4.6, 69.9]"),
                     HasSubstr("up to which success is 50 % or more"), HasSubstr("|    none |")));
-  EXPECT_THAT(levels_csv(tables),
-              AllOf(HasSubstr("dstar,level_2,success,4,0.25,"), HasSubstr("dstar,level,reached,4,1,")));
-  EXPECT_EQ(levels_json(tables)["tables"][0]["entries"][0]["reached"], 1);
-  EXPECT_TRUE(levels_json(tables)["tables"][0]["entries"][1]["reached"].is_null());
-  EXPECT_THAT(levels_latex(tables), HasSubstr("1 waits"));
-  ReportContent content;
-  content.levels = tables;
-  EXPECT_THAT(html_report(content), HasSubstr("<section id=\"levels\""));
+  const auto reached = figures_like(analysis, {.of = "level", .name = "reached"});
+  ASSERT_EQ(reached.size(), 1U);  // the other policy reaches none
+  EXPECT_EQ(reached[0].policy, "dstar");
+  EXPECT_EQ(reached[0].value, 1.0);
+  EXPECT_EQ(figure(analysis, {.of = "level", .name = "pass"}).value, 0.5);
+  const Figure waits = figure(analysis, {.policy = "dstar", .of = "level_1_waits", .name = "success"});
+  EXPECT_EQ(waits.n, 4);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "duet/results/analyses/degradation.h"
 #include "duet/results/analyses/leaderboard.h"
 #include "duet/results/analyses/policy_table.h"
+#include "duet/results/statistics/resolution.h"
 #include "tests/results/policy_rows.h"
 
 namespace duet {
@@ -45,9 +46,9 @@ std::vector<EpisodeRow> rows() {
 
 TEST(Notes, EveryTableNamesTheLevelOfItsIntervals) {
   const std::vector<EpisodeRow> all = rows();
-  for (const std::string& text :
-       {leaderboard_markdown(leaderboard(all)), controller_table_markdown(controller_table(all)),
-        policy_table_markdown(policy_table(all)), degradation_markdown(degradation(all))}) {
+  for (const Analysis& analysis : {leaderboard_analysis(leaderboard(all)), controller_analysis(controller_table(all)),
+                                   policy_analysis(policy_table(all)), degradation_analysis(degradation(all))}) {
+    const std::string text = analysis_markdown(analysis);
     EXPECT_THAT(text, HasSubstr("95 %"));
     EXPECT_THAT(text, ::testing::Not(HasSubstr("195 %"))) << text;
   }
@@ -57,7 +58,7 @@ TEST(Notes, AComparisonNamesTheLevelOfItsIntervals) {
   std::vector<EpisodeRow> a, b;
   add_episodes({.policy = "dstar", .successes = "110111011101"}, a);
   add_episodes({.policy = "replay", .successes = "100110001101"}, b);
-  const std::string text = comparison_markdown(compare_runs(a, b));
+  const std::string text = analysis_markdown(comparison_analysis(compare_runs(a, b)));
   EXPECT_THAT(text, HasSubstr("95 %"));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("195 %")));
 }

@@ -4,13 +4,14 @@
 
 #include <cmath>
 
-#include "duet/results/report/html_report.h"
+#include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
+using test::figure;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -82,22 +83,19 @@ TEST(PeopleTable, OneKindAloneIsNoTable) {
   std::vector<EpisodeRow> rows;
   add_people("recorded", "hug", "1000", rows);
   EXPECT_TRUE(people_table(rows).entries.empty());
-  EXPECT_EQ(people_table_markdown(people_table(rows)), "No run with recorded and synthetic people.\n");
-  EXPECT_EQ(people_table_latex({}), "% No run with recorded and synthetic people.\n");
-  EXPECT_EQ(people_table_json({})["entries"].size(), 0U);
+  EXPECT_EQ(analysis_markdown(people_analysis(people_table(rows))), "No run with recorded and synthetic people.\n");
+  EXPECT_TRUE(people_analysis({}).empty());
 }
 
-TEST(PeopleTable, IsPrintedInEveryFormat) {
-  const PeopleTable table = people_table(both_kinds());
-  EXPECT_THAT(people_table_markdown(table),
+TEST(PeopleTable, FiguresAreOfBothKindsAndOfTheirDifference) {
+  const Analysis analysis = people_analysis(people_table(both_kinds()));
+  EXPECT_THAT(analysis_markdown(analysis),
               AllOf(HasSubstr("### Recorded and synthetic people"), HasSubstr("| dstar  | Hug "),
                     HasSubstr("25.0 [4.6, 69.9]"), HasSubstr("The leaderboard counts both kinds together")));
-  EXPECT_THAT(people_table_csv(table), HasSubstr("duet,mujoco,vmc,main,dstar,hug,recorded_minus_synthetic,8,-0.5,"));
-  EXPECT_EQ(people_table_json(table)["entries"][0]["recorded"]["success"]["k"], 1);
-  EXPECT_THAT(people_table_latex(table), HasSubstr("Recorded and synthetic people"));
-  ReportContent content;
-  content.people = table;
-  EXPECT_THAT(html_report(content), HasSubstr("<section id=\"people\""));
+  const Figure difference = figure(analysis, {.policy = "dstar", .task = "hug", .name = "recorded_minus_synthetic"});
+  EXPECT_EQ(difference.n, 8);
+  EXPECT_EQ(difference.value, -0.5);
+  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "hug", .of = "recorded", .name = "success"}).k, 1);
 }
 
 }  // namespace

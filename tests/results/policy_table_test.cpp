@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 
@@ -12,6 +13,7 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -25,6 +27,8 @@ std::vector<EpisodeRow> two_policies(const std::string& engine = "mujoco") {
   add_episodes({.engine = engine, .policy = "null", .arm = "null", .successes = "1000"}, rows);
   return rows;
 }
+
+std::string text_of(const PolicyTable& table) { return analysis_markdown(policy_analysis(table)); }
 
 const PolicyLine& line_of(const PolicyTable& table, const std::string& policy) {
   for (const PolicyLine& line : table.lines)
@@ -58,8 +62,8 @@ TEST(PolicyTable, FallsJerkAndContactLimitsAreOfTheEpisodesThatHaveThem) {
   EXPECT_DOUBLE_EQ(dstar.dof_jerk, 200.0);
   EXPECT_EQ(dstar.violations.n, 2);
   EXPECT_DOUBLE_EQ(dstar.violations.rate, 0.5);
-  EXPECT_THAT(policy_table_markdown(table), AllOf(HasSubstr("Over a contact limit"), HasSubstr("DOF jerk")));
-  EXPECT_THAT(policy_table_markdown(policy_table(two_policies())),
+  EXPECT_THAT(text_of(table), AllOf(HasSubstr("Over a contact limit"), HasSubstr("DOF jerk")));
+  EXPECT_THAT(text_of(policy_table(two_policies())),
               AllOf(Not(HasSubstr("Over a contact limit [%]")), Not(HasSubstr("DOF jerk"))));
 }
 
@@ -78,8 +82,8 @@ TEST(PolicyTable, PlaybackIsInNoMeanAndTheWorstEngineIsNamed) {
   EXPECT_EQ(over.worst, "bullet");
   EXPECT_DOUBLE_EQ(dstar.mean_success, 0.5);
   EXPECT_LE(dstar.mean_interval.low, 0.5);
-  EXPECT_THAT(policy_table_markdown(table), AllOf(HasSubstr("| bullet"), HasSubstr("Worst"), HasSubstr("Spread")));
-  EXPECT_THAT(policy_table_markdown(policy_table(two_policies())), Not(HasSubstr("Worst")));
+  EXPECT_THAT(text_of(table), AllOf(HasSubstr("| bullet"), HasSubstr("Worst"), HasSubstr("Spread")));
+  EXPECT_THAT(text_of(policy_table(two_policies())), Not(HasSubstr("Worst")));
 }
 
 TEST(PolicyTable, MoreFallsAreWorse) {
@@ -112,7 +116,8 @@ TEST(PolicyTable, EveryPolicyMeetsEveryOtherInsideOneEngineAndController) {
 TEST(PolicyTable, OnlyCleanEpisodesCount) {
   std::vector<EpisodeRow> rows = two_policies();
   add_episodes({.policy = "dstar", .perturbation = "jitter_5cm", .successes = "0000"}, rows);
-  EXPECT_EQ(policy_table_csv(policy_table(rows)), policy_table_csv(policy_table(two_policies())));
+  EXPECT_EQ(analysis_csv(policy_analysis(policy_table(rows))),
+            analysis_csv(policy_analysis(policy_table(two_policies()))));
 }
 
 TEST(PolicyTable, APolicyThatCouldNotRunIsNamedAndHasNoFigure) {
@@ -121,7 +126,7 @@ TEST(PolicyTable, APolicyThatCouldNotRunIsNamedAndHasNoFigure) {
   for (std::size_t i = rows.size() - 2; i < rows.size(); ++i) rows[i].outcome = Outcome::kUnsupported;
   const PolicyTable table = policy_table(rows);
   EXPECT_EQ(table.lines.size(), 2U);
-  EXPECT_THAT(policy_table_markdown(table), HasSubstr("no_language could not run (2 episodes)"));
+  EXPECT_THAT(text_of(table), HasSubstr("no_language could not run (2 episodes)"));
 }
 
 TEST(PolicyTable, APolicyThatDiedIsNamedBelowIt) {
@@ -134,22 +139,24 @@ TEST(PolicyTable, APolicyThatDiedIsNamedBelowIt) {
       "Policy 'mine' lost plans (in 2 episodes: dead in 1, which are errors and count as failures). The first fault: "
       "its process ended "
       "with signal 9";
-  EXPECT_THAT(policy_table_markdown(table), HasSubstr(note));
-  EXPECT_EQ(policy_table_json(table).at("faults").at(0), note);
+  EXPECT_THAT(text_of(table), HasSubstr(note));
+  EXPECT_THAT(analysis_json(policy_analysis(table)).at("notes"), testing::Contains(note));
 }
 
 TEST(PolicyTable, ThePapersRowsStandUnderThePapersDetectorsAlone) {
   std::vector<EpisodeRow> rows = two_policies();
   add_episodes({.task = "wave", .successes = "11"}, rows);
   const PolicyTable table = policy_table(rows);
-  const std::vector<TitledTable> tables = policy_tables(table);
+  const Analysis analysis = policy_analysis(table);
+  const std::vector<TitledTable>& tables = analysis.tables;
   ASSERT_EQ(tables.size(), 4U);
   EXPECT_EQ(tables[1].table.header, (std::vector<std::string>{"Policy", "Overall", "Hug", "Wave"}));
   EXPECT_EQ(tables[1].table.rows.size(), 2U);
   ASSERT_EQ(tables[2].table.rows.size(), 5U);
   EXPECT_EQ(tables[2].table.rows[2], (std::vector<std::string>{"D-STAR (the paper's)", "84.9", "93.3", "96.3"}));
-  EXPECT_THAT(policy_table_markdown(table), HasSubstr("can be held against the paper's figures"));
-  EXPECT_EQ(policy_table_json(table).at("paper").at(0).at("success_percent").at("bend"), 93.3);
+  EXPECT_THAT(text_of(table), HasSubstr("can be held against the paper's figures"));
+  EXPECT_EQ(figure(analysis, {.source = "paper", .policy = "D-STAR", .task = "wave", .name = "paper_success"}).value,
+            96.3 / 100.0);
 }
 
 TEST(PolicyTable, ReplayAloneIsNoExperimentOnPolicies) {
@@ -157,26 +164,38 @@ TEST(PolicyTable, ReplayAloneIsNoExperimentOnPolicies) {
   add_episodes({.policy = "replay"}, rows);
   const PolicyTable table = policy_table(rows);
   EXPECT_TRUE(table.lines.empty());
-  EXPECT_TRUE(policy_tables(table).empty());
-  EXPECT_EQ(policy_table_markdown(table), "No policy but replay ran.\n");
-  EXPECT_EQ(policy_table_latex(table), "% No policy but replay ran.\n");
-  EXPECT_EQ(policy_table_json(table).at("lines").size(), 0U);
+  EXPECT_EQ(text_of(table), "No policy but replay ran.\n");
+  EXPECT_TRUE(policy_analysis(table).empty());
   EXPECT_TRUE(policy_table({}).lines.empty());
 }
 
-TEST(PolicyTable, CsvHasOneFigureALineNotRounded) {
-  const std::string csv = policy_table_csv(policy_table(two_policies()));
-  EXPECT_THAT(csv, AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,all,success,4,0.75,"),
-                         HasSubstr("duet,mujoco,vmc,main,dstar,all,lift,4,0.5,"),
-                         HasSubstr("duet,mujoco,vmc,main,dstar,all,dof_jerk,4,,,"),
-                         HasSubstr("paper,,,,\"D-STAR, HOMIE, waist free\",hug,paper_success,,0.66")));
+TEST(PolicyTable, FiguresAreOfEnginesOfAllOfThemAndOfPairs) {
+  std::vector<EpisodeRow> rows = two_policies();
+  for (const EpisodeRow& row : two_policies("bullet")) rows.push_back(row);
+  rows[0].success = false;  // 2 of 4 in mujoco
+  const Analysis analysis = policy_analysis(policy_table(rows));
+  const auto of = [&](const char* engine, const char* name) {
+    return figure(analysis, {.engine = engine, .policy = "dstar", .task = "all", .name = name});
+  };
+  EXPECT_EQ(of("bullet", "success").k, 3);
+  EXPECT_EQ(of("bullet", "lift").n, 4);
+  EXPECT_EQ(of("bullet", "lift").value, 0.5);
+  EXPECT_EQ(of("bullet", "dof_jerk").unit, "rad/s^3");
+  EXPECT_TRUE(std::isnan(of("bullet", "dof_jerk").value));
+  EXPECT_EQ(of("all", "mean_success").value, 0.625);
+  EXPECT_EQ(of("all", "success_range").value, 0.25);
+  EXPECT_EQ(of("mujoco", "success_worst").value, 0.5);
+  const Figure pair =
+      figure(analysis, {.engine = "bullet", .policy = "dp vs dstar", .task = "all", .name = "difference"});
+  EXPECT_EQ(pair.value, -0.5);
+  EXPECT_EQ(pair.n, 4);
 }
 
 TEST(PolicyTable, OrderOfRowsDoesNotMatter) {
   std::vector<EpisodeRow> rows = two_policies();
-  const std::string before = policy_table_json(policy_table(rows)).dump();
+  const nlohmann::json before = analysis_json(policy_analysis(policy_table(rows)));
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(policy_table_json(policy_table(rows)).dump(), before);
+  EXPECT_EQ(analysis_json(policy_analysis(policy_table(rows))), before);
 }
 
 TEST(PolicyTable, TheSameEpisodeTwiceIsRefused) {

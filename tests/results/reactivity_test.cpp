@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
 #include "tests/support.h"
 
@@ -12,6 +13,7 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -38,6 +40,8 @@ std::vector<EpisodeRow> shifted(const std::string& policy, double follows) {
   add_shifted(policy, "jitter_1cm", 0.0, follows, rows);
   return rows;
 }
+
+std::string text_of(const ReactivityTable& table) { return analysis_markdown(reactivity_analysis(table)); }
 
 TEST(Reactivity, AFollowerHasSlopeOneAndAReplayNone) {
   std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
@@ -73,7 +77,7 @@ TEST(Reactivity, OneClipHasNoInterval) {
   std::erase_if(rows, [](const EpisodeRow& row) { return row.clip != "hug-0"; });
   const ReactivityTable table = reactivity_table(rows);
   EXPECT_TRUE(std::isnan(table.timing.at(0).interval.low));
-  EXPECT_THAT(reactivity_markdown(table), HasSubstr(" 1.00 |"));
+  EXPECT_THAT(text_of(table), HasSubstr(" 1.00 |"));
 }
 
 TEST(Reactivity, RobotsThatDidNotActAreCountedAndInNoSlope) {
@@ -87,8 +91,8 @@ TEST(Reactivity, RobotsThatDidNotActAreCountedAndInNoSlope) {
   const ReactivityTable none = reactivity_table(rows);
   EXPECT_EQ(none.timing.at(0).without, 12);
   EXPECT_TRUE(std::isnan(none.timing.at(0).slope));
-  EXPECT_THAT(reactivity_markdown(none), HasSubstr(" 12 |"));
-  EXPECT_TRUE(reactivity_plots(none).empty());
+  EXPECT_THAT(text_of(none), HasSubstr(" 12 |"));
+  EXPECT_TRUE(reactivity_analysis(none).plots.at(0).plots.empty());
 }
 
 TEST(Reactivity, WithoutAMovedPartnerOrVariantsThereIsNothing) {
@@ -96,9 +100,8 @@ TEST(Reactivity, WithoutAMovedPartnerOrVariantsThereIsNothing) {
   std::erase_if(rows, [](const EpisodeRow& row) { return row.perturbation == "clean"; });
   const ReactivityTable table = reactivity_table(rows);
   EXPECT_TRUE(table.empty());
-  EXPECT_TRUE(reactivity_tables(table).empty());
-  EXPECT_THAT(reactivity_markdown(table), HasSubstr("No perturbation moved a partner's onset"));
-  EXPECT_EQ(reactivity_json(table).at("timing").size(), 0U);
+  EXPECT_THAT(text_of(table), HasSubstr("No perturbation moved a partner's onset"));
+  EXPECT_TRUE(reactivity_analysis(table).empty());
 }
 
 TEST(SpatialCell, IsAWordOfTheClipsId) {
@@ -121,21 +124,32 @@ TEST(Reactivity, CellsAreSuccessByVariantBesideThePapers) {
   EXPECT_EQ(table.spatial[0].cells[0].k, 3);
   EXPECT_EQ(table.spatial[0].cells[3].k, 1);
   EXPECT_EQ(table.spatial[0].cells[1].n, 0);
-  const std::vector<TitledTable> tables = reactivity_tables(table);
+  const Analysis analysis = reactivity_analysis(table);
+  const std::vector<TitledTable>& tables = analysis.tables;
   ASSERT_EQ(tables.size(), 1U);
   EXPECT_EQ(tables[0].table.rows.at(1),
             (std::vector<std::string>{"D-STAR (the paper's)", "Handshake", "80.0", "100.0", "40.0", "60.0"}));
-  EXPECT_THAT(reactivity_markdown(table), AllOf(HasSubstr("75.0 ["), HasSubstr("real robot"), Not(HasSubstr("Slope"))));
-  EXPECT_THAT(reactivity_csv(table), AllOf(HasSubstr("duet,mujoco,vmc,main,dstar,handshake,left_high,4,0.75,"),
-                                           HasSubstr("paper,,,,D-STAR,handshake,left_low,,0.4,,")));
+  EXPECT_THAT(text_of(table), AllOf(HasSubstr("75.0 ["), HasSubstr("real robot"), Not(HasSubstr("Slope"))));
+  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "handshake", .of = "left_high", .name = "success"}).k, 3);
+  EXPECT_EQ(figure(analysis, {.source = "paper", .task = "handshake", .of = "left_low", .name = "success"}).value, 0.4);
 }
 
 TEST(Reactivity, PlotShowsTheShiftsOfEveryPolicy) {
-  const std::vector<LinePlot> plots = reactivity_plots(reactivity_table(shifted("dstar", 1.0)));
+  const Analysis analysis = reactivity_analysis(reactivity_table(shifted("dstar", 1.0)));
+  const std::vector<LinePlot>& plots = analysis.plots.at(0).plots;
   ASSERT_EQ(plots.size(), 1U);
   ASSERT_EQ(plots[0].series.size(), 1U);
   EXPECT_THAT(plots[0].series[0].x,
               testing::ElementsAre(testing::DoubleNear(-0.5, 1e-12), testing::DoubleNear(1.0, 1e-12)));
+}
+
+TEST(Reactivity, FiguresAreOfPoliciesAndOfPerturbations) {
+  const Analysis analysis = reactivity_analysis(reactivity_table(shifted("dstar", 1.0)));
+  EXPECT_NEAR(figure(analysis, {.policy = "dstar", .name = "slope"}).value, 1.0, 1e-12);
+  EXPECT_EQ(figure(analysis, {.name = "did_not_act"}).value, 0.0);
+  EXPECT_EQ(figure(analysis, {.name = "delay_moved"}).unit, "s");
+  EXPECT_NEAR(figure(analysis, {.perturbation = "later_1.0", .name = "partner_shift"}).value, 1.0, 1e-12);
+  EXPECT_NEAR(figure(analysis, {.perturbation = "later_1.0", .name = "robot_shift"}).value, 1.0, 1e-12);
 }
 
 TEST(Reactivity, TheSameEpisodeTwiceIsRefused) {
@@ -145,7 +159,7 @@ TEST(Reactivity, TheSameEpisodeTwiceIsRefused) {
 }
 
 TEST(Reactivity, TheNoteNamesTheLevelOfItsIntervals) {
-  EXPECT_THAT(reactivity_markdown(reactivity_table(shifted("dstar", 1.0))), HasSubstr("with a 95 % interval"));
+  EXPECT_THAT(text_of(reactivity_table(shifted("dstar", 1.0))), HasSubstr("with a 95 % interval"));
 }
 
 }  // namespace

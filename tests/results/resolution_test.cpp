@@ -2,12 +2,13 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/results/analyses/comparison_parts.h"
+#include "tests/results/figures.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
+using test::figure;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -59,11 +60,11 @@ TEST(Resolution, ACautionNamesThePairsThatAreNeeded) {
                                                       HasSubstr(std::to_string(needed_pairs(26.0 / 126.0, 0.05)))));
   EXPECT_TRUE(resolution_notes(small, 0.5).empty());
   EXPECT_TRUE(resolution_notes(std::vector<Comparison>{compared(80, 20, 0, 0.01)}, 0.05).empty());  // decided
-  EXPECT_THAT(comparison_markdown(small), AllOf(HasSubstr("Caution: "), HasSubstr("| undecided")));
-  EXPECT_THAT(comparison_markdown(small, 0.5),
+  EXPECT_THAT(analysis_markdown(comparison_analysis(small)), AllOf(HasSubstr("Caution: "), HasSubstr("| undecided")));
+  EXPECT_THAT(analysis_markdown(comparison_analysis(small, 0.5)),
               AllOf(Not(HasSubstr("Caution: ")), HasSubstr("| same within the margin")));
-  EXPECT_EQ(comparison_json(small).at("comparisons").at(0).at("verdict"), "undecided");
-  EXPECT_EQ(comparison_json(small, 0.5).at("margin"), 0.5);
+  EXPECT_EQ(figure(comparison_analysis(small), {.name = "verdict"}).text, "undecided");
+  EXPECT_EQ(figure(comparison_analysis(small, 0.5), {.name = "margin"}).value, 0.5);
 }
 
 TEST(Resolution, AnArmThatIsTooSmallSaysSo) {

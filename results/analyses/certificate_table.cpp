@@ -1,11 +1,9 @@
-#include "duet/results/rows/certificate.h"
+#include "duet/results/analyses/certificate_table.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-
-#include "duet/results/analyses/cross_engine_tables.h"
 
 namespace duet {
 namespace {
@@ -62,7 +60,7 @@ std::vector<std::string> coverage_notes(const std::vector<nlohmann::json>& certi
 }  // namespace
 
 TitledTable certificate_table(const nlohmann::json& certificate, const std::vector<RunEngine>& engines) {
-  TitledTable titled{.title = kTitle, .caption = "", .table = {}, .notes = {}};
+  TitledTable titled{.title = kTitle};
   if (!certificate.is_object()) {
     titled.notes = {certificate.is_null() ? "No parity certificate is attached (duet validate makes one)."
                                           : "The parity certificate attached is no JSON object and is not shown."};
@@ -88,10 +86,6 @@ TitledTable certificate_table(const nlohmann::json& certificate, const std::vect
   }
   for (std::string& note : coverage_notes(certified, engines)) titled.notes.push_back(std::move(note));
   return titled;
-}
-
-std::string certificate_markdown(const nlohmann::json& certificate, const std::vector<RunEngine>& engines) {
-  return markdown_of(certificate_table(certificate, engines));
 }
 
 }  // namespace duet

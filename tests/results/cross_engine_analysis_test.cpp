@@ -1,15 +1,18 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "duet/results/analyses/cross_engine.h"
 #include "duet/results/report/interval_plot.h"
+#include "tests/results/figures.h"
 #include "tests/results/rows.h"
 
 namespace duet {
 namespace {
 
 using test::engine_episode;
+using test::figure;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -43,11 +46,11 @@ std::vector<EpisodeRow> benchmark() {
 
 CrossEngine compared(const std::vector<EpisodeRow>& rows) {
   return cross_engine(rows, {{"jpe", "Joint position error", "m", "lower"}, {"awd", "AWD", "m", "lower"}},
-                      {.resamples = 1000});
+                      {.intervals = {.resamples = 1000}});
 }
 
 TEST(CrossEngineMarkdown, IsAsBlessed) {
-  EXPECT_EQ(cross_engine_markdown(compared(benchmark())), R"md(### Success per engine
+  EXPECT_EQ(analysis_markdown(engine_analysis(compared(benchmark()))), R"md(### Success per engine
 
 Controller vmc, perturbation clean.
 
@@ -109,15 +112,19 @@ First time at which a traced point (root, hands) is more than 5 cm away from whe
 | human.peak_n | N    |       12 |     100 |       40.0 |  1.200 |  1.000 | 0.800 |
 
 Medians over the episodes in which some engine has the force. Typical: the engines' median. Spread: highest minus lowest over the mean of the engines. Below an engine: its force over the engines' median.
+
+### Parity certificate
+
+No parity certificate is attached (duet validate makes one).
 )md");
 }
 
 TEST(CrossEngineMarkdown, IsOneLineForOneEngine) {
   std::vector<EpisodeRow> rows = benchmark();
   std::erase_if(rows, [](const EpisodeRow& row) { return row.engine == "ode" || row.engine == "bullet"; });
-  EXPECT_EQ(cross_engine_markdown(compared(rows)),
+  EXPECT_EQ(analysis_markdown(engine_analysis(compared(rows))),
             "Nothing to compare across engines: these results have one physics engine, mujoco.\n");
-  EXPECT_EQ(cross_engine_markdown(compared({})),
+  EXPECT_EQ(analysis_markdown(engine_analysis(compared({}))),
             "Nothing to compare across engines: these results have no physics engine.\n");
 }
 
@@ -129,7 +136,7 @@ TEST(CrossEngineMarkdown, SaysWhatIsMissing) {
     row.trace.mm.clear();
     row.forces.clear();
   }
-  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+  EXPECT_THAT(analysis_markdown(engine_analysis(compared(rows))),
               AllOf(HasSubstr("Ranks of combinations: not defined with fewer than two of them."),
                     HasSubstr("1 episodes that only some of the engines ran are left out"),
                     HasSubstr("No episode was also run by the engine playback"),
@@ -141,7 +148,7 @@ TEST(CrossEngineMarkdown, SaysWhatIsMissing) {
 TEST(CrossEngineMarkdown, TiesThroughoutAreNotDefined) {
   std::vector<EpisodeRow> rows = benchmark();
   for (EpisodeRow& row : rows) row.success = true;
-  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+  EXPECT_THAT(analysis_markdown(engine_analysis(compared(rows))),
               AllOf(HasSubstr("tau-b is not defined for any two engines (all tied)"),
                     HasSubstr("| bullet, mujoco |           not defined |  0 of 1 |")));
 }
@@ -153,41 +160,46 @@ TEST(CrossEngineMarkdown, SeveralControllersHaveColumnsAndDriftsOfTheirOwn) {
     rows.push_back(row);
     rows.back().controller = "wbc";
   }
-  EXPECT_THAT(cross_engine_markdown(compared(rows)),
+  EXPECT_THAT(analysis_markdown(engine_analysis(compared(rows))),
               AllOf(HasSubstr("| Controller | Policy  |"), HasSubstr("Controller vmc.\n"),
                     HasSubstr("Controller wbc.\n"), HasSubstr("| Controller | Engines        | Episodes |"),
                     HasSubstr("tau-b of controllers"), HasSubstr("tau-b of policies")));
 }
 
-TEST(CrossEngineCsv, HasOneFigurePerLine) {
-  const std::string text = cross_engine_csv(compared(benchmark()));
-  EXPECT_THAT(text, StartsWith("table,perturbation,controller,policy,engine,engine_b,name,unit,figure,n,value,"));
-  EXPECT_THAT(text, AllOf(HasSubstr("\r\nsuccess,clean,vmc,diffuse,mujoco,,,1,rate,6,0.5,"),
-                          HasSubstr("\r\nsuccess,clean,vmc,replay,playback,,,1,rate,6,1,"),
-                          HasSubstr("\r\nranks,,,,bullet,mujoco,combinations,1,tau_b,2,1,,\r\n"),
-                          HasSubstr("\r\ndrift,,vmc,,ode,,jpe,m,difference,12,0.0"),
-                          HasSubstr("\r\nparting,,vmc,,bullet,ode,,s,median,12,0.2,,\r\n"),
-                          HasSubstr("\r\nforces,,,,ode,,human.peak_n,1,ratio,12,0.8,,\r\n"), Not(HasSubstr("nan"))));
+TEST(CrossEngineFigures, AreOfEnginesPairsOfEnginesAndAllOfThem) {
+  const Analysis analysis = engine_analysis(compared(benchmark()));
+  const Figure rate =
+      figure(analysis, {.engine = "mujoco", .policy = "diffuse", .perturbation = "clean", .name = "success"});
+  EXPECT_EQ(rate.n, 6);
+  EXPECT_EQ(rate.k, 3);
+  EXPECT_EQ(rate.value, 0.5);
+  EXPECT_EQ(figure(analysis, {.engine = "playback", .policy = "replay", .name = "success"}).value, 1.0);
+  EXPECT_EQ(figure(analysis, {.engine = "all", .policy = "replay", .name = "mean_success"}).n, 6);
+  const Figure tau = figure(analysis, {.engine = "bullet vs mujoco", .of = "combinations", .name = "tau_b"});
+  EXPECT_EQ(tau.n, 2);
+  EXPECT_EQ(tau.value, 1.0);
+  EXPECT_EQ(figure(analysis, {.engine = "all", .of = "combinations", .name = "swapped"}).value, 1.0);
+  EXPECT_EQ(figure(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).unit, "m");
+  EXPECT_NEAR(figure(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).value, 0.05, 1e-12);
+  EXPECT_EQ(figure(analysis, {.engine = "bullet vs ode", .name = "parting_median"}).value, 0.2);
+  EXPECT_EQ(figure(analysis, {.engine = "ode", .of = "human.peak_n", .name = "force_ratio"}).value, 0.8);
+  EXPECT_EQ(figure(analysis, {.engine = "all", .of = "human.peak_n", .name = "typical_force"}).unit, "N");
 }
 
-TEST(CrossEngineLatex, HasATabularPerTable) {
-  const std::string text = cross_engine_latex(compared(benchmark()));
-  EXPECT_THAT(text, AllOf(HasSubstr("% Success per engine\n"), HasSubstr("\\begin{tabular}{lrrrrr}"),
-                          HasSubstr("Spread [\\%]"), HasSubstr("human.peak\\_n & N & 12 & 100")));
-  EXPECT_THAT(cross_engine_latex({}), StartsWith("% Nothing to compare"));
-}
-
-TEST(CrossEngineJson, HasEveryPartAndNoNan) {
+TEST(CrossEngineFigures, WhatIsNotDefinedIsNoNumber) {
   std::vector<EpisodeRow> rows = benchmark();
   for (EpisodeRow& row : rows) row.success = true;
-  const nlohmann::json json = cross_engine_json(compared(rows));
-  EXPECT_EQ(json.at("schema"), "duet.cross_engine/1");
-  EXPECT_EQ(json.at("success").at(0).at("engines").size(), 3U);
-  EXPECT_EQ(json.at("success").at(0).at("playback").at("k"), 6);
-  EXPECT_TRUE(json.at("ranks").at(0).at("mean_tau_b").is_null());
-  EXPECT_EQ(json.at("drift").size(), 3U);
-  EXPECT_EQ(json.at("parting").size(), 3U);
-  EXPECT_EQ(json.at("forces").at(0).at("ratio").at("bullet"), 1.2);
+  EXPECT_TRUE(std::isnan(
+      figure(engine_analysis(compared(rows)), {.engine = "all", .of = "combinations", .name = "mean_tau_b"}).value));
+}
+
+TEST(CrossEngineFigures, ACertificateIsShownOfOneEngineToo) {
+  std::vector<EpisodeRow> rows = benchmark();
+  std::erase_if(rows, [](const EpisodeRow& row) { return row.engine != "mujoco"; });
+  EXPECT_TRUE(engine_analysis(compared(rows)).empty());
+  const Analysis certified = engine_analysis(compared(rows), {{"engines", {{{"name", "mujoco"}, {"passed", 20}}}}});
+  EXPECT_FALSE(certified.empty());
+  EXPECT_EQ(certified.tables.back().title, "Parity certificate");
 }
 
 TEST(EnginePlot, HasALinePerEngineAndABarForTheMean) {

@@ -1,13 +1,9 @@
-// The sections "Controllers" and "Training" of the HTML report: Table S4, foot heights of walking episodes, curves.
+#include "duet/results/report/foot_plots.h"
+
 #include <fmt/format.h>
 
 #include <map>
 
-#include "duet/results/analyses/controller_table_parts.h"
-#include "duet/results/report/escape_html.h"
-#include "duet/results/report/html_report.h"
-#include "duet/results/report/report_parts.h"
-#include "duet/results/report/training_curves.h"
 #include "duet/results/statistics/row_groups.h"
 
 namespace duet {
@@ -30,14 +26,6 @@ bool shows_better(const EpisodeRow& a, const EpisodeRow& b) {
 
 }  // namespace
 
-std::string plots_html(const std::vector<LinePlot>& plots) {
-  std::string html = R"(<div class="plots">)";
-  for (const LinePlot& plot : plots)
-    if (const std::string svg = line_plot_svg(plot); !svg.empty())
-      html += fmt::format(R"(<figure><figcaption>{}</figcaption>{}</figure>)", escape_html(plot.title), svg);
-  return html + "</div>\n";
-}
-
 std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
   std::map<std::string, const EpisodeRow*> shown;  // by controller
   for (const EpisodeRow* row : in_episode_order(rows)) {
@@ -58,24 +46,6 @@ std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
                                 {"right foot", seconds, metres(row->feet.right_mm)}}});
   }
   return plots;
-}
-
-std::string controllers_html(const ReportContent& content) {
-  std::string html;
-  for (const TitledTable& titled : controller_tables(content.controllers)) html += titled_table_html(titled);
-  if (!content.foot_plots.empty())
-    html +=
-        "<h3>Steps</h3><p>The lowest point of each sole over the ground, one episode of each controller that "
-        "walks.</p>" +
-        plots_html(content.foot_plots);
-  return html;
-}
-
-std::string training_html(const ReportContent& content) {
-  std::string html;
-  for (const TrainingCurves& curves : content.curves)
-    html += fmt::format("<h3>{}</h3>", escape_html(curves.title)) + plots_html(curve_plots(curves));
-  return html;
 }
 
 }  // namespace duet

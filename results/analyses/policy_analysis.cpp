@@ -1,16 +1,13 @@
-// Policy tables as text and for other programs.
+// Policies as tables and figures.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <set>
 
 #include "duet/core/task.h"
 #include "duet/results/analyses/comparison_parts.h"
-#include "duet/results/analyses/cross_engine.h"
 #include "duet/results/analyses/policy_table.h"
-#include "duet/results/rows/json_fields.h"
 #include "duet/results/statistics/row_groups.h"
 
 namespace duet {
@@ -44,7 +41,7 @@ bool has_figure(const PolicyTable& table, const PolicyFigure& figure) {
   });
 }
 
-std::string plain(const PolicyFigure& figure, double value) {
+std::string figure_number(const PolicyFigure& figure, double value) {
   if (!std::isfinite(value)) return "-";
   if (figure.share) return percent(value);
   return fmt::format("{:.{}f}", value, std::abs(value) >= 100.0 ? 0 : 2);
@@ -54,12 +51,7 @@ std::string figure_cell(const PolicyFigure& figure, const PolicyFigures& figures
   if (figure.name == "success") return rate_cell(figures.success);
   if (figure.name == "paper_success") return rate_cell(figures.paper);
   if (figure.name == "lift") return points(figures.lift.difference, figures.lift.interval);
-  return plain(figure, figure.value(figures));
-}
-
-void add_column(const std::string& header, TitledTable& titled, const std::function<std::string(std::size_t)>& cell) {
-  titled.table.header.push_back(header);
-  for (std::size_t i = 0; i < titled.table.rows.size(); ++i) titled.table.rows[i].push_back(cell(i));
+  return figure_number(figure, figure.value(figures));
 }
 
 std::string meaning(const PolicyTable& table) {
@@ -84,7 +76,7 @@ TitledTable one_engine_table(const PolicyTable& table) {
   for (const PolicyLine& line : table.lines) keys.push_back(line.engines.front().key);
   TitledTable titled = labelled_table("Policies", policy_labels(keys));
   const auto figures = [&](std::size_t i) -> const PolicyFigures& { return table.lines[i].engines.front(); };
-  add_column("n", titled, [&](std::size_t i) { return fmt::format("{}", figures(i).success.n); });
+  add_column("n", titled, [&](std::size_t i) { return count_cell(figures(i).success.n); });
   for (const PolicyFigure& figure : kPolicyFigures)
     if (has_figure(table, figure))
       add_column(std::string(figure.title), titled, [&](std::size_t i) { return figure_cell(figure, figures(i)); });
@@ -95,9 +87,10 @@ void add_over_engines(const PolicyTable& table, const PolicyFigure& figure, Titl
   const auto over = [&](std::size_t i) { return over_engines(table.lines[i], figure); };
   add_column("Mean", titled, [&](std::size_t i) {
     const PolicyLine& line = table.lines[i];
-    return figure.name == "success" ? percent(line.mean_success, line.mean_interval) : plain(figure, over(i).mean);
+    return figure.name == "success" ? percent(line.mean_success, line.mean_interval)
+                                    : figure_number(figure, over(i).mean);
   });
-  add_column("Spread", titled, [&](std::size_t i) { return plain(figure, over(i).range); });
+  add_column("Spread", titled, [&](std::size_t i) { return figure_number(figure, over(i).range); });
   add_column("Worst", titled, [&](std::size_t i) { return over(i).range > 0.0 ? over(i).worst : "-"; });
 }
 
@@ -185,7 +178,7 @@ void add_paper_rows(const PolicyTable& table, TitledTable& titled) {
     std::vector<std::string>& cells = add_paper_row(std::string(paper.name), titled);
     for (const std::string& task : tasks_of(table)) {
       const double value = paper_value(paper, task);
-      cells.push_back(std::isfinite(value) ? fmt::format("{:.1f}", value) : "-");
+      cells.push_back(decimals(value, 1));
     }
   }
   titled.notes = {
@@ -195,75 +188,65 @@ void add_paper_rows(const PolicyTable& table, TitledTable& titled) {
 }
 
 TitledTable pairs_table(const PolicyTable& table) {
-  return {.title = "Policies against each other",
-          .caption = "",
-          .table = comparison_table(table.pairs),
-          .notes = {fmt::format(
-              "The same episodes of one engine and controller under two policies, headline detector. A - B: points "
-              "with Newcombe's paired {:g} % interval; by clip: bootstrap over clips. p: exact McNemar; p (Holm): "
-              "corrected for the {} comparisons here. MDE: the smallest difference, in points, that so many pairs with "
-              "so much disagreement show in 80 % of runs.",
-              100.0 * table.level, table.pairs.size())}};
+  TitledTable titled = comparison_table(table.pairs);
+  titled.title = "Policies against each other";
+  titled.notes = {fmt::format(
+      "The same episodes of one engine and controller under two policies, headline detector. A - B: points "
+      "with Newcombe's paired {:g} % interval; by clip: bootstrap over clips. p: exact McNemar; p (Holm): "
+      "corrected for the {} comparisons here. MDE: the smallest difference, in points, that so many pairs with "
+      "so much disagreement show in 80 % of runs.",
+      100.0 * table.level, table.pairs.size())};
+  return titled;
 }
 
-std::string no_policies() { return "No policy but replay ran."; }
-
-void add_lines(const PolicyFigures& figures, TextTable& lines) {
-  const auto line = [&](const std::string& task, const char* figure, long n, double value, const Interval& interval) {
-    add_figure_line("duet", figures.key, task, figure, n, value, interval, lines);
-  };
-  for (const auto& [task, rate] : figures.by_task) line(task, "success", rate.n, rate.rate, rate.interval);
-  for (const auto& [task, rate] : figures.by_task_paper)
-    if (rate.n > 0) line(task, "paper_success", rate.n, rate.rate, rate.interval);
-  line("all", "lift", figures.lift.pairs, figures.lift.difference, figures.lift.interval);
-  line("all", "falls", figures.falls.n, figures.falls.rate, figures.falls.interval);
-  line("all", "violations", figures.violations.n, figures.violations.rate, figures.violations.interval);
-  line("all", "dof_jerk", figures.success.n, figures.dof_jerk, kNoInterval);
-}
-
-nlohmann::json json_of(const TaskRates& rates) {
-  nlohmann::json json = nlohmann::json::object();
-  for (const auto& [task, rate] : rates)
-    if (rate.n > 0) json[task] = json_of(rate);
-  return json;
-}
-
-nlohmann::json json_of(const PolicyFigures& figures) {
-  return {{"engine", figures.key.engine},
-          {"success", json_of(figures.by_task)},
-          {"paper_success", json_of(figures.by_task_paper)},
-          {"lift",
-           {{"pairs", figures.lift.pairs},
-            {"difference", number_or_null(figures.lift.difference)},
-            {"interval", json_of(figures.lift.interval)}}},
-          {"falls", json_of(figures.falls)},
-          {"violations", json_of(figures.violations)},
-          {"dof_jerk", number_or_null(figures.dof_jerk)}};
-}
-
-nlohmann::json json_of(const PolicyLine& line) {
-  nlohmann::json engines = nlohmann::json::array();
-  for (const PolicyFigures& figures : line.engines) engines.push_back(json_of(figures));
-  nlohmann::json over = nlohmann::json::object();
-  for (const PolicyFigure& figure : kPolicyFigures) {
-    const OverEngines of = over_engines(line, figure);
-    if (of.engines > 0)
-      over[std::string(figure.name)] = {
-          {"engines", of.engines}, {"mean", of.mean}, {"range", of.range}, {"worst", of.worst}};
+void add_policy_figures(const PolicyFigures& of, std::vector<Figure>& into) {
+  FiguresOf figures = figures_of(of.key, into);
+  figures.keys.perturbation = kClean;
+  for (const auto& [task, rate] : of.by_task) {
+    figures.keys.task = task;
+    figures.rate("success", rate);
   }
-  return {{"controller", line.controller},
-          {"arm", line.arm},
-          {"policy", line.policy},
-          {"engines", std::move(engines)},
-          {"over_engines", std::move(over)},
-          {"mean_success", number_or_null(line.mean_success)},
-          {"mean_success_interval", json_of(line.mean_interval)}};
+  for (const auto& [task, rate] : of.by_task_paper) {
+    figures.keys.task = task;
+    if (rate.n > 0) figures.rate("paper_success", rate);
+  }
+  figures.keys.task = "all";
+  add_difference("lift", of.lift, figures);
+  figures.rate("falls", of.falls);
+  figures.rate("violations", of.violations);
+  figures.add("dof_jerk", of.success.n, of.dof_jerk, kNoInterval, "rad/s^3");
 }
 
-nlohmann::json json_of(const PaperPolicy& paper) {
-  nlohmann::json tasks = {{"all", paper.overall}};
-  for (const auto& [task, percent] : paper.tasks) tasks[std::string(to_string(task))] = percent;
-  return {{"name", paper.name}, {"success_percent", std::move(tasks)}};
+// Over physics engines.
+void add_line_figures(const PolicyLine& line, std::vector<Figure>& into) {
+  FiguresOf figures = figures_of(line_key(line, "all"), into);
+  figures.keys.perturbation = kClean;
+  figures.keys.task = "all";
+  figures.add("mean_success", {}, line.mean_success, line.mean_interval);
+  for (const PolicyFigure& figure : kPolicyFigures) {
+    const OverEngines over = over_engines(line, figure);
+    if (over.engines == 0) continue;
+    const char* unit = figure.share ? "1" : "rad/s^3";
+    figures.keys.engine = "all";
+    figures.add(fmt::format("{}_mean", figure.name), over.engines, over.mean, kNoInterval, unit);
+    figures.add(fmt::format("{}_range", figure.name), over.engines, over.range, kNoInterval, unit);
+    figures.keys.engine = over.worst;
+    figures.add(fmt::format("{}_worst", figure.name), over.engines, figure.value(*in_engine(line, over.worst)),
+                kNoInterval, unit);
+  }
+}
+
+void add_paper_policies(std::vector<Figure>& into) {
+  for (const PaperPolicy& paper : paper_policies()) {
+    if (!paper.family.empty()) continue;
+    FiguresOf figures = paper_figures_of(paper.name, into);
+    figures.keys.task = "all";
+    figures.add("paper_success", {}, paper.overall / 100.0);
+    for (const PaperTaskRate& of : paper.tasks) {
+      figures.keys.task = to_string(of.task);
+      figures.add("paper_success", {}, of.percent / 100.0);
+    }
+  }
 }
 
 }  // namespace
@@ -273,54 +256,27 @@ std::string paper_detector_sentence() {
          "the paper's detectors (paper/paper) can be held against the paper's figures.";
 }
 
-std::vector<TitledTable> policy_tables(const PolicyTable& table) {
-  if (table.lines.empty()) return {};
-  std::vector<TitledTable> tables = headline_tables(table);
-  tables.push_back(task_table(table, "Policies by task: headline detector", &PolicyFigures::by_task));
+Analysis policy_analysis(const PolicyTable& table) {
+  Analysis analysis{.name = "policies", .title = "Policies", .level = table.level};
+  if (table.lines.empty()) {
+    analysis.notes = {"No policy but replay ran."};
+    return analysis;
+  }
+  analysis.tables = headline_tables(table);
+  analysis.tables.push_back(task_table(table, "Policies by task: headline detector", &PolicyFigures::by_task));
   if (has_figure(table, kPolicyFigures[1])) {
-    tables.push_back(
+    analysis.tables.push_back(
         task_table(table, "Policies by task: the paper's detectors (Table S9)", &PolicyFigures::by_task_paper));
-    add_paper_rows(table, tables.back());
+    add_paper_rows(table, analysis.tables.back());
   }
-  if (!table.pairs.empty()) tables.push_back(pairs_table(table));
-  return tables;
-}
-
-std::string policy_table_markdown(const PolicyTable& table) {
-  return table.lines.empty() ? no_policies() + "\n" : tables_markdown(policy_tables(table));
-}
-
-std::string policy_table_csv(const PolicyTable& table) {
-  TextTable lines = figure_lines("task");
-  for (const PolicyFigures* figures : all_figures(table)) add_lines(*figures, lines);
-  if (table.lines.empty()) return csv_table(lines);
-  for (const PaperPolicy& paper : paper_policies()) {
-    if (!paper.family.empty()) continue;
-    for (const std::string& task : tasks_of(table))
-      lines.rows.push_back({"paper", "", "", "", std::string(paper.name), task, "paper_success", "",
-                            number_cell(paper_value(paper, task) / 100.0), "", ""});
-  }
-  return csv_table(lines);
-}
-
-std::string policy_table_latex(const PolicyTable& table) {
-  return table.lines.empty() ? fmt::format("% {}\n", no_policies()) : tables_latex(policy_tables(table));
-}
-
-nlohmann::json policy_table_json(const PolicyTable& table) {
-  nlohmann::json lines = nlohmann::json::array();
-  nlohmann::json paper = nlohmann::json::array();
-  for (const PolicyLine& line : table.lines) lines.push_back(json_of(line));
-  for (const PaperPolicy& row : paper_policies())
-    if (row.family.empty()) paper.push_back(json_of(row));
-  return {{"schema", "duet.policy_table/1"},
-          {"level", table.level},
-          {"lines", std::move(lines)},
-          {"pairs", comparison_json(table.pairs).at("comparisons")},
-          {"could_not_run", table.could_not_run},
-          {"faults", table.faults},
-          {"paper", std::move(paper)},
-          {"note", paper_detector_sentence()}};
+  if (!table.pairs.empty()) analysis.tables.push_back(pairs_table(table));
+  for (const PolicyFigures* figures : all_figures(table)) add_policy_figures(*figures, analysis.figures);
+  for (const PolicyLine& line : table.lines) add_line_figures(line, analysis.figures);
+  for (const Comparison& pair : table.pairs) add_comparison_figures(pair, kFivePoints, analysis.figures);
+  for (const auto& [policy, episodes] : table.could_not_run)
+    FiguresOf{{.policy = policy}, analysis.figures}.count("could_not_run", {}, episodes);
+  add_paper_policies(analysis.figures);
+  return analysis;
 }
 
 }  // namespace duet

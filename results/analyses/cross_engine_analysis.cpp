@@ -1,25 +1,27 @@
-#include "duet/results/analyses/cross_engine_tables.h"
-
+// A comparison of engines as tables and figures.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
-#include "duet/results/analyses/leaderboard_rows.h"
+#include "duet/results/analyses/cells.h"
+#include "duet/results/analyses/certificate_table.h"
+#include "duet/results/analyses/cross_engine.h"
 
 namespace duet {
 namespace {
 
-std::string rate_cell(const EngineRate* rate) { return rate != nullptr ? percent(rate->rate, rate->interval) : "-"; }
+std::string engine_rate_cell(const EngineRate* rate) {
+  return rate != nullptr ? percent(rate->rate, rate->interval) : "-";
+}
 
 const EngineRate* find(const std::vector<EngineRate>& rates, const std::string& engine) {
   const auto found =
       std::find_if(rates.begin(), rates.end(), [&](const EngineRate& rate) { return rate.engine == engine; });
   return found != rates.end() ? &*found : nullptr;
 }
-
-std::string count(long value) { return fmt::format("{}", value); }
 
 std::string left_out_note(const std::vector<EngineSuccess>& success) {
   long left_out = 0;
@@ -29,22 +31,17 @@ std::string left_out_note(const std::vector<EngineSuccess>& success) {
                      left_out);
 }
 
-TitledTable success_table(const CrossEngine& result, const CombinationLabels& labels) {
-  TitledTable titled{.title = "Success per engine",
-                     .caption = labels.caption,
-                     .table = {.header = labels.columns, .rows = {}, .label_columns = labels.columns.size()},
-                     .notes = {}};
-  titled.table.header.emplace_back("n");
-  for (const RunEngine& engine : result.engines) titled.table.header.push_back(engine.name);
-  if (result.has_playback) titled.table.header.emplace_back(kPlaybackEngine);
-  for (std::size_t i = 0; i < result.success.size(); ++i) {
-    const EngineSuccess& entry = result.success[i];
-    std::vector<std::string> cells = labels.cells[i];
-    cells.push_back(count(entry.n));
-    for (const RunEngine& engine : result.engines) cells.push_back(rate_cell(find(entry.engines, engine.name)));
-    if (result.has_playback) cells.push_back(rate_cell(entry.playback.has_value() ? &*entry.playback : nullptr));
-    titled.table.rows.push_back(std::move(cells));
-  }
+TitledTable engine_success_table(const CrossEngine& result, const RowLabels& labels) {
+  TitledTable titled = labelled_table("Success per engine", labels);
+  add_column("n", titled, [&](std::size_t i) { return count_cell(result.success[i].n); });
+  for (const RunEngine& engine : result.engines)
+    add_column(engine.name, titled,
+               [&](std::size_t i) { return engine_rate_cell(find(result.success[i].engines, engine.name)); });
+  if (result.has_playback)
+    add_column(std::string(kPlaybackEngine), titled, [&](std::size_t i) {
+      const std::optional<EngineRate>& playback = result.success[i].playback;
+      return engine_rate_cell(playback.has_value() ? &*playback : nullptr);
+    });
   titled.notes = {
       fmt::format("Success in % of the episodes that all engines of the row ran, with {:g} % Wilson "
                   "intervals.{}",
@@ -53,24 +50,17 @@ TitledTable success_table(const CrossEngine& result, const CombinationLabels& la
   return titled;
 }
 
-std::string points_cell(double value) { return percent(value); }
-
-TitledTable spread_table(const CrossEngine& result, const CombinationLabels& labels) {
-  TitledTable titled{.title = "Spread between engines",
-                     .caption = labels.caption,
-                     .table = {.header = labels.columns, .rows = {}, .label_columns = labels.columns.size()},
-                     .notes = {}};
-  for (const char* title : {"Engines", "Mean", "SD", "Range", "Noise SD", "Beyond noise"})
-    titled.table.header.emplace_back(title);
-  for (std::size_t i = 0; i < result.success.size(); ++i) {
-    const EngineSuccess& entry = result.success[i];
-    std::vector<std::string> cells = labels.cells[i];
-    cells.push_back(count(static_cast<long>(entry.engines.size())));
-    cells.push_back(percent(entry.mean, entry.mean_interval));
-    for (const double value : {entry.sd, entry.range, entry.noise_sd, entry.excess_sd})
-      cells.push_back(points_cell(value));
-    titled.table.rows.push_back(std::move(cells));
-  }
+TitledTable spread_table(const CrossEngine& result, const RowLabels& labels) {
+  TitledTable titled = labelled_table("Spread between engines", labels);
+  const auto add = [&](const char* title, const auto& cell) {
+    add_column(title, titled, [&](std::size_t i) { return cell(result.success[i]); });
+  };
+  add("Engines", [](const EngineSuccess& of) { return count_cell(static_cast<long>(of.engines.size())); });
+  add("Mean", [](const EngineSuccess& of) { return percent(of.mean, of.mean_interval); });
+  add("SD", [](const EngineSuccess& of) { return percent(of.sd); });
+  add("Range", [](const EngineSuccess& of) { return percent(of.range); });
+  add("Noise SD", [](const EngineSuccess& of) { return percent(of.noise_sd); });
+  add("Beyond noise", [](const EngineSuccess& of) { return percent(of.excess_sd); });
   titled.notes = {
       fmt::format("Mean over engines in %, each engine counting the same. Its {:g} % interval draws clips again, the "
                   "same clips in all engines: it covers which clips were taken, not which engines; those are the ones "
@@ -83,7 +73,7 @@ TitledTable spread_table(const CrossEngine& result, const CombinationLabels& lab
   return titled;
 }
 
-std::string tau_cell(double tau_b) { return std::isfinite(tau_b) ? fmt::format("{:.2f}", tau_b) : "not defined"; }
+std::string tau_cell(double tau_b) { return std::isfinite(tau_b) ? decimals(tau_b, 2) : "not defined"; }
 
 std::string rank_sentence(const RankStability& ranks) {
   if (ranks.items < 2) return fmt::format("Ranks of {}: not defined with fewer than two of them.", ranks.of);
@@ -108,10 +98,8 @@ std::string reliability_sentence(const RankStability& ranks) {
 }
 
 TitledTable rank_table(const CrossEngine& result) {
-  TitledTable titled{.title = "Stability of ranks",
-                     .caption = "",
-                     .table = {.header = {"Engines"}, .rows = {}, .label_columns = 1},
-                     .notes = {}};
+  TitledTable titled{
+      .title = "Stability of ranks", .caption = "", .table = {.header = {"Engines"}, .rows = {}, .label_columns = 1}};
   std::vector<const RankStability*> shown;
   for (const RankStability& ranks : result.ranks) {
     titled.notes.push_back(rank_sentence(ranks));
@@ -158,7 +146,7 @@ std::vector<std::string> drift_cells(const MetricColumn& metric, const DriftRow&
   }
   std::vector<std::string> cells = {
       metric.title.empty() ? metric.name : metric.title, metric.unit.empty() ? "1" : metric.unit,
-      fewest == most ? count(most) : fmt::format("{}-{}", fewest, most), significant(playback)};
+      fewest == most ? count_cell(most) : fmt::format("{}-{}", fewest, most), significant(playback)};
   for (const RunEngine& engine : result.engines) {
     const auto found = row.find(engine.name);
     cells.push_back(drift_cell(found != row.end() ? found->second : nullptr));
@@ -185,7 +173,7 @@ TitledTable drift_table(const CrossEngine& result, const std::string& controller
   return titled;
 }
 
-std::string reached(double time) { return std::isfinite(time) ? fmt::format("{:.2f}", time) : "not reached"; }
+std::string reached(double time) { return std::isfinite(time) ? decimals(time, 2) : "not reached"; }
 
 TitledTable parting_table(const CrossEngine& result, bool with_controller) {
   TitledTable titled{.title = "Time until engines part", .caption = "", .table = {}, .notes = {}};
@@ -201,7 +189,7 @@ TitledTable parting_table(const CrossEngine& result, bool with_controller) {
     std::vector<std::string> cells;
     if (with_controller) cells.push_back(parting.controller);
     cells.push_back(parting.engine_a + ", " + parting.engine_b);
-    cells.push_back(count(parting.pairs));
+    cells.push_back(count_cell(parting.pairs));
     for (const double time : {parting.lower_quartile, parting.median, parting.upper_quartile})
       cells.push_back(reached(time));
     cells.push_back(percent(static_cast<double>(parting.pairs - parting.parted) / static_cast<double>(parting.pairs)));
@@ -226,15 +214,14 @@ TitledTable force_table(const CrossEngine& result) {
   TitledTable titled{
       .title = "Agreement of contact forces",
       .caption = "",
-      .table = {.header = {"Force", "Unit", "Episodes", "Typical", "Spread [%]"}, .rows = {}, .label_columns = 2},
-      .notes = {}};
+      .table = {.header = {"Force", "Unit", "Episodes", "Typical", "Spread [%]"}, .rows = {}, .label_columns = 2}};
   for (const RunEngine& engine : result.engines) titled.table.header.push_back(engine.name);
   for (const ForceAgreement& force : result.forces) {
-    std::vector<std::string> cells = {force.name, force.unit, count(force.episodes), significant(force.typical),
+    std::vector<std::string> cells = {force.name, force.unit, count_cell(force.episodes), significant(force.typical),
                                       percent(force.spread)};
     for (const RunEngine& engine : result.engines) {
       const auto found = force.ratio.find(engine.name);
-      cells.push_back(found != force.ratio.end() ? fmt::format("{:.3f}", found->second) : "-");
+      cells.push_back(found != force.ratio.end() ? decimals(found->second, 3) : "-");
     }
     titled.table.rows.push_back(std::move(cells));
   }
@@ -246,54 +233,16 @@ TitledTable force_table(const CrossEngine& result) {
   return titled;
 }
 
-bool has_one(const std::vector<EngineSuccess>& success, std::string EngineSuccess::*field) {
-  return std::all_of(success.begin(), success.end(),
-                     [&](const EngineSuccess& entry) { return entry.*field == success.front().*field; });
-}
-
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text.append(text.empty() ? "" : ", ").append(word);
-  return text;
-}
-
-}  // namespace
-
-CombinationLabels combination_labels(const std::vector<EngineSuccess>& success) {
-  CombinationLabels labels;
-  labels.cells.resize(success.size());
-  if (success.empty()) return labels;
-  std::vector<std::string> constants;
-  const auto add = [&](const char* title, const char* word, std::string EngineSuccess::*field, bool always) {
-    if (!always && has_one(success, field)) {
-      constants.push_back(fmt::format("{} {}", word, success.front().*field));
-      return;
-    }
-    labels.columns.emplace_back(title);
-    for (std::size_t i = 0; i < success.size(); ++i) labels.cells[i].push_back(success[i].*field);
-  };
-  add("Controller", "controller", &EngineSuccess::controller, false);
-  add("Perturbation", "perturbation", &EngineSuccess::perturbation, false);
-  add("Policy", "policy", &EngineSuccess::policy, true);
-  if (constants.empty()) return labels;
-  labels.caption = joined(constants) + ".";
-  labels.caption.front() -= 'a' - 'A';
-  return labels;
-}
-
-std::vector<TitledTable> cross_engine_tables(const CrossEngine& result) {
-  if (result.engines.size() < 2) return {};
-  const CombinationLabels labels = combination_labels(result.success);
-  std::vector<TitledTable> tables = {success_table(result, labels), spread_table(result, labels), rank_table(result)};
+std::vector<TitledTable> engine_tables(const CrossEngine& result) {
+  const RowLabels labels = combination_labels(result.success);
+  std::vector<TitledTable> tables = {engine_success_table(result, labels), spread_table(result, labels),
+                                     rank_table(result)};
   std::set<std::string> drifting;
   for (const MetricDrift& drift : result.drift) drifting.insert(drift.controller);
   for (const std::string& controller : drifting) tables.push_back(drift_table(result, controller));
-  if (drifting.empty()) {
+  if (drifting.empty())
     tables.push_back({.title = "Drift of metrics from playback",
-                      .caption = "",
-                      .table = {},
                       .notes = {"No episode was also run by the engine playback, so there is no drift to show."}});
-  }
   const bool several = std::any_of(result.parting.begin(), result.parting.end(), [&](const EngineParting& parting) {
     return parting.controller != result.parting.front().controller;
   });
@@ -308,37 +257,107 @@ std::string too_few_engines(const CrossEngine& result) {
       result.engines.empty() ? "no physics engine" : "one physics engine, " + result.engines.front().name);
 }
 
-std::string markdown_of(const TitledTable& titled) {
-  std::string text = "### " + escape_markdown(titled.title) + "\n\n";
-  if (!titled.caption.empty()) text += escape_markdown(titled.caption) + "\n\n";
-  if (!titled.table.rows.empty()) text += markdown_table(titled.table);
-  if (!titled.table.rows.empty() && !titled.notes.empty()) text += "\n";
-  for (const std::string& note : titled.notes) text += escape_markdown(note) + "\n";
-  return text;
+std::string versus(const std::string& a, const std::string& b) { return fmt::format("{} vs {}", a, b); }
+
+void add_engine_success(const EngineSuccess& success, std::vector<Figure>& into) {
+  FiguresOf figures{{.controller = success.controller, .policy = success.policy, .perturbation = success.perturbation},
+                    into};
+  std::vector<EngineRate> rates = success.engines;
+  if (success.playback.has_value()) rates.push_back(*success.playback);
+  for (const EngineRate& of : rates) {
+    figures.keys.engine = of.engine;
+    figures.rate("success", {of.n, of.k, of.rate, of.interval});
+  }
+  figures.keys.engine = "all";
+  figures.add("mean_success", success.n, success.mean, success.mean_interval);
+  figures.add("success_sd", success.n, success.sd);
+  figures.add("success_range", success.n, success.range);
+  figures.add("noise_sd", success.n, success.noise_sd);
+  figures.add("excess_sd", success.n, success.excess_sd);
+  figures.count("left_out", {}, success.left_out);
 }
 
-std::string latex_of(const TitledTable& titled) {
-  std::string text = latex_comment(titled.title);
-  if (!titled.caption.empty()) text += latex_comment(titled.caption);
-  for (const std::string& note : titled.notes) text += latex_comment(note);
-  if (!titled.table.rows.empty()) text += latex_table(titled.table);
-  return text;
+void add_rank_figures(const RankStability& ranks, std::vector<Figure>& into) {
+  FiguresOf figures{{.of = ranks.of}, into};
+  for (const EnginePairRanks& pair : ranks.engines) {
+    figures.keys.engine = versus(pair.engine_a, pair.engine_b);
+    figures.add("tau_b", pair.items, pair.tau_b);
+    figures.count("swapped", pair.pairs, pair.swapped);
+  }
+  const auto pairs = static_cast<long>(ranks.engines.size());
+  figures.keys.engine = "all";
+  figures.count("items", {}, ranks.items);
+  figures.add("mean_tau_b", ranks.defined, ranks.mean_tau_b, ranks.tau_interval);
+  figures.add("rank_violation", pairs, ranks.rank_violation, ranks.violation_interval);
+  figures.add("winner_changes", pairs, ranks.winner_changes, ranks.winner_interval);
+  figures.count("swapped", ranks.item_pairs, ranks.swapped);
 }
 
-std::string cross_engine_markdown(const CrossEngine& result) {
-  const std::vector<TitledTable> tables = cross_engine_tables(result);
-  if (tables.empty()) return too_few_engines(result) + "\n";
-  std::string text;
-  for (const TitledTable& titled : tables) text.append(text.empty() ? "" : "\n").append(markdown_of(titled));
-  return text;
+void add_drift_figures(const CrossEngine& result, const MetricDrift& drift, std::vector<Figure>& into) {
+  const auto metric = std::ranges::find(result.metrics, drift.metric, &MetricColumn::name);
+  const std::string unit = metric == result.metrics.end() ? "" : metric->unit;
+  const FiguresOf figures{{.engine = drift.engine, .controller = drift.controller, .of = drift.metric}, into};
+  figures.add("playback", drift.pairs, drift.playback, kNoInterval, unit);
+  figures.add("drift", drift.pairs, drift.mean, drift.interval, unit);
 }
 
-std::string cross_engine_latex(const CrossEngine& result) {
-  const std::vector<TitledTable> tables = cross_engine_tables(result);
-  if (tables.empty()) return fmt::format("% {}\n", too_few_engines(result));
-  std::string text = "% \\usepackage{booktabs}\n";
-  for (const TitledTable& titled : tables) text.append("\n").append(latex_of(titled));
-  return text;
+void add_parting_figures(const EngineParting& parting, std::vector<Figure>& into) {
+  const FiguresOf figures{{.engine = versus(parting.engine_a, parting.engine_b), .controller = parting.controller},
+                          into};
+  figures.add("parting_lower_quartile", parting.pairs, parting.lower_quartile, kNoInterval, "s");
+  figures.add("parting_median", parting.pairs, parting.median, kNoInterval, "s");
+  figures.add("parting_upper_quartile", parting.pairs, parting.upper_quartile, kNoInterval, "s");
+  figures.count("parted", parting.pairs, parting.parted);
+  figures.count("without_trace", {}, parting.without_trace);
+}
+
+void add_force_figures(const ForceAgreement& force, std::vector<Figure>& into) {
+  FiguresOf figures{{.engine = "all", .of = force.name}, into};
+  figures.add("typical_force", force.episodes, force.typical, kNoInterval, force.unit);
+  figures.add("force_spread", force.episodes, force.spread);
+  for (const auto& [engine, ratio] : force.ratio) {
+    figures.keys.engine = engine;
+    figures.add("force_ratio", force.episodes, ratio);
+  }
+}
+
+void add_engine_versions(const CrossEngine& result, std::vector<Figure>& into) {
+  for (const RunEngine& engine : result.engines) {
+    const FiguresOf figures{{.engine = engine.name}, into};
+    figures.word("version", engine.version);
+    figures.word("profile", engine.profile);
+  }
+}
+
+void add_engine_figures(const CrossEngine& result, std::vector<Figure>& into) {
+  FiguresOf{{}, into}.add("parting_distance", {}, result.parting_distance, kNoInterval, "m");
+  for (const EngineSuccess& success : result.success) add_engine_success(success, into);
+  for (const RankStability& ranks : result.ranks) add_rank_figures(ranks, into);
+  for (const MetricDrift& drift : result.drift) add_drift_figures(result, drift, into);
+  for (const EngineParting& parting : result.parting) add_parting_figures(parting, into);
+  for (const ForceAgreement& force : result.forces) add_force_figures(force, into);
+}
+
+}  // namespace
+
+RowLabels combination_labels(const std::vector<EngineSuccess>& success) {
+  return row_labels({label_column("Controller", success, &EngineSuccess::controller),
+                     label_column("Perturbation", success, &EngineSuccess::perturbation),
+                     label_column("Policy", success, &EngineSuccess::policy, true)});
+}
+
+Analysis engine_analysis(const CrossEngine& result, const nlohmann::json& certificate) {
+  Analysis analysis{.name = "engines", .title = "Across engines", .level = result.level};
+  const bool several = result.engines.size() > 1;
+  if (several || certificate.is_object()) add_engine_versions(result, analysis.figures);
+  if (several) {
+    analysis.tables = engine_tables(result);
+    add_engine_figures(result, analysis.figures);
+  } else {
+    analysis.notes = {too_few_engines(result)};
+  }
+  if (several || certificate.is_object()) analysis.tables.push_back(certificate_table(certificate, result.engines));
+  return analysis;
 }
 
 }  // namespace duet

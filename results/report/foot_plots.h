@@ -1,0 +1,15 @@
+// Whether a controller lifts its feet: heights of both soles over time.
+#pragma once
+
+#include <vector>
+
+#include "duet/results/report/line_plot.h"
+#include "duet/results/rows/episode_row.h"
+
+namespace duet {
+
+// In one episode of each controller that has one: of its first by task, clip and number, one that ended well and was
+// clean before others.
+std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows);
+
+}  // namespace duet

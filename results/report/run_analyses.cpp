@@ -1,0 +1,118 @@
+#include "duet/results/report/run_analyses.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "duet/core/names.h"
+#include "duet/results/analyses/controller_table.h"
+#include "duet/results/analyses/degradation.h"
+#include "duet/results/analyses/level_table.h"
+#include "duet/results/analyses/people_table.h"
+#include "duet/results/analyses/policy_table.h"
+#include "duet/results/analyses/reactivity.h"
+#include "duet/results/analyses/walk_table.h"
+#include "duet/results/report/foot_plots.h"
+#include "duet/results/report/report_parts.h"
+
+namespace duet {
+namespace {
+
+Analysis engines_with_plot(const RunTables& tables) {
+  Analysis analysis = engine_analysis(tables.engines, tables.certificate);
+  if (tables.engines.engines.size() > 1)
+    analysis.drawing = engine_plot_html(tables.engines) +
+                       "<p>Dots: success in each engine with its interval; bar: the mean over engines, on the shade of "
+                       "its interval.</p>\n";
+  return analysis;
+}
+
+Analysis controllers_with_steps(const RunTables& tables) {
+  Analysis analysis = controller_analysis(controller_table(tables.rows));
+  analysis.plots = {
+      {.title = "Steps",
+       .note = "The lowest point of each sole over the ground, one episode of each controller that walks.",
+       .plots = foot_plots(tables.rows)}};
+  return analysis;
+}
+
+// What is made of robots that walk by command.
+enum class Walking { kPrinted, kWritten, kLeftOut };
+
+struct ListedAnalysis {
+  std::string_view name;
+  Analysis (*make)(const RunTables& tables);
+  Walking walking;
+  bool after_run;  // printed at the end of a run, too
+};
+
+constexpr ListedAnalysis kAnalyses[] = {
+    {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
+     Walking::kWritten, true},
+    {"engines", engines_with_plot, Walking::kWritten, true},
+    {"controllers", controllers_with_steps, Walking::kWritten, true},
+    {"policies", [](const RunTables& run) { return policy_analysis(policy_table(run.rows)); }, Walking::kLeftOut,
+     false},
+    {"degradation", [](const RunTables& run) { return degradation_analysis(degradation(run.rows)); }, Walking::kLeftOut,
+     false},
+    {"reactivity", [](const RunTables& run) { return reactivity_analysis(reactivity_table(run.rows)); },
+     Walking::kLeftOut, false},
+    {"contacts", [](const RunTables& run) { return contact_analysis(run.contacts); }, Walking::kWritten, true},
+    {"people", [](const RunTables& run) { return people_analysis(people_table(run.rows)); }, Walking::kWritten, true},
+    {"levels", [](const RunTables& run) { return level_analysis(level_tables(run.rows)); }, Walking::kPrinted, true},
+    {"walking", [](const RunTables& run) { return walk_analysis(walk_table(run.rows)); }, Walking::kPrinted, true},
+};
+
+bool has_walking(const RunTables& tables) {
+  return std::ranges::any_of(tables.rows, [](const EpisodeRow& row) { return row.task == kWalkRows; });
+}
+
+}  // namespace
+
+RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate) {
+  RunTables tables{.rows = std::move(rows),
+                   .metrics = std::move(metrics),
+                   .certificate = certificate,
+                   .leaderboard = {},
+                   .engines = {},
+                   .contacts = {},
+                   .board = {}};
+  tables.leaderboard = leaderboard(tables.rows);
+  tables.engines = cross_engine(tables.rows, tables.metrics.drifting);
+  tables.contacts = contact_table(tables.rows);
+  tables.board = board(tables.rows, tables.leaderboard, tables.engines, tables.contacts);
+  return tables;
+}
+
+std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent) {
+  const bool walking = has_walking(tables);
+  std::vector<Analysis> analyses;
+  for (const ListedAnalysis& listed : kAnalyses) {
+    if ((extent == Extent::kRun && !listed.after_run) || (walking && listed.walking == Walking::kLeftOut)) continue;
+    Analysis analysis = listed.make(tables);
+    analysis.in_terminal = !walking || listed.walking == Walking::kPrinted;
+    if (!analysis.empty() || tables.rows.empty()) analyses.push_back(std::move(analysis));
+    if (tables.rows.empty()) break;
+  }
+  return analyses;
+}
+
+Analysis run_analysis(const RunTables& tables, std::string_view name) {
+  std::vector<std::string> known;
+  for (const ListedAnalysis& listed : kAnalyses) {
+    if (listed.name == name) return listed.make(tables);
+    known.emplace_back(listed.name);
+  }
+  throw std::invalid_argument(unknown_name_message("table", std::string(name), known));
+}
+
+std::string run_text(const RunTables& tables, const std::vector<Analysis>& analyses) {
+  std::vector<std::string> parts;
+  if (!tables.board.rows.empty() && !has_walking(tables)) parts.push_back(board_markdown(tables.board));
+  for (const Analysis& analysis : analyses)
+    if (analysis.in_terminal) parts.push_back(terminal_text(analysis));
+  return fmt::format("{}", fmt::join(parts, "\n"));
+}
+
+}  // namespace duet
