@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "duet/results/report/axis.h"
 #include "duet/results/report/escape_html.h"
 #include "duet/results/report/report_parts.h"
 
@@ -34,20 +35,6 @@ polyline{fill:none;stroke-width:1.6}
 @media(prefers-color-scheme:dark){text{fill:#a6adb6}text.title{fill:#e7e8ea}.grid{stroke:#3a4048}}
 )css";
 
-struct CurveAxis {
-  double low, high;  // log10, whole decades
-  double from, to;   // [px]
-
-  [[nodiscard]] double at(double value) const { return from + (std::log10(value) - low) / (high - low) * (to - from); }
-};
-
-CurveAxis axis_over(const std::vector<double>& values, double from, double to) {
-  const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  double low = std::floor(std::log10(*least)), high = std::ceil(std::log10(*most));
-  if (high - low < 1.0) high = low + 1.0;
-  return {low, high, from, to};
-}
-
 bool plottable(const conformance::AccuracyPoint& point) {
   return std::isfinite(point.error) && point.error > 0.0 && std::isfinite(point.cost) && point.cost > 0.0;
 }
@@ -58,33 +45,16 @@ const AccuracyCurve* curve_of(const CertifiedEngine& engine, const std::string& 
   return found == engine.accuracy.end() ? nullptr : &*found;
 }
 
-std::string decade_label(double exponent) {
-  return exponent >= -3.0 && exponent <= 3.0 ? fmt::format("{:g}", std::pow(10.0, exponent))
-                                             : fmt::format("1e{:g}", exponent);
-}
-
-std::string grid_svg(const CurveAxis& x, const CurveAxis& y) {
+std::string grid_svg(const PlotAxis& x, const PlotAxis& y) {
   std::string svg;
-  const double step_y = y.high - y.low > 8.0 ? 2.0 : 1.0;
-  for (double e = x.low; e <= x.high; ++e) {
-    const double at = x.at(std::pow(10.0, e));
-    svg += fmt::format(R"(<line class="grid" x1="{0:.1f}" y1="{1}" x2="{0:.1f}" y2="{2}"/>)", at, kTop, kBottom);
+  for (const double tick : x.ticks())
     svg +=
-        fmt::format(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{}</text>)", at, kBottom + 16.0, decade_label(e));
-  }
-  for (double e = y.low; e <= y.high; e += step_y) {
-    const double at = y.at(std::pow(10.0, e));
-    svg += fmt::format(R"(<line class="grid" x1="{0}" y1="{2:.1f}" x2="{1}" y2="{2:.1f}"/>)", kLeft, kRight, at);
-    svg +=
-        fmt::format(R"(<text x="{}" y="{:.1f}" text-anchor="end">{}</text>)", kLeft - 7.0, at + 4.0, decade_label(e));
-  }
-  svg += fmt::format(R"(<text x="{}" y="{}" text-anchor="middle">CPU seconds per simulated second</text>)",
-                     0.5 * (kLeft + kRight), kBottom + 36.0);
-  return svg;
+        fmt::format(R"(<line class="grid" x1="{0:.1f}" y1="{1}" x2="{0:.1f}" y2="{2}"/>)", x.at(tick), kTop, kBottom);
+  return svg + axis_ticks(x, kBottom, "CPU seconds per simulated second") + grid_lines(y, kLeft, kRight);
 }
 
-std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const CurveAxis& x,
-                      const CurveAxis& y) {
+std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const PlotAxis& x,
+                      const PlotAxis& y) {
   std::string points, dots;
   for (const conformance::AccuracyPoint& point : curve.points) {
     if (!plottable(point)) continue;
@@ -219,18 +189,19 @@ std::string navigation_html(const Certificate& certificate) {
 }  // namespace
 
 std::string accuracy_plot_svg(const std::vector<CertifiedEngine>& engines, const std::string& scene) {
-  std::vector<double> errors, costs;
+  PlotAxis x{.from = kLeft, .to = kRight, .logarithmic = true}, y{.from = kBottom, .to = kTop, .logarithmic = true};
   for (const CertifiedEngine& engine : engines) {
     const AccuracyCurve* curve = curve_of(engine, scene);
     if (curve == nullptr) continue;
     for (const conformance::AccuracyPoint& point : curve->points) {
       if (!plottable(point)) continue;
-      errors.push_back(point.error);
-      costs.push_back(point.cost);
+      x.take(point.cost);
+      y.take(point.error);
     }
   }
-  if (errors.empty()) return "";
-  const CurveAxis x = axis_over(costs, kLeft, kRight), y = axis_over(errors, kBottom, kTop);
+  if (x.empty()) return "";
+  x.round_decades(20);
+  y.round_decades(8);
   std::string svg =
       fmt::format(R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}: error against cost">)", kWidth,
                   kHeight, escape_html(scene));

@@ -23,7 +23,4 @@ struct LinePlot {
 inline constexpr std::size_t kPlotPoints = 400;
 std::string line_plot_svg(const LinePlot& plot);
 
-// A round step (1, 2 or 5 times a power of ten) that gives at most `intervals` in `span` > 0.
-double nice_step(double span, int intervals);
-
 }  // namespace duet

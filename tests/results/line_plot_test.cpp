@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "duet/core/require.h"
+#include "duet/results/report/axis.h"
 #include "duet/results/report/training_curves.h"
 #include "tests/support.h"
 
@@ -85,10 +86,36 @@ TEST(LinePlot, LengthsThatDifferAreRefused) {
               HasSubstr("series 'a' has 2 x but 1 y"));
 }
 
-TEST(LinePlot, StepsAreOneTwoFive) {
+TEST(PlotAxis, StepsAreOneTwoFive) {
   EXPECT_DOUBLE_EQ(nice_step(10.0, 5), 2.0);
   EXPECT_DOUBLE_EQ(nice_step(0.3, 3), 0.1);
   EXPECT_DOUBLE_EQ(nice_step(31.0, 10), 5.0);
+}
+
+TEST(PlotAxis, TicksAreRoundValuesWithinIt) {
+  PlotAxis axis{.from = 0.0, .to = 100.0};
+  EXPECT_TRUE(axis.empty());
+  axis.take(0.3);
+  axis.take(9.7);
+  axis.round(5);
+  EXPECT_THAT(axis.ticks(), testing::ElementsAre(0.0, 2.0, 4.0, 6.0, 8.0, 10.0));
+  EXPECT_EQ(axis.at(5.0), 50.0);
+  EXPECT_EQ(axis.label(2.0), "2");
+  EXPECT_EQ(axis.label(12000.0), "12k");
+}
+
+TEST(PlotAxis, DecadesAreWhole) {
+  PlotAxis axis{.from = 100.0, .to = 0.0, .logarithmic = true};
+  axis.take(3e-5);
+  axis.take(0.2);
+  axis.round_decades(20);
+  EXPECT_EQ(axis.ticks().size(), 6U);  // 1e-5 to 1
+  EXPECT_DOUBLE_EQ(axis.at(1.0), 0.0);
+  EXPECT_DOUBLE_EQ(axis.at(1e-5), 100.0);
+  EXPECT_EQ(axis.label(axis.ticks().front()), "1e-5");
+  EXPECT_EQ(axis.label(axis.ticks().back()), "1");
+  axis.round_decades(3);
+  EXPECT_EQ(axis.ticks().size(), 3U);
 }
 
 TEST(TrainingCurves, ColumnsByHeaderAgainstTheFirst) {
