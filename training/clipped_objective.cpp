@@ -6,8 +6,8 @@
 namespace duet {
 namespace {
 
-constexpr float kFarthestAction = 4.0F;     // standard deviations
-constexpr float kLargestLog = 10.0F;  // of a ratio: e^10 is beyond every clip, and finite
+constexpr float kFarthestAction = 4.0F;  // standard deviations
+constexpr float kLargestLog = 10.0F;     // of a ratio: e^10 is beyond every clip, and finite
 
 }  // namespace
 

@@ -59,7 +59,8 @@ std::vector<BenchmarkFigure> time_step(const std::string& engine, const Benchmar
   const StepTimes times = time_steps(engine, options);
   const std::string name = "backend/" + engine + "/step";
   const double dt = standing_scene(engine).dt, target = engine_module(engine).step_target_us;
-  return {target > 0.0 ? at_most(name, 1e6 * times.ours, "us", target) : BenchmarkFigure{name, 1e6 * times.ours, "us", "", true},
+  return {target > 0.0 ? at_most(name, 1e6 * times.ours, "us", target)
+                       : BenchmarkFigure{name, 1e6 * times.ours, "us", "", true},
           at_least(name + ":real_time_factor", dt / times.ours, "1", 20.0)};
 }
 
