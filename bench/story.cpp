@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "duet/bench/clips.h"
 #include "duet/bench/progress.h"
@@ -20,6 +21,14 @@ constexpr const char* kNullAndLift =
     "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
     "same "
     "episodes.";
+
+// The first of a suite's files that is not there, without its folder; "" where all are: recordings that may not be
+// passed on are not in a published run, and what a run was made of may have been moved.
+std::string absent_clip(const Suite& suite) {
+  const auto is_absent = [](const std::string& file) { return !std::filesystem::exists(file); };
+  const auto absent = std::ranges::find_if(suite.clips.files, is_absent);
+  return absent == suite.clips.files.end() ? "" : std::filesystem::path(*absent).filename().string();
+}
 
 StickFigure human_figure(const std::string& label, const HumanMotion& motion, int frame) {
   StickFigure figure{label, {}, {}};
@@ -134,6 +143,11 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   content.columns = metric_columns();
   content.episodes = run.rows;
   if (!with_clips || !suite.references.empty()) return content;
+  if (const std::string absent = absent_clip(suite); !absent.empty()) {
+    content.notes.push_back(
+        fmt::format("Key frames and loss curves of the clips are left out: '{}' is not there.", absent));
+    return content;
+  }
 
   const auto robot = load_shared_robot(suite.robot);
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);

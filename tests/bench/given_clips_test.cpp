@@ -187,6 +187,12 @@ TEST_F(GivenClips, OneCommandPrintsRecordedBesideSynthetic) {
   for (const char* file : {"people.md", "people.csv", "people.json", "people.tex", "report.html"})
     EXPECT_TRUE(fs::exists((folder_ / "run/") + file)) << file;
   EXPECT_EQ(test::duet_program("verify " + (folder_ / "run")).code, 0);
+  fs::remove(recording("one"));
+  for (const fs::directory_entry& kept : fs::directory_iterator(folder_ / "run/inputs/clips")) fs::remove(kept.path());
+  const test::Answer later = test::duet_program("report " + (folder_ / "run") + " -f html");
+  ASSERT_EQ(later.code, 0) << later.err;
+  EXPECT_THAT(read_file(folder_ / "run/report.html"),
+              HasSubstr("Key frames and loss curves of the clips are left out:"));
 }
 
 // Other suites lose their synthesis to clips that are given, and keep nothing of it.
