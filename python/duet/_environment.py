@@ -99,6 +99,14 @@ class Batch:
         return box(-numpy.inf, numpy.inf, self.view("frames").shape[1:])
 
 
+def _begin(batch: Batch, random: Any, options: Optional[Mapping[str, Any]]) -> Dict[str, Any]:
+    """Begins one episode, `options["episode"]` or one that is drawn, and says which."""
+    chosen = (options or {}).get("episode")
+    episode = int(random.integers(batch.episodes)) if chosen is None else int(chosen)
+    batch.reset([episode], [0])
+    return {"episode": episode, "clip": batch.clip(episode)}
+
+
 def _ended_info(row: Optional[Dict[str, Any]]) -> Dict[str, Any]:
     return {"is_success": bool(row and row["success"]), "outcome": row["outcome"] if row else "error", "row": row}
 
@@ -135,10 +143,8 @@ class Env:
 
         if seed is not None:
             self._random = numpy.random.default_rng(seed)
-        chosen = (options or {}).get("episode")
-        episode = int(self.np_random.integers(self._batch.episodes)) if chosen is None else int(chosen)
-        self._batch.reset([episode], [0])
-        return self._observation(), {"episode": episode, "clip": self._batch.clip(episode)}
+        info = _begin(self._batch, self.np_random, options)
+        return self._observation(), info
 
     def step(self, action: Any) -> Tuple[Any, float, bool, bool, Dict[str, Any]]:
         if self._batch.view("over")[0]:
@@ -273,11 +279,8 @@ class ParallelEnv:
 
         if seed is not None or self._random is None:
             self._random = numpy.random.default_rng(seed)
-        chosen = (options or {}).get("episode")
-        episode = int(self._random.integers(self._batch.episodes)) if chosen is None else int(chosen)
-        self._batch.reset([episode], [0])
+        said = _begin(self._batch, self._random, options)
         self.agents = list(self.possible_agents)
-        said = {"episode": episode, "clip": self._batch.clip(episode)}
         return self._observations(), {"robot": said, "partner": {**said, "ahead": self._ahead()}}
 
     def step(self, actions: Mapping[str, Any]) -> Tuple[Dict[str, Any], Dict[str, float], Dict[str, bool], Dict[str, bool], Dict[str, Any]]:
