@@ -61,10 +61,7 @@ std::filesystem::path shipped_folder() {
 
 }  // namespace
 
-bool is_available(const std::string& engine) {
-  const std::vector<EngineInfo> all = engines();
-  return std::any_of(all.begin(), all.end(), [&](const EngineInfo& e) { return e.name == engine && e.available; });
-}
+bool is_available(const std::string& engine) { return find_engine_module(engine) != nullptr; }
 
 void check_step(double dt) {
   const double steps = kTick / dt;
