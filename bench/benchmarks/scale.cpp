@@ -32,7 +32,7 @@ constexpr const char* kScaleSuite = R"(
 schema: duet.suite/1
 name: bench-scale
 version: 1.0.0
-clips: {synth: {per_task: 8, seed: 42}}
+clips: {synth: {per_task: 24, seed: 42}}
 tasks: [wave, high_five]
 engines: [mujoco]
 controllers: [vmc]
@@ -79,9 +79,10 @@ class ScaleRun {
   Progress quiet_{Progress::Style::kQuiet};
 };
 
-double children_cpu_seconds() {
+// Of all threads. `who`: RUSAGE_SELF, or RUSAGE_CHILDREN for the processes that have ended.
+double used_cpu_seconds(int who) {
   struct rusage usage {};
-  getrusage(RUSAGE_CHILDREN, &usage);
+  getrusage(who, &usage);
   const auto seconds = [](const timeval& time) {
     return static_cast<double>(time.tv_sec) + 1.0e-6 * static_cast<double>(time.tv_usec);
   };
@@ -92,20 +93,20 @@ struct Spent {
   double wall = 0.0, cpu = 0.0;  // [s]
 };
 
-// The shards in processes of their own: so many at a time.
+// The shards in processes of their own, of one thread each: so many at a time.
 Spent run_workers(const ScaleRun& run, int shards, int at_once) {
   const std::string program = fs::read_symlink("/proc/self/exe").string();
-  Spent spent{-wall_seconds(), -children_cpu_seconds()};
+  Spent spent{-wall_seconds(), -used_cpu_seconds(RUSAGE_CHILDREN)};
   for (int first = 0; first < shards; first += at_once) {
     std::vector<std::FILE*> workers;
     for (int shard = first; shard < std::min(shards, first + at_once); ++shard)
       workers.push_back(::popen(
-          fmt::format("exec '{}' work '{}' --shard {} --quiet >/dev/null", program, run.run(), shard).c_str(), "r"));
+          fmt::format("exec '{}' work '{}' --shard {} --jobs 1 --quiet >/dev/null", program, run.run(), shard).c_str(), "r"));
     for (std::FILE* worker : workers)
       if (worker == nullptr || ::pclose(worker) != 0) throw InputError("bench scale: a worker failed");
   }
   spent.wall += wall_seconds();
-  spent.cpu += children_cpu_seconds();
+  spent.cpu += used_cpu_seconds(RUSAGE_CHILDREN);
   return spent;
 }
 
@@ -161,9 +162,9 @@ std::vector<BenchmarkFigure> time_merge(const BenchmarkOptions& options) {
   const std::vector<RowSource> sources = write_rows(run, rows, row_bytes);
   RunInfo info;
   info.suite_hash = run.a_row().suite_hash;
-  const double begin = wall_seconds(), cpu = cpu_seconds();
+  const double begin = wall_seconds(), cpu = used_cpu_seconds(RUSAGE_SELF);
   const MergedRows merged = merge_rows(sources, info, run.folder() + "/merged.jsonl");
-  const double wall = wall_seconds() - begin, used = cpu_seconds() - cpu;
+  const double wall = wall_seconds() - begin, used = used_cpu_seconds(RUSAGE_SELF) - cpu;
   if (merged.rows != rows) throw InputError("bench scale: rows were lost");
   const double million = 1.0e6 / static_cast<double>(rows);
   return {{"scale/merge:rows", static_cast<double>(rows), "1", "", true},

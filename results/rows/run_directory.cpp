@@ -92,7 +92,8 @@ void record_resumption(const std::string& folder, const RunInfo& info) {
 RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info, bool retry_errors) {
   if (is_published(path))
     throw InputError(fmt::format("'{}' is published: its rows stay as they are; choose another folder", path));
-  if (!is_run(path) && !is_fresh(path))
+  // In this order: another process may begin the run in between, and its run.json is there before anything else.
+  if (!is_fresh(path) && !is_run(path))
     throw InputError(fmt::format("'{}' is not empty and holds no run (no run.json): choose another folder", path));
   create_folder(path);
   refuse_links(path);

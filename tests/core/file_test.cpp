@@ -1,43 +1,22 @@
 #include "duet/core/file.h"
 
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <csignal>
 #include <fstream>
 #include <vector>
 
 #include "duet/core/require.h"
+#include "tests/file_size_limit.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
+using test::FileSizeLimit;
 using test::ScratchFolder;
 using test::thrown_message;
-
-// While it lives no file of this process may grow above `bytes`: writes beyond fail with EFBIG, as a full disk's do
-// with ENOSPC.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit limit{bytes, old_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  void (*handler_)(int);
-  rlimit old_{};
-};
 
 std::vector<std::string> names_in(const ScratchFolder& folder) {
   std::vector<std::string> names;

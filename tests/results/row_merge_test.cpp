@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <map>
 
 #include "duet/core/file.h"
 #include "duet/core/random.h"
 #include "duet/results/rows/json_fields.h"
+#include "tests/file_size_limit.h"
 #include "tests/results/rows.h"
 #include "tests/support.h"
 
@@ -199,6 +201,22 @@ TEST_F(RowMerge, AFolderThatCannotBeWrittenIsAStorageError) {
   EXPECT_THAT(
       test::thrown_message<StorageError>([&] { merge_rows({good}, test::tiny_run(), folder_ / "no/such/merged"); }),
       HasSubstr("cannot write '"));
+}
+
+TEST_F(RowMerge, ADiskThatFillsUpLeavesWhatWasThere) {
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 2000; ++i) rows.push_back(row_number(i));
+  const std::vector<RowSource> sources = {source("many", rows)};
+  write_file(folder_ / "merged", "before");
+  ASSERT_GT(std::filesystem::file_size(folder_ / "many"), 1U << 20U);
+  {
+    const test::FileSizeLimit limit(1U << 20U);
+    EXPECT_THAT(test::thrown_message<StorageError>([&] { merged(sources); }), HasSubstr("merged': File too large"));
+  }
+  EXPECT_EQ(read_file(folder_ / "merged"), "before");
+  const auto entries = std::filesystem::directory_iterator(folder_ / "");
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), 2);
+  EXPECT_EQ(read_file(folder_ / "many").size(), merged(sources).size());
 }
 
 }  // namespace

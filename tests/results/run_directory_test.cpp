@@ -1,9 +1,7 @@
 #include "duet/results/rows/run_directory.h"
 
 #include <gmock/gmock.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 
@@ -11,6 +9,7 @@
 #include "duet/results/rows/environment.h"
 #include "tests/deep_json.h"
 #include "tests/results/rows.h"
+#include "tests/file_size_limit.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -18,6 +17,7 @@ namespace {
 
 using test::append_text;
 using test::episode;
+using test::FileSizeLimit;
 using test::ScratchFolder;
 using test::thrown_message;
 using test::tiny_run;
@@ -142,27 +142,6 @@ TEST(RunDirectory, RefusesTheSameEpisodeTwiceAndRowsOfAnotherSuite) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(nameless); }), HasSubstr("without a key"));
   EXPECT_EQ(load_run(scratch / "run").rows.size(), 1U);
 }
-
-// As a full disk does, a limit on the size of files lets a part of a line through.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    handler_ = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-
- private:
-  rlimit before_{};
-  void (*handler_)(int) = nullptr;
-};
 
 TEST(RunDirectory, AFullDiskLeavesWholeRowsAndTheEpisodeCanBeAppendedLater) {
   const ScratchFolder scratch;
