@@ -1,18 +1,24 @@
 // The round trip of a command over DDS between two processes on the loopback interface, 500 times a second: written
-// here, answered by `duet-g1-services --echo` with a state that carries its number. Figures of this machine; no test
-// asserts them.
+// here, answered by `duet-g1-services --echo` with a state that carries its number. Beside it the round trip of as many
+// bytes over plain UDP between two threads: what of it is the machine's. Figures of this machine; no test asserts them.
 #include "duet/bench/benchmarks/hardware_wire.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include "duet/bench/benchmarks/parts.h"
 #include "duet/core/require.h"
@@ -85,6 +91,24 @@ double round_trip(RobotWire& wire, std::uint32_t number, RoundTrips& trips) {
   return -1.0;
 }
 
+// Round trips at 500 Hz for so many seconds. `trip`: one with that number, as round_trip(); `number`: the last one
+// used.
+void time_trips(double seconds, std::uint32_t number, const std::function<double(std::uint32_t)>& trip,
+                RoundTrips& trips) {
+  double next = monotonic_seconds();
+  for (const long count = std::max(100L, static_cast<long>(seconds / kRoundPeriod)); trips.sent < count; ++trips.sent) {
+    next = std::max(next + kRoundPeriod, monotonic_seconds());
+    usleep(static_cast<useconds_t>(1e6 * std::max(0.0, next - monotonic_seconds())));
+    const double taken = trip(++number);
+    if (taken < 0.0)
+      ++trips.lost;
+    else
+      trips.seconds.push_back(taken);
+  }
+  std::ranges::sort(trips.seconds);
+}
+
+// Of DDS.
 RoundTrips measure(double seconds) {
   const bool real_time = ask_for_real_time();
   const EchoProcess echo;
@@ -97,36 +121,109 @@ RoundTrips measure(double seconds) {
   while (round_trip(*wire, ++number, found) < 0.0)
     if (monotonic_seconds() - begin > kFirstAnswer)
       throw std::runtime_error("hardware/wire: no answer has come from duet-g1-services");
-  double next = monotonic_seconds();
-  for (const long count = std::max(100L, static_cast<long>(seconds / kRoundPeriod)); trips.sent < count; ++trips.sent) {
-    next = std::max(next + kRoundPeriod, monotonic_seconds());
-    usleep(static_cast<useconds_t>(1e6 * std::max(0.0, next - monotonic_seconds())));
-    const double taken = round_trip(*wire, ++number, trips);
-    if (taken < 0.0)
-      ++trips.lost;
-    else
-      trips.seconds.push_back(taken);
-  }
-  std::ranges::sort(trips.seconds);
+  time_trips(
+      seconds, number, [&](std::uint32_t next) { return round_trip(*wire, next, trips); }, trips);
   return trips;
+}
+
+// A UDP socket of the loopback interface, connected to another.
+class LoopbackSocket {
+ public:
+  LoopbackSocket() : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in place = at(0);
+    socklen_t size = sizeof place;
+    if (descriptor_ < 0 || ::bind(descriptor_, as_address(place), size) != 0 ||
+        ::getsockname(descriptor_, as_address(place), &size) != 0)
+      throw std::runtime_error("hardware/wire: no UDP socket on the loopback interface");
+    port_ = ntohs(place.sin_port);
+    const timeval most{.tv_sec = 0, .tv_usec = static_cast<suseconds_t>(1e6 * kLost)};
+    (void)::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &most, sizeof most);
+  }
+  ~LoopbackSocket() { ::close(descriptor_); }
+  LoopbackSocket(const LoopbackSocket&) = delete;
+  LoopbackSocket& operator=(const LoopbackSocket&) = delete;
+
+  void connect(const LoopbackSocket& other) {
+    sockaddr_in place = at(other.port_);
+    if (::connect(descriptor_, as_address(place), sizeof place) != 0)
+      throw std::runtime_error("hardware/wire: two UDP sockets of the loopback interface do not connect");
+  }
+  template <typename Frame>
+  void send(const Frame& frame) {
+    (void)::send(descriptor_, &frame, sizeof frame, 0);
+  }
+  // False where nothing came.
+  template <typename Frame>
+  bool receive(Frame& frame) {
+    return ::recv(descriptor_, &frame, sizeof frame, 0) == static_cast<ssize_t>(sizeof frame);
+  }
+
+ private:
+  static sockaddr_in at(std::uint16_t port) {
+    sockaddr_in place{};
+    place.sin_family = AF_INET;
+    place.sin_port = htons(port);
+    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    return place;
+  }
+  static sockaddr* as_address(sockaddr_in& place) { return reinterpret_cast<sockaddr*>(&place); }
+
+  int descriptor_ = -1;
+  std::uint16_t port_ = 0;
+};
+
+// Of plain UDP, a command one way and a state the other.
+RoundTrips measure_udp(double seconds) {
+  ask_for_real_time();
+  LoopbackSocket here, there;
+  here.connect(there);
+  there.connect(here);
+  const std::jthread echo([&there](const std::stop_token& stop) {
+    ask_for_real_time();
+    LowCommandFrame command;
+    LowStateFrame state{};
+    while (!stop.stop_requested()) {
+      if (!there.receive(command)) continue;
+      state.tick = command.reserve[0];
+      seal(state);
+      there.send(state);
+    }
+  });
+  RoundTrips trips;
+  const auto trip = [&](std::uint32_t number) {
+    const LowCommandFrame frame = numbered(number);
+    const double begin = monotonic_seconds();
+    here.send(frame);
+    for (LowStateFrame state; here.receive(state);)
+      if (state.crc == checksum_of(state) && state.tick == number) return monotonic_seconds() - begin;
+    return -1.0;
+  };
+  time_trips(seconds, 0, trip, trips);
+  return trips;
+}
+
+// [us] that so large a share of the trips does not take.
+double share_us(const RoundTrips& trips, double share) {
+  if (trips.seconds.empty()) throw std::runtime_error("hardware/wire: every answer was lost");
+  return 1e6 * trips.seconds[static_cast<std::size_t>(share * static_cast<double>(trips.seconds.size() - 1))];
 }
 
 std::vector<BenchmarkFigure> time_round_trips(const BenchmarkOptions& options) {
   constexpr double kLonger = 30.0;  // than other figures: tails are rare
   // On a thread of its own: its priority ends with it.
   const RoundTrips trips = std::async(std::launch::async, measure, kLonger * options.seconds).get();
-  if (trips.seconds.empty()) throw std::runtime_error("hardware/wire: every answer was lost");
-  const auto share = [&](double s) {
-    return 1e6 * trips.seconds[static_cast<std::size_t>(s * static_cast<double>(trips.seconds.size() - 1))];
-  };
+  const RoundTrips udp = std::async(std::launch::async, measure_udp, 5.0 * options.seconds).get();
   const std::string name = "hardware/wire";
   return {{name + ":real_time_priority", trips.real_time ? 1.0 : 0.0, "1", "", true},
           {name + ":sent", static_cast<double>(trips.sent), "1", "", true},
           at_most(name + ":lost", static_cast<double>(trips.lost), "1", 0.0),
           at_most(name + ":bad_checksums", static_cast<double>(trips.bad), "1", 0.0),
-          at_most(name + ":p50", share(0.5), "us", 60.0),
-          at_most(name + ":p99", share(0.99), "us", 500.0),
-          {name + ":largest", 1e6 * trips.seconds.back(), "us", "", true}};
+          at_most(name + ":p50", share_us(trips, 0.5), "us", 60.0),
+          at_most(name + ":p99", share_us(trips, 0.99), "us", 500.0),
+          {name + ":largest", 1e6 * trips.seconds.back(), "us", "", true},
+          {name + "/plain_udp:p50", share_us(udp, 0.5), "us", "", true},
+          {name + "/plain_udp:p99", share_us(udp, 0.99), "us", "", true},
+          {name + ":over_plain_udp", share_us(trips, 0.5) / share_us(udp, 0.5), "1", "", true}};
 }
 
 // Forward, sideways and on a curve; clean and with the noise of usual encoders and a usual IMU.

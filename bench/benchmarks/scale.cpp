@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 
 #include "duet/backends/factory.h"
@@ -101,7 +102,8 @@ Spent run_workers(const ScaleRun& run, int shards, int at_once) {
     std::vector<std::FILE*> workers;
     for (int shard = first; shard < std::min(shards, first + at_once); ++shard)
       workers.push_back(::popen(
-          fmt::format("exec '{}' work '{}' --shard {} --jobs 1 --quiet >/dev/null", program, run.run(), shard).c_str(), "r"));
+          fmt::format("exec '{}' work '{}' --shard {} -j 1 --quiet >/dev/null", program, run.run(), shard).c_str(),
+          "r"));
     for (std::FILE* worker : workers)
       if (worker == nullptr || ::pclose(worker) != 0) throw InputError("bench scale: a worker failed");
   }
@@ -162,6 +164,7 @@ std::vector<BenchmarkFigure> time_merge(const BenchmarkOptions& options) {
   const std::vector<RowSource> sources = write_rows(run, rows, row_bytes);
   RunInfo info;
   info.suite_hash = run.a_row().suite_hash;
+  forget_peak_memory();  // clips were prepared before
   const double begin = wall_seconds(), cpu = used_cpu_seconds(RUSAGE_SELF);
   const MergedRows merged = merge_rows(sources, info, run.folder() + "/merged.jsonl");
   const double wall = wall_seconds() - begin, used = used_cpu_seconds(RUSAGE_SELF) - cpu;
@@ -193,8 +196,15 @@ Constants measure(const BenchmarkOptions& options, Spent& one, Spent& two) {
   constants.status = (wall_seconds() - begin) / kShards;
   constants.start = start_seconds(run);
   constants.record = record_seconds(run, 0.5 * options.seconds);
-  run.forget();
-  two = run_workers(run, kShards, 2);
+  // Another guest of the machine may slow a round down: of each kind the faster of two counts.
+  const auto faster = [&](const Spent& before, int at_once) {
+    run.forget();
+    const Spent now = run_workers(run, kShards, at_once);
+    return now.wall < before.wall ? now : before;
+  };
+  two = faster({.wall = std::numeric_limits<double>::infinity()}, 2);
+  one = faster(one, 1);
+  two = faster(two, 2);
   return constants;
 }
 

@@ -1,10 +1,12 @@
 #include "duet/bench/benchmarks/timer.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <fstream>
 #include <limits>
 
 namespace duet {
@@ -23,6 +25,11 @@ double peak_memory_mib() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+void forget_peak_memory() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5;  // the kernel's word for it (proc(5))
 }
 
 double best_call_seconds(const std::function<void()>& work, double seconds) {
