@@ -227,15 +227,20 @@ std::vector<std::int64_t> attempted_shards(const std::string& run) {
 }
 
 std::int64_t file_system_time(const std::string& run) {
-  const std::string probe =
-      (fs::path(run) / fmt::format("clock.part-{}-{:08x}", ::getpid(), std::random_device()())).string();
-  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (descriptor < 0) return static_cast<std::int64_t>(std::time(nullptr));
+  // Without a name where the file system can do that: who is killed here leaves nothing.
+  int descriptor = ::open(run.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    const std::string probe =
+        (fs::path(run) / fmt::format("clock.part-{}-{:08x}", ::getpid(), std::random_device()())).string();
+    descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    ::unlink(probe.c_str());
+  }
   static_cast<void>(!::write(descriptor, "\n", 1));
-  ::close(descriptor);
-  const std::int64_t now = change_time(probe);
-  ::unlink(probe.c_str());
-  return now;
+  static_cast<void>(::fsync(descriptor));  // over a network the server's clock stands in it only then
+  struct stat changed {};
+  const bool known = ::fstat(descriptor, &changed) == 0;
+  if (descriptor >= 0) ::close(descriptor);
+  return known ? static_cast<std::int64_t>(changed.st_mtime) : static_cast<std::int64_t>(std::time(nullptr));
 }
 
 bool may_be_alive(const AttemptRecord& attempt, std::int64_t now, double silence) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
+#include <ctime>
 #include <filesystem>
 #include <thread>
 
@@ -334,6 +335,14 @@ TEST(Journal, ALineThatIsNotWholeIsLeftOut) {
   EXPECT_FALSE(parse_journal(whole.substr(0, 20), "a.log"));
   EXPECT_THAT(test::thrown_message<InputError>([] { parse_journal("{\"schema\":\"other/1\"}\n", "a.log"); }),
               HasSubstr("a.log:1: expected schema duet.attempt/1, found other/1"));
+}
+
+TEST(FileSystemTime, IsThatOfANewFileAndLeavesNothing) {
+  const test::ScratchFolder folder;
+  const auto now = static_cast<double>(std::time(nullptr));
+  EXPECT_NEAR(static_cast<double>(file_system_time(folder / "")), now, 5.0);
+  EXPECT_TRUE(fs::is_empty(folder / ""));
+  EXPECT_NEAR(static_cast<double>(file_system_time(folder / "absent")), now, 5.0);
 }
 
 TEST(Ranges, AreShort) {
