@@ -128,12 +128,17 @@ class Nodes:
         return [line for line in self.command("squeue", "-h", "-r", "-o", "%i %T %N %r", check=False).split("\n") if line]
 
     def wait_for_end(self, seconds=400):
-        """Slurm waits two minutes before it starts again what it has put back: here that is at once."""
+        """Slurm waits two minutes before it starts again what it has put back: here that is three seconds. At once is
+        too early: a job that a dead node held then begins on no node (`lacks assigned nodes` in slurmctld.log) and
+        stays so until its time limit."""
+        put_back = {}
+
         def over():
             waiting = self.queue()
-            for line in waiting:
-                if line.endswith("BeginTime"):
-                    self.command("scontrol", "update", f"jobid={line.split()[0]}", "StartTime=now", check=False)
+            for job in (line.split()[0] for line in waiting if line.endswith("BeginTime")):
+                if time.monotonic() - put_back.setdefault(job, time.monotonic()) > 3:
+                    self.command("scontrol", "update", f"jobid={job}", "StartTime=now", check=False)
+                    del put_back[job]
             return not waiting
         self.wait_for(over, seconds, "the end of all jobs")
 

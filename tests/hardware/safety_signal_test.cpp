@@ -18,8 +18,15 @@ SafetyInput well() {
   SafetyInput input;
   input.now = kNow;
   input.state_at = input.planner_at = input.person_at = input.odometry_at = kNow;
-  input.remote_at = input.dead_man_at = kNow;
+  input.remote_at = input.dead_man_at = input.executor_at = kNow;
   return input;
+}
+
+// Of a robot whose executor answers.
+SafetyRules answered() {
+  SafetyRules rules;
+  rules.executor_answers = true;
+  return rules;
 }
 
 Assessment assessed(const SafetyInput& input, bool moving = true, const SafetyRules& rules = {}) {
@@ -46,13 +53,14 @@ const Timeout kTimeouts[] = {
     {"odometry", &SafetyInput::odometry_at, {0.05, 0.15, kForever}, StopCause::kOdometryAge},
     {"remote", &SafetyInput::remote_at, {0.1, 0.2, 3.0}, StopCause::kRemoteAge},
     {"dead man", &SafetyInput::dead_man_at, {0.1, 0.2, 3.0}, StopCause::kDeadMan},
+    {"executor", &SafetyInput::executor_at, {0.3, 0.6, kForever}, StopCause::kExecutorAge},
 };
 
 void expect_level_after(const Timeout& timeout, double age, StopLevel level) {
   if (age == kForever) return;
   SafetyInput input = well();
   input.*timeout.at = kNow - age;
-  const Assessment found = assessed(input);
+  const Assessment found = assessed(input, true, answered());
   EXPECT_EQ(found.level, level) << timeout.name << " after " << age;
   if (level != StopLevel::kFine) {
     EXPECT_EQ(found.cause, timeout.cause) << timeout.name;
@@ -75,7 +83,7 @@ TEST(SafetySignals, WhatHasNeverComeHolds) {
   for (const Timeout& timeout : kTimeouts) {
     SafetyInput input = well();
     input.*timeout.at = kNever;
-    EXPECT_GE(assessed(input).level, StopLevel::kHold) << timeout.name;
+    EXPECT_GE(assessed(input, true, answered()).level, StopLevel::kHold) << timeout.name;
   }
 }
 

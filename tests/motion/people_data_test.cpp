@@ -26,6 +26,13 @@ using ::testing::HasSubstr;
 
 const std::string kExamples = DUET_SOURCE_DIR "/examples/data";
 
+// Sines differ in their last bits between mathematics libraries: what is held to bytes is held to them on x86-64 alone.
+#if defined(__x86_64__)
+constexpr bool kSinesOfTheExamples = true;
+#else
+constexpr bool kSinesOfTheExamples = false;
+#endif
+
 // With DUET_WRITE_EXAMPLES=1 it writes them instead.
 TEST(PeopleExamples, AreWhatTheWriterWrites) {
   const bool write = std::getenv("DUET_WRITE_EXAMPLES") != nullptr;
@@ -33,7 +40,8 @@ TEST(PeopleExamples, AreWhatTheWriterWrites) {
   std::size_t bytes = 0;
   for (const test::StandinFile& file : test::example_files()) {
     if (write) write_file(kExamples + "/" + file.path, file.bytes);
-    EXPECT_EQ(read_file(kExamples + "/" + file.path), file.bytes) << file.path;
+    // Not EXPECT_EQ: of binary files it prints what a terminal takes for orders.
+    if (kSinesOfTheExamples) EXPECT_TRUE(read_file(kExamples + "/" + file.path) == file.bytes) << file.path;
     expected.push_back(file.path);
     bytes += file.bytes.size();
   }
@@ -138,6 +146,7 @@ TEST(PeopleData, TheCmuPairComesAsItDid) {
   for (const HumanMotion* motion : {&found.clip.a, &found.clip.b})
     joints.append(reinterpret_cast<const char*>(motion->joints.data().data()), 8 * motion->joints.data().size());
   // Of the clip that was imported before there was a table of formats.
+  if (!kSinesOfTheExamples) GTEST_SKIP() << "not run: digests are of x86-64";
   EXPECT_EQ(sha256_hex(joints), "a851dc763cf69c27d9dd8313aca951418204f63aed50ccffaae59c68170b56de");
 }
 
