@@ -8,8 +8,8 @@
 #include "duet/core/require.h"
 #include "duet/results/rows/environment.h"
 #include "tests/deep_json.h"
-#include "tests/results/rows.h"
 #include "tests/file_size_limit.h"
+#include "tests/results/rows.h"
 #include "tests/support.h"
 
 namespace duet {
