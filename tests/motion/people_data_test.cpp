@@ -41,7 +41,9 @@ TEST(PeopleExamples, AreWhatTheWriterWrites) {
   for (const test::StandinFile& file : test::example_files()) {
     if (write) write_file(kExamples + "/" + file.path, file.bytes);
     // Not EXPECT_EQ: of binary files it prints what a terminal takes for orders.
-    if (kSinesOfTheExamples) EXPECT_TRUE(read_file(kExamples + "/" + file.path) == file.bytes) << file.path;
+    if (kSinesOfTheExamples) {
+      EXPECT_TRUE(read_file(kExamples + "/" + file.path) == file.bytes) << file.path;
+    }
     expected.push_back(file.path);
     bytes += file.bytes.size();
   }
