@@ -76,7 +76,7 @@ library_package() {
   cmake --install "$build" --prefix "$root/usr" --component library >/dev/null
   mkdir -p "$root/DEBIAN"
   local packages="Depends: duet (= $version), libeigen3-dev, libfmt-dev, libtbb-dev, libssl-dev, nlohmann-json3-dev, libyaml-cpp-dev, libprotobuf-dev, libonnx-dev"
-  packages+=", libsqlite3-dev, zlib1g-dev, libzip-dev, liburdfdom-dev, libconsole-bridge-dev, libtinyxml-dev, pkg-config"
+  packages+=", libsqlite3-dev, zlib1g-dev, libzstd-dev, libzip-dev, liburdfdom-dev, libconsole-bridge-dev, libtinyxml-dev, pkg-config"
   control libduet-dev "$root" "libraries of duet for C++ programs" \
     "Headers, static libraries, and what find_package(duet) and pkg-config read." "$packages"$'\n'"Suggests: cmake, g++" >"$root/DEBIAN/control"
   pack libduet-dev
