@@ -3,12 +3,14 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
@@ -115,6 +117,11 @@ bool DatagramSocket::send(std::span<const std::byte> datagram) {
 std::size_t DatagramSocket::receive(std::span<std::byte> buffer) {
   const ssize_t length = recv(descriptor_, buffer.data(), buffer.size(), 0);
   return length > 0 ? static_cast<std::size_t>(length) : 0;
+}
+
+bool DatagramSocket::wait(double most) const {
+  pollfd asked{.fd = descriptor_, .events = POLLIN, .revents = 0};
+  return poll(&asked, 1, static_cast<int>(std::ceil(1.0e3 * most))) > 0;
 }
 
 std::uint16_t DatagramSocket::port() const {

@@ -1,5 +1,5 @@
 // Datagrams between processes of one machine: a Unix socket at a path that only its owner may use, or UDP on the
-// loopback address. Nothing blocks. One owner, one thread.
+// loopback address. Nothing blocks but wait(). One owner, one thread.
 #pragma once
 
 #include <cstddef>
@@ -27,6 +27,8 @@ class DatagramSocket {
   bool send(std::span<const std::byte> datagram);
   // Its length, 0 where none waits. A longer one than `buffer` is cut.
   std::size_t receive(std::span<std::byte> buffer);
+  // Until a datagram waits, so many seconds at most; false where none does.
+  [[nodiscard]] bool wait(double most) const;
   [[nodiscard]] std::uint16_t port() const;  // of at_port
 
  private:

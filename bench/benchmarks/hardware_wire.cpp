@@ -3,12 +3,9 @@
 // bytes over plain UDP between two threads: what of it is the machine's. Figures of this machine; no test asserts them.
 #include "duet/bench/benchmarks/hardware_wire.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <netinet/in.h>
 #include <signal.h>
 #include <spawn.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -16,12 +13,14 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <span>
 #include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "duet/bench/benchmarks/parts.h"
 #include "duet/core/require.h"
+#include "duet/hardware/datagram_socket.h"
 #include "duet/hardware/dds/dds_wire.h"
 #include "duet/hardware/frame_checksum.h"
 #include "duet/hardware/guard_loop.h"
@@ -126,78 +125,35 @@ RoundTrips measure(double seconds) {
   return trips;
 }
 
-// A UDP socket of the loopback interface, connected to another.
-class LoopbackSocket {
- public:
-  LoopbackSocket() : descriptor_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in place = at(0);
-    socklen_t size = sizeof place;
-    if (descriptor_ < 0 || ::bind(descriptor_, as_address(place), size) != 0 ||
-        ::getsockname(descriptor_, as_address(place), &size) != 0)
-      throw std::runtime_error("hardware/wire: no UDP socket on the loopback interface");
-    port_ = ntohs(place.sin_port);
-    const timeval most{.tv_sec = 0, .tv_usec = static_cast<suseconds_t>(1e6 * kLost)};
-    (void)::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &most, sizeof most);
-  }
-  ~LoopbackSocket() { ::close(descriptor_); }
-  LoopbackSocket(const LoopbackSocket&) = delete;
-  LoopbackSocket& operator=(const LoopbackSocket&) = delete;
-
-  void connect(const LoopbackSocket& other) {
-    sockaddr_in place = at(other.port_);
-    if (::connect(descriptor_, as_address(place), sizeof place) != 0)
-      throw std::runtime_error("hardware/wire: two UDP sockets of the loopback interface do not connect");
-  }
-  template <typename Frame>
-  void send(const Frame& frame) {
-    (void)::send(descriptor_, &frame, sizeof frame, 0);
-  }
-  // False where nothing came.
-  template <typename Frame>
-  bool receive(Frame& frame) {
-    return ::recv(descriptor_, &frame, sizeof frame, 0) == static_cast<ssize_t>(sizeof frame);
-  }
-
- private:
-  static sockaddr_in at(std::uint16_t port) {
-    sockaddr_in place{};
-    place.sin_family = AF_INET;
-    place.sin_port = htons(port);
-    place.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    return place;
-  }
-  static sockaddr* as_address(sockaddr_in& place) { return reinterpret_cast<sockaddr*>(&place); }
-
-  int descriptor_ = -1;
-  std::uint16_t port_ = 0;
-};
-
 // Of plain UDP, a command one way and a state the other.
 RoundTrips measure_udp(double seconds) {
   ask_for_real_time();
-  LoopbackSocket here, there;
-  here.connect(there);
-  there.connect(here);
-  const std::jthread echo([&there](const std::stop_token& stop) {
+  DatagramSocket commands = DatagramSocket::at_port(0), states = DatagramSocket::at_port(0);
+  const std::jthread echo([&commands, port = states.port()](const std::stop_token& stop) {
     ask_for_real_time();
+    DatagramSocket answers = DatagramSocket::to_port(port);
     LowCommandFrame command;
     LowStateFrame state{};
     while (!stop.stop_requested()) {
-      if (!there.receive(command)) continue;
+      if (!commands.wait(kLost) || commands.receive(std::as_writable_bytes(std::span(&command, 1))) == 0) continue;
       state.tick = command.reserve[0];
       seal(state);
-      there.send(state);
+      answers.send(std::as_bytes(std::span(&state, 1)));
     }
   });
-  RoundTrips trips;
+  DatagramSocket asks = DatagramSocket::to_port(commands.port());
   const auto trip = [&](std::uint32_t number) {
     const LowCommandFrame frame = numbered(number);
     const double begin = monotonic_seconds();
-    here.send(frame);
-    for (LowStateFrame state; here.receive(state);)
+    asks.send(std::as_bytes(std::span(&frame, 1)));
+    LowStateFrame state{};
+    while (states.wait(kLost)) {
+      states.receive(std::as_writable_bytes(std::span(&state, 1)));
       if (state.crc == checksum_of(state) && state.tick == number) return monotonic_seconds() - begin;
+    }
     return -1.0;
   };
+  RoundTrips trips;
   time_trips(seconds, 0, trip, trips);
   return trips;
 }

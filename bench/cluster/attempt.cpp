@@ -102,6 +102,19 @@ bool runs_here(const AttemptHeader& header) {
   return ::kill(static_cast<pid_t>(header.pid), 0) == 0 || errno != ESRCH;
 }
 
+// A new file of the folder, open to write, without a name: who is killed leaves nothing. -1 where the folder takes
+// none.
+int open_nameless(const std::string& folder) {
+  const int nameless = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+  if (nameless >= 0) return nameless;
+  // A file system that has no such files.
+  const std::string probe =
+      (fs::path(folder) / fmt::format("clock.part-{}-{:08x}", ::getpid(), std::random_device()())).string();
+  const int named = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (named >= 0) ::unlink(probe.c_str());
+  return named;
+}
+
 std::int64_t change_time(const std::string& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 ? static_cast<std::int64_t>(status.st_mtim.tv_sec) : 0;
@@ -227,20 +240,14 @@ std::vector<std::int64_t> attempted_shards(const std::string& run) {
 }
 
 std::int64_t file_system_time(const std::string& run) {
-  // Without a name where the file system can do that: who is killed here leaves nothing.
-  int descriptor = ::open(run.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
-  if (descriptor < 0) {
-    const std::string probe =
-        (fs::path(run) / fmt::format("clock.part-{}-{:08x}", ::getpid(), std::random_device()())).string();
-    descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    ::unlink(probe.c_str());
-  }
+  const int descriptor = open_nameless(run);
+  if (descriptor < 0) return static_cast<std::int64_t>(std::time(nullptr));
   static_cast<void>(!::write(descriptor, "\n", 1));
   static_cast<void>(::fsync(descriptor));  // over a network the server's clock stands in it only then
-  struct stat changed {};
-  const bool known = ::fstat(descriptor, &changed) == 0;
-  if (descriptor >= 0) ::close(descriptor);
-  return known ? static_cast<std::int64_t>(changed.st_mtime) : static_cast<std::int64_t>(std::time(nullptr));
+  struct stat status {};
+  const bool known = ::fstat(descriptor, &status) == 0;
+  ::close(descriptor);
+  return static_cast<std::int64_t>(known ? status.st_mtim.tv_sec : std::time(nullptr));
 }
 
 bool may_be_alive(const AttemptRecord& attempt, std::int64_t now, double silence) {

@@ -115,8 +115,11 @@ TEST(DatagramSocket, CarriesDatagramsOverLoopback) {
   DatagramSocket here = DatagramSocket::at_port(0);
   DatagramSocket there = DatagramSocket::to_port(here.port());
   GuardBuffer buffer;
+  EXPECT_FALSE(here.wait(0.001));
   EXPECT_TRUE(there.send(first(buffer, encode(planned(), buffer))));
+  EXPECT_TRUE(here.wait(1.0));
   EXPECT_GT(here.receive(buffer), 16u);
+  EXPECT_FALSE(here.wait(0.0));
 }
 
 }  // namespace
