@@ -136,8 +136,7 @@ const FieldTable<WbcTraining>& wbc_training_fields() {
   using T = WbcTraining;
   static const FieldTable<T> table = {
       word_field<T>({.name = "stage",
-                     .meaning = "all: stand, walk and student in turn; before student also brace (pushes) and interact "
-                                "(clips, too)"},
+                     .meaning = "all: each in turn: stand, walk, brace (pushes), interact (clips, too), student"},
                     wbc_stage_names(), &T::stage),
       field<T>(
           {.name = "output", .meaning = "folder: one subfolder per stage"},

@@ -17,7 +17,7 @@ struct PpoOptions {
   int threads = 2;
   int environments = 128;  // a multiple of threads; so few that their engines stay in the cache
   int horizon = 64;        // ticks per environment and iteration
-  int epochs = 4, minibatches = 4;
+  int epochs = 3, minibatches = 4;
   double clip = 0.2, discount = 0.99, lambda = 0.95;  // A.3.2
   double entropy = 0.002;
   double rate_low = 5e-5, rate_high = 1e-3;

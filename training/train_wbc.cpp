@@ -35,17 +35,16 @@ std::string file_of(const std::string& folder, const std::string& stage, const c
 // The checkpoint that a stage begins with; empty: new weights.
 std::string beginning(const WbcRun& run) {
   if (!run.from.empty()) return run.from;
-  auto stage = std::ranges::find(wbc_plan(), run.stage, &WbcStage::name);
+  const auto stage = std::ranges::find(wbc_plan(), run.stage, &WbcStage::name);
   if (stage == wbc_plan().begin()) return "";
-  const auto checkpoint = [&] { return wbc_checkpoint(run.folder, stage->name); };
-  do --stage;
-  while (stage->extra && !fs::exists(checkpoint()));
-  if (!fs::exists(checkpoint()))
+  const std::string& before = std::prev(stage)->name;
+  std::string checkpoint = wbc_checkpoint(run.folder, before);
+  if (!fs::exists(checkpoint))
     throw InputError(
         fmt::format("stage '{}' begins with '{}', which is not there: run stage '{}' first, or name a "
                     "checkpoint with --from",
-                    run.stage, checkpoint(), stage->name));
-  return checkpoint();
+                    run.stage, checkpoint, before));
+  return checkpoint;
 }
 
 void check_robot(const TrainingState& state, const RobotModel& robot, const std::string& file) {
@@ -185,9 +184,10 @@ template <typename Trainer>
 bool train_stage(Trainer& trainer, const RobotModel& robot, const WbcRun& run, long steps_wanted,
                  const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
   Log log(run, trainer.state().steps, steps_wanted);
+  const GaitOptions gait = task_of(run).gait;
   const auto save = [&] {
     write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(trainer.state()));
-    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(robot, trainer.state()), TensorType::kF16);
+    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(robot, gait, trainer.state()), TensorType::kF16);
     log.saved();
   };
   bool stopped = false;
@@ -207,6 +207,7 @@ Ppo oracle_trainer(const std::shared_ptr<const RobotModel>& robot, const WbcRun&
   options.threads = run.threads;
   options.environments = run.environments;
   options.entropy = task.entropy;
+  options.largest_std = task.largest_std;
   return {robot, task, options, first_state(run, *robot)};
 }
 
@@ -229,8 +230,9 @@ Distillation student_trainer(const std::shared_ptr<const RobotModel>& robot, con
   return {robot, task_of(run), options, teacher.agent, first_student(run, *robot), rounds};
 }
 
-WbcNetwork named(const RobotModel& robot) {
+WbcNetwork named(const RobotModel& robot, const GaitOptions& gait) {
   WbcNetwork network;
+  network.gait = gait;
   network.robot = robot.name;
   network.joints = robot.joint_names();
   network.neutral = robot.neutral;
@@ -247,9 +249,9 @@ const std::vector<WbcStage>& wbc_plan() {
   static const std::vector<WbcStage> plan = {
       {.name = "stand", .steps = 5'700'000, .task = "stand"},
       {.name = "walk", .steps = 3'600'000, .task = "walk"},
-      {.name = "brace", .steps = 7'000'000, .task = "brace", .extra = true},
-      {.name = "interact", .steps = 8'000'000, .task = "interact", .extra = true, .follows = true},
-      {.name = "student", .steps = 1'200'000, .task = "interact", .follows = true, .distils = true}};
+      {.name = "brace", .steps = 19'000'000, .task = "brace"},
+      {.name = "interact", .steps = 18'000'000, .task = "interact", .follows = true},
+      {.name = "student", .steps = 3'000'000, .task = "interact", .follows = true, .distils = true}};
   return plan;
 }
 
@@ -262,7 +264,6 @@ const WbcStage& find_wbc_stage(const std::string& name) {
 std::vector<WbcRun> wbc_runs(const WbcRun& run) {
   std::vector<WbcRun> runs;
   for (const WbcStage& stage : wbc_plan()) {
-    if (stage.extra) continue;
     WbcRun& next = runs.emplace_back(run);
     next.stage = stage.name;
     if (runs.size() > 1) next.from.clear();
@@ -280,8 +281,8 @@ std::string wbc_curves(const std::string& folder, const std::string& stage) {
   return file_of(folder, stage, "curves.csv");
 }
 
-WbcNetwork network_of(const RobotModel& robot, const TrainingState& state) {
-  WbcNetwork network = named(robot);
+WbcNetwork network_of(const RobotModel& robot, const GaitOptions& gait, const TrainingState& state) {
+  WbcNetwork network = named(robot, gait);
   network.kind = WbcKind::kOracle;
   network.mlp = state.agent.actor;
   network.mean = state.agent.actor_input.mean;
@@ -292,8 +293,8 @@ WbcNetwork network_of(const RobotModel& robot, const TrainingState& state) {
   return network;
 }
 
-WbcNetwork network_of(const RobotModel& robot, const StudentState& state) {
-  WbcNetwork network = named(robot);
+WbcNetwork network_of(const RobotModel& robot, const GaitOptions& gait, const StudentState& state) {
+  WbcNetwork network = named(robot, gait);
   network.kind = WbcKind::kStudent;
   network.mlp = state.student;
   network.mean = state.input.mean;

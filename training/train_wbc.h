@@ -18,7 +18,6 @@ struct WbcStage {
   std::string name;
   long steps = 0;        // of the environment
   std::string task;      // what it trains on (wbc_stage)
-  bool extra = false;    // is run when asked for by name; what comes after it goes without where it was not
   bool follows = false;  // motions are followed in part
   bool distils = false;  // a student learns from the oracle before it; else PPO
 };
@@ -37,8 +36,7 @@ struct WbcRun {
   std::shared_ptr<const std::vector<RobotMotion>> motions;  // for the stages that follow motions; may be none
 };
 
-// All stages in turn but the extra ones. `run.from` is what the first begins with; each other one has the one before
-// it.
+// All stages in turn. `run.from` is what the first begins with; each other one has the one before it.
 std::vector<WbcRun> wbc_runs(const WbcRun& run);
 
 struct WbcProgress {
@@ -61,8 +59,8 @@ std::string wbc_checkpoint(const std::string& folder, const std::string& stage);
 std::string wbc_network_file(const std::string& folder, const std::string& stage);
 std::string wbc_curves(const std::string& folder, const std::string& stage);
 
-// The oracle or the student as a network for a robot.
-WbcNetwork network_of(const RobotModel& robot, const TrainingState& state);
-WbcNetwork network_of(const RobotModel& robot, const StudentState& state);
+// The oracle or the student as a network for a robot, learnt with a gait.
+WbcNetwork network_of(const RobotModel& robot, const GaitOptions& gait, const TrainingState& state);
+WbcNetwork network_of(const RobotModel& robot, const GaitOptions& gait, const StudentState& state);
 
 }  // namespace duet

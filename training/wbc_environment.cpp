@@ -15,8 +15,8 @@ namespace duet {
 namespace {
 
 constexpr double kHigher = 0.05, kSlacker = 0.1;             // than the card's fall, where an episode ends [m], cosine
-constexpr double kFarthest = 1.0;                            // of the root from its reference, likewise [m]
 constexpr double kPendulumTime = 0.27;                       // sqrt(height of the centre of mass / g) [s]
+constexpr int kPlanTicks = 10;  // of a policy at 5 Hz
 constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;  // share, [m]
 
 double kernel(double error, double width) { return std::exp(-error * error / (width * width)); }
@@ -46,7 +46,7 @@ WbcEnvironment::WbcEnvironment(std::shared_ptr<const RobotModel> robot, const Wb
       task_(task),
       random_(seed, stream_key({"wbc", task.name, std::to_string(index)})),
       stream_(nominal_, task.stream),
-      tracker_(nominal_),
+      tracker_(nominal_, task.gait),
       layout_(nominal_->dof()),
       actual_(*nominal_),
       wanted_(*nominal_),
@@ -126,6 +126,9 @@ void WbcEnvironment::reset() {
   tick_ = 0;
   push_ticks_ = 0;
   pushed_ = -1;
+  is_pushed_ = task_.domain.push > 0.0 && random_.chance(task_.domain.push_share);
+  jumps_ = task_.domain.jump > 0.0 && random_.chance(task_.domain.jump_share);
+  X_jump_ = {};
   kick_in_ = random_.uniform(0.5, 4.0);
   top_ = {};
   look();
@@ -134,8 +137,8 @@ void WbcEnvironment::reset() {
 
 void WbcEnvironment::disturb() {
   const DomainOptions& domain = task_.domain;
-  if (domain.push > 0.0) push();
-  if (domain.kick <= 0.0) return;
+  if (is_pushed_) push();
+  if (is_pushed_ || domain.kick <= 0.0) return;
   kick_in_ -= kTick;
   if (kick_in_ > 0.0) return;
   kick_in_ = random_.uniform(domain.kick_from, domain.kick_to);
@@ -144,17 +147,30 @@ void WbcEnvironment::disturb() {
   backend_->kick({speed * std::cos(direction), speed * std::sin(direction), 0.0});
 }
 
-// A force on a hand or the torso for a second, about every fifth second.
+// As a policy's plans move when it plans anew: by some centimetres, five times a second.
+const Reference& WbcEnvironment::show_reference() {
+  if (!jumps_) return stream_.reference();
+  const DomainOptions& domain = task_.domain;
+  if (tick_ % kPlanTicks == 0)
+    X_jump_ = {yaw_rotation(random_.uniform(-domain.jump_turn, domain.jump_turn)),
+               {random_.uniform(-domain.jump, domain.jump), random_.uniform(-domain.jump, domain.jump), 0.0}};
+  shown_ = stream_.reference();
+  shown_.X_WB.p += X_jump_.p;
+  shown_.X_WB.R = X_jump_.R * shown_.X_WB.R;
+  return shown_;
+}
+
+// A force on a hand or the torso for a second, from time to time.
 void WbcEnvironment::push() {
   if (pushed_ >= 0 && --push_ticks_ <= 0) {
     backend_->push(pushed_, Eigen::Vector3d::Zero(), actual_.p_WL(pushed_));
     pushed_ = -1;
   }
-  if (pushed_ >= 0 || !random_.chance(kTick / 4.0)) return;
+  if (pushed_ >= 0 || !random_.chance(kTick / task_.domain.push_pause)) return;
   pushed_ = push_links_[random_.below(static_cast<int>(push_links_.size()))];
   push_ticks_ = 50;
   const double direction = random_.uniform(-std::numbers::pi, std::numbers::pi);
-  const double force = random_.uniform(0.2, 1.0) * task_.domain.push;
+  const double force = random_.uniform(0.3, 1.0) * task_.domain.push;
   const Eigen::Vector3d f_W(force * std::cos(direction), force * std::sin(direction),
                             random_.uniform(-0.3, 0.3) * force);
   backend_->push(pushed_, f_W, actual_.p_WL(pushed_));
@@ -181,7 +197,7 @@ Transition WbcEnvironment::step(std::span<const float> action) {
   steps_of_body_ += 1;
   ++tick_;
   stream_.advance(random_);
-  tracker_.update(backend_->state(), stream_.reference());
+  tracker_.update(backend_->state(), show_reference());
   look();
   Transition transition{.reward = reward(), .end = EpisodeEnd::kNone};
   if (outcome != Outcome::kOk || fell()) {
@@ -196,7 +212,7 @@ Transition WbcEnvironment::step(std::span<const float> action) {
 bool WbcEnvironment::fell() const {
   const RobotState& state = backend_->state();
   const FallRule fall{nominal_->fall.height + kHigher, nominal_->fall.cos_tilt - kSlacker};
-  return has_fallen(state, fall) || (state.X_WB.p - tracker_.root().p).head<2>().norm() > kFarthest;
+  return has_fallen(state, fall) || (state.X_WB.p - tracker_.root().p).head<2>().norm() > task_.farthest;
 }
 
 void WbcEnvironment::look() {

@@ -62,6 +62,7 @@ class WbcEnvironment {
   void draw_gains();
   RobotState draw_start();
   void disturb();
+  const Reference& show_reference();
   void push();
   void apply(std::span<const float> action);
   void read_contacts();
@@ -95,6 +96,9 @@ class WbcEnvironment {
   Eigen::VectorXf action_, last_action_, second_last_;
   WbcSensors sensors_;
   int tick_ = 0, latency_ = 0, push_ticks_ = 0, pushed_ = -1;
+  bool is_pushed_ = false, jumps_ = false;  // in this episode: the robot (instead of kicks), its reference
+  Reference shown_;                         // the stream's reference, off by X_jump_
+  Pose X_jump_;
   double kick_in_ = 0.0;
   std::array<bool, 2> on_ground_{};
   std::array<double, 2> lift_{}, top_{};

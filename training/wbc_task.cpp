@@ -34,27 +34,49 @@ WbcTask walk() {
   return task;
 }
 
-// Half the pushes of `interact`: what is pushed hard at once learns slowly.
+// Pushes, kicks and a reference that moves twice as fast and jumps; feet step as soon as the capture point is off.
 WbcTask brace() {
   WbcTask task = walk();
   task.name = "brace";
+  task.gait.lead_time = 0.4;
+  task.gait.capture_time = 0.27;
+  task.gait.max_speed = 1.0;
   task.stream.moving = 0.5;
-  task.domain.push = 55.0;
+  task.stream.max_speed = 0.8;
+  task.largest_std = 0.35;
+  task.farthest = 2.0;
+  task.domain.kick = 1.1;
+  task.domain.push = 75.0;
+  task.domain.push_share = 0.5;
+  task.domain.push_pause = 2.5;
+  task.domain.jump = 0.015;
+  task.domain.jump_turn = 0.03;
+  task.domain.jump_share = 0.2;
   task.domain.latency = 1;
+  task.reward.foothold = 4.0;
+  task.reward.foothold_width = 0.2;
+  task.reward.root_xy_width = 0.15;
+  task.reward.root_near = 5.0;
+  task.reward.root_near_width = 0.08;
+  task.reward.height = 2.0;
+  task.reward.height_width = 0.025;
+  task.reward.action_rate = 0.12;
+  task.reward.action_jerk = 0.045;
   return task;
 }
 
+// The same and motions of people, later commands and quieter actions.
 WbcTask interact() {
   WbcTask task = brace();
   task.name = "interact";
-  task.stream.motions = 0.3;
+  task.largest_std = 0.25;
+  task.stream.motions = 0.2;
   task.stream.moving = 0.6;
-  task.domain.kick = 1.0;
-  task.domain.push = 75.0;
   task.domain.latency = 2;
   task.entropy = 0.0;
-  task.reward.action_rate = 0.1;
-  task.reward.action_jerk = 0.03;
+  task.reward.root_near_width = 0.06;
+  task.reward.action_rate = 0.4;
+  task.reward.action_jerk = 0.15;
   return task;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/backends/scene.h"
+#include "duet/controllers/wbc_sim/gait.h"
 #include "duet/rollout/reference_stream.h"
 
 namespace duet {
@@ -47,6 +48,11 @@ struct DomainOptions {
   double kick = 1.0;                      // largest change of the velocity [m/s]
   double kick_from = 3.0, kick_to = 6.0;  // time between kicks [s]
   double push = 0.0;                      // largest force on hands or torso, held for a second [N]
+  double push_share = 1.0;                // of episodes that have pushes, and then no kicks
+  double push_pause = 4.0;                // between two of them, on average [s]
+  double jump = 0.0;                      // of the reference's root, sideways and ahead, five times a second [m]
+  double jump_turn = 0.0;                 // likewise of its heading [rad]
+  double jump_share = 0.0;                // of episodes in which it jumps
   int latency = 0;                        // physics steps by which a command may come late, at most
 };
 
@@ -55,11 +61,14 @@ struct WbcTask {
   StreamOptions stream;
   RewardWeights reward;
   DomainOptions domain;
+  GaitOptions gait;
   double dt = 0.005;  // physics [s]
   // Of MuJoCo: half the time of its defaults; what was learnt is tested with those.
-  EngineOptions engine = {{"solver", "cg"}, {"iterations", "8"}, {"cone", "pyramidal"}};
+  EngineOptions engine = {{"solver", "pgs"}, {"iterations", "12"}, {"cone", "pyramidal"}};
   double entropy = 0.002;   // weight of the policy's entropy
+  double largest_std = 1.0;  // of an action
   int episode_ticks = 500;  // A.3.2: 500 steps
+  double farthest = 1.0;    // of the root from its reference, where an episode ends as by a fall [m]
 };
 
 // "stand", "walk", "brace", "interact". Throws std::invalid_argument naming them.

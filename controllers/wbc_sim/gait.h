@@ -20,6 +20,8 @@ struct GaitOptions {
   double still_turn = 0.10;      // [rad/s]
   double start_distance = 0.12;  // of the root from its reference at which feet step though the reference rests [m]
   double start_angle = 0.35;     // likewise of the heading [rad]
+  double lead_time = 0.0;        // by which the reference that the network sees is ahead, at its velocity [s]
+  double capture_time = 0.0;     // of the robot's velocity that counts as distance: sqrt(height / g), or none [s]
 };
 
 // A foot's place relative to the root's reference, in its heading frame on the ground: x forward, y left.
@@ -34,7 +36,8 @@ class Gait {
 
   void reset();
   // One tick of 0.02 s. `velocity`: of the reference's root in its heading frame, vx, vy [m/s], yaw rate [rad/s];
-  // `deviation`: of the robot's root from the reference, x, y [m] in that frame and heading [rad].
+  // `deviation`: of the robot's root, carried on by its velocity for `capture_time`, from the reference, x, y [m]
+  // in that frame and heading [rad].
   void update(const Eigen::Vector3d& velocity, const Eigen::Vector3d& deviation);
 
   [[nodiscard]] bool stepping() const { return stepping_; }

@@ -121,6 +121,42 @@ void check_golden(const NetworkReader& reader, const WbcNetwork& network, const 
                     file, error, kGoldenError));
 }
 
+struct GaitNumber {
+  const char* name;
+  double GaitOptions::*value;
+};
+constexpr GaitNumber kGaitNumbers[] = {
+    {"frequency", &GaitOptions::frequency},           {"swing_height", &GaitOptions::swing_height},
+    {"max_speed", &GaitOptions::max_speed},           {"max_turn", &GaitOptions::max_turn},
+    {"still_speed", &GaitOptions::still_speed},       {"still_turn", &GaitOptions::still_turn},
+    {"start_distance", &GaitOptions::start_distance}, {"start_angle", &GaitOptions::start_angle},
+    {"lead_time", &GaitOptions::lead_time},           {"capture_time", &GaitOptions::capture_time}};
+
+std::string text_of(const GaitOptions& gait) {
+  nlohmann::json json;
+  for (const GaitNumber& number : kGaitNumbers) json[number.name] = gait.*number.value;
+  return json.dump();
+}
+
+// Networks of before there was a choice do not say.
+GaitOptions read_gait(const SafeTensors& tensors, const std::string& file) {
+  GaitOptions gait;
+  const auto found = tensors.metadata.find("gait");
+  if (found == tensors.metadata.end()) return gait;
+  const nlohmann::json json = parse_json(found->second, fmt::format("{}: 'gait' in the header", file));
+  for (const GaitNumber& number : kGaitNumbers) {
+    if (!json.is_object() || !json.contains(number.name) || !json[number.name].is_number())
+      throw InputError(fmt::format("{}: 'gait' in the header has no number '{}'", file, number.name));
+    const auto value = json[number.name].get<double>();
+    if (!std::isfinite(value) || value < 0.0)
+      throw InputError(
+          fmt::format("{}: '{}' of the gait is {}, expected a number of at least 0", file, number.name, value));
+    gait.*number.value = value;
+  }
+  if (gait.frequency <= 0.0) throw InputError(fmt::format("{}: the gait has a frequency of 0", file));
+  return gait;
+}
+
 long whole_number(const NetworkReader& reader, const std::string& key, const std::string& file) {
   const std::string text = reader.text(key);
   try {
@@ -172,6 +208,7 @@ void save_wbc_network(const std::string& path, const WbcNetwork& network, Tensor
                       {"observation", channels_of(network.kind, network.mlp.outputs()).dump()},
                       {"rate_hz", kRate},
                       {"action", kAction},
+                      {"gait", text_of(network.gait)},
                       {"seed", std::to_string(network.seed)},
                       {"steps", std::to_string(network.steps)},
                       {"note", network.note}};
@@ -218,6 +255,7 @@ WbcNetwork load_wbc_network(const std::string& path, const RobotModel& robot) {
   network.neutral = reader.vector("joint.neutral", robot.dof()).cast<double>();
   network.kp = reader.vector("joint.kp", robot.dof()).cast<double>();
   network.kd = reader.vector("joint.kd", robot.dof()).cast<double>();
+  network.gait = read_gait(tensors, path);
   network.seed = static_cast<std::uint64_t>(whole_number(reader, "seed", path));
   network.steps = whole_number(reader, "steps", path);
   network.note = reader.text("note");

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/controllers/wbc_sim/gait.h"
 #include "duet/controllers/wbc_sim/observation.h"
 #include "duet/core/robot_state.h"
 #include "duet/nn/mlp.h"
@@ -27,6 +28,7 @@ struct WbcNetwork {
   Mlp mlp;
   Eigen::VectorXd action_scale;  // target = base + scale a [rad]
   Eigen::VectorXd neutral;       // that joint angles are relative to [rad]
+  GaitOptions gait;              // of the legs that it adds to; its half_width is the card's
   Eigen::VectorXd kp, kd;        // sent with the targets [N m/rad], [N m s/rad]
   std::uint64_t seed = 0;
   long steps = 0;    // of the environment, in training

@@ -106,10 +106,11 @@ void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors
   sensors.gravity = -R_BW.col(2);
   sensors.q_ref = tracker.q() - neutral;
   sensors.v_ref = tracker.v();
-  sensors.root_error = R_BW * (tracker.root().p - state.X_WB.p);
+  const Pose root = tracker.led_root();
+  sensors.root_error = R_BW * (root.p - state.X_WB.p);
   const double distance = sensors.root_error.norm();
   if (distance > 1.0) sensors.root_error /= distance;
-  sensors.root_turn = two_columns(R_BW * tracker.root().R.toRotationMatrix());
+  sensors.root_turn = two_columns(R_BW * root.R.toRotationMatrix());
 }
 
 std::span<const float> WbcObserver::update(const WbcSensors& sensors, const Eigen::VectorXf& action) {

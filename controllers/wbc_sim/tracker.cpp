@@ -46,12 +46,17 @@ Eigen::Vector2d in_heading(double yaw, const Eigen::Vector3d& d_W) {
   return {std::cos(yaw) * d_W.x() + std::sin(yaw) * d_W.y(), -std::sin(yaw) * d_W.x() + std::cos(yaw) * d_W.y()};
 }
 
+GaitOptions on_card(GaitOptions gait, const RobotModel& robot) {
+  gait.half_width = robot.stance_size().half_width;
+  return gait;
+}
+
 }  // namespace
 
-WbcTracker::WbcTracker(std::shared_ptr<const RobotModel> robot)
+WbcTracker::WbcTracker(std::shared_ptr<const RobotModel> robot, const GaitOptions& gait)
     : robot_(std::move(robot)),
       bounds_(robot_->bounds_of_root()),
-      gait_(GaitOptions{.half_width = robot_->stance_size().half_width}),
+      gait_(on_card(gait, *robot_)),
       legs_(two_legs(*robot_, Stance(*robot_))) {
   upper_ = Stance(*robot_).upper();
   Eigen::Matrix<double, 6, 1> q;
@@ -80,13 +85,20 @@ void WbcTracker::update(const RobotState& state, const Reference& reference) {
   root_velocity_.head<2>() = kTickRate * in_heading(yaw, target.p - last_root_.p);
   root_velocity_.z() = kTickRate * wrapped_yaw(yaw - yaw_of(last_root_.R));
   Eigen::Vector3d deviation;
-  deviation.head<2>() = in_heading(yaw, state.X_WB.p - target.p);
+  deviation.head<2>() = in_heading(yaw, state.X_WB.p - target.p) +
+                        gait_.options().capture_time * (in_heading(yaw, state.v_WB) - root_velocity_.head<2>());
   deviation.z() = wrapped_yaw(yaw_of(state.X_WB.R) - yaw);
   gait_.update(root_velocity_, deviation);
   track(reference);
   v_ = kTickRate * (q_ - last_q_);
   last_q_ = q_;
   last_root_ = root_;
+}
+
+Pose WbcTracker::led_root() const {
+  const Eigen::Vector3d ahead = gait_.options().lead_time * gait_.velocity();
+  const Eigen::Vector3d d_W = yaw_rotation(yaw_of(root_.R)) * Eigen::Vector3d(ahead.x(), ahead.y(), 0.0);
+  return {yaw_rotation(ahead.z()) * root_.R, root_.p + d_W};
 }
 
 void WbcTracker::track(const Reference& reference) {

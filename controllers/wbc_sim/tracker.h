@@ -17,8 +17,8 @@ namespace duet {
 class WbcTracker {
  public:
   // Bounds of the root's reference and the width of the stance are the card's; what is beyond a bound is tracked at the
-  // bound. Throws std::invalid_argument for a robot that has not two legs of six joints or whose card lacks either.
-  explicit WbcTracker(std::shared_ptr<const RobotModel> robot);
+  // bound. The width of `gait` is not looked at. Throws std::invalid_argument for a robot that has not two legs of six joints or whose card lacks either.
+  explicit WbcTracker(std::shared_ptr<const RobotModel> robot, const GaitOptions& gait = {});
 
   // Starts at a reference; velocities are zero until the next update.
   void reset(const Reference& reference);
@@ -31,6 +31,8 @@ class WbcTracker {
   [[nodiscard]] const Eigen::Vector3d& root_velocity() const {
     return root_velocity_;
   }  // vx, vy, yaw rate; heading frame
+  // root() as it will be after the gait's lead time.
+  [[nodiscard]] Pose led_root() const;
   [[nodiscard]] const Gait& gait() const { return gait_; }
   [[nodiscard]] const RobotModel& robot() const { return *robot_; }
   [[nodiscard]] const std::array<LegChain, 2>& legs() const { return legs_; }  // left, right

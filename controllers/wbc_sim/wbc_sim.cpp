@@ -15,7 +15,7 @@ class WbcSim final : public Controller {
       : robot_(std::move(robot)),
         network_(std::move(network)),
         policy_(*network_),
-        tracker_(robot_),
+        tracker_(robot_, network_->gait),
         observer_(network_->kind, robot_->dof()) {
     action_.setZero(robot_->dof());
   }
@@ -60,13 +60,17 @@ class WbcSim final : public Controller {
   bool started_ = false;
 };
 
+constexpr std::string_view kShipped[] = {"student", "braced", "oracle", "braced_oracle"};
+
 struct WbcSimOptions {
   std::string network = "student";
 };
 
 const FieldTable<WbcSimOptions>& wbc_sim_options() {
   static const FieldTable<WbcSimOptions> table = {field<WbcSimOptions>(
-      {.name = "network", .meaning = "student, oracle (sees the base velocity), or the path of a network"},
+      {.name = "network",
+       .meaning = "student, braced (learnt with pushes, steps out of them), oracle or braced_oracle (which see the base "
+                  "velocity), or the path of a network"},
       &WbcSimOptions::network)};
   return table;
 }
@@ -81,7 +85,7 @@ std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotM
 
 std::string wbc_sim_network_path(const ControllerOptions& options) {
   std::string network = read_options("controller", "wbc_sim", wbc_sim_options(), options).network;
-  if (network != "student" && network != "oracle") return network;
+  if (std::ranges::find(kShipped, network) == std::end(kShipped)) return network;
   return share_file("network of WBC-Sim", "controllers/wbc_sim/" + network + ".safetensors");
 }
 

@@ -195,6 +195,58 @@ TEST(WbcTracker, TheUpperBodyIsTheReferencesWithinTheLimits) {
   EXPECT_LT(tracker.q()[knee], 1.0);
 }
 
+// A robot at its place that moves at `speed` while the reference rests.
+bool steps_at(double speed, const GaitOptions& gait) {
+  WbcTracker tracker(g1(), gait);
+  tracker.reset(standing_reference());
+  RobotState state = g1()->standing_state();
+  state.v_WB = {0.0, -speed, 0.0};
+  tracker.update(state, standing_reference());
+  return tracker.gait().stepping();
+}
+
+TEST(WbcTracker, WhereTheRobotIsGoingCountsAsDistanceForTheCaptureTime) {
+  const GaitOptions capture{.start_distance = 0.12, .capture_time = 0.25};
+  EXPECT_FALSE(steps_at(0.47, capture));
+  EXPECT_TRUE(steps_at(0.49, capture));
+  EXPECT_FALSE(steps_at(5.0, {.start_distance = 0.12}));
+}
+
+// A robot that keeps up with its reference goes nowhere.
+TEST(WbcTracker, WhatTheReferenceMovesByIsNoDistance) {
+  WbcTracker tracker(g1(), {.still_speed = 10.0, .still_turn = 10.0, .capture_time = 0.25});
+  tracker.reset(standing_reference());
+  for (int tick = 1; tick <= 50; ++tick) {
+    const Reference reference = standing_reference(0.016 * tick, 0.0, 0.0);
+    RobotState state = g1()->standing_state(reference.X_WB);
+    state.v_WB = {0.8, 0.0, 0.0};
+    tracker.update(state, reference);
+    EXPECT_FALSE(tracker.gait().stepping()) << tick;
+  }
+}
+
+// Heading +y, forward at 0.4 m/s and to the left by 0.3 rad/s.
+TEST(WbcTracker, TheNetworkSeesTheReferenceAsItWillBeAfterTheLeadTime) {
+  WbcTracker tracker(g1(), {.lead_time = 0.5});
+  tracker.reset(standing_reference(0.0, 0.0, std::numbers::pi / 2));
+  EXPECT_EQ(tracker.led_root().p, tracker.root().p);
+  Reference reference;
+  for (int tick = 1; tick <= 200; ++tick) {
+    reference = standing_reference(0.0, 0.008 * tick, std::numbers::pi / 2);
+    tracker.update(g1()->standing_state(reference.X_WB), reference);
+  }
+  EXPECT_LT((tracker.led_root().p - reference.X_WB.p - Eigen::Vector3d(0.0, 0.2, 0.0)).norm(), 1e-6);
+  EXPECT_LT(tracker.led_root().R.angularDistance(reference.X_WB.R), 1e-6);
+  WbcSensors sensors;
+  read_sensors(g1()->standing_state(reference.X_WB), tracker, sensors);
+  EXPECT_LT((sensors.root_error - Eigen::Vector3d(0.2, 0.0, 0.0)).norm(), 1e-6);  // in the robot's frame
+  for (int tick = 1; tick <= 200; ++tick) {
+    reference = standing_reference(0.0, 0.0, 0.006 * tick);
+    tracker.update(g1()->standing_state(reference.X_WB), reference);
+  }
+  EXPECT_NEAR(yaw_of(tracker.led_root().R), yaw_of(reference.X_WB.R) + 0.15, 1e-6);
+}
+
 TEST(WbcTracker, ALowerRootBendsTheKnees) {
   WbcTracker tracker(g1());
   Reference low = standing_reference();
@@ -216,6 +268,27 @@ TEST(WbcNetwork, IsTheSameAfterSavingAndLoading) {
               type == TensorType::kF32 ? 0.0F + 1e-9F : 1e-3F);
     EXPECT_LT((read.kp - network.kp).cwiseAbs().maxCoeff(), 0.1);
   }
+  std::filesystem::remove(path);
+}
+
+TEST(WbcNetwork, KeepsTheGaitItWasMadeWith) {
+  const std::string path = temporary("gait");
+  WbcNetwork network = small_network(WbcKind::kStudent);
+  network.gait = {.frequency = 1.6, .swing_height = 0.07, .max_speed = 1.0, .start_distance = 0.1, .lead_time = 0.4, .capture_time = 0.27};
+  save_wbc_network(path, network, TensorType::kF32);
+  const GaitOptions read = load_wbc_network(path, *g1()).gait;
+  EXPECT_EQ(read.frequency, 1.6);
+  EXPECT_EQ(read.swing_height, 0.07);
+  EXPECT_EQ(read.max_speed, 1.0);
+  EXPECT_EQ(read.start_distance, 0.1);
+  EXPECT_EQ(read.lead_time, 0.4);
+  EXPECT_EQ(read.capture_time, 0.27);
+  SafeTensors older = read_safetensors(path);
+  older.metadata.erase("gait");
+  write_safetensors(path, older);
+  EXPECT_EQ(load_wbc_network(path, *g1()).gait.max_speed, 0.6);
+  EXPECT_EQ(load_wbc_network(path, *g1()).gait.lead_time, 0.0);
+  EXPECT_EQ(load_wbc_network(path, *g1()).gait.capture_time, 0.0);
   std::filesystem::remove(path);
 }
 
@@ -245,6 +318,15 @@ TEST(WbcNetwork, BadFilesAreRefusedByWhatIsWrong) {
   refused([](SafeTensors& t) { t.metadata.erase("rate_hz"); }, "no 'rate_hz' in the header");
   refused([](SafeTensors& t) { t.metadata["action"] = "target = action"; },
           "the action is 'target = action', expected 'target = base + scale * clip(action, 4); base: ");
+  refused([](SafeTensors& t) { t.metadata["gait"] = "[1]"; }, "'gait' in the header has no number 'frequency'");
+  refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("max_turn"), 8, "min_turn"); },
+          "'gait' in the header has no number 'max_turn'");
+  refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("0.12"), 4, "-0.1"); },
+          "'start_distance' of the gait is -0.1, expected a number of at least 0");
+  refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("1.4"), 3, "0.0"); },
+          "the gait has a frequency of 0");
+  refused([](SafeTensors& t) { t.metadata["gait"] = test::deep_json(); },
+          std::string("'gait' in the header: ") + test::kTooDeep);
   refused([](SafeTensors& t) { t.metadata["observation"] = test::deep_json(); },
           std::string("'observation' in the header: ") + test::kTooDeep);
   refused([](SafeTensors& t) { t.metadata["joints"] = "[" + test::deep_json() + "]"; },

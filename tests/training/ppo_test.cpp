@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "duet/core/require.h"
 #include "duet/training/distill.h"
 #include "tests/training/fixtures.h"
@@ -55,6 +57,14 @@ TEST_F(PpoInMujoco, AnIterationCountsItsStepsAndMovesTheWeights) {
   EXPECT_EQ(report.iteration, 1);
   EXPECT_GT(report.divergence, 0.0);
   EXPECT_NE(before.layers[0].W, ppo.state().agent.actor.layers[0].W);
+}
+
+TEST_F(PpoInMujoco, NoActionIsDrawnFartherThanTheLargestDeviation) {
+  PpoOptions options = small();
+  options.largest_std = 0.3;
+  Ppo ppo(g1(), wbc_stage("stand"), options, fresh());  // begins with 0.5
+  ppo.iterate();
+  EXPECT_LE(ppo.state().agent.log_std.maxCoeff(), std::log(0.3F) + 1e-6F);
 }
 
 // No episode that ended can have lasted longer than what was simulated.

@@ -141,6 +141,64 @@ TEST_F(WbcEnvironmentInMujoco, TheErrorOfTheJointsIsTheirMean) {
   EXPECT_GE(mean, rms / std::sqrt(29.0));  // no fewer: one joint has all of it
 }
 
+// How far the robot is from its reference, mean over half a second [m].
+double distance_when(const WbcTask& task) {
+  WbcEnvironment environment(g1(), task, 1, 0);
+  for (int tick = 0; tick < 25; ++tick) environment.step(std::vector<float>(29, 0.0F));
+  const TrackingStatistics sums = environment.take_statistics();
+  return sums.root_xy / static_cast<double>(sums.ticks);
+}
+
+TEST_F(WbcEnvironmentInMujoco, OnlyTheShareOfEpisodesAskedForIsPushed) {
+  WbcTask task = unrewarded();
+  task.domain.push = 300.0;
+  task.domain.push_pause = 0.02;
+  task.domain.push_share = 0.0;
+  const double alone = distance_when(task);
+  task.domain.push_share = 1.0;
+  EXPECT_GT(distance_when(task), 3.0 * alone);
+}
+
+TEST_F(WbcEnvironmentInMujoco, AnEpisodeWithPushesHasNoKicks) {
+  for (int index = 0; index < 30; ++index) {  // the first kick is drawn between 0.5 and 4 s
+    WbcTask task = unrewarded();
+    task.reward.root_xy = 1.0;
+    task.domain.push = 1e-9;
+    task.domain.kick_from = task.domain.kick_to = 0.1;
+    WbcEnvironment still(g1(), task, 1, index);
+    task.domain.kick = 5.0;
+    WbcEnvironment kicked(g1(), task, 1, index);
+    const std::vector<float> nothing(29, 0.0F);
+    for (int tick = 0; tick < 45; ++tick) ASSERT_EQ(kicked.step(nothing).reward, still.step(nothing).reward) << tick;
+  }
+}
+
+TEST_F(WbcEnvironmentInMujoco, AnEpisodeEndsWhereTheRobotIsTooFarFromItsReference) {
+  for (const double farthest : {1.0, 0.005}) {
+    WbcTask task = unrewarded();
+    task.farthest = farthest;
+    WbcEnvironment environment(g1(), task, 1, 0);
+    EpisodeEnd end = EpisodeEnd::kNone;
+    for (int tick = 0; tick < 20 && end == EpisodeEnd::kNone; ++tick)
+      end = environment.step(std::vector<float>(29, 0.2F)).end;
+    EXPECT_EQ(end, farthest < 0.1 ? EpisodeEnd::kFell : EpisodeEnd::kNone);
+  }
+}
+
+TEST_F(WbcEnvironmentInMujoco, AReferenceThatJumpsDoesSoFiveTimesASecond) {
+  WbcTask task = unrewarded();
+  task.domain.jump = 0.2;
+  task.domain.jump_share = 1.0;
+  WbcEnvironment environment(g1(), task, 1, 0);
+  Eigen::Vector3d before = environment.sensors().root_error;
+  for (int tick = 1; tick <= 30; ++tick) {
+    environment.step(std::vector<float>(29, 0.0F));
+    const double moved = (environment.sensors().root_error - before).norm();
+    before = environment.sensors().root_error;
+    EXPECT_EQ(moved > 0.03, tick % 10 == 0) << "tick " << tick << ": " << moved;
+  }
+}
+
 TEST_F(WbcEnvironmentInMujoco, FeetThatSlipOnTheGroundCost) {
   WbcTask task = unrewarded();
   task.reward.slip = 1.0;
