@@ -250,8 +250,8 @@ const std::vector<WbcStage>& wbc_plan() {
       {.name = "stand", .steps = 5'700'000, .task = "stand"},
       {.name = "walk", .steps = 3'600'000, .task = "walk"},
       {.name = "brace", .steps = 19'000'000, .task = "brace"},
-      {.name = "interact", .steps = 18'000'000, .task = "interact", .follows = true},
-      {.name = "student", .steps = 3'000'000, .task = "interact", .follows = true, .distils = true}};
+      {.name = "interact", .steps = 8'000'000, .task = "interact", .follows = true},
+      {.name = "student", .steps = 4'000'000, .task = "interact", .follows = true, .distils = true}};
   return plan;
 }
 

@@ -38,7 +38,7 @@ WbcTask walk() {
 WbcTask brace() {
   WbcTask task = walk();
   task.name = "brace";
-  task.gait.lead_time = 0.4;
+  task.gait.lead_time = 0.42;
   task.gait.capture_time = 0.27;
   task.gait.max_speed = 1.0;
   task.stream.moving = 0.5;
@@ -49,9 +49,9 @@ WbcTask brace() {
   task.domain.push = 75.0;
   task.domain.push_share = 0.5;
   task.domain.push_pause = 2.5;
-  task.domain.jump = 0.015;
+  task.domain.jump = 0.02;
   task.domain.jump_turn = 0.03;
-  task.domain.jump_share = 0.2;
+  task.domain.jump_share = 0.3;
   task.domain.latency = 1;
   task.reward.foothold = 4.0;
   task.reward.foothold_width = 0.2;

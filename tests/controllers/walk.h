@@ -24,6 +24,7 @@ struct WalkSetup {
   double friction = 0.8;
   Eigen::VectorXd start = {};  // joints; empty: the card's neutral pose with the arms as in `arms`
   std::function<Reference(int tick, const Reference& neutral)> reference = {};  // absent: the start's angles, standing
+  std::function<void(int tick, Backend&)> act_on = {};                          // pushes; absent: nobody does
 };
 
 // What a run came to; means are over the time from 2 s on.
@@ -68,6 +69,7 @@ inline Walk walk(const WalkSetup& setup) {
       ++measured;
     }
     controller->act(now, reference, command);
+    if (setup.act_on) setup.act_on(tick, *backend);
     const auto same = [&](int) -> const JointCommand& { return command; };
     const auto upright = [&](int) { return stands(backend->state()); };
     result.upright = step_control_period(*backend, steps_per_tick(scene.dt), same, upright) == Outcome::kOk;
