@@ -187,7 +187,8 @@ bool train_stage(Trainer& trainer, const RobotModel& robot, const WbcRun& run, l
   const GaitOptions gait = task_of(run).gait;
   const auto save = [&] {
     write_safetensors(wbc_checkpoint(run.folder, run.stage), to_tensors(trainer.state()));
-    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(robot, gait, trainer.state()), TensorType::kF16);
+    save_wbc_network(wbc_network_file(run.folder, run.stage), network_of(robot, gait, trainer.state()),
+                     TensorType::kF16);
     log.saved();
   };
   bool stopped = false;

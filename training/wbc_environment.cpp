@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kHigher = 0.05, kSlacker = 0.1;             // than the card's fall, where an episode ends [m], cosine
 constexpr double kPendulumTime = 0.27;                       // sqrt(height of the centre of mass / g) [s]
-constexpr int kPlanTicks = 10;  // of a policy at 5 Hz
+constexpr int kPlanTicks = 10;                               // of a policy at 5 Hz
 constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;  // share, [m]
 
 double kernel(double error, double width) { return std::exp(-error * error / (width * width)); }

@@ -65,10 +65,10 @@ struct WbcTask {
   double dt = 0.005;  // physics [s]
   // Of MuJoCo: half the time of its defaults; what was learnt is tested with those.
   EngineOptions engine = {{"solver", "pgs"}, {"iterations", "12"}, {"cone", "pyramidal"}};
-  double entropy = 0.002;   // weight of the policy's entropy
+  double entropy = 0.002;    // weight of the policy's entropy
   double largest_std = 1.0;  // of an action
-  int episode_ticks = 500;  // A.3.2: 500 steps
-  double farthest = 1.0;    // of the root from its reference, where an episode ends as by a fall [m]
+  int episode_ticks = 500;   // A.3.2: 500 steps
+  double farthest = 1.0;     // of the root from its reference, where an episode ends as by a fall [m]
 };
 
 // "stand", "walk", "brace", "interact". Throws std::invalid_argument naming them.

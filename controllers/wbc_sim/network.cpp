@@ -124,9 +124,10 @@ void check_golden(const NetworkReader& reader, const WbcNetwork& network, const 
 struct GaitNumber {
   const char* name;
   double GaitOptions::*value;
+  double low = 0.0, high = 10.0;
 };
 constexpr GaitNumber kGaitNumbers[] = {
-    {"frequency", &GaitOptions::frequency},           {"swing_height", &GaitOptions::swing_height},
+    {"frequency", &GaitOptions::frequency, 0.1, 5.0}, {"swing_height", &GaitOptions::swing_height},
     {"max_speed", &GaitOptions::max_speed},           {"max_turn", &GaitOptions::max_turn},
     {"still_speed", &GaitOptions::still_speed},       {"still_turn", &GaitOptions::still_turn},
     {"start_distance", &GaitOptions::start_distance}, {"start_angle", &GaitOptions::start_angle},
@@ -148,12 +149,11 @@ GaitOptions read_gait(const SafeTensors& tensors, const std::string& file) {
     if (!json.is_object() || !json.contains(number.name) || !json[number.name].is_number())
       throw InputError(fmt::format("{}: 'gait' in the header has no number '{}'", file, number.name));
     const auto value = json[number.name].get<double>();
-    if (!std::isfinite(value) || value < 0.0)
-      throw InputError(
-          fmt::format("{}: '{}' of the gait is {}, expected a number of at least 0", file, number.name, value));
+    if (!(value >= number.low && value <= number.high))
+      throw InputError(fmt::format("{}: '{}' of the gait is {}, expected a number from {} to {}", file, number.name,
+                                   value, number.low, number.high));
     gait.*number.value = value;
   }
-  if (gait.frequency <= 0.0) throw InputError(fmt::format("{}: the gait has a frequency of 0", file));
   return gait;
 }
 

@@ -17,7 +17,8 @@ namespace duet {
 class WbcTracker {
  public:
   // Bounds of the root's reference and the width of the stance are the card's; what is beyond a bound is tracked at the
-  // bound. The width of `gait` is not looked at. Throws std::invalid_argument for a robot that has not two legs of six joints or whose card lacks either.
+  // bound. The width of `gait` is not looked at. Throws std::invalid_argument for a robot that has not two legs of six
+  // joints or whose card lacks either.
   explicit WbcTracker(std::shared_ptr<const RobotModel> robot, const GaitOptions& gait = {});
 
   // Starts at a reference; velocities are zero until the next update.

@@ -1,6 +1,8 @@
 #include "duet/controllers/wbc_sim/wbc_sim.h"
 
 #include <algorithm>
+#include <iterator>
+#include <string_view>
 
 #include "duet/core/option.h"
 #include "duet/core/require.h"
@@ -69,8 +71,9 @@ struct WbcSimOptions {
 const FieldTable<WbcSimOptions>& wbc_sim_options() {
   static const FieldTable<WbcSimOptions> table = {field<WbcSimOptions>(
       {.name = "network",
-       .meaning = "student, braced (learnt with pushes, steps out of them), oracle or braced_oracle (which see the base "
-                  "velocity), or the path of a network"},
+       .meaning =
+           "student, braced (learnt with pushes, steps out of them), oracle or braced_oracle (which see the base "
+           "velocity), or the path of a network"},
       &WbcSimOptions::network)};
   return table;
 }

@@ -115,10 +115,10 @@ void add_walk_figures(const WalkEntry& entry, std::vector<Figure>& into) {
 }  // namespace
 
 std::vector<WalkFigure> walk_figures() {
-  return {{"speed_forward", "Forward", "m/s", 3},       {"speed_sideways", "To the left", "m/s", 3},
-          {"turn_rate", "Turning", "rad/s", 3},         {"drift", "Distance", "m", 2},
-          {"swing_height", "Swing height", "m", 3},     {"closest_feet", "Closest feet", "m", 3},
-          {"root_error", "Root error", "m", 3},         {"upper_body_error", "Upper body", "rad", 3},
+  return {{"speed_forward", "Forward", "m/s", 3},   {"speed_sideways", "To the left", "m/s", 3},
+          {"turn_rate", "Turning", "rad/s", 3},     {"drift", "Distance", "m", 2},
+          {"swing_height", "Swing height", "m", 3}, {"closest_feet", "Closest feet", "m", 3},
+          {"root_error", "Root error", "m", 3},     {"upper_body_error", "Upper body", "rad", 3},
           {"time_to_fall", "Time to fall", "s", 1}};
 }
 

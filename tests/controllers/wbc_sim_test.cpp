@@ -274,7 +274,12 @@ TEST(WbcNetwork, IsTheSameAfterSavingAndLoading) {
 TEST(WbcNetwork, KeepsTheGaitItWasMadeWith) {
   const std::string path = temporary("gait");
   WbcNetwork network = small_network(WbcKind::kStudent);
-  network.gait = {.frequency = 1.6, .swing_height = 0.07, .max_speed = 1.0, .start_distance = 0.1, .lead_time = 0.4, .capture_time = 0.27};
+  network.gait = {.frequency = 1.6,
+                  .swing_height = 0.07,
+                  .max_speed = 1.0,
+                  .start_distance = 0.1,
+                  .lead_time = 0.4,
+                  .capture_time = 0.27};
   save_wbc_network(path, network, TensorType::kF32);
   const GaitOptions read = load_wbc_network(path, *g1()).gait;
   EXPECT_EQ(read.frequency, 1.6);
@@ -322,9 +327,9 @@ TEST(WbcNetwork, BadFilesAreRefusedByWhatIsWrong) {
   refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("max_turn"), 8, "min_turn"); },
           "'gait' in the header has no number 'max_turn'");
   refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("0.12"), 4, "-0.1"); },
-          "'start_distance' of the gait is -0.1, expected a number of at least 0");
+          "'start_distance' of the gait is -0.1, expected a number from 0 to 10");
   refused([](SafeTensors& t) { t.metadata["gait"].replace(t.metadata["gait"].find("1.4"), 3, "0.0"); },
-          "the gait has a frequency of 0");
+          "'frequency' of the gait is 0, expected a number from 0.1 to 5");
   refused([](SafeTensors& t) { t.metadata["gait"] = test::deep_json(); },
           std::string("'gait' in the header: ") + test::kTooDeep);
   refused([](SafeTensors& t) { t.metadata["observation"] = test::deep_json(); },
