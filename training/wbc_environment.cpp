@@ -8,6 +8,7 @@
 
 #include "duet/backends/factory.h"
 #include "duet/core/clock.h"
+#include "duet/policies/densify.h"
 #include "duet/rollout/control_period.h"
 #include "duet/training/domain.h"
 
@@ -15,8 +16,6 @@ namespace duet {
 namespace {
 
 constexpr double kHigher = 0.05, kSlacker = 0.1;             // than the card's fall, where an episode ends [m], cosine
-constexpr double kPendulumTime = 0.27;                       // sqrt(height of the centre of mass / g) [s]
-constexpr int kPlanTicks = 10;                               // of a policy at 5 Hz
 constexpr double kCaptureMargin = 1.2, kFarthestStep = 0.4;  // share, [m]
 
 double kernel(double error, double width) { return std::exp(-error * error / (width * width)); }
@@ -151,7 +150,7 @@ void WbcEnvironment::disturb() {
 const Reference& WbcEnvironment::show_reference() {
   if (!jumps_) return stream_.reference();
   const DomainOptions& domain = task_.domain;
-  if (tick_ % kPlanTicks == 0)
+  if (tick_ % kTicksPerPlan == 0)
     X_jump_ = {yaw_rotation(random_.uniform(-domain.jump_turn, domain.jump_turn)),
                {random_.uniform(-domain.jump, domain.jump), random_.uniform(-domain.jump, domain.jump), 0.0}};
   shown_ = stream_.reference();

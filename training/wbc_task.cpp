@@ -39,7 +39,7 @@ WbcTask brace() {
   WbcTask task = walk();
   task.name = "brace";
   task.gait.lead_time = 0.42;
-  task.gait.capture_time = 0.27;
+  task.gait.capture_time = kPendulumTime;
   task.gait.max_speed = 1.0;
   task.stream.moving = 0.5;
   task.stream.max_speed = 0.8;

@@ -37,6 +37,8 @@ struct RewardWeights {
   double fall = 100.0;        // A.3.2: termination
 };
 
+inline constexpr double kPendulumTime = 0.27;  // sqrt(height of the centre of mass / g) [s]
+
 struct DomainOptions {
   bool randomise = true;
   double torso_mass_low = -1.0, torso_mass_high = 3.0;  // [kg]
@@ -63,7 +65,7 @@ struct WbcTask {
   DomainOptions domain;
   GaitOptions gait;
   double dt = 0.005;  // physics [s]
-  // Of MuJoCo: half the time of its defaults; what was learnt is tested with those.
+  // Of MuJoCo: less than half the time of its defaults; what was learnt is tested with those.
   EngineOptions engine = {{"solver", "pgs"}, {"iterations", "12"}, {"cone", "pyramidal"}};
   double entropy = 0.002;    // weight of the policy's entropy
   double largest_std = 1.0;  // of an action

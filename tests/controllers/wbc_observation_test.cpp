@@ -3,18 +3,13 @@
 
 #include "duet/controllers/wbc_sim/observation.h"
 #include "duet/core/random.h"
+#include "tests/controllers/standing.h"
 
 namespace duet {
 namespace {
 
-std::shared_ptr<const RobotModel> g1() {
-  static const auto robot = load_shared_robot();
-  return robot;
-}
-
-Reference standing_reference(double x = 0.0, double y = 0.0) {
-  return {.X_WB = {Eigen::Quaterniond::Identity(), {x, y, g1()->standing_height}}, .q = g1()->neutral};
-}
+using test::g1;
+using test::standing_reference;
 
 TEST(WbcLayout, SizesAreThePrintedTotals) {
   const WbcLayout layout(29);
