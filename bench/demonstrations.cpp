@@ -56,7 +56,10 @@ void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const De
     scene.robot = robot;
     scene.human = make_human_body(bone_lengths(take.clip->partner));
     const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
-    rollout = roll_out(setup, *backend, *make_controller(options.controller, robot), *policy);
+    const ControllerOptions network = options.controller_network.empty()
+                                          ? ControllerOptions{}
+                                          : ControllerOptions{{"network", options.controller_network}};
+    rollout = roll_out(setup, *backend, *make_controller(options.controller, robot, network), *policy);
   }
   take.followed = std::move(rollout.recording.robot);
   if (rollout.recording.outcome == Outcome::kOk) return;
@@ -128,8 +131,9 @@ std::string origin_of(const DemonstrationOptions& options) {
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
-  return fmt::format("{}, {} of a kind followed in {} under {} by {}", clips, options.followed, options.engine,
-                     options.controller, options.policy);
+  return fmt::format(
+      "{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine, options.controller,
+      options.controller_network.empty() ? "" : fmt::format(" ({})", options.controller_network), options.policy);
 }
 
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,

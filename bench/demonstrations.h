@@ -29,6 +29,7 @@ struct DemonstrationOptions {
   StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
   int followed = 200;  // clips of each kind and task whose first start is also followed in the engine
   std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
+  std::string controller_network;                         // its option `network`; empty: the one it has by itself
   int threads = 1;
   // Who acts: the demonstration itself, also seen as it is, or a policy, on the clips that are followed; then the robot
   // is seen where the policy takes it, and what it was meant to do stays (DAgger: Ross et al. 2011).

@@ -90,6 +90,11 @@ FieldTable<PolicyTraining> demonstration_fields() {
       field<T>(
           {.name = "engine", .meaning = "that they are followed in; '' for none"},
           [](auto& t) -> auto& { return t.data.engine; }),
+      field<T>(
+          {.name = "controller_network",
+           .meaning =
+               "network of WBC-Sim under which they are: student, braced or a file; its own where none is given"},
+          [](auto& t) -> auto& { return t.data.controller_network; }),
       field<T>({.name = "rounds",
                 .meaning = "times that the policy so far acts in the engine and what it meets is added to the "
                            "demonstrations",

@@ -49,6 +49,11 @@ std::string points(double difference, const Interval& interval) {
   return fmt::format("{:+.1f} [{:.1f}, {:.1f}]", rounded(difference), rounded(interval.low), rounded(interval.high));
 }
 
+std::string p_cell(double p) {
+  if (std::isnan(p)) return "-";
+  return p < 0.001 ? "<0.001" : fmt::format("{:.3f}", p);
+}
+
 std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-"; }
 
 std::string short_number(double value, int most_decimals) {

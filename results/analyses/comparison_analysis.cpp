@@ -10,8 +10,6 @@
 namespace duet {
 namespace {
 
-std::string p_value(double p) { return p < 0.001 ? "<0.001" : fmt::format("{:.3f}", p); }
-
 std::string interval_text(const Interval& interval) {
   return fmt::format("[{:.1f}, {:.1f}]", 100.0 * interval.low, 100.0 * interval.high);
 }
@@ -29,8 +27,8 @@ std::vector<std::string> comparison_cells(const Comparison& comparison, double m
           interval_text(comparison.cluster_interval),
           count_cell(comparison.only_a),
           count_cell(comparison.only_b),
-          p_value(comparison.p),
-          p_value(comparison.p_holm),
+          p_cell(comparison.p),
+          p_cell(comparison.p_holm),
           percent(comparison.minimum_detectable),
           std::string(to_string(verdict_of(comparison, margin)))};
 }

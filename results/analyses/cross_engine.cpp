@@ -15,14 +15,6 @@ namespace {
 
 constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
 
-double sample_sd(const std::vector<double>& values) {
-  if (values.size() < 2) return kUndefined;
-  const double mean = mean_of(values);
-  double sum = 0.0;
-  for (const double value : values) sum += (value - mean) * (value - mean);
-  return std::sqrt(sum / static_cast<double>(values.size() - 1));
-}
-
 std::set<std::string> engines_of(const EpisodesOfEngines& episodes) {
   std::set<std::string> engines;
   for (const auto& [id, row_of] : episodes) {
@@ -70,7 +62,7 @@ void add_spread(EngineSuccess& success) {
   const auto [lowest, highest] = std::minmax_element(rates.begin(), rates.end());
   success.mean = mean_of(rates);
   success.range = *highest - *lowest;
-  success.sd = sample_sd(rates);
+  success.sd = sample_deviation(rates);
   success.noise_sd = std::sqrt(mean_of(variances));
   const double excess = success.sd * success.sd - mean_of(variances);
   success.excess_sd = std::isfinite(excess) ? std::sqrt(std::max(excess, 0.0)) : kUndefined;
@@ -220,12 +212,6 @@ std::vector<RunEngine> engine_infos(const std::vector<EpisodeRow>& rows, const s
 }
 
 }  // namespace
-
-double mean_of(const std::vector<double>& values) {
-  double sum = 0.0;
-  for (const double value : values) sum += value;
-  return values.empty() ? kUndefined : sum / static_cast<double>(values.size());
-}
 
 EngineRows::EngineRows(const std::vector<EpisodeRow>& rows, const std::string& arm) {
   for (const EpisodeRow* row : distinct_episodes(rows)) {

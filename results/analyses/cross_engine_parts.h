@@ -41,7 +41,6 @@ class EngineRows {
   std::map<std::tuple<std::string, std::string, EpisodeId>, std::map<std::string, const EpisodeRow*>> playback_;
 };
 
-double mean_of(const std::vector<double>& values);  // NaN of none
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options);
 std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success);
 // Sets what rank_stability leaves: violation, change of the winner, all intervals.

@@ -12,6 +12,7 @@
 #include "duet/results/analyses/people_table.h"
 #include "duet/results/analyses/policy_table.h"
 #include "duet/results/analyses/reactivity.h"
+#include "duet/results/analyses/training_table.h"
 #include "duet/results/analyses/walk_table.h"
 #include "duet/results/report/foot_plots.h"
 #include "duet/results/report/report_parts.h"
@@ -60,6 +61,8 @@ constexpr ListedAnalysis kAnalyses[] = {
      Walking::kLeftOut, false},
     {"contacts", [](const RunTables& run) { return contact_analysis(run.contacts); }, Walking::kWritten, true},
     {"people", [](const RunTables& run) { return people_analysis(people_table(run.rows)); }, Walking::kWritten, true},
+    {"trainings", [](const RunTables& run) { return training_analysis(training_table(run.rows)); }, Walking::kLeftOut,
+     true},
     {"levels", [](const RunTables& run) { return level_analysis(level_tables(run.rows)); }, Walking::kPrinted, true},
     {"walking", [](const RunTables& run) { return walk_analysis(walk_table(run.rows)); }, Walking::kPrinted, true},
 };

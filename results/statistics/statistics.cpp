@@ -88,6 +88,20 @@ double one_sided_difference(double n, const PowerQuantiles& z) {
 
 }  // namespace
 
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? std::numeric_limits<double>::quiet_NaN() : sum / static_cast<double>(values.size());
+}
+
+double sample_deviation(const std::vector<double>& values) {
+  if (values.size() < 2) return std::numeric_limits<double>::quiet_NaN();
+  const double mean = mean_of(values);
+  double sum = 0.0;
+  for (const double value : values) sum += (value - mean) * (value - mean);
+  return std::sqrt(sum / static_cast<double>(values.size() - 1));
+}
+
 Interval wilson(long k, long n, double level) {
   require(n >= 0 && k >= 0 && k <= n, fmt::format("Wilson interval: expected 0 <= k <= n, found k = {}, n = {}", k, n));
   const double z = two_sided_z(level);

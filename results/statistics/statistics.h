@@ -17,6 +17,9 @@ struct Interval {
 inline constexpr Interval kNoInterval = {std::numeric_limits<double>::quiet_NaN(),
                                          std::numeric_limits<double>::quiet_NaN()};
 
+double mean_of(const std::vector<double>& values);           // NaN of none
+double sample_deviation(const std::vector<double>& values);  // NaN of fewer than two
+
 // Of the intervals of an analysis; the latter two of those that are bootstrapped.
 struct IntervalOptions {
   double level = 0.95;

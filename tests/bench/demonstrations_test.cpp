@@ -72,6 +72,9 @@ TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
             "3 clips of each task (seed 880001), retargeted by paper, 2 starts of each, 1 of a kind followed in "
             "playback under "
             "pd by replay");
+  options.controller = "wbc_sim";
+  options.controller_network = "braced";
+  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (braced) by replay"));
   options.starts = 1;
   options.engine = "";
   EXPECT_EQ(origin_of(options),

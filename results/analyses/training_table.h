@@ -1,0 +1,56 @@
+// One method, several trainings: policies named "<method>-seed<number>" ("dstar-seed101") are networks of one method
+// that learnt with other seeds. What each training achieves, their mean and spread, and every method against every
+// other where both trainings and clips are random effects (results/statistics/crossed_effects.h): a difference that
+// another seed would turn round is none. The main arm only; nothing depends on the order of rows.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "duet/results/analyses/analysis.h"
+#include "duet/results/analyses/policy_groups.h"
+#include "duet/results/statistics/crossed_effects.h"
+#include "duet/results/statistics/sequential_test.h"
+
+namespace duet {
+
+// "dstar" and "101" of "dstar-seed101"; both empty for a name that is none of a training.
+std::pair<std::string, std::string> training_of(std::string_view policy);
+
+struct MethodTrainings {
+  PolicyKey key;                               // its policy is the method
+  std::vector<std::string> seeds = {};         // by number
+  std::vector<Rate> success = {}, falls = {};  // of each, over the episodes that all of them have
+  double mean = 0.0;
+  double deviation = 0.0;  // of the trainings' success; NaN for one
+};
+
+// A minus B over the episodes that all trainings of both have.
+struct MethodDifference {
+  PolicyKey key;   // its policy is "dstar vs dp"
+  std::string of;  // kEpisodes for all; "recorded", "synthetic"; a task; a perturbation
+  long episodes = 0, clips = 0;
+  std::size_t trainings_a = 0, trainings_b = 0;
+  double success_a = 0.0, success_b = 0.0;
+  CrossedDifference crossed =
+      {};  // its p and interval NaN where a method has one training, or all episodes are of one clip
+  double p_holm = 1.0;
+  PairVerdict verdict = PairVerdict::kUndecided;
+};
+inline constexpr std::string_view kEpisodes = "all";
+
+struct TrainingTable {
+  double level = 0.95, margin = 0.05;
+  std::vector<MethodTrainings> methods;       // by engine, controller, method
+  std::vector<MethodDifference> differences;  // of all episodes, recorded and synthetic; p_holm over these
+  std::vector<MethodDifference> parts;        // of tasks and perturbations; p_holm over these
+};
+
+// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
+TrainingTable training_table(const std::vector<EpisodeRow>& rows, double level = 0.95, double margin = 0.05);
+
+Analysis training_analysis(const TrainingTable& table);
+
+}  // namespace duet
