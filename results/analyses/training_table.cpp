@@ -43,13 +43,14 @@ std::map<PolicyKey, Trainings> trainings_of(const std::vector<EpisodeRow>& rows)
 
 // In the order of the first.
 std::vector<EpisodeKey> in_all(const std::vector<const Trainings*>& methods) {
-  std::vector<EpisodeKey> keys;
-  for (const auto& [key, row] : methods.front()->begin()->second) {
-    const bool everywhere = std::ranges::all_of(methods, [&](const Trainings* trainings) {
+  const auto everywhere = [&](const EpisodeKey& key) {
+    return std::ranges::all_of(methods, [&](const Trainings* trainings) {
       return std::ranges::all_of(*trainings, [&](const auto& training) { return training.second.contains(key); });
     });
-    if (everywhere) keys.push_back(key);
-  }
+  };
+  std::vector<EpisodeKey> keys;
+  for (const auto& [key, row] : methods.front()->begin()->second)
+    if (everywhere(key)) keys.push_back(key);
   return keys;
 }
 
@@ -103,6 +104,7 @@ MethodDifference difference_of(const Pair& pair, const std::string& of, const st
   MethodDifference result{.key = pair.key, .of = of, .episodes = static_cast<long>(keys.size())};
   ClipNumbers clips;
   std::vector<int> clip;
+  clip.reserve(keys.size());
   for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(id));
   const TrainingOutcomes a = outcomes_of(pair.a, keys), b = outcomes_of(pair.b, keys);
   result.clips = static_cast<long>(clips.size());
@@ -153,9 +155,10 @@ void add_differences(const Pair& pair, TrainingTable& table) {
     tasks.insert({task_rank(id.task), id.task});
     perturbations.insert(perturbation);
   }
-  for (const auto& [rank, task] : tasks)
+  for (const auto& ranked : tasks)
     add_part(
-        pair, task, keys, [&](const EpisodeKey& key) { return key.second.task == task; }, table.parts);
+        pair, ranked.second, keys, [&](const EpisodeKey& key) { return key.second.task == ranked.second; },
+        table.parts);
   for (const std::string& perturbation : perturbations)
     add_part(
         pair, perturbation, keys, [&](const EpisodeKey& key) { return key.first == perturbation; }, table.parts);
