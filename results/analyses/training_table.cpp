@@ -41,6 +41,12 @@ std::map<PolicyKey, Trainings> trainings_of(const std::vector<EpisodeRow>& rows)
   return methods;
 }
 
+// A clip in either role is one clip: "-A" and "-B" (motion/interaction_clip.h, set_reactor) are left out.
+EpisodeId recording_of(EpisodeId id) {
+  if (id.clip.ends_with("-A") || id.clip.ends_with("-B")) id.clip.resize(id.clip.size() - 2);
+  return id;
+}
+
 // In the order of the first.
 std::vector<EpisodeKey> in_all(const std::vector<const Trainings*>& methods) {
   const auto everywhere = [&](const EpisodeKey& key) {
@@ -105,7 +111,7 @@ MethodDifference difference_of(const Pair& pair, const std::string& of, const st
   ClipNumbers clips;
   std::vector<int> clip;
   clip.reserve(keys.size());
-  for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(id));
+  for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(recording_of(id)));
   const TrainingOutcomes a = outcomes_of(pair.a, keys), b = outcomes_of(pair.b, keys);
   result.clips = static_cast<long>(clips.size());
   result.trainings_a = a.size();
@@ -202,7 +208,7 @@ TitledTable method_rows(const TrainingTable& table) {
       cells.push_back(std::move(cell));
   }
   titled.notes = {
-      "Policies named <method>-seed<number> are trainings of one method. n: the episodes that all of its trainings "
+      "Policies named METHOD-seedNUMBER are trainings of one method. n: the episodes that all of its trainings "
       "have. "
       "SD: between trainings."};
   return titled;
@@ -229,7 +235,8 @@ TitledTable difference_rows(const std::string& title, const std::vector<MethodDi
       fmt::format("A, B: mean success of the trainings of the first and of the second method over n episodes that all "
                   "of them have. "
                   "Trainings and clips are random effects: intervals of {0:g} % and p from Student's distribution with "
-                  "Satterthwaite's degrees of freedom; p (Holm): corrected for the {1} lines here. Verdict: of A; the "
+                  "Satterthwaite's degrees of freedom; a clip in both roles is one clip. p (Holm): corrected for the "
+                  "{1} lines here. Verdict: of A; the "
                   "same where the "
                   "interval lies within {2:g} points, else better or worse where p (Holm) is at most {3:.2g}. Without "
                   "two trainings "

@@ -29,9 +29,9 @@ struct MethodTrainings {
 
 // A minus B over the episodes that all trainings of both have.
 struct MethodDifference {
-  PolicyKey key;   // its policy is "dstar vs dp"
-  std::string of;  // kEpisodes for all; "recorded", "synthetic"; a task; a perturbation
-  long episodes = 0, clips = 0;
+  PolicyKey key;                 // its policy is "dstar vs dp"
+  std::string of;                // kEpisodes for all; "recorded", "synthetic"; a task; a perturbation
+  long episodes = 0, clips = 0;  // a clip in both of its roles is one
   std::size_t trainings_a = 0, trainings_b = 0;
   double success_a = 0.0, success_b = 0.0;
   CrossedDifference crossed =

@@ -112,6 +112,17 @@ TEST(TrainingTable, RecordedPeopleAreApartFromSyntheticOnes) {
   EXPECT_DOUBLE_EQ(table.differences[2].success_a, 5.0 / 8.0);
 }
 
+TEST(TrainingTable, AClipInBothRolesIsOneClip) {
+  std::vector<EpisodeRow> rows = two_methods();
+  for (EpisodeRow& row : rows) {
+    row.clip = "sbu-hug-" + std::to_string(row.episode / 2) + (row.episode % 2 == 0 ? "" : "-A");
+    row.key = episode_key(row);
+  }
+  const MethodDifference& found = training_table(rows).differences.front();
+  EXPECT_EQ(found.episodes, 8);
+  EXPECT_EQ(found.clips, 4);
+}
+
 TEST(TrainingTable, OneTrainingSaysNothingOfAMethod) {
   std::vector<EpisodeRow> rows = two_methods();
   std::erase_if(rows, [](const EpisodeRow& row) { return row.policy == "dp-seed2"; });
