@@ -92,6 +92,8 @@ class DstarPolicy final : public Policy {
   bool drawn_ = false;
 };
 
+constexpr std::string_view kBraced = "braced";
+
 // What a suite may set; "" where the one that ships, or the one that is built in, is meant.
 struct DstarOptions {
   std::string network, language;
@@ -101,7 +103,9 @@ struct DstarOptions {
 const FieldTable<DstarOptions>& dstar_options() {
   using O = DstarOptions;
   static const FieldTable<O> table = {
-      duet::field<O>({.name = "network", .meaning = "path of a network; the one that ships where none is given"},
+      duet::field<O>({.name = "network",
+                      .meaning = "braced (learnt over WBC-Sim's network of that name), or the path of a network; the "
+                                 "one that ships where none is given"},
                      &O::network),
       duet::field<O>({.name = "language", .meaning = "path of an NPZ table of prompts and their embeddings"},
                      &O::language),
@@ -123,10 +127,11 @@ DstarOptions read_dstar_options(const std::string& name, const PolicyOptions& op
 }
 
 std::string network_path(const std::string& name, const DstarOptions& options) {
-  if (!options.network.empty())
+  const bool braced = options.network == kBraced;
+  if (!options.network.empty() && !braced)
     return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {options.network});
   return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
-                    fmt::format("policies/dstar/{}.safetensors", name));
+                    fmt::format("policies/dstar/{}{}.safetensors", name, braced ? "_braced" : ""));
 }
 
 // "" for the encoder that is built in.

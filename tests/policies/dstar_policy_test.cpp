@@ -195,6 +195,15 @@ TEST(DstarPolicy, ComesByItsNameWithANetworkOfItsOwn) {
   }
 }
 
+TEST(DstarPolicy, ShipsANetworkOfEachThatLearntOverBraced) {
+  for (const std::string name : {"dstar", "dp"}) {
+    const std::string own = dstar_files(name, {}).at(0).path,
+                      braced = dstar_files(name, {{"network", "braced"}}).at(0).path;
+    EXPECT_EQ(braced, own.substr(0, own.rfind(".safetensors")) + "_braced.safetensors");
+    EXPECT_NO_THROW(make_policy(name, g1(), {{"network", "braced"}}));
+  }
+}
+
 TEST(DstarPolicy, RefusesWhatItCannotRun) {
   const auto refusal = [](const PolicyOptions& options) {
     return thrown_message<std::invalid_argument>([&] { make_policy("dstar", g1(), options); });
