@@ -12,14 +12,12 @@
 
 #include "duet/core/synthetic_id.h"
 #include "duet/results/analyses/cells.h"
-#include "duet/results/analyses/leaderboard.h"
 #include "duet/results/statistics/resolution.h"
 
 namespace duet {
 namespace {
 
 constexpr std::string_view kSeed = "-seed";
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // One episode under one perturbation.
 using EpisodeKey = std::pair<std::string, EpisodeId>;
@@ -114,20 +112,10 @@ MethodDifference difference_of(const Pair& pair, const std::string& of, const st
   for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(recording_of(id)));
   const TrainingOutcomes a = outcomes_of(pair.a, keys), b = outcomes_of(pair.b, keys);
   result.clips = static_cast<long>(clips.size());
-  result.trainings_a = a.size();
-  result.trainings_b = b.size();
   result.success_a = mean_success(a);
   result.success_b = mean_success(b);
-  if (a.size() >= 2 && b.size() >= 2 && clips.size() >= 2) {
-    result.crossed = crossed_difference(a, b, clip, pair.level);
-  } else {
-    result.crossed = {.difference = result.success_a - result.success_b,
-                      .error = kNan,
-                      .of_trainings = kNan,
-                      .degrees = kNan,
-                      .interval = kNoInterval,
-                      .p = kNan};
-  }
+  result.crossed.difference = result.success_a - result.success_b;
+  if (a.size() >= 2 && b.size() >= 2 && clips.size() >= 2) result.crossed = crossed_difference(a, b, clip, pair.level);
   return result;
 }
 
@@ -178,14 +166,9 @@ void judge(std::vector<MethodDifference>& differences, double level, double marg
   const std::vector<double> adjusted = holm(p_values);
   std::size_t next = 0;
   for (MethodDifference& each : differences) {
-    each.p_holm = std::isnan(each.crossed.p) ? kNan : adjusted[next++];
-    if (std::isnan(each.p_holm)) continue;
-    Comparison compared;
-    compared.difference = each.crossed.difference;
-    compared.interval = each.crossed.interval;
-    compared.p_holm = each.p_holm;
-    compared.level = level;
-    each.verdict = verdict_of(compared, margin);
+    if (std::isnan(each.crossed.p)) continue;
+    each.p_holm = adjusted[next++];
+    each.verdict = verdict_of(each.crossed.difference, each.crossed.interval, each.p_holm, level, margin);
   }
 }
 

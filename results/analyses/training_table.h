@@ -32,11 +32,10 @@ struct MethodDifference {
   PolicyKey key;                 // its policy is "dstar vs dp"
   std::string of;                // kEpisodes for all; "recorded", "synthetic"; a task; a perturbation
   long episodes = 0, clips = 0;  // a clip in both of its roles is one
-  std::size_t trainings_a = 0, trainings_b = 0;
   double success_a = 0.0, success_b = 0.0;
-  CrossedDifference crossed =
-      {};  // its p and interval NaN where a method has one training, or all episodes are of one clip
-  double p_holm = 1.0;
+  // Of the difference alone where a method has one training, or all episodes are of one clip: then p_holm is NaN, too.
+  CrossedDifference crossed = {};
+  double p_holm = CrossedDifference::kUnknown;
   PairVerdict verdict = PairVerdict::kUndecided;
 };
 inline constexpr std::string_view kEpisodes = "all";

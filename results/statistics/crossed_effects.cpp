@@ -115,17 +115,17 @@ CrossedDifference crossed_difference(const TrainingOutcomes& a, const TrainingOu
   const double from_a = squared_error(means_of(a)), from_b = squared_error(means_of(b));
   const double all = from_a + from_b + from_clips;
   result.error = std::sqrt(all);
-  result.of_trainings = (from_a + from_b) / all;
-  const auto freedom = [](std::size_t n) { return static_cast<double>(n) - 1.0; };
-  result.degrees = all * all /
-                   (from_a * from_a / freedom(a.size()) + from_b * from_b / freedom(b.size()) +
-                    from_clips * from_clips / freedom(clips));
   if (!(all > 0.0)) {
     result.degrees = std::numeric_limits<double>::infinity();
     result.interval = {result.difference, result.difference};
     result.p = result.difference == 0.0 ? 1.0 : 0.0;
     return result;
   }
+  const auto freedom = [](std::size_t n) { return static_cast<double>(n) - 1.0; };
+  result.of_trainings = (from_a + from_b) / all;
+  result.degrees = all * all /
+                   (from_a * from_a / freedom(a.size()) + from_b * from_b / freedom(b.size()) +
+                    from_clips * from_clips / freedom(clips));
   const double half = student_quantile(level, result.degrees) * result.error;
   result.interval = {result.difference - half, result.difference + half};
   result.p = student_two_sided(result.difference / result.error, result.degrees);

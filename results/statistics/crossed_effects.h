@@ -2,6 +2,7 @@
 // Trainings and clips are both random effects, crossed: every training meets every episode.
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -12,13 +13,15 @@ namespace duet {
 // Of one method: for each training its success (1 or 0) in each episode.
 using TrainingOutcomes = std::vector<std::vector<double>>;
 
+// As it is made: nothing is known.
 struct CrossedDifference {
-  double difference = 0.0;          // mean of A minus mean of B
-  double error = 0.0;               // its standard error
-  double of_trainings = 0.0;        // the part of error^2 that trainings make; NaN where error is 0
-  double degrees = 0.0;             // of freedom; infinite where error is 0
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  double difference = kUnknown;     // mean of A minus mean of B
+  double error = kUnknown;          // its standard error
+  double of_trainings = kUnknown;   // the part of error^2 that trainings make; NaN where error is 0
+  double degrees = kUnknown;        // of freedom; infinite where error is 0
   Interval interval = kNoInterval;  // Student's
-  double p = 1.0;                   // two-sided
+  double p = kUnknown;              // two-sided
 };
 
 // error^2 = s_A^2 / trainings of A + s_B^2 / trainings of B + s_clip^2 / clips: the spread of each method's trainings

@@ -35,9 +35,13 @@ double discordance_of(const Comparison& comparison) {
 }  // namespace
 
 PairVerdict verdict_of(const Comparison& comparison, double margin) {
-  if (verdict_of(comparison.interval, margin) == PairVerdict::kSame) return PairVerdict::kSame;
-  if (comparison.p_holm > 1.0 - comparison.level) return PairVerdict::kUndecided;
-  return comparison.difference > 0.0 ? PairVerdict::kBetter : PairVerdict::kWorse;
+  return verdict_of(comparison.difference, comparison.interval, comparison.p_holm, comparison.level, margin);
+}
+
+PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin) {
+  if (verdict_of(interval, margin) == PairVerdict::kSame) return PairVerdict::kSame;
+  if (p_holm > 1.0 - level) return PairVerdict::kUndecided;
+  return difference > 0.0 ? PairVerdict::kBetter : PairVerdict::kWorse;
 }
 
 long needed_pairs(double discordance, double difference, double alpha) {

@@ -15,6 +15,8 @@ inline constexpr double kFivePoints = 0.05;  // the margin where nobody names on
 // The same where Newcombe's interval lies inside (-margin, margin); else better or worse where p (Holm) is at most
 // 1 - level; else undecided.
 PairVerdict verdict_of(const Comparison& comparison, double margin);
+// The same of a difference that another test has judged, with that test's interval.
+PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin);
 
 // The smallest number of pairs, or of episodes per arm, that shows the difference in 80 % of runs. difference in (0,
 // 1); throws std::invalid_argument.
