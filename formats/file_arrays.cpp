@@ -33,7 +33,8 @@ void take_qpos(const Eigen::MatrixXd& qpos, Eigen::Index joints, FileMotion& mot
     motion.position.emplace_back(qpos.col(t).head<3>());
     motion.quaternion.emplace_back(qpos.col(t).segment<4>(3));
   }
-  motion.q = qpos.middleRows(7, joints);
+  motion.q.resize(joints, qpos.cols());
+  if (qpos.cols() > 0) motion.q = qpos.middleRows(7, joints);  // without frames there is no row to point at
 }
 
 Eigen::MatrixXd matrix_of(const Npz& npz, const std::string& key) {

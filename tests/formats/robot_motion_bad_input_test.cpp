@@ -192,6 +192,22 @@ TEST(RobotMotionBadInput, AnotherNumberOfJointsIsRefused) {
   EXPECT_THAT(refusal(csv_text({}, rows.leftCols(1)), "x.csv"), HasSubstr("expected at least 2 frames, found 1"));
 }
 
+// Tables with columns and no line: under the sanitizers, also that no row of them is pointed at.
+TEST(RobotMotionBadInput, ArchivesWithoutFramesAreRefused) {
+  for (const auto& [name, bytes] : samples()) {
+    if (name != "x.npz") continue;
+    Npz npz = Npz::parse(bytes, name);
+    for (const std::string& key : npz.keys()) {
+      NpzArray array = npz.array(key);
+      if (array.shape.size() < 2) continue;
+      array.shape.front() = 0;
+      std::visit([](auto& values) { values.clear(); }, array.values);
+      npz.set(key, array);
+    }
+    EXPECT_THAT(refusal(npz.bytes(), name), HasSubstr("'x.npz'"));
+  }
+}
+
 TEST(RobotMotionBadInput, JointsOfAnotherRobotAreRefused) {
   const RobotModel t1 = load_robot(card_path("t1"));
   const std::string bytes = robot_motion_files(known_motion(t1), t1, robot_motion_format("hhtools")).at("");
