@@ -39,12 +39,6 @@ std::map<PolicyKey, Trainings> trainings_of(const std::vector<EpisodeRow>& rows)
   return methods;
 }
 
-// A clip in either role is one clip: "-A" and "-B" (motion/interaction_clip.h, set_reactor) are left out.
-EpisodeId recording_of(EpisodeId id) {
-  if (id.clip.ends_with("-A") || id.clip.ends_with("-B")) id.clip.resize(id.clip.size() - 2);
-  return id;
-}
-
 // In the order of the first.
 std::vector<EpisodeKey> in_all(const std::vector<const Trainings*>& methods) {
   const auto everywhere = [&](const EpisodeKey& key) {
@@ -109,7 +103,7 @@ MethodDifference difference_of(const Pair& pair, const std::string& of, const st
   ClipNumbers clips;
   std::vector<int> clip;
   clip.reserve(keys.size());
-  for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(recording_of(id)));
+  for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(id));
   const TrainingOutcomes a = outcomes_of(pair.a, keys), b = outcomes_of(pair.b, keys);
   result.clips = static_cast<long>(clips.size());
   result.success_a = mean_success(a);

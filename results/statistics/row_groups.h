@@ -35,11 +35,13 @@ void require_one_suite(const std::vector<EpisodeRow>& rows);
 // Throws InputError where two rows of one group are the same episode.
 void require_distinct(const EpisodeRow& a, const EpisodeRow& b);
 
-// Numbers for clips in the order in which they come, the clusters of every bootstrap over clips.
+// Numbers for clips in the order in which they come, the clusters of every bootstrap over clips. A clip in either role
+// is one clip: "-A" and "-B" (motion/interaction_clip.h, set_reactor) are left out.
 class ClipNumbers {
  public:
-  int of(const std::string& task, const std::string& clip) {
-    return numbers_.try_emplace({task, clip}, static_cast<int>(numbers_.size())).first->second;
+  int of(const std::string& task, std::string clip) {
+    if (clip.ends_with("-A") || clip.ends_with("-B")) clip.resize(clip.size() - 2);
+    return numbers_.try_emplace({task, std::move(clip)}, static_cast<int>(numbers_.size())).first->second;
   }
   int of(const EpisodeId& id) { return of(id.task, id.clip); }
   [[nodiscard]] std::size_t size() const { return numbers_.size(); }

@@ -45,6 +45,25 @@ TEST(CompareRuns, BuildsThePairedTableOfTwoPolicies) {
   EXPECT_GT(hug.cluster_interval.high, hug.difference);
 }
 
+// Where the two roles of a clip go the same way, twice as many episodes say no more than one role of each.
+TEST(CompareRuns, ClustersTheTwoRolesOfAClipTogether) {
+  const auto compared = [](bool other_role) {
+    std::vector<EpisodeRow> a = hugs("dstar", 20, 0, 15), b = hugs("replay", 20, 10, 20);
+    for (std::vector<EpisodeRow>* rows : {&a, &b}) {
+      for (EpisodeRow row : std::vector<EpisodeRow>(*rows)) {
+        row.clip += other_role ? "-A" : "-of-another-take";
+        rows->push_back(row);
+      }
+    }
+    return compare_runs(a, b)[0];
+  };
+  const auto width = [](const Comparison& of) { return of.cluster_interval.high - of.cluster_interval.low; };
+  const Comparison roles = compared(true), takes = compared(false);
+  EXPECT_EQ(roles.pairs, 40);
+  EXPECT_EQ(roles.difference, takes.difference);
+  EXPECT_GT(width(roles), 1.25 * width(takes));  // the square root of two, but for chance
+}
+
 TEST(CompareRuns, PairsByEpisodeAndNotByOrder) {
   std::vector<EpisodeRow> a = hugs("replay", 12, 0, 6);
   std::vector<EpisodeRow> b = hugs("replay", 12, 0, 6);
