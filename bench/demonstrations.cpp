@@ -123,7 +123,9 @@ bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& p
 }  // namespace
 
 std::string origin_of(const DemonstrationOptions& options) {
-  std::string clips;
+  std::string clips, network = options.controller_network;
+  for (const ControllerOption& option : controller_info(options.controller).options)
+    if (network.empty() && option.name == "network") network = option.fallback;
   for (const auto& [like, per_task] : options.clips)
     clips += fmt::format("{}{}{}{}", clips.empty() ? "" : " and ", per_task, clips.empty() ? " clips of each task" : "",
                          like == Likeness::kPeople ? " like people" : "");
@@ -131,9 +133,8 @@ std::string origin_of(const DemonstrationOptions& options) {
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
-  return fmt::format(
-      "{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine, options.controller,
-      options.controller_network.empty() ? "" : fmt::format(" ({})", options.controller_network), options.policy);
+  return fmt::format("{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine,
+                     options.controller, network.empty() ? "" : fmt::format(" ({})", network), options.policy);
 }
 
 std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,

@@ -93,7 +93,7 @@ FieldTable<PolicyTraining> demonstration_fields() {
       field<T>(
           {.name = "controller_network",
            .meaning =
-               "network of WBC-Sim under which they are: student, braced or a file; its own where none is given"},
+               "network of WBC-Sim under which they are: braced, student or a file; its default where none is given"},
           [](auto& t) -> auto& { return t.data.controller_network; }),
       field<T>({.name = "rounds",
                 .meaning = "times that the policy so far acts in the engine and what it meets is added to the "

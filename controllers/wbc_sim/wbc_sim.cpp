@@ -62,18 +62,18 @@ class WbcSim final : public Controller {
   bool started_ = false;
 };
 
-constexpr std::string_view kShipped[] = {"student", "braced", "oracle", "braced_oracle"};
+constexpr std::string_view kShipped[] = {"braced", "student", "braced_oracle", "oracle"};
 
 struct WbcSimOptions {
-  std::string network = "student";
+  std::string network = "braced";
 };
 
 const FieldTable<WbcSimOptions>& wbc_sim_options() {
   static const FieldTable<WbcSimOptions> table = {field<WbcSimOptions>(
       {.name = "network",
        .meaning =
-           "student, braced (learnt with pushes, steps out of them), oracle or braced_oracle (which see the base "
-           "velocity), or the path of a network"},
+           "braced (learnt with pushes, steps out of them), student (the one before, which did not), braced_oracle or "
+           "oracle (which see the base velocity), or the path of a network"},
       &WbcSimOptions::network)};
   return table;
 }

@@ -92,11 +92,12 @@ class DstarPolicy final : public Policy {
   bool drawn_ = false;
 };
 
-constexpr std::string_view kBraced = "braced";
+// Networks that ship, by the network of WBC-Sim that they learnt over.
+constexpr std::string_view kBraced = "braced", kStudent = "student";
 
-// What a suite may set; "" where the one that ships, or the one that is built in, is meant.
+// What a suite may set; an empty language is the one that is built in.
 struct DstarOptions {
-  std::string network, language;
+  std::string network{kBraced}, language;
   DstarSampling sampling;
 };
 
@@ -104,8 +105,8 @@ const FieldTable<DstarOptions>& dstar_options() {
   using O = DstarOptions;
   static const FieldTable<O> table = {
       duet::field<O>({.name = "network",
-                      .meaning = "braced (learnt over WBC-Sim's network of that name), or the path of a network; the "
-                                 "one that ships where none is given"},
+                      .meaning = "braced or student (learnt over WBC-Sim's network of that name), or the path of a "
+                                 "network"},
                      &O::network),
       duet::field<O>({.name = "language", .meaning = "path of an NPZ table of prompts and their embeddings"},
                      &O::language),
@@ -128,7 +129,7 @@ DstarOptions read_dstar_options(const std::string& name, const PolicyOptions& op
 
 std::string network_path(const std::string& name, const DstarOptions& options) {
   const bool braced = options.network == kBraced;
-  if (!options.network.empty() && !braced)
+  if (!braced && options.network != kStudent)
     return first_existing(fmt::format("network of policy '{}' (option 'network')", name), {options.network});
   return share_file(fmt::format("network of policy '{}' (option 'network' names another)", name),
                     fmt::format("policies/dstar/{}{}.safetensors", name, braced ? "_braced" : ""));
@@ -174,8 +175,7 @@ PolicyInfo dstar_info(const std::string& name) {
   return {name,
           baseline ? "Diffusion Policy: D-STAR's head on one stream of frames and the command, without its reasoning"
                    : "D-STAR of the supplement: phase attention, spatial reasoning and language, by diffusion",
-          option_list<PolicyOption>(dstar_options(),
-                                    {.network = name, .language = std::string(kBuiltInLanguage), .sampling = {}})};
+          option_list<PolicyOption>(dstar_options(), {.language = std::string(kBuiltInLanguage), .sampling = {}})};
 }
 
 LoadedFiles dstar_files(const std::string& name, const PolicyOptions& given) {

@@ -73,8 +73,9 @@ TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
             "playback under "
             "pd by replay");
   options.controller = "wbc_sim";
-  options.controller_network = "braced";
-  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (braced) by replay"));
+  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (braced) by replay"));  // its default, by name
+  options.controller_network = "student";
+  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (student) by replay"));
   options.starts = 1;
   options.engine = "";
   EXPECT_EQ(origin_of(options),

@@ -107,8 +107,8 @@ class OtherShare {
 
 TEST(PolicyDigest, CoversTheNetworkThatShips) {
   for (const auto& [name, file] :
-       std::map<std::string, std::string>{{"dstar", "policies/dstar/dstar.safetensors"},
-                                          {"dp", "policies/dstar/dp.safetensors"},
+       std::map<std::string, std::string>{{"dstar", "policies/dstar/dstar_braced.safetensors"},
+                                          {"dp", "policies/dstar/dp_braced.safetensors"},
                                           {"retrieval", "policies/dstar/retrieval.safetensors"}}) {
     const ActorIdentity before = identity_of(SuitePolicy{name});
     ASSERT_THAT(before.files, SizeIs(1));
@@ -120,7 +120,7 @@ TEST(PolicyDigest, CoversTheNetworkThatShips) {
 
 TEST(PolicyDigest, IsOfTheNetworkNotOfItsPlace) {
   const test::ScratchFolder folder;
-  std::filesystem::copy(share_file("network", "policies/dstar/dp.safetensors"), folder / "mine.safetensors");
+  std::filesystem::copy(share_file("network", "policies/dstar/dp_braced.safetensors"), folder / "mine.safetensors");
   SuitePolicy given{"dp"};
   given.options = {{"network", folder / "mine.safetensors"}};
   EXPECT_EQ(identity_of(given).digest, identity_of(SuitePolicy{"dp"}).digest);
@@ -166,7 +166,7 @@ TEST(PolicyDigest, CoversTheProgramBesideADescriptor) {
 TEST(ControllerDigest, CoversTheNetworkThatShips) {
   const ActorIdentity before = identity_of(SuiteController{"wbc_sim"});
   ASSERT_THAT(before.files, SizeIs(1));
-  const OtherShare other("controllers/wbc_sim/student.safetensors", "other weights");
+  const OtherShare other("controllers/wbc_sim/braced.safetensors", "other weights");
   EXPECT_NE(identity_of(SuiteController{"wbc_sim"}).digest, before.digest);
   EXPECT_EQ(suite_hash(suite_with({{"controllers", "[wbc_sim]"}})), [&] {
     unsetenv("DUET_SHARE");

@@ -195,12 +195,14 @@ TEST(DstarPolicy, ComesByItsNameWithANetworkOfItsOwn) {
   }
 }
 
-TEST(DstarPolicy, ShipsANetworkOfEachThatLearntOverBraced) {
+TEST(DstarPolicy, ShipsANetworkOfEachForEitherNetworkOfWbcSimAndTakesBraced) {
   for (const std::string name : {"dstar", "dp"}) {
-    const std::string own = dstar_files(name, {}).at(0).path,
-                      braced = dstar_files(name, {{"network", "braced"}}).at(0).path;
-    EXPECT_EQ(braced, own.substr(0, own.rfind(".safetensors")) + "_braced.safetensors");
-    EXPECT_NO_THROW(make_policy(name, g1(), {{"network", "braced"}}));
+    const auto file = [&](const PolicyOptions& options) { return dstar_files(name, options).at(0).path; };
+    const std::string student = file({{"network", "student"}});
+    EXPECT_THAT(student, testing::EndsWith("/" + name + ".safetensors"));
+    EXPECT_EQ(file({}), student.substr(0, student.rfind(".safetensors")) + "_braced.safetensors");
+    EXPECT_EQ(file({{"network", "braced"}}), file({}));
+    for (const char* network : {"braced", "student"}) EXPECT_NO_THROW(make_policy(name, g1(), {{"network", network}}));
   }
 }
 
