@@ -86,7 +86,7 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   const ActSignal signal = definition_of(clip.task).phases.act;
   const bool hands = signal == ActSignal::kHandsTogether, embrace = signal == ActSignal::kHandAtChest;
   int first = -1, last = -1, count = 0, right = 0;
-  double height = 0.0;
+  double height = 0.0, hips = 0.0;
   for (int t = 0; t < clip.frames(); ++t) {
     const Nearest nearest = embrace ? nearest_embrace(people, t) : nearest_hands(people, t);
     const bool in_act = t >= clip.phases.act_begin && t < clip.phases.act_end;
@@ -107,6 +107,9 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   result.touch_distance = root_distance(people, first);
   result.touch_bearing =
       0.5 * (bearing_of_other(*people[0], *people[1], first) + bearing_of_other(*people[1], *people[0], first));
+  for (const HumanMotion* person : people)
+    hips += 0.5 * turned(facing(*person, (first + last) / 2) - facing(*person, 0));
+  result.turned_hips = hips;
   result.touch_turn = std::abs(turned(facing(*people[0], first) - facing(*people[1], first) + std::numbers::pi));
   if (!hands && !embrace) return;
   result.touch_height = height / count;
@@ -175,15 +178,30 @@ double noise_of(const InteractionClip& clip, const People& people) {
   return quantile(std::move(residuals), 0.5);
 }
 
+// Of what is measured in each frame of a person.
+template <typename Measure>
+double median_over_frames(const HumanMotion& person, const Measure& measure) {
+  std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(person.frames()));
+  for (int t = 0; t < person.frames(); ++t) values.push_back(measure(t));
+  return quantile(std::move(values), 0.5);
+}
+
 void add_bodies(const People& people, InteractionStatistics& result) {
   std::vector<double> changes;
   int occluded = 0, arms = 0;
-  result.stature = result.arm_length = 0.0;
+  result.stature = result.arm_length = result.feet_aside = result.neck_height = 0.0;
   for (const HumanMotion* person : people) {
-    std::vector<double> heads;
-    heads.reserve(static_cast<std::size_t>(person->frames()));
-    for (int t = 0; t < person->frames(); ++t) heads.push_back(joint(*person, t, kHead).z() - lowest_of(*person, t));
-    result.stature += 0.5 * quantile(std::move(heads), 0.5);
+    const auto between = [&](int t, int to, int from) -> Eigen::Vector3d {
+      return joint(*person, t, to) - joint(*person, t, from);
+    };
+    result.stature +=
+        0.5 * median_over_frames(*person, [&](int t) { return joint(*person, t, kHead).z() - lowest_of(*person, t); });
+    result.neck_height += 0.5 * median_over_frames(*person, [&](int t) { return between(t, kNeck, kPelvis).z(); });
+    for (const auto& [ankle, hip] : {std::pair(kLeftAnkle, kLeftHip), std::pair(kRightAnkle, kRightHip)})
+      result.feet_aside += 0.25 * median_over_frames(*person, [&, ankle = ankle, hip = hip](int t) {
+                             return between(t, ankle, hip).head<2>().norm();
+                           });
     for (const auto& [shoulder, elbow, wrist] :
          {std::array{kLeftShoulder, kLeftElbow, kLeftWrist}, std::array{kRightShoulder, kRightElbow, kRightWrist}}) {
       std::array<std::vector<double>, 2> bones;
@@ -243,6 +261,7 @@ std::span<const InteractionStatisticInfo> interaction_statistic_catalogue() {
       {"after_s", "After the touch", "s", &S::after_s, false},
       {"touch_distance", "Distance of the roots at the touch", "m", &S::touch_distance, false},
       {"touch_bearing", "The other is to the right by", "deg", &S::touch_bearing, false},
+      {"turned_hips", "Turned to the left until mid-touch", "deg", &S::turned_hips, false},
       {"touch_turn", "Turned from facing each other", "deg", &S::touch_turn, false},
       {"largest_distance", "Largest distance of the roots", "m", &S::largest_distance, false},
       {"touch_height", "Height of the touch", "m", &S::touch_height, false},
@@ -257,6 +276,8 @@ std::span<const InteractionStatisticInfo> interaction_statistic_catalogue() {
       {"noise", "Residual of the trunk", "m", &S::noise, false},
       {"arm_change_p95", "Change of the arms' bones p95", "1", &S::arm_change_p95, false},
       {"arm_occluded", "Arms lost", "1", &S::arm_occluded, true},
+      {"feet_aside", "Ankles from below the hips", "m", &S::feet_aside, false},
+      {"neck_height", "Neck over the pelvis", "m", &S::neck_height, false},
       {"stature", "Head over the feet", "m", &S::stature, false},
       {"arm_length", "Shoulder to wrist", "m", &S::arm_length, false},
   });

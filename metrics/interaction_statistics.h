@@ -25,6 +25,7 @@ struct InteractionStatistics {
   double touch_distance = kUnknownStatistic;    // of the roots, level, at the first touch [m]
   double largest_distance = kUnknownStatistic;  // of the roots, level, in the clip [m]
   double touch_bearing = kUnknownStatistic;     // of the other from either's facing, to the right, mean of both [deg]
+  double turned_hips = kUnknownStatistic;       // to the left, from the first frame to mid-touch, mean of both [deg]
   double touch_turn = kUnknownStatistic;        // by which the two do not face opposite ways then [deg]
   double touch_height = kUnknownStatistic;      // of the touching hands over the lowest foot, mean in touch [m]
   double approach_speed = kUnknownStatistic;    // fastest closing of the roots over kApproachWindow [m/s]
@@ -38,6 +39,8 @@ struct InteractionStatistics {
   double noise = kUnknownStatistic;             // median residual of trunk joints, see kNoiseStep [m]
   double arm_change_p95 = kUnknownStatistic;    // of the arms' bones against their median, over frames [1]
   double arm_occluded = kUnknownStatistic;      // share of frames and arms with a bone changed by over kOccluded [1]
+  double feet_aside = kUnknownStatistic;        // of an ankle from below its hip, level, median, mean of all four [m]
+  double neck_height = kUnknownStatistic;       // of the neck over the pelvis, median, mean of both [m]
   double stature = kUnknownStatistic;           // of the head joint over the lowest joint, median, mean of both [m]
   double arm_length = kUnknownStatistic;        // shoulder to wrist, median, mean of both [m]
 };

@@ -63,12 +63,33 @@ class LostArm {
   Eigen::Vector3d elbow_ = Eigen::Vector3d::Zero(), hand_ = Eigen::Vector3d::Zero();
 };
 
-PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Tracker& tracker, int frames,
-                 Random random) {
+using Errors = std::array<Eigen::Vector3d, kColumns.size()>;
+
+// What stays: a foot that is taken for another place is no lower than the floor.
+Errors misplaced(const Tracker& tracker, Random random) {
+  Errors errors;
+  errors.fill(Eigen::Vector3d::Zero());
+  std::array<Eigen::Vector3d, 2> feet;
+  for (Eigen::Vector3d& foot : feet) {
+    foot = tracker.feet * normal3(random);
+    foot.z() = 0.4 * std::abs(foot.z());
+  }
+  for (std::size_t i = 0; i < kColumns.size(); ++i) {
+    const SmplJoint joint = kColumns[i];
+    if (joint == kNeck) errors[i].z() = -tracker.low_neck;
+    if (joint == kLeftShoulder || joint == kRightShoulder) errors[i].z() = -tracker.low_shoulders;
+    if (joint == kLeftKnee || joint == kRightKnee) errors[i] = 0.5 * feet[joint == kLeftKnee ? 0 : 1];
+    if (joint == kLeftAnkle || joint == kRightAnkle) errors[i] = feet[joint == kLeftAnkle ? 0 : 1];
+  }
+  return errors;
+}
+
+PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Tracker& tracker, int frames, Random random,
+                 const Errors& staying) {
   const double ratio = person.rate_hz / tracker.rate_hz;
   const double keep = std::exp(-1.0 / (tracker.drift_time * tracker.rate_hz)), add = std::sqrt(1.0 - keep * keep);
   PointTracks result(frames, static_cast<int>(kColumns.size()));
-  std::array<Eigen::Vector3d, kColumns.size()> drift;
+  Errors drift;
   for (Eigen::Vector3d& value : drift) value = tracker.drift * normal3(random);
   std::array<LostArm, 2> arms;
   for (int t = 0; t < frames; ++t) {
@@ -85,7 +106,7 @@ PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Trac
       const SmplJoint joint = kColumns[i];
       const Eigen::Vector3d here = person.joints.at(at.frame, joint), there = person.joints.at(next, joint);
       drift[i] = keep * drift[i] + add * tracker.drift * normal3(random);
-      Eigen::Vector3d error = drift[i] + noise * normal3(random);
+      Eigen::Vector3d error = staying[i] + drift[i] + noise * normal3(random);
       if (is_limb(joint)) error += tracker.limb_noise * normal3(random);
       if (is_arm(joint)) {
         const int side = is_left(joint) ? 0 : 1;
@@ -100,8 +121,9 @@ PointTracks seen(const HumanMotion& person, const HumanMotion& other, const Trac
 void check_tracker(const Tracker& tracker) {
   require(tracker.rate_hz >= 5.0 && tracker.rate_hz <= 120.0,
           fmt::format("tracked clip: expected a rate of 5 to 120 Hz, found {}", tracker.rate_hz));
-  for (const double value : {tracker.noise, tracker.crowded, tracker.drift, tracker.limb_noise, tracker.hidden_within,
-                             tracker.lost_share, tracker.lost_noise})
+  for (const double value :
+       {tracker.noise, tracker.crowded, tracker.drift, tracker.limb_noise, tracker.feet, tracker.low_neck,
+        tracker.low_shoulders, tracker.hidden_within, tracker.lost_share, tracker.lost_noise})
     require(value >= 0.0, fmt::format("tracked clip: expected figures of 0 or more, found {}", value));
   require(tracker.drift_time > 0.0,
           fmt::format("tracked clip: expected a positive drift_time, found {}", tracker.drift_time));
@@ -112,11 +134,14 @@ void check_tracker(const Tracker& tracker) {
 InteractionClip tracked(const InteractionClip& clip, const Tracker& tracker, std::uint64_t seed) {
   check_tracker(tracker);
   const int frames = resampled_frames(clip.frames(), clip.rate_hz(), tracker.rate_hz);
+  const auto person = [&](const char* who, const HumanMotion& one, const HumanMotion& other) {
+    return seen(one, other, tracker, frames, {seed, stream_key({"tracked", clip.id, who})},
+                misplaced(tracker, {seed, stream_key({"misplaced", clip.id, who})}));
+  };
   RawPeople raw{.id = clip.id + "-tracked",
                 .name = clip.id,
                 .layout = &joint_layout("kinect-15"),
-                .joints = {seen(clip.a, clip.b, tracker, frames, {seed, stream_key({"tracked", clip.id, "a"})}),
-                           seen(clip.b, clip.a, tracker, frames, {seed, stream_key({"tracked", clip.id, "b"})})},
+                .joints = {person("a", clip.a, clip.b), person("b", clip.b, clip.a)},
                 .rate_hz = tracker.rate_hz,
                 .up = Axis::kPlusZ,
                 .metres_per_unit = 1.0,

@@ -17,6 +17,10 @@ struct Tracker {
   double drift = 0.004;       // and of a slow error of each joint [m]
   double drift_time = 0.8;    // over which it changes [s]
   double limb_noise = 0.011;  // of elbows, hands, knees and feet besides [m]
+  // For as long as it looks it has feet aside of where they are, by such a standard deviation along each level axis,
+  // half of it in the knees; and the neck, and the shoulders, so much lower than a body model has them. [m]
+  double feet = 0.19;
+  double low_neck = 0.12, low_shoulders = 0.06;
   // A hand within this of the other person is lost at times, and jumps. [m]
   double hidden_within = 0.30;
   double lost_share = 0.16;  // of such frames

@@ -24,7 +24,8 @@ constexpr RecordedManner kRecordedHandshake = {.tempo = {0.95, 1.25, 1.55},
                                                .touch = {0.85, 1.3, 1.7},
                                                .until_touch = kReach,
                                                .distance = {0.98, 1.08, 1.26},
-                                               .bearing = {0.20, 0.47, 0.72},
+                                               .bearing = {0.41, 0.70, 0.90},
+                                               .turn = {0.12, 0.48, 1.00},
                                                .way = {0.0, 0.04, 0.4},
                                                .speed = {0.5, 0.75, 1.0},
                                                .stands = 0.15,
@@ -83,6 +84,8 @@ void perform_handshake(Scene& scene, Draws& draws) {
     };
     const double begin = scene.act_begin + person.reaction;
     person.lean_to(begin, clasp, scene.layout.lean[k]);
+    person.hips.to(begin, clasp + 0.25 * (scene.act_end - clasp), scene.layout.lean[k].hips);
+    person.hips.to(scene.act_end, scene.release_end, 0.0);
     person.arms[side].to(begin, clasp, at_point(point, {-0.4, 0.45, -1.0}, 0.05), {0.02, 0.04, 0.02});
     person.arms[side].rest(scene.act_end, scene.release_end);
     person.lean_to(scene.act_end, scene.release_end, {});

@@ -36,7 +36,11 @@ Cast draw_cast(Task task, const SynthesisOptions& options, Draws& draws) {
   cast.manner.rehearsed = false;
   cast.manner.tempo = draws.spread("tempo", recorded.tempo);
   if (recorded.distance.middle > 0.0) cast.manner.distance = draws.spread("act.apart", recorded.distance);
-  for (const int k : {0, 1}) cast.manner.bearing[k] = draws.spread(std::string(kWho[k]) + "bearing", recorded.bearing);
+  for (const int k : {0, 1}) {
+    const std::string who(kWho[k]);
+    if (recorded.turn.middle > 0.0) cast.manner.turn[k] = draws.spread(who + "turn", recorded.turn);
+    cast.manner.bearing[k] = draws.spread(who + "bearing", recorded.bearing) - cast.manner.turn[k];
+  }
   return cast;
 }
 
@@ -195,7 +199,9 @@ void perform_abort(Scene& scene, Draws& draws) {
     Lean half = scene.layout.lean[k];
     half.forward *= 0.4;
     person.lean_to(begin, up, half);
+    person.hips.to(begin, up, 0.4 * half.hips);
     person.lean_to(down, down + 0.9, {});
+    person.hips.to(down, down + 0.9, 0.0);
     person.arms[scene.cast.side].to(begin, up, half_way());
     person.arms[scene.cast.side].rest(down, down + 0.9);
   }

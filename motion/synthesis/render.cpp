@@ -47,14 +47,18 @@ TorsoPose torso_at(const Performer& person, const Performer& partner, double t) 
   const double weight = person.gait.weight(t);
   const double walking = 0.02 * weight * weight;
   const Lean lean = {person.forward.at(t) + walking + kTrunkSway * person.sway[2].at(t),
-                     person.side.at(t) + kTrunkSway * person.sway[3].at(t), person.twist.at(t), 0.0,
-                     person.shift.at(t) + kStanceSway * person.sway[0].at(t)};
+                     person.side.at(t) + kTrunkSway * person.sway[3].at(t),
+                     person.twist.at(t),
+                     0.0,
+                     person.shift.at(t) + kStanceSway * person.sway[0].at(t),
+                     person.hips.at(t)};
   TorsoPose torso = standing_torso(person.body, root, lean, 0.0);
   const double aside = kWeightShift * weight + 1.5 * kStanceSway * person.sway[1].at(t);
   torso.pelvis.head<2>() += aside * Eigen::Vector2d(-std::sin(root.yaw), std::cos(root.yaw));
   torso.pelvis_roll = kPelvisDrop * weight;
-  torso.pelvis_yaw = -kPelvisTurn * left_ahead(person, t, root.yaw) + 0.01 * person.sway[4].at(t);
-  torso.twist -= kCounterTurn * torso.pelvis_yaw;
+  const double swing = -kPelvisTurn * left_ahead(person, t, root.yaw) + 0.01 * person.sway[4].at(t);
+  torso.pelvis_yaw += swing;
+  torso.twist -= kCounterTurn * swing;
   turn_head(person, partner, t, torso);
   return torso;
 }

@@ -14,6 +14,16 @@ double reach_ahead(const Body& body, int side, double z, double share, const Lea
   return shoulder.x() + std::sqrt(std::max(square, 0.0));
 }
 
+// From `from`, straight and with the hips turned as the manner has it: the hand gets to the point on the way, too.
+Lean lean_to_meet(const Cast& cast, int person, const Layout& layout, const Lean& from, double share) {
+  Lean lean = from;
+  for (const double hips : {0.0, -side_sign(cast.side) * cast.manner.turn[person]}) {
+    lean.hips = hips;
+    lean = lean_to_reach(cast.body[person], cast.side, seen_by(person, layout, layout.meet), lean, share);
+  }
+  return lean;
+}
+
 // On the line between the roots, which are then where the manner has them.
 void meet_between(const Cast& cast, double share_of_a, Layout& layout) {
   stand_at_bearings(cast, layout);
@@ -51,8 +61,7 @@ Layout meeting_layout(const Cast& cast, double z, double share, double nearest, 
   layout.distance = ahead[0] + ahead[1];
   layout.meet = {ahead[0], 0.0, z};
   if (!cast.manner.rehearsed) meet_between(cast, ahead[0] / layout.distance, layout);
-  for (const int k : {0, 1})
-    layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.93);
+  for (const int k : {0, 1}) layout.lean[k] = lean_to_meet(cast, k, layout, lean, 0.93);
   return layout;
 }
 
@@ -62,8 +71,7 @@ Layout meeting_at_distance(const Cast& cast, double z, double distance, const Le
   layout.distance = distance;
   layout.meet = {distance * cast.body[0].arm() / arms, 0.0, z};
   if (!cast.manner.rehearsed) meet_between(cast, cast.body[0].arm() / arms, layout);
-  for (const int k : {0, 1})
-    layout.lean[k] = lean_to_reach(cast.body[k], cast.side, seen_by(k, layout, layout.meet), lean, 0.96);
+  for (const int k : {0, 1}) layout.lean[k] = lean_to_meet(cast, k, layout, lean, 0.96);
   return layout;
 }
 

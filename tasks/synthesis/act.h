@@ -15,8 +15,9 @@ struct Manner {
   bool rehearsed = true;
   double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
   std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
-  // Of A and B: where each has the other in the act, from its own facing towards the acting hand. [rad]
-  std::array<double, 2> bearing = {0.0, 0.0};
+  // Of A and B: where each has the other when its feet stand for the act, from its own facing towards the acting hand,
+  // and by how much it then turns away from there, the hand forward. [rad]
+  std::array<double, 2> bearing = {0.0, 0.0}, turn = {0.0, 0.0};
 };
 
 // What recorded people do in an act. docs/synthesis.md says where each figure is from.
@@ -26,7 +27,8 @@ struct RecordedManner {
   Deciles touch = {};                   // of an act with a touch that lasts, its length as played [s]
   double until_touch = 0.0;             // from the act's begin to that touch, at tempo 1 [s]
   Deciles distance = {};                // of the roots in the act [m]; zeros: the layout's own
-  Deciles bearing = {-0.2, 0.0, 0.2};   // Manner::bearing, of either [rad]
+  Deciles bearing = {-0.2, 0.0, 0.2};   // of either: Manner::bearing, and Manner::turn more, in mid-act [rad]
+  Deciles turn = {};                    // Manner::turn, of either [rad]
   Deciles way = {0.0, 0.2, 0.5};        // that both together walk up to each other [m]
   Deciles speed = {0.45, 0.7, 1.0};     // in the middle of such a way [m/s]
   double stands = 0.35;                 // share of people who leave it to the other

@@ -27,6 +27,7 @@ TorsoPose standing_torso(const Body& body, const Placement& root, const Lean& le
   torso.yaw = root.yaw;
   const double ahead = lean.shift - kCounterweight * body.height * std::sin(lean.forward);
   torso.pelvis << root.position + ahead * Eigen::Vector2d(std::cos(root.yaw), std::sin(root.yaw)), height - lean.crouch;
+  torso.pelvis_yaw = lean.hips;
   torso.pelvis_pitch = kPelvisShare * lean.forward;
   torso.spine_bend = (1.0 - kPelvisShare) * lean.forward;
   torso.spine_side = lean.side;

@@ -16,13 +16,14 @@ struct Lean {
   double twist = 0.0;    // of the spine to the left [rad]
   double crouch = 0.0;   // of the pelvis below its standing height [m]
   double shift = 0.0;    // of the pelvis forward, feet planted [m]
+  double hips = 0.0;     // of the pelvis over the feet to the left, the trunk with it [rad]
 };
 
 struct Performer {
   Performer(const Body& a_body, const Placement& start, const Hold& hang)
       : body(a_body), gait(a_body, start), arms{ArmTrack(hang), ArmTrack(hang)} {}
 
-  // Moves every channel of the trunk at once.
+  // Moves every channel of the trunk at once, but for the hips.
   void lean_to(double begin, double end, const Lean& lean);
 
   Body body;
@@ -31,7 +32,7 @@ struct Performer {
   double reaction = 0.0;  // how much later than A this person begins things [s]
   double arm_swing = 0.7;
   bool meets_skin = false;  // hands stop at the partner's trunk and head
-  Channel forward, side, twist, crouch, shift;
+  Channel forward, side, twist, crouch, shift, hips;
   Channel look{1.0};  // 1: at the partner, 0: straight ahead
   Channel nod;        // of the head, forward [rad]
   std::array<ArmTrack, 2> arms;

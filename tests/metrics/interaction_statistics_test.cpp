@@ -83,6 +83,35 @@ TEST(InteractionStatistics, BearingIsToTheRightAndTurnHasNoSign) {
   }
 }
 
+// Of both, so that B's alone counts half: 0.4 rad to the left from the first frame to the middle of the touch.
+TEST(InteractionStatistics, HipsTurnUntilTheMiddleOfTheTouch) {
+  InteractionClip clip = facing_each_other(0.0, 0.0);
+  const InteractionClip turned = facing_each_other(0.0, 0.4);
+  EXPECT_NEAR(interaction_statistics(clip).turned_hips, 0.0, 1e-9);
+  for (const int joint : {kLeftHip, kRightHip}) clip.b.joints.at(44, joint) = turned.b.joints.at(44, joint);
+  EXPECT_NEAR(interaction_statistics(clip).turned_hips, 0.2 * 180.0 / std::numbers::pi, 1e-9);
+  for (const int joint : {kLeftHip, kRightHip}) clip.b.joints.at(0, joint) = turned.b.joints.at(0, joint);
+  EXPECT_NEAR(interaction_statistics(clip).turned_hips, 0.0, 1e-9);
+}
+
+// Of one ankle in four, and of one neck in two.
+TEST(InteractionStatistics, FeetAndNecksAreThereWhereTheyAreMostly) {
+  InteractionClip clip = meeting(20, 70);
+  for (int t = 0; t < clip.frames(); ++t)
+    for (HumanMotion* person : {&clip.a, &clip.b})
+      for (const auto& [ankle, hip] : {std::pair(kLeftAnkle, kLeftHip), std::pair(kRightAnkle, kRightHip)})
+        person->joints.at(t, ankle) = person->joints.at(t, hip) - Eigen::Vector3d(0.0, 0.0, 0.9);
+  const InteractionStatistics before = interaction_statistics(clip);
+  EXPECT_NEAR(before.feet_aside, 0.0, 1e-9);
+  for (int t = 0; t < clip.frames(); ++t) {
+    if (t > 5) clip.a.joints.at(t, kLeftAnkle) += Eigen::Vector3d(0.3, 0.4, 0.1);  // level; not in the first frames
+    clip.b.joints.at(t, kNeck).z() += 0.1;
+  }
+  const InteractionStatistics after = interaction_statistics(clip);
+  EXPECT_NEAR(after.feet_aside, 0.25 * 0.5, 1e-9);
+  EXPECT_NEAR(after.neck_height - before.neck_height, 0.05, 1e-9);
+}
+
 TEST(InteractionStatistics, HandsTouchBelowTheirThresholdOnly) {
   InteractionClip clip = meeting(20, 70);
   for (int t = 20; t < 70; ++t) clip.b.joints.at(t, kRightHand).x() = 0.45 + kHandsTouch + 1e-9;
