@@ -189,10 +189,63 @@ TEST(Windows, WithTheSameRandomNumbersAreTheSameBits) {
   EXPECT_NE(one.batch.frames, other.batch.frames);
 }
 
+// The partner's joint beside where the demonstration has it, in each frame of a window.
+std::vector<double> beside(const WindowBatch& batch, const WindowBatch& plain, int column, int joint) {
+  std::vector<double> distances;
+  for (int i = 0; i < kHistoryFrames; ++i) {
+    const int at = kFrameSize * i + 3 + 3 * joint;
+    distances.push_back((batch.frames.col(column).segment<3>(at) - plain.frames.col(column).segment<3>(at)).norm());
+  }
+  return distances;
+}
+
+// As long as somebody waits: all joints but the pelvis stay beside their places; hands come back in the act, not
+// before.
+TEST(Windows, OfAMisplacedPartnerKeepItsHandsOnceTheActHasBegun) {
+  WindowOptions options = {.stride = 1,
+                           .root = 0.0,
+                           .heading = 0.0,
+                           .tilt = 0.0,
+                           .astray = 0.0,
+                           .turned = 0.0,
+                           .joints = 0.0,
+                           .rates = 0.0,
+                           .jitter = 0.0,
+                           .dropout = 0.0};
+  const DemonstrationSet set = made_set(*test::g1());
+  const int begin = set.list[0].phases.act_begin;
+  WindowOptions plain_options = options;
+  plain_options.augment = false;
+  WindowMaker maker(test::g1(), set, options), plain_maker(test::g1(), set, plain_options);
+  WindowBatch batch, plain;
+  batch.resize(60);
+  plain.resize(60);
+  int misplaced = 0;
+  for (int i = 0; i < 60; ++i) {
+    const int frame = i % 2 == 0 ? begin - 1 : begin + 40;
+    Random random(5, static_cast<std::uint64_t>(i)), other(5, static_cast<std::uint64_t>(i));
+    maker.make({0, frame}, random, batch, i);
+    plain_maker.make({0, frame}, other, plain, i);
+    const std::vector<double> ankle = beside(batch, plain, i, kLeftAnkle), hand = beside(batch, plain, i, kRightHand);
+    EXPECT_NEAR(*std::ranges::max_element(ankle), *std::ranges::min_element(ankle), 1e-5);
+    if (ankle.front() == 0.0) continue;
+    ++misplaced;
+    EXPECT_LT(ankle.front(), 1.0);
+    if (i % 2 == 0) {
+      EXPECT_GT(hand.back(), 1e-4);
+      EXPECT_NEAR(hand.front(), hand.back(), 1e-5);
+    } else {
+      EXPECT_NEAR(hand.back(), 0.0, 1e-5);
+    }
+  }
+  EXPECT_GT(misplaced, 25);  // two of three
+  EXPECT_LT(misplaced, 55);
+}
+
 TEST(Windows, OfADisplacedRobotLeadBackToTheDemonstration) {
   WindowOptions options;
   options.stride = 1;  // no shift in time
-  options.jitter = options.dropout = 0.0;
+  options.jitter = options.dropout = options.misplaced = 0.0;
   const DemonstrationSet set = made_set(*test::g1());
   WindowMaker maker(test::g1(), set, options);
   WindowBatch batch;

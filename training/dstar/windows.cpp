@@ -13,6 +13,48 @@ namespace {
 constexpr int kStatisticsWindows = 4000;
 constexpr float kLeastWindowDeviation = 0.01F;
 
+// Where a tracker has joints and a body model does not, for as long as it looks: deviations of a joint against the one
+// that carries it, level and upright, found on the waiting people of SBU beside their synthetic twins. Its legs swing
+// about, its neck is a shoulder's height; elbows and hands of people who wait are before them. [m]
+struct Misplaced {
+  SmplJoint joint;
+  double level, upright;
+};
+constexpr std::array<Misplaced, 15> kMisplaced = {{{kLeftKnee, 0.08, 0.03},
+                                                   {kRightKnee, 0.08, 0.03},
+                                                   {kLeftAnkle, 0.12, 0.06},
+                                                   {kRightAnkle, 0.12, 0.06},
+                                                   {kLeftToe, 0.03, 0.02},
+                                                   {kRightToe, 0.03, 0.02},
+                                                   {kSpine1, 0.01, 0.02},
+                                                   {kSpine2, 0.01, 0.03},
+                                                   {kSpine3, 0.01, 0.04},
+                                                   {kNeck, 0.03, 0.06},
+                                                   {kHead, 0.03, 0.06},
+                                                   {kLeftCollar, 0.01, 0.02},
+                                                   {kRightCollar, 0.01, 0.02},
+                                                   {kLeftShoulder, 0.03, 0.03},
+                                                   {kRightShoulder, 0.03, 0.03}}};
+constexpr std::array<Misplaced, 6> kMisplacedWaiting = {{{kLeftElbow, 0.08, 0.05},
+                                                         {kRightElbow, 0.08, 0.05},
+                                                         {kLeftWrist, 0.08, 0.09},
+                                                         {kRightWrist, 0.08, 0.09},
+                                                         {kLeftHand, 0.04, 0.04},
+                                                         {kRightHand, 0.04, 0.04}}};
+constexpr int kArmsSettle = 25;  // frames of the act until the hands are where they are
+
+using Offsets = Eigen::Matrix<double, 3, kSmplJoints>;
+
+// Parents first, so that what is carried goes along.
+template <std::size_t kCount>
+void add_offsets(const std::array<Misplaced, kCount>& joints, double scale, Random& random, Offsets& offsets) {
+  for (const Misplaced& it : joints) {
+    offsets.col(it.joint) = offsets.col(kSmplParents[it.joint]);
+    for (int axis = 0; axis < 3; ++axis)
+      offsets(axis, it.joint) += scale * (axis == 2 ? it.upright : it.level) * random.normal();
+  }
+}
+
 int clamped(const Demonstration& entry, int frame) { return entry.begin + std::clamp(frame, 0, entry.frames - 1); }
 
 // Moves a state about a point on the ground.
@@ -92,8 +134,27 @@ void WindowMaker::look(const Demonstration& entry, int frame, Random& random) {
     past_[i] = seen((kHistoryFrames - 1 - i) * options_.long_stride);
   }
   if (!options_.augment) return;
+  misplace(entry, frame, random);
   blur(random);
   displace(random);
+}
+
+// The partner as another tracker has people: each joint beside its place in all frames, arms until the act has begun.
+// Nothing of it may tell that the act is about to begin, so that arms come to their places after it.
+void WindowMaker::misplace(const Demonstration& entry, int frame, Random& random) {
+  if (!random.chance(2.0 / 3.0)) return;
+  const double scale = random.uniform(0.0, options_.misplaced);
+  Offsets always = Offsets::Zero(), waiting = Offsets::Zero();
+  add_offsets(kMisplaced, scale, random, always);
+  add_offsets(kMisplacedWaiting, scale, random, waiting);
+  const auto put = [&](ObservationFrame& seen, int at) {
+    const double share = std::clamp(1.0 - static_cast<double>(at - entry.phases.act_begin) / kArmsSettle, 0.0, 1.0);
+    seen.partner += always + share * waiting;
+  };
+  for (int i = 0; i < kHistoryFrames; ++i) {
+    put(history_[i], frame - (kHistoryFrames - 1 - i));
+    put(past_[i], frame - (kHistoryFrames - 1 - i) * options_.long_stride);
+  }
 }
 
 // The partner through a camera: joints that jitter, joints that keep their last place.

@@ -14,17 +14,18 @@
 namespace duet {
 
 struct WindowOptions {
-  int stride = 25;        // of windows in an epoch; each is moved by up to it at random
-  double root = 0.06;     // deviation of the robot's place [m]; of two windows in three
-  double heading = 0.08;  // [rad]
-  double tilt = 0.05;     // of its roll and pitch [rad]: what it leans is not what it means
-  double astray = 0.8;    // the robot up to so far from where it should be [m]; of every fourth window
-  double turned = 0.5;    // and turned by so much [rad]
-  double joints = 0.03;   // of all joints at once, and a fifth of it per frame [rad]
-  double rates = 0.15;    // of joint rates [rad/s]
-  double jitter = 0.04;   // largest deviation of the partner's joints [m]; of every second window
-  double dropout = 0.2;   // largest share of joints that are not seen; of every third window
-  int long_stride = 1;    // of the network's configuration
+  int stride = 25;         // of windows in an epoch; each is moved by up to it at random
+  double root = 0.06;      // deviation of the robot's place [m]; of two windows in three
+  double heading = 0.08;   // [rad]
+  double tilt = 0.05;      // of its roll and pitch [rad]: what it leans is not what it means
+  double astray = 0.8;     // the robot up to so far from where it should be [m]; of every fourth window
+  double turned = 0.5;     // and turned by so much [rad]
+  double joints = 0.03;    // of all joints at once, and a fifth of it per frame [rad]
+  double rates = 0.15;     // of joint rates [rad/s]
+  double jitter = 0.04;    // largest deviation of the partner's joints [m]; of every second window
+  double misplaced = 1.3;  // largest share of what a tracker misplaces joints by (windows.cpp); of two windows in three
+  double dropout = 0.2;    // largest share of joints that are not seen; of every third window
+  int long_stride = 1;     // of the network's configuration
   bool augment = true;
   // A robot that has gone astray is not asked to be back at once: the root of anchor k is at most so far from it.
   // It leads no faster than WBC-Sim follows.
@@ -65,6 +66,7 @@ class WindowMaker {
 
  private:
   void look(const Demonstration& entry, int frame, Random& random);
+  void misplace(const Demonstration& entry, int frame, Random& random);
   void blur(Random& random);
   void displace(Random& random);
 
