@@ -198,7 +198,7 @@ TEST(RobotMotionBadInput, ArchivesWithoutFramesAreRefused) {
     if (name != "x.npz") continue;
     Npz npz = Npz::parse(bytes, name);
     for (const std::string& key : npz.keys()) {
-      NpzArray array = npz.array(key);
+      NpyArray array = npz.array(key);
       if (array.shape.size() < 2) continue;
       array.shape.front() = 0;
       std::visit([](auto& values) { values.clear(); }, array.values);
