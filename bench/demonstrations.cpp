@@ -120,12 +120,18 @@ bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& p
   return true;
 }
 
+// By name also where it is the controller's default; "" of a controller that has none.
+std::string controller_network_of(const DemonstrationOptions& options) {
+  if (!options.controller_network.empty()) return options.controller_network;
+  for (const ControllerOption& option : controller_info(options.controller).options)
+    if (option.name == "network") return option.fallback;
+  return "";
+}
+
 }  // namespace
 
 std::string origin_of(const DemonstrationOptions& options) {
-  std::string clips, network = options.controller_network;
-  for (const ControllerOption& option : controller_info(options.controller).options)
-    if (network.empty() && option.name == "network") network = option.fallback;
+  std::string clips;
   for (const auto& [like, per_task] : options.clips)
     clips += fmt::format("{}{}{}{}", clips.empty() ? "" : " and ", per_task, clips.empty() ? " clips of each task" : "",
                          like == Likeness::kPeople ? " like people" : "");
@@ -133,6 +139,7 @@ std::string origin_of(const DemonstrationOptions& options) {
                        options.starts, options.starts == 1 ? "" : "s",
                        options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
   if (options.engine.empty()) return clips + ", none followed";
+  const std::string network = controller_network_of(options);
   return fmt::format("{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine,
                      options.controller, network.empty() ? "" : fmt::format(" ({})", network), options.policy);
 }

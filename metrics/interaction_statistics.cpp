@@ -86,7 +86,7 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   const ActSignal signal = definition_of(clip.task).phases.act;
   const bool hands = signal == ActSignal::kHandsTogether, embrace = signal == ActSignal::kHandAtChest;
   int first = -1, last = -1, count = 0, right = 0;
-  double height = 0.0, hips = 0.0;
+  double height = 0.0;
   for (int t = 0; t < clip.frames(); ++t) {
     const Nearest nearest = embrace ? nearest_embrace(people, t) : nearest_hands(people, t);
     const bool in_act = t >= clip.phases.act_begin && t < clip.phases.act_end;
@@ -107,9 +107,9 @@ void add_touch(const InteractionClip& clip, const People& people, InteractionSta
   result.touch_distance = root_distance(people, first);
   result.touch_bearing =
       0.5 * (bearing_of_other(*people[0], *people[1], first) + bearing_of_other(*people[1], *people[0], first));
+  result.turned_hips = 0.0;
   for (const HumanMotion* person : people)
-    hips += 0.5 * turned(facing(*person, (first + last) / 2) - facing(*person, 0));
-  result.turned_hips = hips;
+    result.turned_hips += 0.5 * turned(facing(*person, (first + last) / 2) - facing(*person, 0));
   result.touch_turn = std::abs(turned(facing(*people[0], first) - facing(*people[1], first) + std::numbers::pi));
   if (!hands && !embrace) return;
   result.touch_height = height / count;

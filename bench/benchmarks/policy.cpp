@@ -3,7 +3,7 @@
 #include "duet/bench/benchmarks/timer.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
-#include "duet/core/share.h"
+#include "duet/policies/dstar/dstar_policy.h"
 #include "duet/policies/dstar/random_network.h"
 
 namespace duet {
@@ -12,7 +12,7 @@ namespace {
 // The network that ships; where there is none, one of random weights and the same size: it takes the same time.
 std::shared_ptr<const DstarNetwork> benchmark_network(const RobotModel& robot) {
   try {
-    return load_dstar_network(share_file("network of D-STAR", "policies/dstar/dstar_braced.safetensors"), robot);
+    return load_dstar_network(dstar_files("dstar", {}).front().path, robot);
   } catch (const MissingError&) {
     return std::make_shared<const DstarNetwork>(random_dstar_network({}, robot, 1));
   }

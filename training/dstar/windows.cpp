@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "duet/core/skeleton.h"
 #include "duet/policies/language.h"
@@ -46,8 +47,7 @@ constexpr int kArmsSettle = 25;  // frames of the act until the hands are where 
 using Offsets = Eigen::Matrix<double, 3, kSmplJoints>;
 
 // Parents first, so that what is carried goes along.
-template <std::size_t kCount>
-void add_offsets(const std::array<Misplaced, kCount>& joints, double scale, Random& random, Offsets& offsets) {
+void add_offsets(std::span<const Misplaced> joints, double scale, Random& random, Offsets& offsets) {
   for (const Misplaced& it : joints) {
     offsets.col(it.joint) = offsets.col(kSmplParents[it.joint]);
     for (int axis = 0; axis < 3; ++axis)
