@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "duet/core/require.h"
 
@@ -37,6 +38,26 @@ double quantile(std::vector<double> values, double p) {
   std::nth_element(values.begin(), below, values.end());
   const double above = below + 1 == values.end() ? *below : *std::min_element(below + 1, values.end());
   return *below + (place - std::floor(place)) * (above - *below);
+}
+
+double weighted_median(std::span<const double> values, std::span<const double> weights) {
+  require(
+      values.size() == weights.size(),
+      fmt::format("weighted median: expected one weight per value, found {} for {}", weights.size(), values.size()));
+  require(std::ranges::all_of(weights, [](double weight) { return weight >= 0.0; }),
+          "weighted median: expected weights of at least 0");
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::erase_if(order, [&](std::size_t i) { return weights[i] == 0.0; });
+  std::ranges::sort(order, {}, [&](std::size_t i) { return values[i]; });
+  const double half = 0.5 * std::accumulate(weights.begin(), weights.end(), 0.0);
+  double below = 0.0;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    below += weights[order[i]];
+    if (below > half) return values[order[i]];
+    if (below == half) return 0.5 * (values[order[i]] + values[order[i + 1]]);
+  }
+  return kUndefined;
 }
 
 RankAgreement kendall(std::span<const double> a, std::span<const double> b) {

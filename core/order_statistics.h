@@ -11,6 +11,11 @@ namespace duet {
 double quantile_of_sorted(std::span<const double> sorted, double p);
 double quantile(std::vector<double> values, double p);
 
+// The value below and above which the weights sum to the same, the mean of two where half ends between them. NaN for no
+// weight. Of ratios y / x weighted by |x| it is the slope through the origin with the least absolute deviations of y.
+// Throws std::invalid_argument for unequal lengths and for negative weights.
+double weighted_median(std::span<const double> values, std::span<const double> weights);
+
 struct RankAgreement {
   long pairs = 0, concordant = 0, discordant = 0;  // of items; a pair tied in a or b is neither
   double tau_b = 0.0;                              // NaN where all of a or all of b are tied, or items are fewer than 2

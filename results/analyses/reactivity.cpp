@@ -12,6 +12,7 @@
 namespace duet {
 namespace {
 
+constexpr const char* kAllTasks = "all";
 constexpr double kNoReaction = std::numeric_limits<double>::quiet_NaN();
 
 struct Onsets {
@@ -32,6 +33,7 @@ Onsets onsets_of(const EpisodeRow& row) {
 // What is gathered of one policy before its figures are computed.
 struct GatheredShifts {
   std::vector<double> products, squares;  // robot's times partner's shift, partner's squared
+  std::vector<double> ratios, sizes;      // robot's over partner's shift, size of the partner's
   std::vector<int> clips;
   ClipNumbers numbers;
   std::vector<double> delays;
@@ -40,6 +42,8 @@ struct GatheredShifts {
   void add(const EpisodeId& id, double robot, double partner) {
     products.push_back(robot * partner);
     squares.push_back(partner * partner);
+    ratios.push_back(robot / partner);
+    sizes.push_back(std::abs(partner));
     clips.push_back(numbers.of(id));
   }
 };
@@ -77,17 +81,19 @@ double sum(const std::vector<double>& values) {
   return total;
 }
 
-std::vector<double> clean_delays(const EpisodeRows& rows) {
+std::vector<double> delays_of(const EpisodeRows& rows) {
   std::vector<double> delays;
   for (const auto& [id, row] : rows)
     if (const Onsets onsets = onsets_of(*row); onsets.both()) delays.push_back(onsets.delay());
   return delays;
 }
 
-Reactivity timing_of(const PolicyKey& key, const PerturbedRows& rows, ClusterBootstrap& bootstrap, double level) {
+Reactivity timing_of(const PolicyKey& key, const std::string& task, const PerturbedRows& rows,
+                     ClusterBootstrap& bootstrap, double level) {
   const EpisodeRows& clean = rows.find(kClean)->second;
   Reactivity of;
   of.key = key;
+  of.task = task;
   GatheredShifts gathered;
   for (const auto& [perturbation, episodes] : rows) {
     if (perturbation == kClean) continue;
@@ -99,14 +105,25 @@ Reactivity timing_of(const PolicyKey& key, const PerturbedRows& rows, ClusterBoo
   of.n = static_cast<long>(gathered.products.size());
   of.without = gathered.without;
   of.slope = of.n > 0 ? sum(gathered.products) / sum(gathered.squares) : kNoReaction;
-  of.interval = gathered.numbers.size() > 1
-                    ? bootstrap.ratio(gathered.products, gathered.squares, gathered.clips, level)
-                    : Interval{.low = kNoReaction, .high = kNoReaction};
-  std::vector<double> delays = clean_delays(clean);
+  of.median_slope = weighted_median(gathered.ratios, gathered.sizes);
+  const bool several = gathered.numbers.size() > 1;
+  of.interval = several ? bootstrap.ratio(gathered.products, gathered.squares, gathered.clips, level) : kNoInterval;
+  of.median_interval =
+      several ? bootstrap.weighted_median(gathered.ratios, gathered.sizes, gathered.clips, level) : kNoInterval;
+  std::vector<double> delays = delays_of(clean);
   of.n_clean = static_cast<long>(delays.size());
   of.delay_clean = quantile(std::move(delays), 0.5);
   of.delay_moved = quantile(std::move(gathered.delays), 0.5);
   return of;
+}
+
+// By task, in their order.
+std::map<std::pair<int, std::string>, PerturbedRows> by_task(const PerturbedRows& rows) {
+  std::map<std::pair<int, std::string>, PerturbedRows> tasks;
+  for (const auto& [perturbation, episodes] : rows)
+    for (const auto& [id, row] : episodes) tasks[{task_rank(id.task), id.task}][perturbation].emplace(id, row);
+  std::erase_if(tasks, [](const auto& task) { return !task.second.contains(kClean); });
+  return tasks;
 }
 
 std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& rows, double level) {
@@ -128,20 +145,23 @@ std::string seconds(double value) { return std::isfinite(value) ? fmt::format("{
 
 TitledTable timing_table(const ReactivityTable& table) {
   TitledTable titled = labelled_table("Reactivity: when the robot acts", labels_of(table.timing));
-  titled.table.header.insert(titled.table.header.end(),
-                             {"n", "Did not act", "Slope", "Delay, clean [s]", "Delay, partner moved [s]"});
+  titled.table.header.insert(titled.table.header.end(), {"Task", "n", "Did not act", "Slope", "Median slope",
+                                                         "Delay, clean [s]", "Delay, partner moved [s]"});
+  ++titled.table.label_columns;
   for (std::size_t i = 0; i < table.timing.size(); ++i) {
     const Reactivity& of = table.timing[i];
-    titled.table.rows[i].insert(titled.table.rows[i].end(),
-                                {count_cell(of.n), count_cell(of.without), decimals(of.slope, of.interval, 2),
-                                 seconds(of.delay_clean), seconds(of.delay_moved)});
+    titled.table.rows[i].insert(
+        titled.table.rows[i].end(),
+        {task_title(of.task), count_cell(of.n), count_cell(of.without), decimals(of.slope, of.interval, 2),
+         decimals(of.median_slope, of.median_interval, 2), seconds(of.delay_clean), seconds(of.delay_moved)});
   }
   titled.notes = {fmt::format(
       "n: perturbed episodes whose partner's onset is {:g} s or more from that of the same episode clean. Slope: of "
-      "the "
-      "robot's onset shift over the partner's, least squares through the origin, with a {:g} % interval, clips drawn "
-      "again; 1 follows its partner, 0 plays its clip. Delay: median of the robot's onset minus its partner's. Did not "
-      "act: of such episodes, those without an onset of the robot, here or clean; they are in no slope.",
+      "the robot's onset shift over the partner's, least squares through the origin, with a {:g} % interval, clips "
+      "drawn again; 1 follows its partner, 0 plays its clip. Median slope: the least absolute deviations, what most "
+      "episodes do: an arm that swings with the steps can pass for an onset. Delay: median of the robot's onset minus "
+      "its partner's; replay's is that of the demonstrations. Did not act: of such episodes, those without an onset of "
+      "the robot, here or clean; they are in no slope.",
       kPartnerShift, 100.0 * table.level)};
   return titled;
 }
@@ -172,7 +192,7 @@ TitledTable spatial_table(const ReactivityTable& table) {
 std::vector<LinePlot> reactivity_plots(const ReactivityTable& table) {
   std::map<std::pair<std::string, std::string>, LinePlot> plots;
   for (const Reactivity& of : table.timing) {
-    if (of.shifts.empty()) continue;
+    if (of.shifts.empty() || of.task != kAllTasks) continue;
     LinePlot& plot = plots[{of.key.engine, of.key.controller}];
     plot.title = fmt::format("Onset shifts: {} in {}", of.key.controller, of.key.engine);
     plot.x_label = "shift of the partner's onset [s]";
@@ -192,8 +212,9 @@ std::vector<LinePlot> reactivity_plots(const ReactivityTable& table) {
 
 void add_timing_figures(const Reactivity& of, std::vector<Figure>& into) {
   FiguresOf figures = figures_of(of.key, into);
-  figures.keys.task = "all";
+  figures.keys.task = of.task;
   figures.add("slope", of.n, of.slope, of.interval);
+  figures.add("median_slope", of.n, of.median_slope, of.median_interval);
   figures.count("did_not_act", of.n + of.without, of.without);
   figures.add("delay_clean", of.n_clean, of.delay_clean, kNoInterval, "s");
   figures.add("delay_moved", of.n, of.delay_moved, kNoInterval, "s");
@@ -241,8 +262,14 @@ ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const Inte
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
     const auto clean = perturbed.find(kClean);
     if (clean == perturbed.end()) continue;
-    Reactivity timing = timing_of(key, perturbed, bootstrap, options.level);
-    if (timing.n + timing.without > 0) table.timing.push_back(std::move(timing));
+    const auto add = [&](const std::string& task, const PerturbedRows& of) {
+      Reactivity timing = timing_of(key, task, of, bootstrap, options.level);
+      if (timing.n + timing.without > 0) table.timing.push_back(std::move(timing));
+    };
+    add(kAllTasks, perturbed);
+    const auto tasks = by_task(perturbed);
+    if (tasks.size() > 1)
+      for (const auto& [task, of] : tasks) add(task.second, of);
     for (SpatialCells& cells : spatial_of(key, clean->second, options.level)) table.spatial.push_back(std::move(cells));
   }
   return table;

@@ -25,10 +25,15 @@ struct OnsetShift {
 
 struct Reactivity {
   PolicyKey key;
+  std::string task;    // "all" or one
   long n = 0;          // episodes with a moved partner in which both onsets are known, perturbed and clean
   long without = 0;    // with a moved partner in which the robot's is not: it did not act
   double slope = 0.0;  // of robot's over partner's shift, through the origin: 1 follows, 0 plays its clip. NaN: n = 0
   Interval interval;   // bootstrap over clips; NaN for fewer than two
+  // The same with the least absolute deviations: what most episodes do. An arm that swings with the steps can pass for
+  // an onset, in a few episodes, and pulls the squares.
+  double median_slope = 0.0;
+  Interval median_interval;
   double delay_clean = 0.0, delay_moved = 0.0;  // median of robot's minus partner's onset [s]; NaN: none
   long n_clean = 0;                             // clean episodes with both onsets
   std::vector<OnsetShift> shifts;               // by partner's shift
@@ -51,7 +56,8 @@ inline constexpr std::array<SpatialCell, 4> kSpatialCells = {{{"left_high", "Lef
 
 struct ReactivityTable {
   double level = 0.95;
-  std::vector<Reactivity> timing;     // empty: no perturbation moved a partner's onset
+  // Of each policy all tasks and, where there are several, each. Empty: no perturbation moved a partner's onset.
+  std::vector<Reactivity> timing;
   std::vector<SpatialCells> spatial;  // empty: no clip names a variant
 
   [[nodiscard]] bool empty() const { return timing.empty() && spatial.empty(); }

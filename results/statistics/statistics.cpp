@@ -45,22 +45,28 @@ double square_and_add(double left, double right, double correlation) {
   return std::sqrt(std::max(left * left - 2.0 * correlation * left * right + right * right, 0.0));
 }
 
-struct Cluster {
-  double above = 0.0, below = 0.0;
-};
-
 // In the order of first appearance, so that the numbers that name clusters do not matter.
-std::vector<Cluster> clusters_of(std::span<const double> above, std::span<const double> below,
-                                 std::span<const int> ids) {
-  std::vector<Cluster> clusters;
-  std::map<int, std::size_t> place;
-  for (std::size_t i = 0; i < above.size(); ++i) {
-    const auto [found, is_new] = place.try_emplace(ids[i], clusters.size());
-    if (is_new) clusters.emplace_back();
-    clusters[found->second].above += above[i];
-    clusters[found->second].below += below[i];
-  }
-  return clusters;
+struct ClusterPlaces {
+  std::vector<std::size_t> of;  // value -> cluster
+  std::size_t clusters = 0;
+};
+ClusterPlaces places_of(std::span<const int> ids) {
+  ClusterPlaces places;
+  std::map<int, std::size_t> known;
+  for (const int id : ids) places.of.push_back(known.try_emplace(id, known.size()).first->second);
+  places.clusters = known.size();
+  return places;
+}
+
+void require_samples(std::span<const double> values, std::span<const double> positive, std::span<const int> cluster,
+                     const char* what) {
+  require(!values.empty(), "bootstrap: expected at least one value, found none");
+  require(values.size() == cluster.size(),
+          fmt::format("bootstrap: expected one cluster per value, found {} for {}", cluster.size(), values.size()));
+  require(positive.size() == values.size(),
+          fmt::format("bootstrap: expected one {} per value, found {} for {}", what, positive.size(), values.size()));
+  require(std::ranges::all_of(positive, [](double value) { return value > 0.0; }),
+          fmt::format("bootstrap: expected {}s above 0", what));
 }
 
 struct PowerQuantiles {
@@ -179,30 +185,52 @@ Interval ClusterBootstrap::mean(std::span<const double> values, std::span<const 
   return ratio(values, std::vector<double>(values.size(), 1.0), cluster, level);
 }
 
+template <typename Statistic>
+Interval ClusterBootstrap::percentiles(int clusters, double level, const Statistic& statistic) {
+  require_level(level);
+  std::span<const int> drawn = draws(clusters);
+  std::vector<double> found(static_cast<std::size_t>(resamples_));
+  for (double& value : found) {
+    value = statistic(drawn.first(static_cast<std::size_t>(clusters)));
+    drawn = drawn.subspan(static_cast<std::size_t>(clusters));
+  }
+  std::ranges::sort(found);
+  return {.low = quantile_of_sorted(found, 0.5 - 0.5 * level), .high = quantile_of_sorted(found, 0.5 + 0.5 * level)};
+}
+
 Interval ClusterBootstrap::ratio(std::span<const double> above, std::span<const double> below,
                                  std::span<const int> cluster, double level) {
-  require(!above.empty(), "bootstrap: expected at least one value, found none");
-  require(above.size() == cluster.size(),
-          fmt::format("bootstrap: expected one cluster per value, found {} for {}", cluster.size(), above.size()));
-  require(below.size() == above.size(),
-          fmt::format("bootstrap: expected one divisor per value, found {} for {}", below.size(), above.size()));
-  require(std::all_of(below.begin(), below.end(), [](double divisor) { return divisor > 0.0; }),
-          "bootstrap: expected divisors above 0");
-  require_level(level);
-  const std::vector<Cluster> clusters = clusters_of(above, below, cluster);
-  const std::vector<int>& drawn = draws(static_cast<int>(clusters.size()));
-  auto draw = drawn.begin();
-  std::vector<double> ratios(resamples_);
-  for (double& value : ratios) {
-    Cluster total;
-    for (std::size_t i = 0; i < clusters.size(); ++i, ++draw) {
-      total.above += clusters[*draw].above;
-      total.below += clusters[*draw].below;
-    }
-    value = total.above / total.below;
+  require_samples(above, below, cluster, "divisor");
+  const ClusterPlaces places = places_of(cluster);
+  struct Sums {
+    double above = 0.0, below = 0.0;
+  };
+  std::vector<Sums> sums(places.clusters);
+  for (std::size_t i = 0; i < above.size(); ++i) {
+    sums[places.of[i]].above += above[i];
+    sums[places.of[i]].below += below[i];
   }
-  std::sort(ratios.begin(), ratios.end());
-  return {.low = quantile_of_sorted(ratios, 0.5 - 0.5 * level), .high = quantile_of_sorted(ratios, 0.5 + 0.5 * level)};
+  return percentiles(static_cast<int>(places.clusters), level, [&](std::span<const int> drawn) {
+    Sums total;
+    for (const int number : drawn) {
+      total.above += sums[static_cast<std::size_t>(number)].above;
+      total.below += sums[static_cast<std::size_t>(number)].below;
+    }
+    return total.above / total.below;
+  });
+}
+
+Interval ClusterBootstrap::weighted_median(std::span<const double> values, std::span<const double> weights,
+                                           std::span<const int> cluster, double level) {
+  require_samples(values, weights, cluster, "weight");
+  const ClusterPlaces places = places_of(cluster);
+  std::vector<double> times(places.clusters), drawn_weights(values.size());
+  return percentiles(static_cast<int>(places.clusters), level, [&](std::span<const int> drawn) {
+    std::ranges::fill(times, 0.0);
+    for (const int number : drawn) times[static_cast<std::size_t>(number)] += 1.0;
+    for (std::size_t i = 0; i < values.size(); ++i) drawn_weights[i] = times[places.of[i]] * weights[i];
+    return duet::weighted_median(values, drawn_weights);
+  });
 }
 
 std::vector<double> holm(std::span<const double> p_values) {

@@ -53,9 +53,15 @@ class ClusterBootstrap {
   // std::invalid_argument where a value of `below` is not above 0.
   Interval ratio(std::span<const double> above, std::span<const double> below, std::span<const int> cluster,
                  double level = 0.95);
+  // Of the weighted median. Throws std::invalid_argument where a weight is not above 0.
+  Interval weighted_median(std::span<const double> values, std::span<const double> weights,
+                           std::span<const int> cluster, double level = 0.95);
 
  private:
   const std::vector<int>& draws(int clusters);
+  // Percentile interval of statistic(std::span<const int>) over the resamples: the clusters drawn, by number.
+  template <typename Statistic>
+  Interval percentiles(int clusters, double level, const Statistic& statistic);
 
   int resamples_;
   std::uint64_t seed_;

@@ -64,6 +64,43 @@ TEST(Kendall, IsNotDefinedForOneItemOrTiesThroughout) {
               HasSubstr("as many values in both, found 1 and 0"));
 }
 
+double weighted_median_of(const std::vector<double>& values, const std::vector<double>& weights) {
+  return weighted_median(values, weights);
+}
+
+TEST(WeightedMedian, HasHalfOfTheWeightOnEitherSide) {
+  EXPECT_EQ(weighted_median_of({3.0, 1.0, 2.0}, {1.0, 1.0, 1.0}), 2.0);
+  EXPECT_EQ(weighted_median_of({3.0, 1.0, 2.0}, {5.0, 1.0, 1.0}), 3.0);
+  EXPECT_EQ(weighted_median_of({1.0, 4.0}, {1.0, 1.0}), 2.5);
+  EXPECT_EQ(weighted_median_of({4.0, 1.0, 9.0, 2.0}, {1.0, 2.0, 0.0, 1.0}), 1.5);  // nobody has the weight of 9
+  EXPECT_TRUE(std::isnan(weighted_median_of({}, {})));
+  EXPECT_TRUE(std::isnan(weighted_median_of({1.0}, {0.0})));
+}
+
+TEST(WeightedMedian, OfRatiosIsTheLineOfLeastAbsoluteDeviations) {
+  const std::vector<double> x = {1.0, -0.5, 2.0, 1.5, -1.0}, y = {0.9, -0.6, 0.2, 1.6, -0.7};
+  const auto deviations = [&](double slope) {
+    double total = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) total += std::abs(y[i] - slope * x[i]);
+    return total;
+  };
+  std::vector<double> ratios, sizes;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    ratios.push_back(y[i] / x[i]);
+    sizes.push_back(std::abs(x[i]));
+  }
+  const double slope = weighted_median(ratios, sizes);
+  for (const double other : ratios) EXPECT_LE(deviations(slope), deviations(other)) << other;
+}
+
+TEST(WeightedMedian, RefusesWrongWeights) {
+  const auto message = [](const std::vector<double>& weights) {
+    return thrown_message<std::invalid_argument>([&] { weighted_median_of({1.0, 2.0}, weights); });
+  };
+  EXPECT_THAT(message({1.0}), HasSubstr("expected one weight per value, found 1 for 2"));
+  EXPECT_THAT(message({1.0, -1.0}), HasSubstr("expected weights of at least 0"));
+}
+
 // Weeks of remission, Freireich et al. 1963, the example of most textbooks.
 std::vector<Lifetime> remission() {
   std::vector<Lifetime> weeks;

@@ -72,6 +72,33 @@ TEST(Reactivity, SlopeIsLeastSquaresThroughTheOrigin) {
   EXPECT_NEAR(of.shifts[1].robot, 1.0, 1e-12);
 }
 
+TEST(Reactivity, MedianSlopeIsThatOfMostEpisodes) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  rows.at(6).metrics["onset_s"] = 0.0;  // an arm that swung, of one episode of later_1.0
+  const Reactivity of = reactivity_table(rows).timing.at(0);
+  EXPECT_LT(of.slope, 0.9);
+  EXPECT_NEAR(of.median_slope, 1.0, 1e-12);
+  EXPECT_NEAR(of.median_interval.high, 1.0, 1e-12);
+}
+
+TEST(Reactivity, EachOfSeveralTasksHasItsLine) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  std::vector<EpisodeRow> waves = shifted("dstar", 0.5);
+  for (EpisodeRow& row : waves) row.task = "wave";
+  rows.insert(rows.end(), waves.begin(), waves.end());
+  const ReactivityTable table = reactivity_table(rows);
+  ASSERT_EQ(table.timing.size(), 3U);
+  EXPECT_EQ(table.timing[0].task, "all");
+  EXPECT_EQ(table.timing[0].n, 24);
+  EXPECT_EQ(table.timing[1].task, "hug");
+  EXPECT_NEAR(table.timing[1].slope, 1.0, 1e-12);
+  EXPECT_EQ(table.timing[2].task, "wave");
+  EXPECT_NEAR(table.timing[2].slope, 0.5, 1e-12);
+  const Analysis analysis = reactivity_analysis(table);
+  EXPECT_NEAR(figure(analysis, {.policy = "dstar", .task = "wave", .name = "slope"}).value, 0.5, 1e-12);
+  EXPECT_EQ(analysis.plots.at(0).plots.at(0).series.size(), 1U);
+}
+
 TEST(Reactivity, OneClipHasNoInterval) {
   std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
   std::erase_if(rows, [](const EpisodeRow& row) { return row.clip != "hug-0"; });
@@ -146,6 +173,7 @@ TEST(Reactivity, PlotShowsTheShiftsOfEveryPolicy) {
 TEST(Reactivity, FiguresAreOfPoliciesAndOfPerturbations) {
   const Analysis analysis = reactivity_analysis(reactivity_table(shifted("dstar", 1.0)));
   EXPECT_NEAR(figure(analysis, {.policy = "dstar", .name = "slope"}).value, 1.0, 1e-12);
+  EXPECT_NEAR(figure(analysis, {.policy = "dstar", .name = "median_slope"}).value, 1.0, 1e-12);
   EXPECT_EQ(figure(analysis, {.name = "did_not_act"}).value, 0.0);
   EXPECT_EQ(figure(analysis, {.name = "delay_moved"}).unit, "s");
   EXPECT_NEAR(figure(analysis, {.perturbation = "later_1.0", .name = "partner_shift"}).value, 1.0, 1e-12);

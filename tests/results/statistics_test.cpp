@@ -360,5 +360,31 @@ TEST(ClusterBootstrap, RatioRefusesDivisorsThatAreNotAboveZero) {
   EXPECT_THAT(message({1.0}), HasSubstr("expected one divisor per value, found 1 for 2"));
 }
 
+TEST(ClusterBootstrap, WeightedMedianIsDrawnByCluster) {
+  // Of two clusters with one value each: both of the first, one of each or both of the second, 1 : 2 : 1.
+  const Interval interval =
+      ClusterBootstrap(4000, 1).weighted_median(std::vector{1.0, 3.0}, std::vector{1.0, 1.0}, std::vector{0, 1}, 0.4);
+  EXPECT_EQ(interval.low, 2.0);
+  EXPECT_EQ(interval.high, 2.0);
+  const Interval wide =
+      ClusterBootstrap(4000, 1).weighted_median(std::vector{1.0, 3.0}, std::vector{1.0, 1.0}, std::vector{0, 1}, 0.6);
+  EXPECT_EQ(wide.low, 1.0);
+  EXPECT_EQ(wide.high, 3.0);
+}
+
+TEST(ClusterBootstrap, AnOutlierMovesTheRatioAndNotTheWeightedMedian) {
+  const std::vector<double> robot = {1.0, 1.0, 1.0, -8.0, 1.0}, partner(5, 1.0);
+  const std::vector<int> clusters = {0, 1, 2, 3, 4};
+  ClusterBootstrap bootstrap(500, 1);
+  EXPECT_LT(bootstrap.ratio(robot, partner, clusters, 0.8).low, 0.0);
+  EXPECT_EQ(bootstrap.weighted_median(robot, partner, clusters, 0.8).low, 1.0);
+}
+
+TEST(ClusterBootstrap, WeightedMedianRefusesWeightsThatAreNotAboveZero) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>(
+                  [] { ClusterBootstrap(10, 1).weighted_median(std::vector{1.0}, std::vector{0.0}, std::vector{0}); }),
+              HasSubstr("expected weights above 0"));
+}
+
 }  // namespace
 }  // namespace duet
