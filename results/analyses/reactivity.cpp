@@ -117,13 +117,16 @@ Reactivity timing_of(const PolicyKey& key, const std::string& task, const Pertur
   return of;
 }
 
-// By task, in their order.
-std::map<std::pair<int, std::string>, PerturbedRows> by_task(const PerturbedRows& rows) {
+// All of them and, where there are several tasks, each in its order.
+std::vector<std::pair<std::string, PerturbedRows>> with_tasks(const PerturbedRows& rows) {
   std::map<std::pair<int, std::string>, PerturbedRows> tasks;
   for (const auto& [perturbation, episodes] : rows)
     for (const auto& [id, row] : episodes) tasks[{task_rank(id.task), id.task}][perturbation].emplace(id, row);
-  std::erase_if(tasks, [](const auto& task) { return !task.second.contains(kClean); });
-  return tasks;
+  std::vector<std::pair<std::string, PerturbedRows>> parts = {{kAllTasks, rows}};
+  if (tasks.size() == 1) return parts;
+  for (auto& [task, of] : tasks)
+    if (of.contains(kClean)) parts.emplace_back(task.second, std::move(of));
+  return parts;
 }
 
 std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& rows, double level) {
@@ -262,14 +265,10 @@ ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const Inte
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
     const auto clean = perturbed.find(kClean);
     if (clean == perturbed.end()) continue;
-    const auto add = [&](const std::string& task, const PerturbedRows& of) {
+    for (const auto& [task, of] : with_tasks(perturbed)) {
       Reactivity timing = timing_of(key, task, of, bootstrap, options.level);
       if (timing.n + timing.without > 0) table.timing.push_back(std::move(timing));
-    };
-    add(kAllTasks, perturbed);
-    const auto tasks = by_task(perturbed);
-    if (tasks.size() > 1)
-      for (const auto& [task, of] : tasks) add(task.second, of);
+    }
     for (SpatialCells& cells : spatial_of(key, clean->second, options.level)) table.spatial.push_back(std::move(cells));
   }
   return table;

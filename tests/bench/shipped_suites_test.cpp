@@ -1,8 +1,10 @@
 #include "duet/bench/shipped_suites.h"
 
 #include <filesystem>
+#include <sstream>
 
 #include "duet/bench/demonstrations.h"
+#include "duet/bench/progress.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/training_motions.h"
 #include "duet/results/analyses/level_table.h"
@@ -45,6 +47,21 @@ TEST(ShippedSuites, OneWithoutClipsOfItsOwnSaysSo) {
   EXPECT_TRUE(shipped_suite("real").clips_given);
   EXPECT_FALSE(shipped_suite("people").clips_given);
   EXPECT_EQ(shipped_suite("wbc_gates").episodes, 13 * 6 * 32);  // commands, perturbations, episodes
+}
+
+// Their digests were committed before the suite was run.
+TEST(ShippedSuites, SealedClipsAreThoseOfTheTestSplit) {
+  Suite sealed = load_suite(suite_file("sealed"));
+  sealed.tasks = {Task::kHandshake, Task::kFlyKiss};
+  sealed.clips.synth_per_task = 1;
+  Progress quiet(Progress::Style::kQuiet);
+  std::istringstream lines(split_text(sealed, 1, quiet));
+  const std::string split = read_text(share_file("test split", "policies/dstar/test_split.txt"));
+  std::string line;
+  EXPECT_TRUE(std::getline(lines, line) && line.starts_with("# The clips of hhoi-sealed 1.0.0"));
+  int clips = 0;
+  for (; std::getline(lines, line); ++clips) EXPECT_THAT(split, HasSubstr(line + "\n"));
+  EXPECT_EQ(clips, 4);  // either role
 }
 
 // Rows of before compare with those of now only where these stay.
