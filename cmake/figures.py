@@ -83,7 +83,8 @@ def success(folder):
     file = f"{folder}/leaderboard.csv"
     rows = [r for r in rows_of(folder, "leaderboard.csv") if r["engine"] == "mujoco"]
     table = []
-    for policy, name in POLICIES.items():
+    ran = {r["policy"] for r in rows}
+    for policy, name in ((policy, name) for policy, name in POLICIES.items() if policy in ran):
         def value(task, name="success", of=""):
             return figure(rows, file, policy=policy, task=task, name=name, of=of)
         every, printed = value("all"), float(value("all", of="paper/paper")["value"])

@@ -1,5 +1,5 @@
 // The tables of the published rows, figure by figure: results/tables. Where a figure changes on purpose,
-// `duet report results/published/policies --format csv -o results/tables/policies` writes them anew.
+// `duet report results/published/NAME --format csv -o results/tables/NAME` writes them anew.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -35,9 +35,11 @@ std::vector<MetricColumn> units_in(const std::string& file) {
   return columns;
 }
 
-TEST(PublishedTables, AreWhatTheRowsSay) {
-  const std::string folder = in("tables/policies/");
-  const std::vector<EpisodeRow> rows = load_run(in("published/policies")).rows;
+class PublishedTables : public testing::TestWithParam<const char*> {};
+
+TEST_P(PublishedTables, AreWhatTheRowsSay) {
+  const std::string folder = in(std::string("tables/") + GetParam() + "/");
+  const std::vector<EpisodeRow> rows = load_run(in(std::string("published/") + GetParam())).rows;
   const RunTables tables = run_tables(rows, {.all = units_in(folder + "leaderboard.csv"), .drifting = {}}, nullptr);
   std::set<std::string> written;
   for (const auto& [file, text] : analysis_files(run_analyses(tables), "csv")) {
@@ -49,6 +51,8 @@ TEST(PublishedTables, AreWhatTheRowsSay) {
   for (const auto& entry : std::filesystem::directory_iterator(folder))
     EXPECT_TRUE(written.contains(entry.path().filename().string())) << entry.path();
 }
+INSTANTIATE_TEST_SUITE_P(OfRows, PublishedTables, testing::Values("policies", "sealed"),
+                         [](const auto& info) { return std::string(info.param); });
 
 }  // namespace
 }  // namespace duet
