@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <random>
 #include <system_error>
 #include <tuple>
@@ -54,7 +54,8 @@ LineFile::LineFile(std::string path) : path_(std::move(path)), file_(std::fopen(
 // More of the file behind what is there; false at its end.
 bool LineFile::fill() {
   if (!file_) return false;
-  std::memmove(block_.data(), block_.data() + begin_, end_ - begin_);
+  std::copy(block_.begin() + static_cast<std::ptrdiff_t>(begin_), block_.begin() + static_cast<std::ptrdiff_t>(end_),
+            block_.begin());
   searched_ -= begin_;
   end_ -= begin_;
   begin_ = 0;

@@ -65,7 +65,7 @@ TEST(PeopleTable, TheIntervalIsNewcombes) {
   std::vector<EpisodeRow> rows;
   add_people("recorded", "hug", std::string(56, '1') + std::string(14, '0'), rows);
   add_people("synthetic", "hug", std::string(48, '1') + std::string(32, '0'), rows);
-  const PeopleEntry& entry = people_table(rows).entries.at(0);
+  const PeopleEntry entry = people_table(rows).entries.at(0);
   constexpr double kPrinted = 5e-5;
   EXPECT_NEAR(entry.difference, 0.2, 1e-12);
   EXPECT_NEAR(entry.interval.low, 0.0524, kPrinted);

@@ -118,7 +118,7 @@ TEST(TrainingTable, AClipInBothRolesIsOneClip) {
     row.clip = "sbu-hug-" + std::to_string(row.episode / 2) + (row.episode % 2 == 0 ? "" : "-A");
     row.key = episode_key(row);
   }
-  const MethodDifference& found = training_table(rows).differences.front();
+  const MethodDifference found = training_table(rows).differences.front();
   EXPECT_EQ(found.episodes, 8);
   EXPECT_EQ(found.clips, 4);
 }
@@ -126,7 +126,7 @@ TEST(TrainingTable, AClipInBothRolesIsOneClip) {
 TEST(TrainingTable, OneTrainingSaysNothingOfAMethod) {
   std::vector<EpisodeRow> rows = two_methods();
   std::erase_if(rows, [](const EpisodeRow& row) { return row.policy == "dp-seed2"; });
-  const MethodDifference& found = training_table(rows).differences.front();
+  const MethodDifference found = training_table(rows).differences.front();
   EXPECT_TRUE(std::isnan(found.crossed.p));
   EXPECT_EQ(found.verdict, PairVerdict::kUndecided);
   EXPECT_DOUBLE_EQ(found.crossed.difference, found.success_a - found.success_b);
