@@ -1,15 +1,23 @@
 #include "duet/bench/shipped_suites.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <sstream>
 
 #include "duet/bench/episode.h"
+#include "duet/bench/run_identity.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
+#include "duet/core/require.h"
 #include "duet/core/share.h"
+#include "duet/core/text.h"
+#include "duet/results/rows/name_digests.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -27,6 +35,46 @@ std::string head_comment(const std::string& yaml) {
   for (std::string line; std::getline(lines, line) && line.starts_with("# ");)
     comment += (comment.empty() ? "" : " ") + line.substr(2);
   return comment;
+}
+
+// The suite that ships and calls itself so in its file; none where there is none.
+std::optional<Suite> suite_that_ships(const std::string& name) {
+  for (const std::string& file : shipped_suite_names())
+    if (Suite suite = load_suite(path_of(file)); suite.name == name) return suite;
+  return std::nullopt;
+}
+
+// Keys of a suite as it is written out, with their values; without those that its hash leaves out.
+std::map<std::string, std::string> hashed_keys(Suite suite) {
+  suite.policies.clear();
+  suite.engines.clear();
+  std::map<std::string, std::string> keys;
+  for (const auto& entry : parse_yaml(resolved_yaml(suite), "suite.yaml")) {
+    const auto name = entry.first.as<std::string>();
+    if (name != "policies" && name != "engines") keys[name] = YAML::Dump(entry.second);
+  }
+  return keys;
+}
+
+std::vector<std::string> differing_keys(const Suite& one, const Suite& other) {
+  const std::map<std::string, std::string> a = hashed_keys(one), b = hashed_keys(other);
+  std::vector<std::string> names;
+  for (const auto& [name, value] : a)
+    if (const auto found = b.find(name); found == b.end() || found->second != value) names.push_back(name);
+  for (const auto& [name, value] : b)
+    if (!a.contains(name)) names.push_back(name);
+  std::ranges::sort(names);
+  return names;
+}
+
+// What another hash is of: keys of the suite, or files that they name.
+std::string difference_note(const Suite& shipped, const RunInfo& info) {
+  const Suite run = parse_suite(info.suite_yaml, "suite.yaml");
+  const std::vector<std::string> keys = differing_keys(shipped, run);
+  if (keys == std::vector<std::string>{"clips"} && !run.clips.files.empty())
+    return "as it ships but for its clips, which were given";
+  return fmt::format("NOT the suite of that name that ships with this program: it differs in {}",
+                     keys.empty() ? "its robots, limits or detectors" : fmt::format("{}", fmt::join(keys, ", ")));
 }
 
 }  // namespace
@@ -54,6 +102,21 @@ std::string suite_file(const std::string& suite) {
   if (std::ranges::find(names, suite) == names.end())
     throw std::invalid_argument(unknown_name_message("suite", suite, names) + "; or the path of a file");
   return path_of(suite);
+}
+
+std::string shipped_suite_note(const RunInfo& info) {
+  try {
+    const std::optional<Suite> shipped = suite_that_ships(info.suite);
+    if (!shipped) return "";
+    const bool same = !shipped->clips.given && suite_hash(*shipped) == info.suite_hash;
+    return fmt::format("{} ({})", same ? "as it ships" : difference_note(*shipped, info),
+                       shown(short_digest(info.suite_hash)));
+  } catch (const MissingError&) {
+    return "";
+  } catch (const InputError&) {  // a suite.yaml that this program does not read is none that ships
+    return fmt::format("NOT the suite of that name that ships with this program ({})",
+                       shown(short_digest(info.suite_hash)));
+  }
 }
 
 std::string first_sentence(const std::string& yaml) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "duet/bench/suite.h"
+#include "duet/results/rows/run_info.h"
 
 namespace duet {
 
@@ -25,6 +26,13 @@ ShippedSuite shipped_suite(const std::string& name);
 // `suite` where it is a file's path (a file that exists, or it ends in ".yaml" or has a '/'), else the file of the
 // suite that ships under this name. Throws std::invalid_argument for an unknown name, with the known ones.
 std::string suite_file(const std::string& suite);
+
+// How a run's suite stands to the one that ships under its name, for titles and verdicts. By the hash:
+//   "as it ships (45a100d81a17)"
+//   "as it ships but for its clips, which were given (fa2f93af8209)"
+//   "NOT the suite of that name that ships with this program: it differs in clips, start (0123456789ab)"
+// Empty for a name that no suite has that ships, and where those that ship are not on this machine.
+std::string shipped_suite_note(const RunInfo& info);
 
 // The first sentence of the comment that begins a YAML file; empty where it begins with none.
 std::string first_sentence(const std::string& yaml);

@@ -51,6 +51,52 @@ TEST(ShippedSuites, OneWithoutClipsOfItsOwnSaysSo) {
   EXPECT_EQ(shipped_suite("wbc_gates").episodes, 13 * 6 * 32);  // commands, perturbations, episodes
 }
 
+RunInfo info_of(const Suite& suite) {
+  RunInfo info;
+  info.suite = suite.name;
+  info.suite_version = suite.version;
+  info.suite_hash = suite_hash(suite);
+  info.suite_yaml = resolved_yaml(suite);
+  return info;
+}
+
+TEST(ShippedSuiteNote, TellsTheSuiteThatShipsFromOneUnderItsName) {
+  const std::string file = suite_file("sealed");
+  const RunInfo shipped = info_of(load_suite(file));
+  EXPECT_EQ(shipped_suite_note(shipped), "as it ships (" + shipped.suite_hash.substr(0, 12) + ")");
+  // Policies and engines are told by the rows.
+  EXPECT_THAT(shipped_suite_note(info_of(load_suite(file, {{"policies", "[replay]"}, {"engines", "[playback]"}}))),
+              ::testing::StartsWith("as it ships ("));
+  const RunInfo easy =
+      info_of(load_suite(file, {{"start", "act"}, {"max_root_speed", "1.5"}, {"clips.synth.per_task", "1"}}));
+  EXPECT_THAT(shipped_suite_note(easy),
+              AllOf(::testing::StartsWith("NOT the suite of that name that ships with this program: it differs in "
+                                          "clips, max_root_speed, start ("),
+                    HasSubstr(easy.suite_hash.substr(0, 12))));
+}
+
+TEST(ShippedSuiteNote, AHashThatNoKeyExplainsIsNotTheSuiteEither) {
+  RunInfo info = info_of(load_suite(suite_file("sealed")));
+  info.suite_hash = std::string(64, 'a');
+  EXPECT_THAT(shipped_suite_note(info), HasSubstr("it differs in its robots, limits or detectors (aaaaaaaaaaaa)"));
+  info.suite_yaml = "nothing";
+  EXPECT_THAT(shipped_suite_note(info), ::testing::StartsWith("NOT the suite of that name"));
+}
+
+TEST(ShippedSuiteNote, ClipsThatWereGivenAreSaid) {
+  const test::ScratchFolder folder;
+  write_file(folder / "a.npz", "clip");
+  const Suite suite = load_suite(suite_file("real"), {{"clips.files", "['" + (folder / "a.npz") + "']"}});
+  EXPECT_THAT(shipped_suite_note(info_of(suite)),
+              ::testing::StartsWith("as it ships but for its clips, which were given ("));
+}
+
+TEST(ShippedSuiteNote, OfASuiteOfOnesOwnIsEmpty) {
+  RunInfo info = info_of(load_suite(suite_file("sealed")));
+  info.suite = "mine";
+  EXPECT_EQ(shipped_suite_note(info), "");
+}
+
 // Their digests were committed before the suite was run.
 TEST(ShippedSuites, SealedClipsAreThoseOfTheTestSplit) {
   Suite sealed = load_suite(suite_file("sealed"));
