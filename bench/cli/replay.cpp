@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/clips.h"
 #include "duet/bench/replay/replay_mcap.h"
 #include "duet/bench/replay/replay_page.h"
 #include "duet/bench/replay/replay_source.h"
@@ -25,8 +26,14 @@ const std::vector<std::string> kReplayFormats = {"html", "mcap"};
 
 std::string format_of(const ReplayArguments& arguments) {
   std::string format = arguments.format;
-  if (format.empty() && !arguments.output.empty())
-    format = std::filesystem::path(arguments.output).extension().string().substr(1);
+  if (format.empty() && !arguments.output.empty()) {
+    const std::string ending = std::filesystem::path(arguments.output).extension().string();
+    require(ending.size() > 1,
+            fmt::format("--output '{}': expected a name that ends in .html or .mcap, or --format beside "
+                        "it, found no ending",
+                        arguments.output));
+    format = ending.substr(1);
+  }
   if (format.empty()) format = "html";
   require(std::ranges::find(kReplayFormats, format) != kReplayFormats.end(),
           unknown_name_message("format", format, kReplayFormats));
@@ -38,9 +45,17 @@ std::string output_of(const ReplayArguments& arguments, const std::string& forma
   return is_run ? inside(arguments.sources.front(), "replay." + format) : "replay." + format;
 }
 
+// A run's folder, or one with runs in it, which load_run refuses by their names; others hold motions.
+bool is_run_folder(const std::string& folder) {
+  namespace fs = std::filesystem;
+  if (!fs::is_directory(folder)) return false;
+  const auto has_run = [](const fs::path& path) { return fs::exists(path / "run.json"); };
+  return has_run(folder) || std::ranges::any_of(fs::directory_iterator(folder), has_run);
+}
+
 ReplayContent content_of(const ReplayArguments& arguments, bool is_run, Progress& progress) {
-  if (!is_run) return replay_of_files(arguments.sources, arguments.choice.card);
-  require(arguments.sources.size() == 1, "expected one run, or recordings (NPZ); found several sources, one a folder");
+  if (!is_run) return replay_of_files(find_motion_files(arguments.sources), arguments.choice.card);
+  require(arguments.sources.size() == 1, "expected one run, or motions (NPZ); found several sources, the first a run");
   return replay_of_run(load_run(arguments.sources.front()), arguments.choice, progress);
 }
 
@@ -95,7 +110,8 @@ int changed_tracks(const ReplayContent& content) {
 
 void run_replay_command(Session& session, const ReplayArguments& arguments) {
   const std::string format = format_of(arguments);
-  const bool is_run = std::filesystem::is_directory(arguments.sources.front());
+  const std::string& source = arguments.sources.front();
+  const bool is_run = is_run_folder(source);
   const std::string output = output_of(arguments, format, is_run);
   const ViewerBundle viewer = format == "html" ? load_viewer() : ViewerBundle{};  // before an hour of episodes
   Progress progress(session.progress());
@@ -130,12 +146,16 @@ void add_choice(CLI::App& command, ReplayChoice& choice) {
 
 void add_replay(CLI::App& app, Session& session) {
   CLI::App* command =
-      add_command(app, session, "replay", "episodes in 3-D: one page that opens from disk, or MCAP for Foxglove",
+      add_command(app, session, "replay",
+                  "episodes, clips and paired motions in 3-D: one page that opens from disk, or MCAP for Foxglove",
                   "duet replay runs/core -o replay.html\n  duet replay runs/core --episodes "
-                  "hug/hug_000/0 --controllers vmc,pd");
+                  "hug/hug_000/0 --controllers vmc,pd\n  duet replay clip.npz paired.npz -o motions.html");
   auto arguments = std::make_shared<ReplayArguments>();
-  command->add_option("source", arguments->sources, "run directory, or recordings (NPZ)")->required();
-  command->add_option("-o,--output", arguments->output, "file (default: replay.html in the run directory)");
+  command
+      ->add_option("source", arguments->sources,
+                   "run directory; or clips, paired motions and recordings (NPZ), also a folder of them")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "file (default: replay.html, of a run in its directory)");
   command->add_option("-f,--format", arguments->format, "html, mcap (default: by the output's ending)");
   add_choice(*command, arguments->choice);
   arguments->choice.threads = default_threads();

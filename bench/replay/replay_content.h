@@ -1,4 +1,5 @@
-// What a replay shows: episodes of one clip side by side, each a recording with the row that it left.
+// What a replay shows: episodes of one clip side by side, each a recording with the row that it left; and motions that
+// no episode made, people alone among them.
 #pragma once
 
 #include <memory>
@@ -13,12 +14,15 @@
 namespace duet {
 
 struct ReplayTrack {
-  Recording recording;
-  std::optional<KeptEpisode> kept;  // empty: a recording of anybody
-  std::shared_ptr<const RobotModel> robot;
-  std::string name;    // "mujoco · vmc · dstar", or the file's
-  std::string repeat;  // the command that makes it again; empty where none does
+  Recording recording;                      // without frames of a robot where people alone are shown
+  std::optional<KeptEpisode> kept;          // empty: a recording of anybody
+  std::shared_ptr<const RobotModel> robot;  // null: people alone
+  PointTracks other_person;                 // (T, 24, 3) beside recording.partner, in the robot's place; empty: none
+  std::string name;                         // "mujoco · vmc · dstar", or the file's
+  std::string repeat;                       // the command that makes it again; empty where none does
   std::string origin;  // "kept by the run", "run again, bit for bit", "run again, NOT as it was", "read from a file"
+
+  [[nodiscard]] int frames() const { return robot ? recording.frames() : recording.partner.frames(); }
 };
 
 // Tracks of one task, clip, episode and perturbation: on one clock, which is 0 where the act begins.

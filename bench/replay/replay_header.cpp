@@ -6,6 +6,7 @@
 #include <map>
 
 #include "duet/bench/replay/detector_trace.h"
+#include "duet/bench/replay/robot_outline.h"
 #include "duet/motion/human_motion.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/robots/human_body.h"
@@ -96,7 +97,7 @@ nlohmann::json trace_json(const DetectorTrace& trace, ReplayColumns& columns) {
 
 nlohmann::json detectors_json(const ReplayTrack& track, ReplayColumns& columns) {
   nlohmann::json list = nlohmann::json::array();
-  if (!track.recording.task) return list;
+  if (!track.recording.task || !track.robot) return list;
   const ScoringRules rules = track.kept ? track.kept->rules : ScoringRules{};
   const DetectorVersion other =
       rules.detector == DetectorVersion::kRobot ? DetectorVersion::kPaper : DetectorVersion::kRobot;
@@ -172,10 +173,11 @@ class HeaderMaker {
     nlohmann::json json = {{"name", track.name},
                            {"repeat", track.repeat},
                            {"origin", track.origin},
-                           {"robot", robot_place(*track.robot)},
-                           {"partner", recording.partner.empty() ? -1 : partner_place(recording.partner)},
+                           {"robot", track.robot ? robot_place(*track.robot) : -1},
+                           {"partner", partner_place(recording.partner)},
+                           {"other_person", partner_place(track.other_person)},
                            {"rate_hz", recording.rate_hz},
-                           {"frames", recording.frames()},
+                           {"frames", track.frames()},
                            {"act", {recording.phases.act_begin, recording.phases.act_end}},
                            {"outcome", to_string(recording.outcome)},
                            {"message", recording.message},
@@ -196,6 +198,7 @@ class HeaderMaker {
     return place->second;
   }
   int partner_place(const PointTracks& partner) {
+    if (partner.empty()) return -1;
     const auto found = std::ranges::find_if(partner_places_, [&](const PointTracks* one) { return *one == partner; });
     if (found != partner_places_.end()) return static_cast<int>(found - partner_places_.begin());
     partner_places_.push_back(&partner);
@@ -207,6 +210,24 @@ class HeaderMaker {
   std::map<std::string, int> robot_places_;
   std::vector<const PointTracks*> partner_places_;
 };
+
+nlohmann::json outline_json(const RobotModel& robot) {
+  const RobotOutline outline = robot_outline(robot);
+  nlohmann::json hulls = nlohmann::json::array(), bars = nlohmann::json::array();
+  for (const OutlineHull& hull : outline.hulls) {
+    nlohmann::json spheres = nlohmann::json::array();
+    for (const OutlineSphere& sphere : hull.spheres)
+      spheres.push_back({sphere.center.x(), sphere.center.y(), sphere.center.z(), sphere.radius});
+    hulls.push_back(
+        {{"link", hull.link}, {"spheres", std::move(spheres)}, {"shapes", hull.shapes}, {"foot", hull.is_foot}});
+  }
+  for (const OutlineBar& bar : outline.bars)
+    bars.push_back({{"links", {bar.from_link, bar.to_link}},
+                    {"from", vector_json(bar.from)},
+                    {"to", vector_json(bar.to)},
+                    {"radius", bar.radius}});
+  return {{"hulls", std::move(hulls)}, {"bars", std::move(bars)}};
+}
 
 }  // namespace
 
@@ -226,7 +247,8 @@ nlohmann::json robot_json(const RobotModel& robot) {
                       {"half_length", shape.half_length}});
   for (const auto& [name, frame] : robot.tracks)
     points[name] = {{"link", robot.frames[frame].link}, {"p", vector_json(robot.frames[frame].X_LF.p)}};
-  return {{"name", robot.name}, {"links", links}, {"shapes", shapes}, {"points", points}};
+  return {
+      {"name", robot.name}, {"links", links}, {"shapes", shapes}, {"points", points}, {"outline", outline_json(robot)}};
 }
 
 nlohmann::json replay_header(const ReplayContent& content, ReplayColumns& columns) {

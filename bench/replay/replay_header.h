@@ -11,7 +11,7 @@ namespace duet {
 // Adds every column of the content to `columns`.
 nlohmann::json replay_header(const ReplayContent& content, ReplayColumns& columns);
 
-// Links with their hinges and shapes: all that forward kinematics and drawing take.
+// Links with their hinges, shapes and outline: all that forward kinematics and drawing take.
 nlohmann::json robot_json(const RobotModel& robot);
 
 }  // namespace duet

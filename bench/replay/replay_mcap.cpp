@@ -122,26 +122,26 @@ std::uint64_t nanoseconds(double begin, int t, double rate_hz) {
   return static_cast<std::uint64_t>(std::llround((begin + t / rate_hz) * 1e9));
 }
 
-// The person: capsules as long as in the first frame.
-void write_partner(const Recording& recording, double begin, const std::string& name, ReplayTopics& topics) {
-  const PointTracks& partner = recording.partner;
+// Capsules as long as in the first frame.
+void write_person(const PointTracks& person, double rate_hz, double begin, const std::string& name,
+                  ReplayTopics& topics) {
   const HumanBody human =
-      make_human_body(bone_lengths(HumanMotion{.rate_hz = recording.rate_hz, .joints = partner, .rotations = {}}));
+      make_human_body(bone_lengths(HumanMotion{.rate_hz = rate_hz, .joints = person, .rotations = {}}));
   const std::uint16_t bodies = topics.scene("/" + name), where = topics.transforms("/" + name + "/where");
   const nlohmann::json colour = colour_json(0.85, 0.72, 0.55);
   nlohmann::json entities = nlohmann::json::array();
   for (const HumanCapsule& capsule : human.capsules) {
-    const auto [a, b] = capsule.ends(partner.frame(0));
+    const auto [a, b] = capsule.ends(person.frame(0));
     const Eigen::Vector3d half(0.0, 0.0, (b - a).norm() / 2.0);
     entities.push_back(entity_json(capsule.name, name + "/" + capsule.name, nanoseconds(begin, 0, 1.0)));
     add_capsule(-half, half, capsule.radius, colour, entities.back());
   }
   topics.put_entities(bodies, 0, nanoseconds(begin, 0, 1.0), std::move(entities));
-  for (int t = 0; t < partner.frames(); t += kMcapStride) {
-    const std::uint64_t time = nanoseconds(begin, t, recording.rate_hz);
+  for (int t = 0; t < person.frames(); t += kMcapStride) {
+    const std::uint64_t time = nanoseconds(begin, t, rate_hz);
     nlohmann::json transforms = nlohmann::json::array();
     for (const HumanCapsule& capsule : human.capsules) {
-      const auto [a, b] = capsule.ends(partner.frame(t));
+      const auto [a, b] = capsule.ends(person.frame(t));
       const Eigen::Quaterniond R = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), b - a);
       transforms.push_back(transform_json(name + "/" + capsule.name, (a + b) / 2.0, R, time));
     }
@@ -262,13 +262,16 @@ void write_scene(const ReplayScene& scene, ReplayTopics& topics) {
     if (frames > 1 && (longest == nullptr || frames > longest->recording.partner.frames())) longest = &track;
   }
   if (longest != nullptr)
-    write_partner(longest->recording, begin_of(*longest) - earliest, scene.id + "/partner", topics);
+    write_person(longest->recording.partner, longest->recording.rate_hz, begin_of(*longest) - earliest,
+                 scene.id + "/partner", topics);
   for (const ReplayTrack& track : scene.tracks) {
     const std::string name = fmt::format("{}/{}", scene.id, track.name);
     const double begin = begin_of(track) - earliest;
     if (track.recording.partner.frames() > 1 && !same_partner(*longest, track))
-      write_partner(track.recording, begin, name + "/partner", topics);
-    TrackWriter(track, begin, name, topics).write();
+      write_person(track.recording.partner, track.recording.rate_hz, begin, name + "/partner", topics);
+    if (track.other_person.frames() > 1)
+      write_person(track.other_person, track.recording.rate_hz, begin, name + "/person", topics);
+    if (track.robot) TrackWriter(track, begin, name, topics).write();
   }
 }
 

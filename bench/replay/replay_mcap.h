@@ -12,8 +12,9 @@ namespace duet {
 // (foxglove.SceneUpdate: the links' bodies, once), ".../where" (foxglove.FrameTransforms: the links, named
 // "SCENE/TRACK/link"), ".../contacts" (foxglove.SceneUpdate: arrows), ".../state" (duet.ReplayState: time, joints by
 // name, force of the partner on the robot [N]). A track whose partner moves otherwise than the first one's has an own
-// one, "/SCENE/TRACK/partner". JSON, 25 frames a second, in chunks packed by zstd; places to 0.01 mm. Time 0 is where
-// the earliest track of a scene begins. Replaces `path`. Throws StorageError.
+// one, "/SCENE/TRACK/partner", and where people alone are shown, "/SCENE/TRACK/person" is the one in the robot's place.
+// JSON, 25 frames a second, in chunks packed by zstd; places to 0.01 mm. Time 0 is where the earliest track of a scene
+// begins. Replaces `path`. Throws StorageError.
 void write_replay_mcap(const ReplayContent& content, const std::string& path);
 
 }  // namespace duet

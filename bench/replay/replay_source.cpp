@@ -7,10 +7,15 @@
 #include <filesystem>
 #include <map>
 
+#include "duet/bench/clips.h"
 #include "duet/bench/verification.h"
+#include "duet/core/naming_file.h"
 #include "duet/core/npz.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
+#include "duet/motion/paired_motion.h"
 #include "duet/robots/robot_cards.h"
+#include "duet/rollout/play_back.h"
 
 namespace duet {
 namespace {
@@ -128,8 +133,8 @@ ReplayScene scene_of(const Run& run, const ChosenScene& chosen, const ReplayChoi
   return scene;
 }
 
-ReplayTrack track_of_file(const std::string& file, const std::string& card) {
-  EpisodeRecording episode = read_episode_recording(Npz::load(file));
+ReplayTrack track_of_recording(const std::string& file, const Npz& npz, const std::string& card) {
+  EpisodeRecording episode = read_episode_recording(npz);
   ReplayTrack track;
   track.recording = std::move(episode.recording);
   track.kept = std::move(episode.kept);
@@ -140,6 +145,97 @@ ReplayTrack track_of_file(const std::string& file, const std::string& card) {
   track.name = track.kept ? track_name(track.kept->row) : stem;
   track.origin = "read from " + file;
   return track;
+}
+
+// Two people without a robot.
+ReplayTrack track_of_people(const HumanMotion& actor, const HumanMotion& reactor, Task task, const Phases& phases) {
+  ReplayTrack track;
+  track.recording.task = task;
+  track.recording.phases = phases;
+  track.recording.rate_hz = actor.rate_hz;
+  track.recording.partner = actor.joints;
+  track.other_person = reactor.joints;
+  return track;
+}
+
+ReplayScene motion_scene(const std::string& id, Task task) {
+  ReplayScene scene;
+  scene.task = to_string(task);
+  scene.id = scene.task + '/' + id;
+  scene.name = id;
+  return scene;
+}
+
+ReplayScene scene_of_clip(const std::string& file, const Npz& npz) {
+  const InteractionClip clip = read_clip(npz);
+  ReplayScene scene = motion_scene(clip.id, clip.task);
+  ReplayTrack& track =
+      scene.tracks.emplace_back(track_of_people(clip.actor_motion(), clip.reactor_motion(), clip.task, clip.phases));
+  track.name = "the two people";
+  track.origin = "people of a clip, read from " + file;
+  return scene;
+}
+
+std::shared_ptr<const RobotModel> robot_of_motion(const PairedMotion& motion, const std::string& card) {
+  const auto named = motion.settings.find("robot");
+  const auto is_named = [&](const RobotCardFile& known) {
+    return named != motion.settings.end() && known.name == named->second;
+  };
+  const bool is_known = card.empty() && std::ranges::any_of(robot_cards(), is_named);
+  std::shared_ptr<const RobotModel> robot = load_shared_robot(is_known ? named->second : card);
+  if (motion.robot.joint_names != robot->joint_names())
+    throw InputError(
+        fmt::format("clip '{}' was retargeted to another robot: its joints are not those of '{}'; --card "
+                    "names a card",
+                    motion.clip_id, robot->name));
+  return robot;
+}
+
+ReplayScene scene_of_paired(const std::string& file, const Npz& npz, const std::string& card) {
+  const PairedMotion motion = read_paired_motion(npz);
+  ReplayScene scene = motion_scene(motion.clip_id, motion.task);
+  ReplayTrack robot;
+  robot.robot = robot_of_motion(motion, card);
+  robot.recording = play_back(motion.robot, motion.partner.joints, motion.task, motion.phases, robot.robot);
+  robot.name = fmt::format("{} and adapted partner", robot.robot->name);
+  robot.origin = "a paired motion, played back without physics, read from " + file;
+  ReplayTrack people = track_of_people(motion.source_partner, motion.source_reactor, motion.task, motion.phases);
+  people.name = "people as recorded";
+  people.origin = "what the robot's motion was made from, read from " + file;
+  scene.tracks = {std::move(robot), std::move(people)};
+  return scene;
+}
+
+// The scene of the row's or the file's name, which is new or was there before.
+ReplayScene& scene_for(const std::string& file, const ReplayTrack& track, std::vector<ReplayScene>& scenes) {
+  const std::string id = track.kept ? scene_id(track.kept->row) : fs::path(file).stem().string();
+  const auto found = std::ranges::find(scenes, id, &ReplayScene::id);
+  if (found != scenes.end()) return *found;
+  ReplayScene& scene = scenes.emplace_back();
+  scene.id = id;
+  scene.name = track.kept ? track.kept->row.clip : id;
+  scene.task = track.recording.task ? std::string(to_string(*track.recording.task)) : "";
+  scene.perturbation = track.kept ? track.kept->row.perturbation : "";
+  return scene;
+}
+
+void add_file(const std::string& file, const std::string& card, std::vector<ReplayScene>& scenes) {
+  const Npz npz = Npz::load(file);
+  const MotionFile kind = kind_of(npz);
+  if (kind == MotionFile::kRecording) {
+    ReplayTrack track = track_of_recording(file, npz, card);
+    ReplayScene& scene = scene_for(file, track, scenes);
+    count(track, scene);
+    scene.tracks.push_back(std::move(track));
+    return;
+  }
+  ReplayScene scene = kind == MotionFile::kClip ? scene_of_clip(file, npz) : scene_of_paired(file, npz, card);
+  if (std::ranges::find(scenes, scene.id, &ReplayScene::id) != scenes.end())
+    throw InputError(
+        fmt::format("'{}': a motion of task {} with the id '{}' is among the files already; each has a "
+                    "scene of its own",
+                    file, scene.task, shown(scene.name)));
+  scenes.push_back(std::move(scene));
 }
 
 }  // namespace
@@ -172,20 +268,7 @@ ReplayContent replay_of_files(const std::vector<std::string>& files, const std::
   ReplayContent content;
   content.title = fs::path(files.front()).filename().string();
   content.limits = load_contact_limits(default_contact_limits_path());
-  for (const std::string& file : files) {
-    ReplayTrack track = track_of_file(file, card);
-    const std::string id = track.kept ? scene_id(track.kept->row) : fs::path(file).stem().string();
-    auto scene = std::ranges::find(content.scenes, id, &ReplayScene::id);
-    if (scene == content.scenes.end()) {
-      scene = content.scenes.insert(content.scenes.end(), ReplayScene{});
-      scene->id = id;
-      scene->name = track.kept ? track.kept->row.clip : id;
-      scene->task = track.recording.task ? std::string(to_string(*track.recording.task)) : "";
-      scene->perturbation = track.kept ? track.kept->row.perturbation : "";
-    }
-    count(track, *scene);
-    scene->tracks.push_back(std::move(track));
-  }
+  for (const std::string& file : files) naming_file(file, [&] { add_file(file, card, content.scenes); });
   return content;
 }
 

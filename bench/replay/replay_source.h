@@ -1,5 +1,5 @@
 // Where the recordings of a replay come from: those that a run kept; other episodes are run again, and the hash of
-// their states says whether they are what they were.
+// their states says whether they are what they were. And files: recordings, clips of people, paired motions.
 #pragma once
 
 #include <string>
@@ -16,7 +16,10 @@ namespace duet {
 // digest) and as verify_run where episodes have to be run again.
 ReplayContent replay_of_run(const Run& run, const ReplayChoice& choice, Progress& progress);
 
-// Recordings of anybody (NPZ), a track each; those of one task, clip and episode are one scene. Throws InputError.
+// NPZ files of anybody, told apart by their schema. A recording is a track; those of one task, clip and episode are one
+// scene. A clip is a scene of its two people. A paired motion is a scene of two tracks: the robot, played back without
+// physics, with the adapted partner; and the people that it was made from. A paired motion is shown on the robot that
+// it names, where a card has that name. Throws InputError, also for two motions of one task and id.
 ReplayContent replay_of_files(const std::vector<std::string>& files, const std::string& card);
 
 }  // namespace duet

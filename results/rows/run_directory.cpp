@@ -1,6 +1,7 @@
 #include "duet/results/rows/run_directory.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -27,6 +28,18 @@ std::string beside(const std::string& folder, const char* name) {
 }
 
 bool is_run(const std::string& folder) { return std::filesystem::exists(beside(folder, "run.json")); }
+
+// "; 'runs/demo/run' is one": where somebody gave the folder of a run's folder.
+std::string runs_hint(const std::string& folder) {
+  std::vector<std::string> runs;
+  std::error_code unreadable;
+  for (std::filesystem::directory_iterator entry(folder, unreadable), end; !unreadable && entry != end;
+       entry.increment(unreadable))
+    if (std::filesystem::exists(entry->path() / "run.json", unreadable)) runs.push_back(entry->path().string());
+  std::ranges::sort(runs);
+  return runs.empty() ? ""
+                      : fmt::format("; '{}' {}", fmt::join(runs, "', '"), runs.size() == 1 ? "is one" : "are some");
+}
 
 // A run that was killed before run.json was there leaves only the lock and the half-written file of another name.
 bool is_fresh(const std::string& folder) {
@@ -190,7 +203,8 @@ bool RunDirectory::is_finished() {
 }
 
 Run load_run_head(const std::string& path) {
-  if (!is_run(path)) throw InputError(fmt::format("'{}' is not a run directory (no run.json)", path));
+  if (!is_run(path))
+    throw InputError(fmt::format("'{}' is not a run directory (no run.json){}", path, runs_hint(path)));
   check_published(path);
   Run run;
   run.path = path;

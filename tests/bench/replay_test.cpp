@@ -12,12 +12,17 @@
 #include "duet/bench/replay/replay_mcap.h"
 #include "duet/bench/replay/replay_page.h"
 #include "duet/bench/replay/replay_source.h"
+#include "duet/bench/replay/robot_outline.h"
 #include "duet/core/json.h"
 #include "duet/core/npz.h"
 #include "duet/core/require.h"
 #include "duet/hardware/mcap.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/motion/synthesis.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/retarget/pair.h"
 #include "duet/robots/kinematics.h"
+#include "duet/robots/robot_cards.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"
 #include "tests/bench/verified_run.h"
@@ -314,6 +319,155 @@ TEST_F(Replay, RecordingsOfAnybodyAreShownToo) {
   EXPECT_EQ(mine.scenes[0].tracks[0].name, "mine");
   EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "mine.npz"}, "g1_27dof"); }),
               HasSubstr("expected the 27 joints of"));
+}
+
+// Pieces of the drawn body in the world, each as spheres: hulls, the shapes outside of them, bars.
+std::vector<std::vector<OutlineSphere>> drawn_pieces(const RobotModel& robot, const RobotState& state) {
+  Kinematics kinematics(robot);
+  kinematics.update(state.X_WB, state.q);
+  const auto placed = [&](int link, const Eigen::Vector3d& p, double radius) {
+    return OutlineSphere{kinematics.X_WL(link) * p, radius};
+  };
+  const RobotOutline outline = robot_outline(robot);
+  std::vector<std::vector<OutlineSphere>> pieces;
+  std::set<int> inside;
+  for (const OutlineHull& hull : outline.hulls) {
+    inside.insert(hull.shapes.begin(), hull.shapes.end());
+    pieces.emplace_back();
+    for (const OutlineSphere& one : hull.spheres) pieces.back().push_back(placed(hull.link, one.center, one.radius));
+  }
+  for (int i = 0; i < static_cast<int>(robot.shapes.size()); ++i) {
+    if (inside.contains(i)) continue;
+    const RobotShape& shape = robot.shapes[i];
+    pieces.emplace_back();
+    for (const double z : {-shape.half_length, 0.0, shape.half_length})
+      pieces.back().push_back(placed(shape.link, shape.X_LS * Eigen::Vector3d(0.0, 0.0, z), shape.radius));
+  }
+  for (const OutlineBar& bar : outline.bars)
+    pieces.push_back({placed(bar.from_link, bar.from, bar.radius), placed(bar.to_link, bar.to, bar.radius)});
+  return pieces;
+}
+
+bool touch(const std::vector<OutlineSphere>& a, const std::vector<OutlineSphere>& b) {
+  for (const OutlineSphere& one : a)
+    for (const OutlineSphere& other : b)
+      if ((one.center - other.center).norm() < one.radius + other.radius) return true;
+  return false;
+}
+
+// How many pieces hang together with the first one.
+std::size_t in_one_piece(const std::vector<std::vector<OutlineSphere>>& pieces) {
+  std::set<std::size_t> reached = {0}, open = {0};
+  while (!open.empty()) {
+    const std::size_t here = *open.begin();
+    open.erase(open.begin());
+    for (std::size_t other = 0; other < pieces.size(); ++other)
+      if (!reached.contains(other) && touch(pieces[here], pieces[other])) reached.insert(other), open.insert(other);
+  }
+  return reached.size();
+}
+
+TEST(RobotOutline, IsOnePieceThatStandsOnItsSoles) {
+  for (const RobotCardFile& card : robot_cards()) {
+    const auto robot = load_shared_robot(card.name);
+    const std::vector<std::vector<OutlineSphere>> pieces = drawn_pieces(*robot, robot->standing_state());
+    ASSERT_FALSE(pieces.empty()) << card.name;
+    EXPECT_EQ(in_one_piece(pieces), pieces.size()) << card.name;
+    double lowest = 1.0;
+    for (const auto& piece : pieces)
+      for (const OutlineSphere& one : piece) lowest = std::min(lowest, one.center.z() - one.radius);
+    EXPECT_NEAR(lowest, 0.0, 1e-6) << card.name;  // standing_state puts the soles on the ground
+    const RobotOutline outline = robot_outline(*robot);
+    EXPECT_EQ(std::ranges::count(outline.hulls, true, &OutlineHull::is_foot), 2) << card.name;
+    EXPECT_GE(std::ranges::count(outline.hulls, false, &OutlineHull::is_foot), 1) << card.name;
+  }
+}
+
+TEST(RobotOutline, StaysOnePieceHoweverTheJointsAreBent) {
+  const auto robot = load_shared_robot("");
+  RobotState state = robot->standing_state();
+  for (const double part : {0.1, 0.5, 0.9}) {
+    state.q = robot->lower() + part * (robot->upper() - robot->lower());
+    const auto pieces = drawn_pieces(*robot, state);
+    EXPECT_EQ(in_one_piece(pieces), pieces.size()) << part;
+  }
+}
+
+TEST(RobotOutline, IsEmptyForARobotWithoutShapes) {
+  RobotModel bare = *load_shared_robot("");
+  bare.shapes.clear();
+  bare.feet.clear();
+  EXPECT_TRUE(robot_outline(bare).hulls.empty());
+  EXPECT_TRUE(robot_outline(bare).bars.empty());
+}
+
+class ReplayOfMotions : public testing::Test {
+ protected:
+  ReplayOfMotions() {
+    save_clip(clip_, folder_ / "clip.npz");
+    save_paired_motion(retarget(clip_, *load_shared_robot(""), {}), folder_ / "paired.npz");
+  }
+  test::ScratchFolder folder_;
+  InteractionClip clip_ = synthesize(Task::kHug, {});
+};
+
+TEST_F(ReplayOfMotions, AClipIsItsTwoPeople) {
+  const ReplayContent content = replay_of_files({folder_ / "clip.npz"}, "");
+  ASSERT_EQ(content.scenes.size(), 1U);
+  const ReplayTrack& track = content.scenes[0].tracks.at(0);
+  EXPECT_EQ(content.scenes[0].task, "hug");
+  EXPECT_EQ(track.robot, nullptr);
+  EXPECT_EQ(track.frames(), clip_.frames());
+  EXPECT_EQ(track.recording.partner, clip_.actor_motion().joints);
+  EXPECT_EQ(track.other_person, clip_.reactor_motion().joints);
+  ReplayColumns columns;
+  const nlohmann::json header = replay_header(content, columns);
+  EXPECT_TRUE(header.at("robots").empty());
+  EXPECT_EQ(header.at("partners").size(), 2U);
+  EXPECT_EQ(header.at("scenes").at(0).at("tracks").at(0).at("robot"), -1);
+}
+
+TEST_F(ReplayOfMotions, APairedMotionIsTheRobotBesideTheAdaptedPartnerAndThePeopleThatItCameFrom) {
+  const PairedMotion motion = load_paired_motion(folder_ / "paired.npz");
+  const ReplayContent content = replay_of_files({folder_ / "paired.npz"}, "");
+  const std::vector<ReplayTrack>& tracks = content.scenes.at(0).tracks;
+  ASSERT_EQ(tracks.size(), 2U);
+  EXPECT_EQ(tracks[0].recording.partner, motion.partner.joints);
+  EXPECT_EQ(tracks[0].recording.robot.at(9).q, Eigen::VectorXd(motion.robot.q.col(9)));
+  EXPECT_EQ(tracks[1].recording.partner, motion.source_partner.joints);
+  EXPECT_EQ(tracks[1].other_person, motion.source_reactor.joints);
+  ReplayColumns columns;
+  const nlohmann::json header = replay_header(content, columns), scene = header.at("scenes").at(0);
+  EXPECT_EQ(header.at("partners").size(), 3U);
+  EXPECT_FALSE(scene.at("tracks").at(0).at("detectors").empty());
+  EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "paired.npz"}, "t1"); }),
+              AllOf(HasSubstr("paired.npz"), HasSubstr("its joints are not those of 't1'")));
+  EXPECT_THAT(thrown_message<InputError>([&] {
+                replay_of_files({folder_ / "paired.npz", folder_ / "clip.npz"}, "");
+              }),
+              AllOf(HasSubstr("clip.npz"), HasSubstr("is among the files already")));
+}
+
+TEST_F(ReplayOfMotions, TheCommandTakesFilesAndFolders) {
+  const test::Answer page = test::duet_program("replay " + (folder_ / "paired.npz") + " -o " + (folder_ / "p.mcap"));
+  EXPECT_EQ(page.code, 0) << page.err;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "p.mcap"));
+  std::filesystem::create_directory(folder_ / "motions");
+  std::filesystem::copy(folder_ / "clip.npz", folder_ / "motions");
+  const test::Answer folder = test::duet_program("replay " + (folder_ / "motions") + " -o " + (folder_ / "m.mcap"));
+  EXPECT_EQ(folder.code, 0) << folder.err;
+  EXPECT_THAT(folder.out, HasSubstr("1 clip)"));
+  const test::Answer without = test::duet_program("replay " + (folder_ / "clip.npz") + " -o " + (folder_ / "rep"));
+  EXPECT_EQ(without.code, 2);
+  EXPECT_THAT(without.err, AllOf(HasSubstr("expected a name that ends in .html or .mcap"), HasSubstr("/rep'")));
+}
+
+TEST_F(Replay, TheFolderOfARunIsNamed) {
+  std::filesystem::create_directory(folder_ / "demo");
+  test::make_run(kept_suite("all"), folder_ / "demo/run");
+  const test::Answer answer = test::duet_program("replay " + (folder_ / "demo") + " -f mcap");
+  EXPECT_EQ(answer.code, 2);
+  EXPECT_THAT(answer.err, HasSubstr("is not a run directory (no run.json); '" + (folder_ / "demo/run") + "' is one"));
 }
 
 TEST_F(Replay, TheCommandSaysWhatItCannotRead) {

@@ -227,6 +227,16 @@ TEST(RunDirectory, KeepsTheDigestsOfItsPoliciesAndRefusesOthers) {
               HasSubstr("run.json: key 'controllers': expected an object of names and digests"));
 }
 
+TEST(LoadRun, NamesTheRunsInAFolderThatIsNone) {
+  const ScratchFolder scratch;
+  std::filesystem::create_directory(scratch / "demo");
+  std::filesystem::create_directory(scratch / "demo/clips");
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "demo"); }), testing::EndsWith("(no run.json)"));
+  RunDirectory::open(scratch / "demo/run", tiny_run());
+  EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "demo"); }),
+              testing::EndsWith("(no run.json); '" + (scratch / "demo/run") + "' is one"));
+}
+
 TEST(LoadRun, RefusesWhatIsNoRun) {
   const ScratchFolder scratch;
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "nowhere"); }), HasSubstr("is not a run directory"));

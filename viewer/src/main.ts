@@ -9,7 +9,7 @@ import {Colour, Renderer, Theme} from './renderer';
 import {Actor} from './stage';
 import {readState, writeState} from './state';
 import {Shown, Strips} from './strips';
-import {Happening, frameAt, happeningsOf, phaseAt, rangeOf} from './timeline';
+import {Happening, baseOf, endOf, frameAt, happeningsOf, phaseAt, rangeOf, secondsAt} from './timeline';
 
 const PALETTE = ['#0072b2', '#e07000', '#009e73', '#cc5fa0', '#8a6fd1', '#4fa8dd', '#a88600', '#7a8b2d'];
 const NULL_COLOUR = '#8b9199';
@@ -32,6 +32,7 @@ class Page {
   private happenings: Happening[] = [];
   private seconds = 0;
   private playing = false;
+  private loop: [number, number] | null = null; // the act, over and over, until somebody does something
   private speed = 1;
   private grid = false;
   private reference = false;
@@ -60,7 +61,7 @@ class Page {
 
   constructor(private readonly replay: Replay, private readonly app: HTMLElement) {
     this.renderer = this.makeRenderer();
-    this.strips = new Strips(replay.limits, (seconds) => this.seek(seconds));
+    this.strips = new Strips(replay.limits, (seconds) => this.goTo(seconds));
     const stage = el('div', {class: 'stage'}, this.renderer ? this.canvas : el('p', {class: 'nogl', role: 'alert'},
       'This browser has no WebGL2, so there is no picture in 3-D. The strips below and the table at the end stay.'), this.overlay);
     const bar = el('div', {class: 'bar', role: 'toolbar', 'aria-label': 'Playback'}, this.play,
@@ -68,7 +69,7 @@ class Page {
                    this.speedButton, this.clock, el('span', {class: 'gap'}), this.gridButton, this.referenceButton, this.holdButton,
                    button('?', 'Keys', () => this.keys.showModal(), '?'));
     app.append(el('div', {class: 'main'}, stage, bar, el('div', {class: 'slide'}, this.slider), this.strips.element), this.side, this.keys);
-    this.slider.addEventListener('input', () => this.seek(Number(this.slider.value)));
+    this.slider.addEventListener('input', () => this.goTo(Number(this.slider.value)));
     window.addEventListener('keydown', (event) => this.key(event));
     window.addEventListener('hashchange', () => this.restore(location.hash));
     new ResizeObserver(() => { this.dirty = true; }).observe(stage);
@@ -77,6 +78,7 @@ class Page {
     const hash = location.hash;  // before opening an episode writes its own
     this.open(0);
     this.restore(hash);
+    if (readState(hash).seconds === undefined && !matchMedia('(prefers-reduced-motion: reduce)').matches) this.playAct();
     requestAnimationFrame((now) => this.tick(now));
   }
 
@@ -103,7 +105,7 @@ class Page {
     this.range = rangeOf(scene.tracks);
     const same = scene.tracks.findIndex((track) => track.name === before);
     this.focus = Math.max(0, same);
-    this.choose('engines');
+    this.choose(scene.tracks.some((track) => track.row) ? 'engines' : 'all');
     this.frameCamera();
     this.seek(Math.max(this.range[0], Math.min(0, this.range[1])));
   }
@@ -149,17 +151,27 @@ class Page {
     const choice = {colours: this.colours, visible: this.visible, focus: this.focus};
     const active = document.activeElement?.getAttribute('aria-label') ?? document.activeElement?.textContent;
     this.side.replaceChildren(
-      verdictPanel(this.scene.tracks[this.focus]!),
+      verdictPanel(this.scene.tracks[this.focus]!, this.scene.task),
       tracksPanel(this.scene, choice, (i) => this.toggleTrack(i), (i) => this.setFocus(i), (which) => this.choose(which)),
       episodesPanel(this.replay, this.sceneIndex, (i) => this.open(i)));
     if (active && document.activeElement === document.body)
       for (const one of this.side.querySelectorAll<HTMLElement>('button, input'))
         if ((one.getAttribute('aria-label') ?? one.textContent) === active) one.focus();
+    this.showTitle();
     this.press(this.gridButton, this.grid);
     this.press(this.referenceButton, this.reference);
     this.press(this.holdButton, this.hold);
     this.seek(this.seconds);
     this.save();
+  }
+
+  // "Hug, hug_000: success" before the run's name.
+  private showTitle(): void {
+    const track = this.scene.tracks[this.focus]!, task = this.scene.task.replaceAll('_', ' ');
+    const what = [task && `${task[0]!.toUpperCase()}${task.slice(1)}`, this.scene.name].filter((part) => part).join(', ');
+    const text = track.row ? `${what}: ${wordOf(track)}` : what;
+    document.querySelector('#head h1')?.replaceChildren(text, el('small', {}, `${track.name} · ${this.replay.title}`));
+    document.title = `${text} - ${this.replay.title}`;
   }
 
   private press(of: HTMLElement, on: boolean): void { of.setAttribute('aria-pressed', String(on)); }
@@ -203,7 +215,25 @@ class Page {
     if (!this.playing) this.save();
   }
 
+  private goTo(seconds: number): void {
+    this.endLoop();
+    this.seek(seconds);
+  }
+
+  private playAct(): void {
+    const track = this.scene.tracks[this.focus]!, pause = 0.4;
+    this.loop = [Math.max(this.range[0], -pause), Math.min(endOf(track), secondsAt(track, track.act[1]) + pause)];
+    this.setPlaying(true);
+    this.seek(this.loop[0]);
+  }
+
+  private endLoop(): void {
+    if (this.loop && this.playing) this.setPlaying(false);
+    this.loop = null;
+  }
+
   private setPlaying(on: boolean): void {
+    if (!on) this.loop = null;
     if (on && this.seconds >= this.range[1] - 0.01) this.seek(this.range[0]);
     this.playing = on;
     this.play.textContent = on ? '❙❙' : '▶';
@@ -309,6 +339,7 @@ class Page {
     const found = act[event.key] ?? act[event.key.toLowerCase()];
     if (!found || (pressed && event.key === ' ') || (typing && event.key.startsWith('Page'))) return;
     event.preventDefault();
+    if (event.key !== ' ') this.endLoop();
     found();
   }
 
@@ -350,7 +381,7 @@ class Page {
   private pair(): [Vec3, Vec3] {
     const track = this.scene.tracks[this.focus]!, frame = frameAt(track, 0);
     const at = (values: Float64Array, rows: number): Vec3 => [0, 1, 2].map((k) => values[k * rows + Math.min(frame, rows - 1)]!) as Vec3;
-    const robot = at(track.motion.position.values, track.motion.position.rows);
+    const base = baseOf(track), robot = at(base.values, base.rows);
     const joints = track.partner?.joints;
     return [robot, joints && joints.rows > 0 ? at(joints.values, joints.rows) : [robot[0] + 1, robot[1], robot[2]]];
   }
@@ -383,7 +414,8 @@ class Page {
       const passed = Math.min(0.2, (now - this.last) / 1000);
       this.last = now;
       this.seek(this.seconds + passed * this.speed);
-      if (this.seconds >= this.range[1]) this.setPlaying(false);
+      if (this.loop && this.seconds >= this.loop[1]) this.seek(this.loop[0]);
+      else if (this.seconds >= this.range[1]) this.setPlaying(false);
       this.pace(now);
     }
     if (this.dirty) {
@@ -450,7 +482,7 @@ class Page {
       this.renderer!.draw(column * w, height - (row + 1) * h, w, h, view, this.camera.target,
                           actor.layers(false, this.reference, true), theme);
       const word = wordOf(actor.track);
-      labels.push([column / across, row / down, `${actor.track.name}: ${word}`, `cell ${word}`]);
+      labels.push([column / across, row / down, actor.track.row ? `${actor.track.name}: ${word}` : actor.track.name, `cell ${word}`]);
       this.label(actor, view, column / across, row / down, 1 / across, 1 / down, labels);
     }
   }

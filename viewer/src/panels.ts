@@ -1,6 +1,7 @@
 // Beside the picture: the verdict on one track with the command that repeats it, which tracks are shown, all episodes.
 import {el, button} from './dom';
 import {Replay, Row, Scene, Track, Verdict} from './replay';
+import {holds} from './timeline';
 
 export function wordOf(track: Track): string {
   if (!track.row || track.row.success === null) return 'not judged';
@@ -28,11 +29,21 @@ function verdictTable(row: Row): HTMLElement {
           verdict.success ? null : el('span', {class: 'why'}, why(verdict)))))));
 }
 
-export function verdictPanel(track: Track): HTMLElement {
+// What the headline detector says at the end of a motion that no run judged.
+function seenIn(track: Track, task: string): string {
+  const detector = track.detectors[0];
+  if (!track.robot) return 'People, no robot';
+  if (!detector) return 'Not judged';
+  const sees = holds(detector.success, detector.frames.length - 1);
+  return `The detector sees ${sees ? 'a' : 'no'} ${task.replaceAll('_', ' ')}`;
+}
+
+export function verdictPanel(track: Track, task: string): HTMLElement {
   const word = wordOf(track), row = track.row;
+  const text = row ? `${word[0]!.toUpperCase()}${word.slice(1)}` : seenIn(track, task);
   const panel = el('section', {class: 'panel verdict', 'aria-label': 'Verdict'},
                    el('h2', {class: word}, el('span', {class: 'mark', 'aria-hidden': 'true'}, word === 'success' ? '✓' : word === 'failure' ? '✗' : '–'),
-                      ` ${word[0]!.toUpperCase()}${word.slice(1)}`), el('p', {class: 'who'}, track.name));
+                      ` ${text}`), el('p', {class: 'who'}, track.name));
   if (track.outcome !== 'ok') panel.append(el('p', {class: 'bad'}, `${track.outcome}${track.message ? `: ${track.message}` : ''}`));
   if (!row) {
     panel.append(el('p', {}, track.origin));
@@ -52,7 +63,7 @@ export function verdictPanel(track: Track): HTMLElement {
   panel.append(el('details', {}, el('summary', {}, 'What made it'), facts([
     ['recording', track.origin], ['seed', String(row.seed)], ['engine', `${row.engine} ${row.engine_version}`],
     ['controller', `${row.controller} ${short(row.controller_digest)}`], ['policy', `${row.policy} ${short(row.policy_digest)}`],
-    ['robot', `${track.robot.name} ${short(row.robot_digest)}`], ['states', short(row.state_hash)], ['episode', row.key.slice(0, 16)],
+    ['robot', `${track.robot?.name ?? 'none'} ${short(row.robot_digest)}`], ['states', short(row.state_hash)], ['episode', row.key.slice(0, 16)],
   ])));
   return panel;
 }
@@ -76,11 +87,11 @@ export function tracksPanel(scene: Scene, choice: TrackChoice, toggle: (index: n
     const name = el('button', {type: 'button', class: 'name', 'aria-pressed': String(i === choice.focus)}, track.name);
     name.addEventListener('click', () => focus(i));
     return el('li', {class: i === choice.focus ? 'focus' : ''}, box, swatch, name,
-              el('span', {class: `word ${word}`}, track.outcome === 'ok' ? word : track.outcome));
+              el('span', {class: `word ${word}`}, !track.row ? '' : track.outcome === 'ok' ? word : track.outcome));
   });
   const some = (text: string, label: string, which: 'engines' | 'policies' | 'all' | 'one') => button(text, label, () => choose(which));
   return el('section', {class: 'panel tracks', 'aria-label': 'Tracks'}, el('h2', {}, 'Who is shown'),
-            el('p', {class: 'choices'}, some('engines', 'The same policy in every engine', 'engines'),
+            el('p', {class: 'choices', ...(scene.tracks.some((track) => track.row) ? {} : {hidden: ''})}, some('engines', 'The same policy in every engine', 'engines'),
                some('policies', 'Every policy in the same engine', 'policies'), some('all', 'All tracks', 'all'),
                some('one', 'This track alone', 'one')),
             el('ul', {}, ...rows));
@@ -101,7 +112,7 @@ export function episodesPanel(replay: Replay, current: number, open: (index: num
   });
   list.append(...items);
   const panel = el('section', {class: 'panel episodes', 'aria-label': 'Episodes'},
-                   el('h2', {}, 'Episodes, least agreement first'));
+                   el('h2', {}, replay.episodes_of_run > 0 ? 'Episodes, least agreement first' : 'Motions'));
   if (replay.scenes.length > 8) {
     const search = el('input', {type: 'search', placeholder: 'filter', 'aria-label': 'Filter episodes'});
     search.addEventListener('input', () => {

@@ -1,6 +1,8 @@
-// Draws capsules, cones and a floor by WebGL2: one mesh, one draw call a body. Small on purpose: a page holds it whole,
-// and a computer without a graphics card has to draw 250 capsules 30 times a second.
+// Draws capsules, cones, hulls of spheres and a floor by WebGL2: one mesh and one draw call for all capsules of a body,
+// one of each for a hull. Small on purpose: a page holds it whole, and a computer without a graphics card has to draw 250
+// capsules 30 times a second.
 import {View} from './camera';
+import {Hull} from './replay';
 
 export type Colour = [number, number, number];
 
@@ -10,8 +12,16 @@ const STRIDE = 13;
 export class Bodies {
   data = new Float32Array(64 * STRIDE);
   count = 0;
+  readonly hulls: {hull: Hull; data: Float32Array}[] = [];
 
-  clear(): void { this.count = 0; }
+  clear(): void {
+    this.count = 0;
+    this.hulls.length = 0;
+  }
+
+  addHull(hull: Hull, p: ArrayLike<number>, R: ArrayLike<number>, colour: Colour): void {
+    this.hulls.push({hull, data: new Float32Array([p[0]!, p[1]!, p[2]!, R[0]!, R[1]!, R[2]!, R[3]!, 1, 0, 1, ...colour])});
+  }
 
   // Along z of its frame; taper is the radius of the far end as a part of the near one's (1: a capsule, 0: a cone).
   add(p: ArrayLike<number>, R: ArrayLike<number>, radius: number, half: number, taper: number, colour: Colour): void {
@@ -49,6 +59,7 @@ layout(location=1) in vec3 place;
 layout(location=2) in vec4 turn; // w, x, y, z
 layout(location=3) in vec3 size; // radius, half length, taper
 layout(location=4) in vec3 tint;
+layout(location=5) in vec3 facing; // the normal before it is turned
 uniform mat4 view;
 uniform vec3 light;
 uniform float flatten;
@@ -60,7 +71,7 @@ void main() {
   float r = size.x * (corner.w > 0.0 ? size.z : 1.0);
   vec3 p = place + turned(corner.xyz * r + vec3(0.0, 0.0, corner.w * size.y));
   if (flatten > 0.5) { p.xy -= light.xy / light.z * max(p.z, 0.0); p.z = 0.004; }
-  normal = turned(corner.xyz);
+  normal = turned(facing);
   colour = tint;
   world = p;
   gl_Position = view * vec4(p, 1.0);
@@ -79,9 +90,12 @@ out vec4 pixel;
 void main() {
   if (flatten > 0.5) { pixel = vec4(0.0, 0.0, 0.0, alpha); return; }
   vec3 n = normalize(normal), to = normalize(eye - world);
-  float lit = 0.52 + 0.22 * n.z + 0.42 * max(dot(n, light), 0.0);
-  float rim = pow(1.0 - max(dot(n, to), 0.0), 3.0);
-  pixel = vec4(colour * lit + 0.12 * rim, alpha);
+  float facing = max(dot(n, to), 0.0);
+  float lit = 0.44 + 0.2 * n.z + 0.36 * max(dot(n, light), 0.0) + 0.26 * facing;
+  float edge = 1.0 - facing, rim = edge * edge * edge;
+  // Ghosts are seen by their outlines: where several overlap, the middle stays clear.
+  float cover = alpha < 1.0 ? alpha * (0.3 + 1.5 * edge * edge) : 1.0;
+  pixel = vec4(colour * lit + 0.12 * rim, cover);
 }`;
 
 const FLOOR_VERTEX = `#version 300 es
@@ -126,14 +140,35 @@ function capsuleMesh(around: number, rings: number): {corners: Float32Array; ind
   return {corners: new Float32Array(corners), indices: new Uint16Array(indices)};
 }
 
+// The hull of spheres, as a sphere whose corners are moved to where the hull is farthest in their direction, which is
+// also its normal there: seven numbers a corner (place, end, normal).
+function hullMesh(hull: Hull, around: number, rings: number): {corners: Float32Array; indices: Uint16Array} {
+  const sphere = capsuleMesh(around, rings), corners: number[] = [];
+  for (let i = 0; i < sphere.corners.length; i += 4) {
+    const [x, y, z] = sphere.corners.subarray(i, i + 3) as unknown as [number, number, number];
+    let far = hull.spheres[0]!, most = -Infinity;
+    for (const one of hull.spheres) {
+      const reach = x * one[0] + y * one[1] + z * one[2] + one[3];
+      if (reach > most) [far, most] = [one, reach];
+    }
+    corners.push(far[0] + far[3] * x, far[1] + far[3] * y, far[2] + far[3] * z, 1, x, y, z);
+  }
+  return {corners: new Float32Array(corners), indices: sphere.indices};
+}
+
+interface Mesh {
+  array: WebGLVertexArrayObject;
+  indices: number;
+}
+
 export class Renderer {
   private readonly gl: WebGL2RenderingContext;
   private readonly body: WebGLProgram;
   private readonly floor: WebGLProgram;
   private readonly instances: WebGLBuffer;
-  private readonly bodyArray: WebGLVertexArrayObject;
+  private readonly capsule: Mesh;
+  private readonly hulls = new Map<Hull, Mesh>();
   private readonly floorArray: WebGLVertexArrayObject;
-  private readonly indices: number;
   private readonly places = new Map<string, WebGLUniformLocation | null>();
   readonly software: boolean;
   drawn = 0; // instances of the last picture
@@ -150,14 +185,29 @@ export class Renderer {
     this.gl = gl;
     this.body = program(gl, BODY_VERTEX, BODY_FRAGMENT);
     this.floor = program(gl, FLOOR_VERTEX, FLOOR_FRAGMENT);
-    const mesh = this.software ? capsuleMesh(9, 2) : capsuleMesh(18, 6);
-    this.indices = mesh.indices.length;
-    this.bodyArray = gl.createVertexArray()!;
-    gl.bindVertexArray(this.bodyArray);
-    attribute(gl, mesh.corners, 4);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
     this.instances = gl.createBuffer()!;
+    this.capsule = this.meshOf(this.software ? capsuleMesh(9, 2) : capsuleMesh(18, 6), 4, 0);
+    this.floorArray = gl.createVertexArray()!;
+    gl.bindVertexArray(this.floorArray);
+    attribute(gl, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), 2);
+    gl.enable(gl.DEPTH_TEST);
+    gl.enable(gl.CULL_FACE);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+  }
+
+  // Numbers a corner, and where its normal begins among them.
+  private meshOf(made: {corners: Float32Array; indices: Uint16Array}, numbers: number, normal: number): Mesh {
+    const gl = this.gl, array = gl.createVertexArray()!;
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ARRAY_BUFFER, made.corners, gl.STATIC_DRAW);
+    for (const [location, size, at] of [[0, 4, 0], [5, 3, normal]] as const) {
+      gl.enableVertexAttribArray(location);
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 4 * numbers, 4 * at);
+    }
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, made.indices, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
     let offset = 0;
     for (const [location, size] of [[1, 3], [2, 4], [3, 3], [4, 3]] as const) {
@@ -166,13 +216,16 @@ export class Renderer {
       gl.vertexAttribDivisor(location, 1);
       offset += size;
     }
-    this.floorArray = gl.createVertexArray()!;
-    gl.bindVertexArray(this.floorArray);
-    attribute(gl, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), 2);
-    gl.enable(gl.DEPTH_TEST);
-    gl.enable(gl.CULL_FACE);
-    gl.enable(gl.SCISSOR_TEST);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    return {array, indices: made.indices.length};
+  }
+
+  private hullOf(hull: Hull): Mesh {
+    let mesh = this.hulls.get(hull);
+    if (!mesh) {
+      const made = this.software ? hullMesh(hull, 16, 5) : hullMesh(hull, 32, 10);
+      this.hulls.set(hull, mesh = this.meshOf(made, 7, 4));
+    }
+    return mesh;
   }
 
   begin(): void { this.drawn = 0; }
@@ -200,17 +253,15 @@ export class Renderer {
     gl.uniformMatrix4fv(this.at(this.body, 'view'), false, view.matrix);
     gl.uniform3f(this.at(this.body, 'light'), 0.36, 0.28, 0.89);
     gl.uniform3f(this.at(this.body, 'eye'), ...view.eye);
-    gl.bindVertexArray(this.bodyArray);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
     for (const layer of layers) this.shadow(layer, theme);
-    for (const layer of layers) this.drawn += layer.bodies.count;
+    for (const layer of layers) this.drawn += layer.bodies.count + layer.bodies.hulls.length;
     for (const layer of layers) if (layer.alpha >= 1) this.instancesOf(layer, 1, 0);
     for (const layer of layers) if (layer.alpha < 1) this.ghost(layer);
   }
 
   private shadow(layer: Layer, theme: Theme): void {
     const gl = this.gl;
-    if (!layer.shadow || layer.bodies.count === 0) return;
+    if (!layer.shadow || layer.bodies.count + layer.bodies.hulls.length === 0) return;
     gl.enable(gl.STENCIL_TEST);
     gl.stencilFunc(gl.EQUAL, 0, 0xff);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
@@ -238,12 +289,19 @@ export class Renderer {
   }
 
   private instancesOf(layer: Layer, alpha: number, flatten: number): void {
-    const gl = this.gl, count = layer.bodies.count;
-    if (count === 0) return;
+    const gl = this.gl, {count, data, hulls} = layer.bodies;
     gl.uniform1f(this.at(this.body, 'alpha'), alpha);
     gl.uniform1f(this.at(this.body, 'flatten'), flatten);
-    gl.bufferData(gl.ARRAY_BUFFER, layer.bodies.data.subarray(0, count * STRIDE), gl.STREAM_DRAW);
-    gl.drawElementsInstanced(gl.TRIANGLES, this.indices, gl.UNSIGNED_SHORT, 0, count);
+    if (count > 0) this.drawMesh(this.capsule, data.subarray(0, count * STRIDE), count);
+    for (const one of hulls) this.drawMesh(this.hullOf(one.hull), one.data, 1);
+  }
+
+  private drawMesh(mesh: Mesh, instances: Float32Array, count: number): void {
+    const gl = this.gl;
+    gl.bindVertexArray(mesh.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.instances);
+    gl.bufferData(gl.ARRAY_BUFFER, instances, gl.STREAM_DRAW);
+    gl.drawElementsInstanced(gl.TRIANGLES, mesh.indices, gl.UNSIGNED_SHORT, 0, count);
   }
 
   private at(of: WebGLProgram, name: string): WebGLUniformLocation | null {

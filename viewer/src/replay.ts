@@ -6,6 +6,15 @@ export interface Robot {
   links: {name: string; parent: number; p: number[]; quat_wxyz: number[]; axis: number[]}[];
   shapes: {link: number; p: number[]; quat_wxyz: number[]; radius: number; half_length: number}[];
   points: Record<string, {link: number; p: number[]}>;
+  outline: {hulls: Hull[]; bars: {links: [number, number]; from: number[]; to: number[]; radius: number}[]};
+}
+
+// The convex hull of spheres that a link carries: a foot, or a block of the trunk. Drawn in the place of its shapes.
+export interface Hull {
+  link: number;
+  spheres: [number, number, number, number][]; // x, y, z and radius, in the axes of the link [m]
+  shapes: number[];
+  foot: boolean;
 }
 
 export interface Capsule {
@@ -80,8 +89,9 @@ export interface Track {
   name: string;
   repeat: string;
   origin: string;
-  robot: Robot;
+  robot: Robot | null; // null: people alone
   partner: Partner | null;
+  other: Partner | null; // the person in the robot's place, where people are shown
   rate: number;
   frames: number;
   act: [number, number];
@@ -177,8 +187,9 @@ class Reader {
       name: json.name,
       repeat: json.repeat,
       origin: json.origin,
-      robot: this.header.robots[json.robot],
+      robot: json.robot < 0 ? null : this.header.robots[json.robot],
       partner: json.partner < 0 ? null : this.partners[json.partner]!,
+      other: json.other_person < 0 ? null : this.partners[json.other_person]!,
       rate: json.rate_hz,
       frames: json.frames,
       act: json.act,

@@ -1,7 +1,7 @@
 // What stands on the floor at an instant: robots, their partner, forces, the reference.
 import {Bodies, Colour, Layer} from './renderer';
 import {Kinematics, Quat, Vec3, multiply, rotate, turnOfZ} from './kinematics';
-import {Contact, Limits, Motion, Robot, Track} from './replay';
+import {Contact, Limits, Motion, Partner, Robot, Track} from './replay';
 import {frameAt} from './timeline';
 
 const SKIN: Colour = [0.86, 0.72, 0.56];
@@ -31,21 +31,34 @@ export function contactsAt(track: Track, frame: number): Contact[] {
   return list;
 }
 
+// Feet and blocks, the shapes outside of them, and what joins them.
 function addRobot(kinematics: Kinematics, robot: Robot, colour: Colour, to: Bodies): void {
-  const p: Vec3 = [0, 0, 0], R: Quat = [1, 0, 0, 0];
-  for (const shape of robot.shapes) {
+  const p: Vec3 = [0, 0, 0], q: Vec3 = [0, 0, 0], R: Quat = [1, 0, 0, 0], dark = mix(colour, [0, 0, 0], 0.32);
+  const inside = new Set(robot.outline.hulls.flatMap((hull) => hull.shapes));
+  for (const [i, shape] of robot.shapes.entries()) {
+    if (inside.has(i)) continue;
     kinematics.point(shape.link, shape.p, p);
     multiply(kinematics.R[shape.link]!, shape.quat_wxyz, R);
     to.add(p, R, shape.radius, shape.half_length, 1, colour);
+  }
+  for (const hull of robot.outline.hulls)
+    to.addHull(hull, kinematics.p[hull.link]!, kinematics.R[hull.link]!, hull.foot ? dark : colour);
+  for (const bar of robot.outline.bars) {
+    kinematics.point(bar.links[0], bar.from, p);
+    kinematics.point(bar.links[1], bar.to, q);
+    const axis: Vec3 = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
+    for (let k = 0; k < 3; ++k) p[k] = (p[k]! + q[k]!) / 2;
+    to.add(p, turnOfZ(axis, R), bar.radius, Math.hypot(...axis) / 2, 1, dark);
   }
 }
 
 // The pictures of one track, made again when its frame or colour changes.
 export class Actor {
-  readonly kinematics: Kinematics;
+  readonly kinematics: Kinematics | null;
   readonly bodies = new Bodies();
   readonly reference = new Bodies();
   readonly partner = new Bodies();
+  readonly other = new Bodies();
   readonly arrows = new Bodies();
   labels: Label[] = [];
   frame = -1;
@@ -54,7 +67,7 @@ export class Actor {
   private readonly held = new Map<number, number>(); // largest force over limit of a capsule so far
 
   constructor(readonly track: Track, private readonly limits: Limits) {
-    this.kinematics = new Kinematics(track.robot);
+    this.kinematics = track.robot && new Kinematics(track.robot);
   }
 
   update(seconds: number, colour: Colour, hold: boolean): void {
@@ -62,16 +75,20 @@ export class Actor {
     if (made === this.made) return;
     this.made = made;
     this.frame = frame;
-    this.poseOf(this.track.motion, this.bodies, colour);
+    if (this.kinematics) this.poseOf(this.track.motion, this.bodies, colour);
     this.referenceMade = false;
     const contacts = contactsAt(this.track, frame);
     this.touch(contacts);
-    this.person(contacts, hold);
+    this.touched(contacts, hold);
+    this.person(this.track.partner, this.partner, (capsule) => mix(SKIN, HOT, this.tintOf(capsule)));
+    this.person(this.track.other, this.other, () => mix(colour, [1, 1, 1], 0.25));
   }
 
   layers(ghost: boolean, reference: boolean, person: boolean): Layer[] {
     const layers: Layer[] = [];
-    if (person) layers.push({bodies: this.partner, alpha: 1, shadow: true});
+    if (person || !this.track.robot) {
+      for (const bodies of [this.partner, this.other]) layers.push({bodies, alpha: ghost ? 0.42 : 1, shadow: !ghost});
+    }
     if (!ghost) layers.push({bodies: this.arrows, alpha: 1, shadow: false});
     if (reference && !this.referenceMade) {
       this.referenceMade = true;
@@ -84,7 +101,7 @@ export class Actor {
 
   private poseOf(motion: Motion, to: Bodies, colour: Colour): void {
     to.clear();
-    if (this.kinematics.update(motion, this.frame)) addRobot(this.kinematics, this.track.robot, colour, to);
+    if (this.kinematics?.update(motion, this.frame)) addRobot(this.kinematics, this.track.robot!, colour, to);
   }
 
   private touch(contacts: Contact[]): void {
@@ -108,26 +125,34 @@ export class Actor {
     }
   }
 
-  private person(contacts: Contact[], hold: boolean): void {
-    this.partner.clear();
-    const partner = this.track.partner;
-    if (!partner || this.frame >= partner.joints.rows) return;
+  // How close to its limit the force on each capsule of the partner is, or was at most.
+  private touched(contacts: Contact[], hold: boolean): void {
     const forces = new Map<number, number>();
     for (const contact of contacts) forces.set(contact.capsule, (forces.get(contact.capsule) ?? 0) + contact.newton);
     if (!hold) this.held.clear();
-    const rows = partner.joints.rows, R: Quat = [1, 0, 0, 0], middle: Vec3 = [0, 0, 0], axis: Vec3 = [0, 0, 0];
-    for (const [i, capsule] of partner.capsules.entries()) {
+    for (const [i, force] of forces) {
+      const limit = this.limits.regions[this.track.partner?.capsules[i]?.region ?? '']?.newton;
+      this.held.set(i, Math.max(limit ? force / limit : 0, this.held.get(i) ?? 0));
+    }
+  }
+
+  private tintOf(capsule: number): number {
+    const ratio = this.held.get(capsule) ?? 0;
+    return ratio > 0 ? Math.min(1, 0.25 + 0.75 * ratio) : 0;
+  }
+
+  private person(of: Partner | null, to: Bodies, colourOf: (capsule: number) => Colour): void {
+    to.clear();
+    if (!of || this.frame >= of.joints.rows) return;
+    const rows = of.joints.rows, R: Quat = [1, 0, 0, 0], middle: Vec3 = [0, 0, 0], axis: Vec3 = [0, 0, 0];
+    for (const [i, capsule] of of.capsules.entries()) {
       for (let k = 0; k < 3; ++k) {
-        const a = partner.joints.values[(3 * capsule.a + k) * rows + this.frame]!;
-        const b = partner.joints.values[(3 * capsule.b + k) * rows + this.frame]!;
+        const a = of.joints.values[(3 * capsule.a + k) * rows + this.frame]!;
+        const b = of.joints.values[(3 * capsule.b + k) * rows + this.frame]!;
         axis[k] = (capsule.end - capsule.begin) * (b - a);
         middle[k] = a + capsule.begin * (b - a) + axis[k]! / 2;
       }
-      const limit = this.limits.regions[capsule.region]?.newton;
-      const now = limit ? (forces.get(i) ?? 0) / limit : 0;
-      this.held.set(i, hold ? Math.max(now, this.held.get(i) ?? 0) : now);
-      const ratio = this.held.get(i)!, tint = ratio > 0 ? Math.min(1, 0.25 + 0.75 * ratio) : 0;
-      this.partner.add(middle, turnOfZ(axis, R), capsule.radius, Math.hypot(...axis) / 2, 1, mix(SKIN, HOT, tint));
+      to.add(middle, turnOfZ(axis, R), capsule.radius, Math.hypot(...axis) / 2, 1, colourOf(i));
     }
   }
 }

@@ -1,7 +1,7 @@
 // The strips under the scrub bar: what was measured over time, on the clock of the picture above.
 import {el} from './dom';
 import {Limits, Scene, Track} from './replay';
-import {Happening, PARTED, Trace, distancesOf, frameAt, holds, phaseAt, sampleAt, secondsAt, traceOf} from './timeline';
+import {Happening, PARTED, Trace, baseOf, distancesOf, frameAt, holds, phaseAt, sampleAt, secondsAt, traceOf} from './timeline';
 
 export interface Shown {
   index: number;
@@ -17,17 +17,27 @@ interface Plot {
   css: (name: string) => string;
 }
 
+// One line of a strip: how it is drawn, and what it is.
+interface Legend {
+  colour: string; // of the style sheet
+  dashes: number[];
+  text: string;
+}
+
 interface Strip {
   name: string;
   height: number;
   draw: (plot: Plot) => void;
   read: (seconds: number) => string; // what the label says at an instant
+  legend?: () => Legend[];
 }
+
+const DASHES = [[], [5, 3], [2, 2], [8, 3, 2, 3], [1, 3], [9, 4]];
 
 export class Strips {
   readonly element = el('div', {class: 'strips'});
   private readonly cursor = el('div', {class: 'cursor', 'aria-hidden': 'true'});
-  private readonly rows: {strip: Strip; canvas: HTMLCanvasElement; value: HTMLElement; row: HTMLElement}[] = [];
+  private readonly rows: {strip: Strip; canvas: HTMLCanvasElement; value: HTMLElement; row: HTMLElement; legend: HTMLElement}[] = [];
   private readonly traces = new Map<Track, Trace>();
   private shown: Shown[] = [];
   private focus: Shown | null = null;
@@ -40,8 +50,9 @@ export class Strips {
       const canvas = el('canvas', {'aria-hidden': 'true'});
       canvas.style.height = `${strip.height}px`;
       const value = el('span', {class: 'value'});
-      const row = el('div', {class: 'strip'}, el('div', {class: 'label'}, el('b', {}, strip.name), value), canvas);
-      this.rows.push({strip, canvas, value, row});
+      const legend = el('ul', {class: 'legend', 'aria-label': `Lines of ${strip.name}`});
+      const row = el('div', {class: 'strip'}, el('div', {class: 'label'}, el('b', {}, strip.name), value), canvas, legend);
+      this.rows.push({strip, canvas, value, row, legend});
       this.element.append(row);
     }
     this.element.append(this.cursor);
@@ -78,7 +89,13 @@ export class Strips {
     const touched = scene.tracks.some((track) => track.contacts.length > 0);
     const rows = new Map(this.rows.map((row) => [row.strip.name, row.row]));
     rows.get('partner force')!.hidden = !touched;
-    rows.get('distance')!.hidden = shown.length < 2;
+    rows.get('distance')!.hidden = shown.filter((one) => one.track.robot).length < 2 || !this.focus?.track.robot;
+    rows.get('detector')!.hidden = !this.focus?.track.detectors[0];
+    for (const {strip, legend} of this.rows) {
+      const lines = strip.legend?.() ?? [];
+      legend.hidden = lines.length === 0;
+      legend.replaceChildren(...lines.map((one) => el('li', {}, swatchOf(one), one.text)));
+    }
     this.draw();
   }
 
@@ -155,7 +172,6 @@ export class Strips {
   }
 
   private margins(): Strip {
-    const dashes = [[], [5, 3], [2, 2], [8, 3, 2, 3], [1, 3], [9, 4]];
     return {
       name: 'detector',
       height: 78,
@@ -172,7 +188,7 @@ export class Strips {
         }
         axis(context, css, [[middle, 'threshold']], width);
         for (const k of detector.names.keys()) {
-          context.setLineDash(dashes[k % dashes.length]!);
+          context.setLineDash(DASHES[k % DASHES.length]!);
           line(context, css(`--m${k % 6}`), 1.6, detector.frames.map((f, i) =>
             [x(secondsAt(track, f)), y(detector.margins.values[k * detector.margins.rows + i]!)]));
           context.setLineDash([]);
@@ -183,6 +199,13 @@ export class Strips {
           if (holds(detector.success, i))
             context.fillRect(Math.floor(x(secondsAt(track, detector.frames[i - 1] ?? 0))), height - 3,
                              Math.ceil(x(secondsAt(track, frame)) - x(secondsAt(track, detector.frames[i - 1] ?? 0))) + 1, 3);
+      },
+      legend: () => {
+        const detector = this.focus?.track.detectors[0];
+        return (detector?.names ?? []).map((name, k) => ({
+          colour: `--m${k % 6}`, dashes: DASHES[k % DASHES.length]!,
+          text: `${name.replaceAll('_', ' ')}${limitText(detector!.thresholds[k]!, detector!.units[k]!)}`,
+        }));
       },
       read: (seconds) => {
         const track = this.focus?.track, detector = track?.detectors[0];
@@ -278,7 +301,7 @@ export class Strips {
         const y = (v: number) => height - 3 - Math.min(1.05, Math.max(0, v / 1.0)) * (height - 12);
         axis(context, css, [[y(0), ''], [y(1), '1 m']], width);
         for (const one of this.inOrder()) {
-          const {values, rows} = one.track.motion.position;
+          const {values, rows} = baseOf(one.track);
           const points: [number, number][] = [];
           for (let t = 0; t < rows; t += 3) points.push([x(secondsAt(one.track, t)), y(values[2 * rows + t]!)]);
           line(context, one.colour, one === this.focus ? 2 : 1.1, points);
@@ -291,7 +314,7 @@ export class Strips {
       read: (seconds) => {
         const track = this.focus?.track;
         if (!track) return '';
-        const {values, rows} = track.motion.position;
+        const {values, rows} = baseOf(track);
         return `${values[2 * rows + frameAt(track, seconds)]!.toFixed(2)} m`;
       },
     };
@@ -300,6 +323,22 @@ export class Strips {
   private inOrder(): Shown[] {
     return [...this.shown.filter((one) => one !== this.focus), ...(this.focus ? [this.focus] : [])];
   }
+}
+
+// A short piece of the line, as it is drawn.
+function swatchOf({colour, dashes}: Legend): SVGElement {
+  const space = 'http://www.w3.org/2000/svg', svg = document.createElementNS(space, 'svg'), line = document.createElementNS(space, 'line');
+  for (const [name, value] of Object.entries({width: '26', height: '8', 'aria-hidden': 'true'})) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries({x1: '0', x2: '26', y1: '4', y2: '4', 'stroke-width': '2', 'stroke-dasharray': dashes.join(' ')}))
+    line.setAttribute(name, value);
+  line.style.stroke = `var(${colour})`;
+  svg.append(line);
+  return svg;
+}
+
+// " (limit 0.3 m)"; a margin of the best of several ways has no limit of its own.
+function limitText(threshold: number, unit: string): string {
+  return unit ? ` (limit ${Number(Math.abs(threshold).toPrecision(3))} ${unit})` : '';
 }
 
 function signed(value: number): string { return `${value >= 0 ? '+' : '−'}${Math.abs(value).toPrecision(3)}`; }

@@ -1,5 +1,6 @@
 // One clock for all tracks of a scene: seconds since the act began. What happens on it.
 import {Kinematics, Vec3} from './kinematics';
+import {Columns} from './columns';
 import {Track} from './replay';
 
 export const PARTED = 0.05; // [m], as in the report's table of engines
@@ -23,6 +24,11 @@ export function secondsAt(track: Track, frame: number): number { return (frame -
 
 export function rangeOf(tracks: Track[]): [number, number] {
   return [Math.min(...tracks.map(beginOf)), Math.max(...tracks.map(endOf))];
+}
+
+// Where the base is, or the pelvis of the person in the robot's place: x, y and z are the first three columns.
+export function baseOf(track: Track): Columns {
+  return track.robot ? track.motion.position : (track.other ?? track.partner)!.joints;
 }
 
 export function phaseAt(track: Track, frame: number): string {
@@ -50,14 +56,16 @@ export function sampleAt(frames: number[], frame: number): number {
   return low;
 }
 
-// Where the base and both hands are, ten times a second.
+// Where a robot's base and both hands are, ten times a second; nothing of people.
 export interface Trace {
   step: number; // frames
   points: Float64Array; // x, y, z of each point in turn
 }
 
 export function traceOf(track: Track): Trace {
-  const step = Math.max(1, Math.round(track.rate / 10)), kinematics = new Kinematics(track.robot);
+  const step = Math.max(1, Math.round(track.rate / 10));
+  if (!track.robot) return {step, points: new Float64Array(0)};
+  const kinematics = new Kinematics(track.robot);
   const count = Math.ceil(track.frames / step), points = new Float64Array(9 * count).fill(NaN);
   const out: Vec3 = [0, 0, 0];
   for (let i = 0; i < count; ++i) {
@@ -74,7 +82,7 @@ export function traceOf(track: Track): Trace {
 
 // Distance of the farthest of the points, by sample of `a`; NaN where one of the two is not there.
 export function distancesOf(a: Track, ta: Trace, b: Track, tb: Trace): Float64Array {
-  const out = new Float64Array(ta.points.length / 9).fill(NaN);
+  const out = new Float64Array(tb.points.length > 0 ? ta.points.length / 9 : 0).fill(NaN);
   for (let i = 0; i < out.length; ++i) {
     const frame = Math.round((secondsAt(a, i * ta.step) + b.act[0] / b.rate) * b.rate), j = Math.round(frame / tb.step);
     if (j < 0 || 9 * j >= tb.points.length) continue;

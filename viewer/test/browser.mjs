@@ -25,8 +25,9 @@ export async function closeAll() {
 }
 
 // A page from disk with the network off, and what it complained of.
+// Nothing moves by itself: a visitor who asked for less motion, unless a check says otherwise.
 export async function open(browser, path, {hash = '', width = 1440, height = 1000, ...options} = {}) {
-  const context = await browser.newContext({viewport: {width, height}, ...options});
+  const context = await browser.newContext({viewport: {width, height}, reducedMotion: 'reduce', ...options});
   opened.push(context);
   await context.setOffline(true);
   const page = await context.newPage(), errors = [];

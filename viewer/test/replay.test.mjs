@@ -52,6 +52,64 @@ test('playing draws pictures and moves the clock', async () => {
   console.log(`${await attribute(page, 'capsules')} capsules at 1440 x 1000, ${await attribute(page, 'fps')} pictures a second`);
 });
 
+test('the act plays in a loop when the page opens, until somebody does something', async () => {
+  const {page} = await ready(replay, {reducedMotion: 'no-preference'});
+  const play = page.getByRole('button', {name: 'Play or pause'});
+  assert.equal(await play.textContent(), '❙❙');
+  const first = await attribute(page, 'frame');
+  await page.waitForFunction((frame) => document.getElementById('app').dataset.frame !== frame, first, {timeout: 60000});
+  await page.keyboard.press('End');
+  assert.equal(await play.textContent(), '▶');
+  const shared = await ready(replay, {reducedMotion: 'no-preference', hash: await page.evaluate(() => location.hash)});
+  assert.equal(await shared.page.getByRole('button', {name: 'Play or pause'}).textContent(), '▶', 'a link to an instant stays there');
+});
+
+test('the title names task, clip and verdict; the lines of the detector have names and limits', async () => {
+  const {page} = await ready(), {header} = readPage(html), scene = header.scenes[0];
+  const title = await page.locator('h1').textContent();
+  assert.match(title.toLowerCase(), new RegExp(`^${scene.task.replaceAll('_', ' ')}, ${scene.name}: (success|failure|not judged)`));
+  assert.ok(title.includes(header.title), title);
+  const legend = await page.locator('.strip', {hasText: 'detector'}).locator('.legend li').allTextContents();
+  const names = scene.tracks[0].detectors[0].names.map((name) => name.replaceAll('_', ' '));
+  assert.deepEqual(legend.map((text) => text.replace(/ \(limit .*\)$/, '')), names);
+  assert.ok(legend.some((text) => /\(limit [\d.]+ \S+\)$/.test(text)), legend.join('; '));
+});
+
+// Lowest point of a robot's feet, and how far the shins end above it, at a frame.
+function feetOf(track, robot, bytes, frame) {
+  const motion = {};
+  for (const name of ['position', 'turn', 'q']) motion[name] = readColumns(bytes, track.motion[name]);
+  const kinematics = new Kinematics(robot);
+  assert.ok(kinematics.update(motion, frame));
+  return robot.outline.hulls.filter((hull) => hull.foot).map((hull) =>
+    Math.min(...hull.spheres.map(([x, y, z, r]) => kinematics.point(hull.link, [x, y, z], [0, 0, 0])[2] - r)));
+}
+
+test('the robot stands on its feet', async () => {
+  const {header, bytes} = readPage(html), track = header.scenes[0].tracks[0], robot = header.robots[track.robot];
+  const feet = feetOf(track, robot, bytes, 0);
+  assert.equal(feet.length, 2);
+  for (const lowest of feet) assert.ok(Math.abs(lowest) < 0.01, `a foot ends ${lowest} m above the floor`);
+});
+
+for (const [name, robots] of [['clip', false], ['paired', true]])
+  test(`a ${name} is shown with both people${robots ? ', the robot and the adapted partner' : ''}`, async () => {
+    const file = join(folder, `${name}.html`), {header} = readPage(readFileSync(file, 'utf8'));
+    const tracks = header.scenes[0].tracks;
+    assert.equal(tracks.length, robots ? 2 : 1);
+    assert.equal(tracks.at(-1).robot, -1);
+    assert.ok(tracks.at(-1).partner >= 0 && tracks.at(-1).other_person >= 0);
+    const {page, errors} = await ready(file);
+    assert.ok(Number(await attribute(page, 'capsules')) > (robots ? 60 : 30), await attribute(page, 'capsules'));
+    const picture = brightness(await page.locator('.stage canvas').screenshot());
+    assert.ok(spread(picture) > 8, `spread of the brightness ${spread(picture)}`);
+    await page.screenshot({path: join(pictures, `motion-${name}.png`)});
+    for (const key of ['g', 'r', 'ArrowDown', ']', 'End', 'h', '3']) await page.keyboard.press(key);
+    await page.waitForTimeout(150);
+    await page.screenshot({path: join(pictures, `motion-${name}-grid.png`)});
+    assert.deepEqual(errors, []);
+  });
+
 // A point of a frame, in the world.
 function placed({translation: p, rotation: {x, y, z, w}}, [a, b, c]) {
   const [u, v, t] = [2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)];
