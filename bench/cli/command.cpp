@@ -1,14 +1,79 @@
 #include "duet/bench/cli/command.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 
+#include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
 namespace duet::cli {
+namespace {
+
+// The command that was being read, `duet hw check` rather than `duet`.
+const CLI::App* last_command(const CLI::App& app) {
+  const std::vector<CLI::App*> parsed = app.get_subcommands();
+  return parsed.empty() ? &app : last_command(*parsed.back());
+}
+
+// "hw check "; "" of the program itself.
+std::string command_words(const CLI::App& command) {
+  return command.get_parent() == nullptr ? "" : command_words(*command.get_parent()) + command.get_name() + ' ';
+}
+
+// "--engines" for "--engine=ode"; "" where none of the command is near.
+std::string nearest_option(const CLI::App& command, const std::string& word) {
+  const std::string typed =
+      word.substr(0, word.find('=')).substr(std::min<std::size_t>(2, word.find_first_not_of('-')));
+  std::vector<std::string> names, begun;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back(name);
+  std::ranges::copy_if(names, std::back_inserter(begun),
+                       [&](const std::string& name) { return name.starts_with(typed); });
+  const std::string near = typed.empty() ? "" : closest_name(typed, names);
+  if (!near.empty()) return "--" + near;
+  return typed.size() > 1 && begun.size() == 1 ? "--" + begun.front() : "";
+}
+
+std::string extras_message(const CLI::App& command, const std::vector<std::string>& extras) {
+  std::string message = fmt::format("unexpected: {}", fmt::join(extras, " "));
+  for (const std::string& word : extras) {
+    const std::string near = word.starts_with("-") && word.size() > 2 ? nearest_option(command, word) : "";
+    if (!near.empty()) message += fmt::format("; did you mean '{}'?", near);
+  }
+  return message;
+}
+
+// Of a command that has commands, or the arguments that it cannot do without.
+std::string missing_message(const CLI::App& command, const std::string& fallback) {
+  if (const std::vector<std::string> commands = command_names(command);
+      !commands.empty() && command.get_require_subcommand_min() > 0)
+    return fmt::format("expected a command, one of {}", fmt::join(commands, ", "));
+  std::string message;
+  for (const CLI::Option* option : command.get_options()) {
+    if (!option->get_required() || option->count() > 0) continue;
+    const std::string name = option->get_positional() ? option->get_single_name() : option->get_name();
+    message += fmt::format("{}expected {}: {}", message.empty() ? "" : "; ", name, option->get_description());
+  }
+  return message.empty() ? fallback : message;
+}
+
+}  // namespace
+
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = *last_command(app);
+  const std::string words = command_words(command), help = fmt::format(" (duet {}--help shows what there is)", words);
+  const std::string name = words.empty() ? "" : words.substr(0, words.size() - 1) + ": ";
+  const std::vector<std::string> extras = app.remaining(true);
+  if (!extras.empty()) return fmt::format("{}{}{}", name, extras_message(command, extras), help);
+  if (dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
+    return fmt::format("{}{}{}", name, missing_message(command, error.what()), help);
+  return fmt::format("{}{}{}", name, error.what(), help);
+}
 
 CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, const std::string& description,
                       const std::string& example) {

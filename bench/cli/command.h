@@ -56,6 +56,10 @@ void add_threads(CLI::App* command, int& threads, const std::string& what = "thr
 // Of the program or of a command that has commands, in the order of its help.
 std::vector<std::string> command_names(const CLI::App& app);
 
+// One sentence for what the parser refused: what the command was given that it does not know, in the order in which it
+// was given and with the nearest option; or what it needs and was not given.
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error);
+
 // "a=b" -> {a, b}; throws std::invalid_argument.
 std::pair<std::string, std::string> split_assignment(const std::string& text);
 

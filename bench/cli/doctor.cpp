@@ -88,7 +88,21 @@ std::vector<Finding> findings() {
   return list;
 }
 
+// Throws std::invalid_argument for an unknown engine, with the nearest, and MissingError for one that is absent.
+void check_needed(const std::vector<std::string>& needed) {
+  for (const std::string& engine : needed) {
+    for (const EngineInfo& info : engines()) {
+      if (info.name == engine && !info.available)
+        throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
+    }
+    Scene scene;
+    scene.robot = load_shared_robot();
+    make_backend(engine, scene);
+  }
+}
+
 void run_doctor(Session& session, const std::vector<std::string>& needed) {
+  check_needed(needed);
   const std::vector<Finding> list = findings();
   nlohmann::json json = {{"version", duet_version()}, {"parts", nlohmann::json::array()}};
   std::string text = version_text() + "\n";
@@ -98,15 +112,6 @@ void run_doctor(Session& session, const std::vector<std::string>& needed) {
   }
   json["environment"] = capture_environment();
   print(session, text, json);
-  for (const std::string& engine : needed) {
-    for (const EngineInfo& info : engines()) {
-      if (info.name == engine && !info.available)
-        throw MissingError(fmt::format("engine '{}' is absent: {}", engine, info.reason));
-    }
-    Scene scene;  // an unknown name is refused with the nearest one
-    scene.robot = load_shared_robot();
-    make_backend(engine, scene);
-  }
 }
 
 }  // namespace

@@ -58,13 +58,17 @@ void check_command(const CLI::App& app, int argc, char** argv) {
 }
 
 int run_command(CLI::App& app, int argc, char** argv, cli::Session& session) {
+  if (argc < 2) {  // nothing was asked for: what could be
+    duet::print_error(app.help());
+    return cli::kExitUsage;
+  }
   try {
     check_command(app, argc, argv);
     app.parse(argc, argv);
     return session.exit_code;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    return fail(cli::kExitUsage, fmt::format("{} (--help shows what there is)", error.what()));
+    return fail(cli::kExitUsage, cli::usage_message(app, error));
   } catch (const duet::MissingError& error) {
     return fail(cli::kExitMissing, error.what());
   } catch (const std::filesystem::filesystem_error& error) {

@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+
 #include "duet/core/require.h"
+#include "duet/policies/densify.h"
 #include "duet/results/rows/distinct_episodes.h"
 
 namespace duet::cli {
@@ -19,6 +24,25 @@ Frame frame_of(const std::string& format) {
   if (format == "csv") return {"# ", "\n"};
   if (format == "tex") return {"% ", "\n"};
   return {"<!-- ", " -->\n", true};  // svg: its first line has to be its own
+}
+
+// A policy that takes longer for a plan than the plan is for: the run waits for it, though no plan is late.
+std::vector<std::string> slow_policy_notes(const std::vector<EpisodeRow>& rows) {
+  constexpr double kPlanSeconds = kTicksPerPlan / 50.0;  // of the clock that policies are asked by
+  std::map<std::string, std::vector<double>> seconds;
+  for (const EpisodeRow& row : rows)
+    if (std::isfinite(row.policy_ms.p50)) seconds[row.policy].push_back(row.policy_ms.p50 / 1e3);
+  std::vector<std::string> notes;
+  for (auto& [policy, plans] : seconds) {
+    const auto middle = plans.begin() + std::ssize(plans) / 2;
+    std::ranges::nth_element(plans, middle);
+    if (*middle <= kPlanSeconds) continue;
+    notes.push_back(
+        fmt::format("policy '{}' takes {:.2g} s for a plan (median over {} episodes) and is asked for one every "
+                    "{} s of an episode: most of the time of its episodes is its own",
+                    policy, *middle, plans.size(), kPlanSeconds));
+  }
+  return notes;
 }
 
 }  // namespace
@@ -41,6 +65,7 @@ std::vector<std::string> completeness_notes(const std::vector<std::string>& path
 std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
                                   const std::vector<EpisodeRow>& rows) {
   std::vector<std::string> notes = completeness_notes(paths, runs);
+  for (std::string& slow : slow_policy_notes(rows)) notes.push_back(std::move(slow));
   const std::string repeats = repeats_note(rows);
   if (repeats.empty()) return notes;
   warn(repeats);

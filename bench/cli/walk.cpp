@@ -37,7 +37,9 @@ void add_walk(CLI::App& app, Session& session) {
   command->add_option("--network", arguments->suite.networks, "NAME=PATH: the network of a controller (repeatable)");
   command->add_option("-o,--output", arguments->output, "run directory")->capture_default_str();
   add_threads(command, arguments->options.threads);
-  command->callback([&session, arguments, walk] {
+  command->callback([&session, arguments, walk, command] {
+    if (command->count("--output") == 0)
+      note(session, fmt::format("writing to {} (--output names another folder)", arguments->output));
     if (!walk->velocity.empty())
       arguments->suite.overrides.push_back(
           fmt::format("reference={{velocity: [{}]{}}}", fmt::join(walk->velocity, ", "),

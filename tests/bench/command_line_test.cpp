@@ -20,6 +20,7 @@ using test::Answer;
 using test::duet_program;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(CommandLine, EveryCommandHasHelpWithAnExample) {
   for (const char* command : {"doctor", "list", "synth", "import", "convert", "retarget", "score", "run", "report",
@@ -65,6 +66,58 @@ TEST(CommandLine, AMistypedCommandIsAskedAbout) {
   EXPECT_THAT(answer.err, HasSubstr("duet: unknown command 'runn': did you mean 'run'?"));
   EXPECT_THAT(duet_program("train wcb").err, HasSubstr("unknown command 'wcb': did you mean 'wbc'?"));
   EXPECT_EQ(duet_program("train wcb").code, 2);
+}
+
+// What was given and is not known stands in the order in which it was given, with the nearest option.
+TEST(CommandLine, AMistypedOptionIsAskedAbout) {
+  const auto refusal = [](const char* arguments) {
+    const Answer answer = duet_program(arguments);
+    EXPECT_EQ(answer.code, 2) << arguments;
+    EXPECT_EQ(answer.out, "") << arguments;
+    return answer.err;
+  };
+  EXPECT_THAT(refusal("run demo --engine mujoco"),
+              HasSubstr("duet: run: unexpected: --engine mujoco; did you mean '--engines'?"));
+  EXPECT_THAT(refusal("run demo --polices=null"), HasSubstr("did you mean '--policies'?"));
+  EXPECT_THAT(refusal("compare r --jsn"), HasSubstr("unexpected: --jsn; did you mean '--json'?"));
+  EXPECT_THAT(refusal("--hepl"), HasSubstr("duet: unexpected: --hepl; did you mean '--help'?"));
+  EXPECT_THAT(refusal("run demo --outp x"), HasSubstr("did you mean '--output'?"));
+  EXPECT_THAT(refusal("run demo extra words"), HasSubstr("duet: run: unexpected: extra words (duet run --help"));
+}
+
+TEST(CommandLine, WhatACommandNeedsIsSaidInItsWords) {
+  const Answer bare = duet_program("");
+  EXPECT_THAT(bare.err, AllOf(HasSubstr("duet [OPTIONS] SUBCOMMAND"), HasSubstr("retarget")));
+  EXPECT_THAT(duet_program("list").err, HasSubstr("duet: list: expected what: tasks, "));
+  EXPECT_THAT(duet_program("compare r").err,
+              AllOf(HasSubstr("duet: compare: expected b: run"), Not(HasSubstr("expected a "))));
+  EXPECT_THAT(duet_program("synth hug").err,
+              HasSubstr("duet: synth: expected --output: folder for the clips (NPZ) (duet synth --help"));
+  EXPECT_THAT(duet_program("dataset").err, HasSubstr("duet: dataset: expected a command, one of inspect"));
+}
+
+TEST(CommandLine, APolicyThatTakesTheTimeOfTheRunIsNamed) {
+  const test::ScratchFolder folder;
+  ASSERT_EQ(duet_program("run demo -q -s clips.synth.per_task=1 -s tasks=[wave] --engines playback --controllers pd "
+                         "--policies replay -o " +
+                         (folder / "run"))
+                .code,
+            0);
+  const std::string report = "report -q " + (folder / "run") + " -f md -o " + folder / "report";
+  EXPECT_THAT(duet_program(report).out, Not(HasSubstr("for a plan")));
+  const std::string rows = folder / "run/episodes.jsonl";
+  std::istringstream lines(read_file(rows));
+  std::string slow;
+  for (std::string line; std::getline(lines, line);) {
+    nlohmann::json row = nlohmann::json::parse(line);
+    if (row["policy"] == "replay") row["policy_ms"] = {{"p50", 1900.0}, {"p95", 1950.0}, {"max", 2000.0}};
+    slow += row.dump() + '\n';
+  }
+  write_file(rows, slow);
+  ASSERT_EQ(duet_program(report).code, 0);
+  EXPECT_THAT(
+      read_file(folder / "report/leaderboard.md"),
+      HasSubstr("policy 'replay' takes 1.9 s for a plan (median over 1 episodes) and is asked for one every 0.2 s"));
 }
 
 TEST(CommandLine, SuitesAreListedAndRunByName) {
@@ -113,6 +166,7 @@ TEST(CommandLine, BenchGatesWhatIsNotReached) {
 TEST(CommandLine, MissingEngineIsRefusedByName) {
   const Answer answer = duet_program("doctor --need warp9");
   EXPECT_EQ(answer.code, 2);
+  EXPECT_EQ(answer.out, "");
   EXPECT_THAT(answer.err, HasSubstr("warp9"));
 }
 
