@@ -145,11 +145,11 @@ void add_choice(CLI::App& command, ReplayChoice& choice) {
 }  // namespace
 
 void add_replay(CLI::App& app, Session& session) {
-  CLI::App* command =
-      add_command(app, session, "replay",
-                  "episodes, clips and paired motions in 3-D: one page that opens from disk, or MCAP for Foxglove",
-                  "duet replay runs/core -o replay.html\n  duet replay runs/core --episodes "
-                  "hug/hug_000/0 --controllers vmc,pd\n  duet replay clip.npz paired.npz -o motions.html");
+  CLI::App* command = add_command(
+      app, session, "replay",
+      "episodes, clips and paired motions in 3-D: one page that opens from disk, or MCAP for Foxglove",
+      "duet replay runs/core -o replay.html\n  duet replay runs/core --episodes "
+      "hug/hug_000/0 --controllers vmc,pd\n  duet replay handshake.npz handshake_paired.npz -o motions.html");
   auto arguments = std::make_shared<ReplayArguments>();
   command
       ->add_option("source", arguments->sources,

@@ -86,6 +86,18 @@ std::vector<ChosenScene> scenes_of(const std::vector<const EpisodeRow*>& rows) {
   return scenes;
 }
 
+// The first `count`: the one of each task with the least agreement, before the second one of any; in the order as
+// before.
+std::vector<ChosenScene> least_agreeing(std::vector<ChosenScene> scenes, int count) {
+  std::map<std::string, int> seen;
+  std::map<std::string, int> place;  // of a scene among those of its task
+  for (const ChosenScene& scene : scenes) place[scene.id] = seen[scene.rows.front()->task]++;
+  std::ranges::stable_sort(scenes, {}, [&](const ChosenScene& scene) { return place[scene.id]; });
+  scenes.resize(static_cast<std::size_t>(count));
+  std::ranges::stable_sort(scenes, std::greater(), disagreement_of);
+  return scenes;
+}
+
 }  // namespace
 
 std::string scene_id(const EpisodeRow& row) {
@@ -119,9 +131,10 @@ ChosenRows chosen_rows(const std::vector<EpisodeRow>& rows, const ReplayChoice& 
   chosen.scenes = scenes_of(fitting);
   const auto all = static_cast<int>(chosen.scenes.size());
   if (choice.episodes.empty() && all > choice.scenes) {
-    chosen.scenes.resize(static_cast<std::size_t>(choice.scenes));
-    chosen.notes.push_back(
-        fmt::format("The {} of {} clips on which the tracks agree least; --scenes shows more.", choice.scenes, all));
+    chosen.scenes = least_agreeing(std::move(chosen.scenes), choice.scenes);
+    chosen.notes.push_back(fmt::format(
+        "The {} of {} clips on which the tracks agree least, of different tasks first; --scenes shows more.",
+        choice.scenes, all));
   }
   return chosen;
 }

@@ -158,17 +158,18 @@ ReplayTrack track_of_people(const HumanMotion& actor, const HumanMotion& reactor
   return track;
 }
 
-ReplayScene motion_scene(const std::string& id, Task task) {
+// `who`: a clip and what was made of it have one id.
+ReplayScene motion_scene(const std::string& id, Task task, const std::string& who) {
   ReplayScene scene;
   scene.task = to_string(task);
-  scene.id = scene.task + '/' + id;
-  scene.name = id;
+  scene.id = scene.task + '/' + id + '/' + who;
+  scene.name = id + ", " + who;
   return scene;
 }
 
 ReplayScene scene_of_clip(const std::string& file, const Npz& npz) {
   const InteractionClip clip = read_clip(npz);
-  ReplayScene scene = motion_scene(clip.id, clip.task);
+  ReplayScene scene = motion_scene(clip.id, clip.task, "people");
   ReplayTrack& track =
       scene.tracks.emplace_back(track_of_people(clip.actor_motion(), clip.reactor_motion(), clip.task, clip.phases));
   track.name = "the two people";
@@ -193,7 +194,7 @@ std::shared_ptr<const RobotModel> robot_of_motion(const PairedMotion& motion, co
 
 ReplayScene scene_of_paired(const std::string& file, const Npz& npz, const std::string& card) {
   const PairedMotion motion = read_paired_motion(npz);
-  ReplayScene scene = motion_scene(motion.clip_id, motion.task);
+  ReplayScene scene = motion_scene(motion.clip_id, motion.task, "robot");
   ReplayTrack robot;
   robot.robot = robot_of_motion(motion, card);
   robot.recording = play_back(motion.robot, motion.partner.joints, motion.task, motion.phases, robot.robot);
@@ -231,10 +232,8 @@ void add_file(const std::string& file, const std::string& card, std::vector<Repl
   }
   ReplayScene scene = kind == MotionFile::kClip ? scene_of_clip(file, npz) : scene_of_paired(file, npz, card);
   if (std::ranges::find(scenes, scene.id, &ReplayScene::id) != scenes.end())
-    throw InputError(
-        fmt::format("'{}': a motion of task {} with the id '{}' is among the files already; each has a "
-                    "scene of its own",
-                    file, scene.task, shown(scene.name)));
+    throw InputError(fmt::format("'{}': '{}' is among the files already; each motion has a scene of its own", file,
+                                 shown(scene.id)));
   scenes.push_back(std::move(scene));
 }
 

@@ -124,6 +124,22 @@ TEST(ReplayChoice, PutsTheClipWithTheLeastAgreementFirst) {
   EXPECT_THAT(fewer.notes, ElementsAre(HasSubstr("The 1 of 2 clips")));
 }
 
+TEST(ReplayChoice, TakesAClipOfEachTaskBeforeASecondOfOne) {
+  std::vector<EpisodeRow> rows;
+  for (const char* clip : {"a", "b"})
+    for (const char* engine : {"ode", "mujoco"}) rows.push_back(row_of(engine, "vmc", clip, engine[0] == 'o'));
+  for (const char* engine : {"ode", "mujoco"}) {
+    rows.push_back(row_of(engine, "vmc", "w", true));
+    rows.back().task = "wave";
+  }
+  ReplayChoice choice;
+  choice.scenes = 2;
+  const ChosenRows chosen = chosen_rows(rows, choice);
+  ASSERT_EQ(chosen.scenes.size(), 2U);
+  EXPECT_EQ(chosen.scenes[0].id, "hug/a/0/clean");
+  EXPECT_EQ(chosen.scenes[1].id, "wave/w/0/clean");  // agrees, and is of another task
+}
+
 TEST(ReplayChoice, TakesTheBestControllerWhereNoneIsNamed) {
   const std::vector<EpisodeRow> rows = some_rows();
   const ChosenRows chosen = chosen_rows(rows, {});
@@ -442,10 +458,11 @@ TEST_F(ReplayOfMotions, APairedMotionIsTheRobotBesideTheAdaptedPartnerAndThePeop
   EXPECT_FALSE(scene.at("tracks").at(0).at("detectors").empty());
   EXPECT_THAT(thrown_message<InputError>([&] { replay_of_files({folder_ / "paired.npz"}, "t1"); }),
               AllOf(HasSubstr("paired.npz"), HasSubstr("its joints are not those of 't1'")));
+  EXPECT_EQ(replay_of_files({folder_ / "paired.npz", folder_ / "clip.npz"}, "").scenes.size(), 2U);
   EXPECT_THAT(thrown_message<InputError>([&] {
-                replay_of_files({folder_ / "paired.npz", folder_ / "clip.npz"}, "");
+                replay_of_files({folder_ / "clip.npz", folder_ / "clip.npz"}, "");
               }),
-              AllOf(HasSubstr("clip.npz"), HasSubstr("is among the files already")));
+              AllOf(HasSubstr("clip.npz"), HasSubstr("/people' is among the files already")));
 }
 
 TEST_F(ReplayOfMotions, TheCommandTakesFilesAndFolders) {
