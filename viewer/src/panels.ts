@@ -12,21 +12,27 @@ function facts(pairs: [string, string][]): HTMLElement {
   return el('dl', {}, ...pairs.flatMap(([name, value]) => [el('dt', {}, name), el('dd', {}, value)]));
 }
 
-// "missed: min distance -0.04, ..." of the margins that decided against.
-function why(verdict: Verdict): string {
+// "body short by 0.091 m (limit 0.45 m), ..." of the margins that decided against.
+function why(verdict: Verdict, track: Track): string {
+  const trace = track.detectors.find((one) => one.version === verdict.version && one.set === verdict.thresholds);
+  const short = (name: string, margin: number) => {
+    const k = trace?.names.indexOf(name) ?? -1, unit = k >= 0 ? trace!.units[k]! : '';
+    const limit = unit ? ` ${unit} (limit ${Number(Math.abs(trace!.thresholds[k]!).toPrecision(3))} ${unit})` : '';
+    return `${name.replaceAll('_', ' ')} short by ${Number(Math.abs(margin).toPrecision(3))}${limit}`;
+  };
   const parts = Object.entries(verdict.parts).filter(([, ok]) => !ok).map(([name]) => name.replaceAll('_', ' '));
   const margins = Object.entries(verdict.margins)
                       .filter(([, margin]) => margin !== null && margin < 0)
-                      .map(([name, margin]) => `${name.replaceAll('_', ' ')} ${margin!.toPrecision(3)}`);
-  const text = [parts.length > 0 ? `not met: ${parts.join(', ')}` : '', margins.length > 0 ? `short by ${margins.join(', ')}` : ''];
+                      .map(([name, margin]) => short(name, margin!));
+  const text = [parts.length > 0 ? `not met: ${parts.join(', ')}` : '', margins.join(', ')];
   return text.filter((part) => part).join('; ');
 }
 
-function verdictTable(row: Row): HTMLElement {
+function verdictTable(row: Row, track: Track): HTMLElement {
   return el('table', {class: 'verdicts'}, el('caption', {}, 'Every detector'), el('tbody', {}, ...row.verdicts.map((verdict) =>
     el('tr', {}, el('th', {scope: 'row'}, `${verdict.version} / ${verdict.thresholds}`),
        el('td', {}, el('span', {class: verdict.success ? 'good' : 'bad'}, verdict.success ? '✓ success' : '✗ failure'),
-          verdict.success ? null : el('span', {class: 'why'}, why(verdict)))))));
+          verdict.success ? null : el('span', {class: 'why'}, why(verdict, track)))))));
 }
 
 // What the headline detector says at the end of a motion that no run judged.
@@ -49,7 +55,7 @@ export function verdictPanel(track: Track, task: string): HTMLElement {
     panel.append(el('p', {}, track.origin));
     return panel;
   }
-  if (row.verdicts.length > 0) panel.append(verdictTable(row));
+  if (row.verdicts.length > 0) panel.append(verdictTable(row, track));
   const late = row.late_plans + (row.policy_faults?.late ?? 0);
   if (late > 0) panel.append(el('p', {class: 'bad'}, `${late} plans came late (the recording does not say when)`));
   if (track.repeat) {

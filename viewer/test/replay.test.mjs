@@ -75,6 +75,14 @@ test('the title names task, clip and verdict; the lines of the detector have nam
   assert.ok(legend.some((text) => /\(limit [\d.]+ \S+\)$/.test(text)), legend.join('; '));
 });
 
+test('a failure says by how much, and of which limit', async () => {
+  const {header} = readPage(html), tracks = header.scenes[0].tracks;
+  const index = tracks.findIndex((track) => track.row.success === false && track.detectors[0]);
+  assert.ok(index >= 0, 'the null arm fails');
+  const {page} = await ready(replay, {hash: `#e=${encodeURIComponent(header.scenes[0].id)}&f=${index}&t=0`});
+  assert.match(await page.locator('.why').first().textContent(), /[a-z ]+ short by [\d.]+ \S+ \(limit [\d.]+ \S+\)/);
+});
+
 // Lowest point of a robot's feet, and how far the shins end above it, at a frame.
 function feetOf(track, robot, bytes, frame) {
   const motion = {};
