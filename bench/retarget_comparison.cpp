@@ -33,6 +33,7 @@ constexpr ShownFigure kShownMetrics[] = {
     {"joint_speed_max", "joint speed, peak [rad/s]", 1.0, true},
     {"joint_acceleration_max", "joint acceleration, peak [rad/s^2]", 1.0, true},
     {"limit_violations", "limit violations", 1.0, true},
+    {"speed_violations", "limits of joint speed violated", 1.0, true},
     {"root_roll_max", "roll of the base, peak [deg]", 57.29577951308232, true},
     {"root_tilt_max", "tilt of the base, peak [deg]", 57.29577951308232, true},
     {"jpe", "JPE [cm]", 100.0, true},

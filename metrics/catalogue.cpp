@@ -63,6 +63,7 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"joint_speed_max", "rad/s", kDown, kStanding, "Joint speed, peak", kGround},
     {"joint_acceleration_max", "rad/s^2", kDown, kStanding, "Joint acceleration, peak", kGround},
     {"limit_violations", "1", kDown, kStanding, "Joint limits violated", kGround},
+    {"speed_violations", "1", kDown, kStanding, "Limits of joint speed violated", kGround},
     {"root_roll_max", "rad", kDown, kStanding, "Roll of the base, peak", kGround},
     {"root_tilt_max", "rad", kDown, kStanding, "Tilt of the base, peak", kGround},
 

@@ -15,6 +15,7 @@ namespace duet {
 namespace {
 
 constexpr double kLimitSlack = 1e-9;  // [rad]
+constexpr double kSpeedSlack = 1e-9;  // of the limit
 
 using Segment = std::array<Eigen::Vector3d, 2>;
 
@@ -169,6 +170,12 @@ void add_joint_figures(const RobotMotion& motion, const RobotModel& robot, std::
         ((q.row(j).array() < joint.lower - kLimitSlack) || (q.row(j).array() > joint.upper + kLimitSlack)).count());
   }
   out["limit_violations"] = violations;
+  double quick = 0.0;
+  for (Eigen::Index j = 0; j < q.rows(); ++j) {
+    const double most = robot.joints[static_cast<std::size_t>(j)].velocity;
+    if (most > 0.0) quick += static_cast<double>((v.row(j).array().abs() > most * (1.0 + kSpeedSlack)).count());
+  }
+  out["speed_violations"] = quick;
 }
 
 void add_lean(const RobotMotion& motion, std::map<std::string, double>& out) {

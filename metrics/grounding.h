@@ -21,6 +21,8 @@ namespace duet {
 //   bone_change_max               [m]      of the partner's arm bones against the source, any frame
 //   joint_speed_max               [rad/s]  joint_acceleration_max [rad/s^2] of any joint
 //   limit_violations              [1]      frames and joints outside the limits by more than 1e-9 rad
+//   speed_violations              [1]      steps between frames in which a joint is quicker than its limit (by more
+//                                          than 1e-9 of it); joints without a limit are passed over
 //   root_roll_max, root_tilt_max  [rad]    of the base: sideways, and between its z axis and the vertical
 std::map<std::string, double> grounding_metrics(const PairedMotion& motion, const RobotModel& robot);
 

@@ -9,7 +9,6 @@ namespace duet {
 
 namespace {
 
-constexpr double kSmallDecrease = 2e-5;  // as in lanes
 constexpr int kMostHalvings = 6;
 
 constexpr double kLongestJointStep = 1.0, kLongestJointTurn = 0.4;  // as in lanes [rad]
@@ -21,8 +20,8 @@ class DoubleLbfgs {
         options_(options),
         weights_(pair_iteration(options, pair_iterations(options) - 1).weights),
         preconditioner_(make_preconditioner(problem, options, weights_)),
-        x_(PairVariables::zero(problem.chain.dof(), problem.frames())) {
-    vectors_.fill(x_);
+        x_(PairVariables::at_rest(problem)) {
+    vectors_.fill(PairVariables::zero(problem.chain.dof(), problem.frames()));
   }
 
   PairSolution solve();
@@ -166,7 +165,7 @@ void DoubleLbfgs::descend(const PairWeights& weights, int iterations, PairSoluti
       memory_.forget();
       continue;
     }
-    small = before - terms_.total(weights_) < kSmallDecrease * before ? small + 1 : 0;
+    small = before - terms_.total(weights_) < options_.lbfgs_tolerance * before ? small + 1 : 0;
   }
 }
 

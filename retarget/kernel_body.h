@@ -79,9 +79,13 @@ inline void place_keys(const Place& at, Work& k) {
   }
 }
 
-// Keypoint i against keypoints begin <= j < end, whose original distances lie in the rows from `distance` on.
-template <bool kWeighted>
-inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int distance, V scale) {
+// Weights of distances: none, those of the two keypoints, or a row of the constants for each distance.
+enum class Weighing { kNone, kKeys, kRows };
+
+// Keypoint i against keypoints begin <= j < end, whose original distances lie in the rows from `distance` on, and their
+// weights, where each has its own, in the rows from `near` on.
+template <Weighing kWeighing>
+inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int distance, V scale, int near = 0) {
   const V x0 = k.key[i][0];
   const V x1 = k.key[i][1];
   const V x2 = k.key[i][2];
@@ -95,10 +99,20 @@ inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int dista
     const V d2 = x2 - k.key[j][2];
     const V length = square_root(d0 * d0 + d1 * d1 + d2 * d2 + kGuard);
     const V error = length - at.constant(distance + j - begin);
-    const float own =
-        kWeighted ? at.setup.key_weight[i % at.setup.keys] * at.setup.key_weight[j % at.setup.keys] : 1.0f;
-    sum += kWeighted ? own * (error * error) : error * error;
-    const V f = kWeighted ? error * (own * scale) / length : error * scale / length;
+    V f;
+    if constexpr (kWeighing == Weighing::kRows) {
+      const V own = at.constant(near + j - begin);
+      if (!any(own > V{})) continue;
+      sum += own * (error * error);
+      f = error * (own * scale) / length;
+    } else if constexpr (kWeighing == Weighing::kKeys) {
+      const float own = at.setup.key_weight[i % at.setup.keys] * at.setup.key_weight[j % at.setup.keys];
+      sum += own * (error * error);
+      f = error * (own * scale) / length;
+    } else {
+      sum += error * error;
+      f = error * scale / length;
+    }
     g0 += f * d0;
     g1 += f * d1;
     g2 += f * d2;
@@ -112,7 +126,7 @@ inline V con_rows(const Place& at, Work& k, int i, int begin, int end, int dista
   return sum;
 }
 
-template <bool kWeighted>
+template <Weighing kOwn, Weighing kCross>
 inline void con_term(const Place& at, Work& k) {
   place_keys(at, k);
   const int keys = at.setup.keys;
@@ -125,14 +139,14 @@ inline void con_term(const Place& at, Work& k) {
   V cross_sum = V{};
   V human_sum = V{};
   for (int i = 0; i < keys; ++i) {
-    if (at.step.con_robot != 0.0f) robot_sum += con_rows<kWeighted>(at, k, i, i + 1, keys, row, robot);
+    if (at.step.con_robot != 0.0f) robot_sum += con_rows<kOwn>(at, k, i, i + 1, keys, row, robot);
     row += keys - 1 - i;
-    cross_sum += con_rows<kWeighted>(at, k, i, keys, 2 * keys, row, cross);
+    cross_sum += con_rows<kCross>(at, k, i, keys, 2 * keys, row, cross, at.setup.near_row + i * keys);
     row += keys;
   }
   if (at.setup.adapt_human && at.step.con_human != 0.0f) {
     for (int i = keys; i < 2 * keys; ++i) {
-      human_sum += con_rows<kWeighted>(at, k, i, i + 1, 2 * keys, row, human);
+      human_sum += con_rows<kOwn>(at, k, i, i + 1, 2 * keys, row, human);
       row += 2 * keys - 1 - i;
     }
   }
@@ -162,12 +176,14 @@ inline void hum_term(const Place& at, Work& k) {
   }
 }
 
+template <bool kExtended>
 inline void pose_term(const Place& at, Work& k) {
   const V weight = at.constant(kWeight);
   const V scale = weight * at.step.pose;
   V sum = V{};
   for (int j = 0; j < at.setup.dof; ++j) {
-    const V x = at.variable(j);
+    V x = at.variable(j);
+    if (kExtended) x -= at.setup.rest[j];
     sum += x * x;
     k.g[j] += scale * x;
   }
@@ -246,15 +262,17 @@ inline void sweep_with(const Sweep& sweep) {
       temporal(at, k);
       forward(at, k);
       kin_term<kExtended>(at, k);
-      if (kExtended && at.setup.weighted) {
-        con_term<true>(at, k);
+      if (kExtended && at.setup.near_row > 0) {
+        con_term<Weighing::kKeys, Weighing::kRows>(at, k);
+      } else if (kExtended && at.setup.weighted) {
+        con_term<Weighing::kKeys, Weighing::kKeys>(at, k);
       } else {
-        con_term<false>(at, k);
+        con_term<Weighing::kNone, Weighing::kNone>(at, k);
       }
       if (kExtended && at.setup.objects > 0) object_term(at, k);
       hum_term(at, k);
       if (kExtended) ground_terms(at, k);
-      pose_term(at, k);
+      pose_term<kExtended>(at, k);
       pull_back<kExtended>(at, k);
       if (sweep.gradient != nullptr) {
         for (std::size_t i = 0; i < sweep.rows; ++i) store(sweep.gradient[first + i], lane, k.g[i]);

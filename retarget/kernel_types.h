@@ -74,6 +74,8 @@ struct Setup {
   int objects;     // keypoints of a carried object
   int object_row;  // of the constants: the object's keypoints (3 each), then distances of each of 2 K keypoints
   float key_object[kMaxKeys];
+  float rest[kMaxJoints];
+  int near_row;  // of the constants: weights of the robot-human distances, with those of the keypoints; 0: none
 };
 
 // One iteration: factors of the gradient of T times the objective, and Adam's step.

@@ -15,9 +15,8 @@ using pair_kernel::kLanes;
 using pair_kernel::Row;
 using Rows = LaneProblem::Rows;
 
-constexpr double kEnough = 2e-5;  // relative decrease; three steps in a row below it end the search
-constexpr int kHalvings = 6;      // of a step that does not descend
-constexpr double kFaded = 1e-9;   // of a state that a lane hands on to the next
+constexpr int kHalvings = 6;     // of a step that does not descend
+constexpr double kFaded = 1e-9;  // of a state that a lane hands on to the next
 
 constexpr double kFarthestTurn = 1.0;  // of a joint along the direction in one step [rad]
 constexpr double kLongestTurn = 0.4;   // of it what is taken: longer turns jump into poor minima, and a few joints that
@@ -50,7 +49,7 @@ class LaneLbfgs {
       : options_(options),
         weights_(pair_iteration(options, pair_iterations(options) - 1).weights),
         lanes_(problem, options, kernel),
-        x_(lanes_.make_rows_with_halo()),
+        x_(lanes_.rows_at_rest(problem)),
         next_(x_),
         gradient_(lanes_.make_rows()),
         here_(gradient_),
@@ -261,7 +260,7 @@ void LaneLbfgs::descend(const PairWeights& weights, int iterations, PairSolution
     if (!step && memory_.pairs() == 0) break;
     const double before = value_.objective;
     if (!step || !take(*step)) memory_.forget();
-    if (step) small = before - value_.objective < kEnough * before ? small + 1 : 0;
+    if (step) small = before - value_.objective < options_.lbfgs_tolerance * before ? small + 1 : 0;
   }
 }
 

@@ -35,13 +35,14 @@ void pack_ground(const PairProblem& problem, const PairOptions& options, pair_ke
   setup.weighted = problem.chain.weighted();
   setup.objects = problem.object.count();
   setup.extended = setup.upright || setup.bones || setup.sphere_pairs > 0 || options.weights.partner > 0.0 ||
-                   setup.weighted || setup.objects > 0;
+                   setup.weighted || setup.objects > 0 || problem.nearness.size() > 0 || !problem.rest.isZero(0.0);
   for (int k = 0; k < problem.chain.keys(); ++k) {
     setup.key_weight[k] = static_cast<float>(problem.chain.key_weight[k]);
     setup.key_object[k] = static_cast<float>(problem.chain.key_object[k]);
   }
   setup.object_row = pair_kernel::kHuman + 3 * problem.chain.keys() +
                      static_cast<int>(problem.distances.rows() + problem.bones.rows()) + 3 * setup.human_spheres;
+  if (problem.nearness.size() > 0) setup.near_row = setup.object_row + setup.objects * (3 + 2 * problem.chain.keys());
   std::copy(spheres.robot_point.begin(), spheres.robot_point.end(), setup.sphere_point);
   std::copy(spheres.human_offset.begin(), spheres.human_offset.end(), setup.sphere_offset);
   for (int i = 0; i < setup.sphere_pairs; ++i)
@@ -62,6 +63,7 @@ pair_kernel::Setup pack_setup(const PairProblem& problem, const PairOptions& opt
     setup.joints[j] = pack_joint(chain.joints[j]);
     setup.lower[j] = static_cast<float>(chain.joints[j].lower);
     setup.upper[j] = static_cast<float>(chain.joints[j].upper);
+    setup.rest[j] = static_cast<float>(problem.rest[j]);
   }
   for (int k = 0; k < setup.points; ++k) {
     setup.point[k].link = chain.points[k].link;
@@ -105,7 +107,8 @@ LaneProblem::LaneProblem(const PairProblem& problem, const PairOptions& options,
       setup_(pack_setup(problem, options)),
       frames_(problem.frames()),
       blocks_((frames_ + kLanes - 1) / kLanes),
-      constant_rows_(setup_.object_row + setup_.objects * (3 + 2 * setup_.keys)),
+      constant_rows_(setup_.object_row + setup_.objects * (3 + 2 * setup_.keys) +
+                     static_cast<int>(problem.nearness.rows())),
       rows_in_time_(setup_.extended && setup_.adapt_human ? setup_.dof + 3 + kHumanRows : setup_.dof) {
   constants_.resize(static_cast<std::size_t>(blocks_) * constant_rows_);
   for (int block = 0; block < blocks_; ++block) {
@@ -142,6 +145,10 @@ void LaneProblem::pack_frame(const PairProblem& problem, int block, int lane) {
     const Eigen::Matrix3Xd spheres = problem.spheres.human.frame(source).colwise() - problem.root.col(source);
     for (int i = 0; i < 3 * setup_.human_spheres; ++i) set(row++, spheres.data()[i]);
   }
+  const int keys = setup_.keys;
+  for (int i = 0; i < problem.nearness.rows(); ++i)
+    set(setup_.near_row + i,
+        problem.nearness(i, source) * problem.chain.key_weight[i / keys] * problem.chain.key_weight[i % keys]);
   if (setup_.objects == 0) return;
   const Eigen::Matrix3Xd object = problem.object.points.frame(source).colwise() - problem.root.col(source);
   for (int i = 0; i < 3 * setup_.objects; ++i) set(row++, object.data()[i]);
@@ -231,6 +238,18 @@ void LaneProblem::fill_halo(Rows& x) const {
       }
     }
   }
+}
+
+LaneProblem::Rows LaneProblem::rows_at_rest(const PairProblem& problem) const {
+  Rows x = make_rows_with_halo();
+  for (int block = 0; block < blocks_; ++block) {
+    for (int j = 0; j < setup_.dof; ++j) {
+      float* lanes = x[static_cast<std::size_t>(block + pair_kernel::kHalo) * setup_.rows + j].lane;
+      std::fill(lanes, lanes + kLanes, static_cast<float>(problem.rest[j]));
+    }
+  }
+  fill_halo(x);
+  return x;
 }
 
 PairVariables LaneProblem::variables(const Rows& x, const Eigen::Array3d& offset) const {

@@ -34,6 +34,8 @@ class LaneProblem {
   [[nodiscard]] Rows make_rows_with_halo() const {
     return Rows(static_cast<std::size_t>(blocks_) * rows() + 2 * halo());
   }
+  // With its halo: where the search begins.
+  [[nodiscard]] Rows rows_at_rest(const PairProblem& problem) const;
   // The row of PairVariables::frames that row i of a block is.
   [[nodiscard]] int variable_of(int row) const;
 

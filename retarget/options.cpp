@@ -95,7 +95,7 @@ void add_schedule(FieldTable<Options>& table) {
 
 FieldTable<Options> make_table() {
   FieldTable<Options> table = {mode_field()};
-  table.reserve(32);
+  table.reserve(48);
   add_weights(table);
   add_schedule(table);
   for (Field<Options>& more : FieldTable<Options>{
@@ -110,6 +110,13 @@ FieldTable<Options> make_table() {
            choice("keypoints", {"nine", "eleven", "seven"},
                   "head, shoulders, elbows, wrists, hands; with hips; without hands", &Options::keypoints),
            keypoint_list(),
+           choice("rest-pose", {"zero", "neutral"},
+                  "where L_pose pulls each joint and the search begins: 0 as printed, or the card's neutral pose",
+                  &Options::rest_pose),
+           amount("contact-range",
+                  "robot-human distances count fully up to half of it, and not at all beyond it; 0: all count",
+                  &Options::contact_range, "m"),
+           flag("joint-speeds", "keeps every joint within the card's limit of its speed", &Options::joint_speeds),
            flag("filter", "Gaussian over time, kernel 5, sigma 0.75, once at the end", &Options::filter),
            flag("adapt-human", "whether the partner is moved", &Options::adapt_human),
            choice("kernel", {"auto", "scalar", "portable", "v2", "v3", "v4"},
@@ -118,6 +125,8 @@ FieldTable<Options> make_table() {
            choice("optimizer", {"adam", "lbfgs"}, "Adam in two stages, or L-BFGS", &Options::optimizer),
            amount("lbfgs-iterations", "of L-BFGS, the first eight with the weights of stage 1",
                   &Options::lbfgs_iterations),
+           amount("lbfgs-tolerance", "of L-BFGS: three steps that each lower the objective by a smaller share end it",
+                  &Options::lbfgs_tolerance),
            flag("ground", "the robot stands: soles where the person's feet do", &Options::ground),
            amount("root-smoothing", "standard deviation of the base's smoothing, where ground is on",
                   &Options::root_smoothing, "s"),
@@ -156,7 +165,14 @@ PairOptions pair_options_of(PairMode mode) {
   options.step_speed = 1.8;
   if (mode != PairMode::kBest) return options;
   options.optimizer = Optimizer::kLbfgs;
-  options.lbfgs_iterations = 60;
+  options.lbfgs_iterations = 120;
+  options.lbfgs_tolerance = 2e-6;
+  options.rest_pose = RestPose::kNeutral;
+  options.weights.kin = 4.0;
+  options.weights.pose = 2.5;
+  options.weights.hand = 5.0;
+  options.contact_range = 2.0;
+  options.joint_speeds = true;
   return options;
 }
 

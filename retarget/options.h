@@ -42,6 +42,10 @@ enum class KinLoss { kSquared, kMeanNorm };                  // sum of squares o
 enum class ContactReduction { kFrobenius, kMean };           // printed, 1/T | 1/(T N^2)
 enum class ContactBlocks { kFull, kCrossAndHuman, kCross };  // N x N | without robot-robot | robot-human only
 enum class RootTranslation { kConstantOffset, kPerFrame, kFixed };
+enum class RestPose {
+  kZero,
+  kNeutral
+};  // where L_pose pulls and the search begins: q = 0 as printed | the card's neutral pose
 enum class ContactKeypoints {
   kNine,
   kEleven,
@@ -64,13 +68,17 @@ struct PairOptions {
   bool adapt_human = true;  // false keeps the partner as it is
   KernelKind kernel = KernelKind::kAuto;
   Optimizer optimizer = Optimizer::kAdam;
-  int lbfgs_iterations = 50;  // the first eight with the weights of stage 1, the others with those of stage 2
+  int lbfgs_iterations = 50;      // the first eight with the weights of stage 1, the others with those of stage 2
+  double lbfgs_tolerance = 2e-5;  // relative decrease; three steps in a row below it end the search
   // The robot stands: soles where the person's feet do, a base that follows slowly and upright
   // (retarget/ground_plan.h).
   bool ground = false;
   double root_smoothing = 0.2;  // standard deviation of the base's smoothing, where `ground` is on [s]
   double step_speed = 1.2;      // at most, mean over a step of a foot, where `ground` is on [m/s]
-  std::string smpl_path;        // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
+  RestPose rest_pose = RestPose::kZero;
+  double contact_range = 0.0;  // robot-human distances count fully up to half of it and not at all beyond; 0: all [m]
+  bool joint_speeds = false;   // no joint of the result is quicker than its limit (retarget/joint_speeds.h)
+  std::string smpl_path;       // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
 };
 
 // One table of them, for `duet list`, suites and the reference page.

@@ -9,6 +9,7 @@
 #include "duet/core/clock.h"
 #include "duet/core/skeleton.h"
 #include "duet/retarget/gaussian_filter.h"
+#include "duet/retarget/joint_speeds.h"
 #include "duet/retarget/pair_problem.h"
 #include "duet/retarget/pair_solver.h"
 
@@ -167,6 +168,7 @@ PairedMotion retarget(const InteractionClip& clip, const RobotModel& robot, cons
   out.phases = resampled.phases;
   out.reactor = clip.reactor;
   out.robot = robot_motion(robot, problem, options, solution.x);
+  if (options.joint_speeds) keep_joint_speeds(robot, out.robot);
   out.source_partner = resampled.actor_motion();
   out.source_reactor = resampled.reactor_motion();
   out.partner = adapted_partner(out.source_partner, problem.chain.dof(), options, solution.x);

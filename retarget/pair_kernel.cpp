@@ -15,7 +15,7 @@ class LaneSolver {
   LaneSolver(const PairProblem& problem, const PairOptions& options, KernelKind kernel)
       : options_(options),
         lanes_(problem, options, kernel),
-        x_(lanes_.make_rows_with_halo()),
+        x_(lanes_.rows_at_rest(problem)),
         next_(x_),
         mean_(lanes_.make_rows()),
         square_(mean_) {}

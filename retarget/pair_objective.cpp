@@ -64,10 +64,13 @@ double con_term(const PairProblem& problem, const Scales& s, int t, FrameWork& w
   for (int i = 0; i < 2 * keys; ++i) {
     for (int j = i + 1; j < 2 * keys; ++j, ++row) {
       const double own = problem.chain.key_weight[i % keys] * problem.chain.key_weight[j % keys];
-      const double factor = (j < keys   ? s.contact.robot
-                             : i < keys ? s.contact.cross
-                                        : s.contact.human) *
-                            s.contact.all * own;
+      const double factor =
+          (j < keys   ? s.contact.robot
+           : i < keys ? s.contact.cross
+                      : s.contact.human) *
+          s.contact.all * own *
+          (i < keys && j >= keys && problem.nearness.size() > 0 ? problem.nearness(Eigen::Index{i} * keys + j - keys, t)
+                                                                : 1.0);
       if (factor == 0.0) continue;
       const Eigen::Vector3d d = work.keys.col(i) - work.keys.col(j);
       const double distance = std::sqrt(d.squaredNorm() + kDistanceGuard);
@@ -193,14 +196,15 @@ PairTerms frame_terms(const PairProblem& problem, const PairOptions& options, co
                                work.key_force);
   const auto offsets = column.segment<3 * kHumanOffsets>(dof + 3);
   terms.hum = offsets.squaredNorm() / s.frames;
-  terms.pose = column.head(dof).squaredNorm() / (s.frames * dof);
+  const Eigen::VectorXd bent = column.head(dof) - problem.rest;
+  terms.pose = bent.squaredNorm() / (s.frames * dof);
   Eigen::VectorXd g_arms = Eigen::VectorXd::Zero(3 * kHumanOffsets);
   terms.bone = bone_term(problem, s, t, offsets, g_arms);
   terms.collision = collision_term(problem, s, t, work, offsets, g_arms);
   if (gradient == nullptr) return terms;
 
   Eigen::VectorXd g = Eigen::VectorXd::Zero(column.size());
-  g.head(dof) = 2.0 * s.weights.pose / (s.frames * dof) * column.head(dof);
+  g.head(dof) = 2.0 * s.weights.pose / (s.frames * dof) * bent;
   for (int k = 0; k < keys; ++k) work.point_force.col(problem.chain.key_points[k]) += work.key_force.col(k);
   Eigen::Vector3d root_force;
   pull_back(problem, w, work, g, root_force);

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
 #include "duet/retarget/reshape.h"
@@ -35,6 +37,42 @@ Eigen::MatrixXd original_distances(const PointTracks& source, const PointTracks&
     }
   }
   return distances;
+}
+
+// Smooth from 1 at half of `range` to 0 at it.
+double nearness_of(double distance, double range) {
+  const double s = std::clamp(2.0 * (1.0 - distance / range), 0.0, 1.0);
+  return s * s * (3.0 - 2.0 * s);
+}
+
+constexpr double kTrunkRange = 0.5;  // of the range: two who stand before one another to bow are farther apart
+
+bool is_of_an_arm(int smpl) { return smpl >= kLeftElbow && smpl <= kRightHand; }
+
+// Distances between arms count up to `range`, those of heads, shoulders and hips to half of it.
+Eigen::MatrixXd find_nearness(const Eigen::MatrixXd& distances, const std::vector<int>& smpl, double range) {
+  const int keys = static_cast<int>(smpl.size());
+  Eigen::MatrixXd nearness(Eigen::Index{keys} * keys, distances.cols());
+  Eigen::Index row = 0;
+  for (int i = 0; i < keys; ++i) {
+    row += keys - 1 - i;  // the robot's own
+    for (int j = 0; j < keys; ++j, ++row) {
+      const double own = (is_of_an_arm(smpl[i]) && is_of_an_arm(smpl[j]) ? 1.0 : kTrunkRange) * range;
+      for (Eigen::Index t = 0; t < distances.cols(); ++t)
+        nearness(Eigen::Index{i} * keys + j, t) = nearness_of(distances(row, t), own);
+    }
+  }
+  return nearness;
+}
+
+Eigen::VectorXd rest_of(const RobotModel& robot, const PairProblem& problem, RestPose pose) {
+  Eigen::VectorXd rest = Eigen::VectorXd::Zero(problem.chain.dof());
+  if (pose == RestPose::kZero) return rest;
+  for (int j = 0; j < problem.chain.dof(); ++j) {
+    const int joint = problem.upright ? problem.robot_joint[j] : j;
+    if (joint >= 0) rest[j] = robot.neutral[joint];
+  }
+  return rest;
 }
 
 // The robot stands: its base and soles are planned, the rest is a chain above the base, and the reshaped person hangs
@@ -89,6 +127,9 @@ PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& rob
   problem.human = partner.joints.select(problem.chain.key_smpl);
   for (const int smpl : problem.chain.key_smpl) problem.human_offset.push_back(human_offset_of(smpl));
   problem.distances = original_distances(source.joints.select(problem.chain.key_smpl), problem.human);
+  problem.rest = rest_of(robot, problem, options.rest_pose);
+  if (options.contact_range > 0.0)
+    problem.nearness = find_nearness(problem.distances, problem.chain.key_smpl, options.contact_range);
   if (options.weights.object > 0.0)
     problem.object = make_object_keypoints(clip.object, source.joints.select(problem.chain.key_smpl), problem.human);
   if (options.weights.bone > 0.0) problem.bones = arm_bones(partner);

@@ -27,6 +27,9 @@ struct PairProblem {
   std::vector<int> human_offset;  // per keypoint of the partner: which of the 6 offsets moves it, -1 for none
   Eigen::MatrixXd distances;      // (pairs i < j of the 2 K keypoints, robot's first, row by row; T): D_orig [m]
 
+  Eigen::VectorXd rest;      // (dof): where L_pose pulls and the search begins [rad]
+  Eigen::MatrixXd nearness;  // (K K, T), robot's keypoint by row: of a robot-human distance, 0 to 1; empty: 1 for all
+
   ObjectKeypoints object;        // that the people carry; without points where there is none
   Eigen::MatrixXd bones;         // (18, T): the partner's arm bones before optimisation; empty where w-bone is 0 [m]
   BodySpheres spheres;           // no pairs where w-collision is 0
@@ -43,6 +46,12 @@ struct PairVariables {
   Eigen::MatrixXd frames;                            // (dof + 24, T)
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // of the root, the same in all frames [m]
 
+  // The search begins at rest, everything else at 0.
+  [[nodiscard]] static PairVariables at_rest(const PairProblem& problem) {
+    PairVariables x = zero(problem.chain.dof(), problem.frames());
+    x.frames.topRows(problem.chain.dof()).colwise() = problem.rest;
+    return x;
+  }
   [[nodiscard]] static PairVariables zero(int dof, int frames) {
     return {Eigen::MatrixXd::Zero(dof + 6 + 3 * kHumanOffsets, frames), Eigen::Vector3d::Zero()};
   }

@@ -19,9 +19,9 @@ class ReferenceSolver {
   ReferenceSolver(const PairProblem& problem, const PairOptions& options)
       : problem_(problem),
         options_(options),
-        x_(PairVariables::zero(problem.chain.dof(), problem.frames())),
-        mean_(x_),
-        square_(x_) {}
+        x_(PairVariables::at_rest(problem)),
+        mean_(PairVariables::zero(problem.chain.dof(), problem.frames())),
+        square_(mean_) {}
 
   PairTerms iterate(const PairIteration& iteration) {
     if (iteration.reset) mean_ = square_ = PairVariables::zero(problem_.chain.dof(), problem_.frames());

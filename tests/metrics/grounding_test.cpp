@@ -46,6 +46,7 @@ TEST(GroundingMetrics, ARobotThatStandsIsAtZero) {
   EXPECT_EQ(figures.at("bone_change_max"), 0.0);
   EXPECT_EQ(figures.at("joint_speed_max"), 0.0);
   EXPECT_EQ(figures.at("limit_violations"), 0.0);
+  EXPECT_EQ(figures.at("speed_violations"), 0.0);
   EXPECT_NEAR(figures.at("root_roll_max"), 0.0, 1e-12);
 }
 
@@ -68,6 +69,20 @@ TEST(GroundingMetrics, EachFaultIsSeen) {
   motion = standing(30);
   for (int t = 0; t < 30; ++t) motion.partner.joints.frame(t).row(0).array() -= 1.95;  // he stands in the robot
   EXPECT_GT(grounding_metrics(motion, g1()).at("penetration_max"), 0.03);
+}
+
+TEST(GroundingMetrics, StepsOverTheLimitOfAJointsSpeedAreCounted) {
+  const double limit = g1().joints[3].velocity / 50.0;  // rad a frame
+  for (const auto& [share, expected] : {std::pair{1.0, 0.0}, {1.001, 2.0}, {-1.001, 2.0}}) {
+    PairedMotion motion = standing(30);
+    motion.robot.q(3, 10) += share * limit;  // there and back
+    EXPECT_EQ(grounding_metrics(motion, g1()).at("speed_violations"), expected) << share;
+  }
+  PairedMotion motion = standing(30);
+  motion.robot.q(3, 10) += 2.0;
+  RobotModel unlimited = g1();
+  unlimited.joints[3].velocity = 0.0;
+  EXPECT_EQ(grounding_metrics(motion, unlimited).at("speed_violations"), 0.0);
 }
 
 TEST(GroundingMetrics, OfAnotherRobotIsRefused) {

@@ -38,10 +38,12 @@ PairVariables random_above_legs(const PairProblem& problem, unsigned seed) {
 
 TEST(PairOnGround, GradientIsTheSlopeOfEachTerm) {
   const InteractionClip clip = test::random_clip(6, 1);
-  for (const bool adapt : {true, false}) {
-    PairOptions options = mode(PairMode::kGrounded);
+  for (const auto& [name, adapt] :
+       {std::pair{PairMode::kGrounded, true}, {PairMode::kGrounded, false}, {PairMode::kBest, true}}) {
+    PairOptions options = mode(name);
     options.adapt_human = adapt;
     PairProblem problem = make_pair_problem(clip, test::g1(), options);
+    EXPECT_EQ(name == PairMode::kBest, problem.nearness.size() > 0 && problem.rest.norm() > 1.0);
     for (SpherePair& pair : problem.spheres.pairs) pair.reach += 0.3;  // so that many are in each other
     const PairVariables x = [&] {
       PairVariables v = random_above_legs(problem, 5);
@@ -70,8 +72,14 @@ TEST(PairOnGround, GradientIsTheSlopeOfEachTerm) {
 }
 
 TEST(PairOnGround, KernelsDescendAsTheReferenceDoes) {
-  for (const int frames : {5, 16, 37, 250}) {
-    PairOptions options = mode(PairMode::kGrounded);
+  for (const auto& [name, frames] : {std::pair{PairMode::kGrounded, 5},
+                                     {PairMode::kGrounded, 16},
+                                     {PairMode::kGrounded, 37},
+                                     {PairMode::kGrounded, 250},
+                                     {PairMode::kBest, 37},
+                                     {PairMode::kBest, 150}}) {
+    PairOptions options = mode(name);
+    options.optimizer = Optimizer::kAdam;
     options.schedule = {.stage1_iterations = 40, .stage1_rate = 0.05, .stage2_iterations = 20, .stage2_rate = 0.02};
     options.schedule.epsilon = 5.0 / frames;
     PairProblem problem = make_pair_problem(test::random_clip(frames, frames), test::g1(), options);
@@ -110,6 +118,20 @@ TEST(PairOnGround, Avx2AndAvx512GiveTheSameBitsInEveryMode) {
     EXPECT_EQ(a.partner.joints, b.partner.joints);
     EXPECT_EQ(a.loss, b.loss);
   }
+}
+
+TEST(PairOnGround, DistancesOfThoseWhoAreFarDoNotCount) {
+  PairOptions options = mode(PairMode::kBest);
+  InteractionClip clip = test::random_clip(20, 7);
+  const auto nearness = [&] { return make_pair_problem(clip, test::g1(), options).nearness; };
+  EXPECT_GT(nearness().maxCoeff(), 0.9);
+  EXPECT_LT(nearness().minCoeff(), 0.5);
+  for (int t = 0; t < 20; ++t) clip.a.joints.frame(t).row(0).array() -= 3.0;
+  EXPECT_EQ(nearness().maxCoeff(), 0.0);
+  options.contact_range = 20.0;
+  EXPECT_EQ(nearness().minCoeff(), 1.0);
+  options.contact_range = 0.0;
+  EXPECT_EQ(nearness().size(), 0);
 }
 
 TEST(PairLbfgs, ReachesWhatAdamReachesInAQuarterOfTheEvaluations) {
@@ -291,7 +313,7 @@ TEST(PairOnGround, HandsWeighAsAskedUnlessKeypointsAreListed) {
   };
   EXPECT_THAT(hand_weights({{"mode", "paper"}}), testing::ElementsAre(1.0, 1.0));
   EXPECT_THAT(hand_weights({{"mode", "grounded"}}), testing::ElementsAre(3.0, 3.0));
-  EXPECT_THAT(hand_weights({{"mode", "best"}}), testing::ElementsAre(3.0, 3.0));
+  EXPECT_THAT(hand_weights({{"mode", "best"}}), testing::ElementsAre(5.0, 5.0));
   EXPECT_THAT(hand_weights({{"mode", "best"}, {"w-hand", "2"}}), testing::ElementsAre(2.0, 2.0));
   EXPECT_THAT(hand_weights({{"mode", "paper"}, {"w-hand", "0.5"}}), testing::ElementsAre(0.5, 0.5));
   EXPECT_THAT(hand_weights({{"mode", "best"}, {"keypoint-list", "head,left_hand,right_hand"}}),
