@@ -12,7 +12,8 @@ namespace duet {
 inline constexpr int kMostJsonDepth = 64;
 
 // Throws InputError that begins with `what` ("golden baseline", "run.json") for text that is not JSON, that nests
-// deeper than kMostJsonDepth, or that holds a number which no double is.
+// deeper than kMostJsonDepth, that holds a number which no double is, or an object with a key twice (two readers could
+// take one and the other).
 nlohmann::json parse_json(std::string_view text, const std::string& what);
 
 }  // namespace duet

@@ -2,15 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace duet {
 
-bool is_plain_name(std::string_view name) {
+bool is_plain_letter(char letter) {
   constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
-  return !name.empty() && name.find_first_not_of(kLetters) == std::string_view::npos;
+  return kLetters.find(letter) != std::string_view::npos;
+}
+
+bool is_plain_name(std::string_view name) {
+  return !name.empty() && name.front() != '+' && name.front() != '-' && std::ranges::all_of(name, is_plain_letter);
 }
 
 std::string plain_name_message(std::string_view name) {
-  return fmt::format("expected letters, digits and _ . + - only, found '{}'", name);
+  return fmt::format("expected letters, digits and _ . + - only, none of + and - first, found '{}'", name);
 }
 
 }  // namespace duet

@@ -1,4 +1,5 @@
-// Names that stand in tables, keys and file names: letters, digits and _ . + - only.
+// Names that stand in tables, keys and file names: letters, digits and _ . + - only, and none of + and - first: options
+// of a command line and formulas of a spreadsheet begin so.
 #pragma once
 
 #include <string>
@@ -6,6 +7,7 @@
 
 namespace duet {
 
+bool is_plain_letter(char letter);
 bool is_plain_name(std::string_view name);
 std::string plain_name_message(std::string_view name);  // the sentence for one that is not
 

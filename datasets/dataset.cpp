@@ -64,7 +64,7 @@ json settings_of(const DatasetPlan& plan, const PeopleFormat& format) {
 std::string plain_id(const std::string& id) {
   std::string stem = id;
   for (char& c : stem)
-    if (!is_plain_name(std::string_view(&c, 1))) c = '-';
+    if (!is_plain_letter(c)) c = '-';
   return stem.empty() || stem.front() == '.' ? "clip" + stem : stem;
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "duet/core/number.h"
 #include "duet/core/text.h"
 
 namespace duet {
@@ -37,7 +38,14 @@ std::string escape_markdown_cell(std::string_view text) {
   return escaped;
 }
 
+// A spreadsheet computes a cell that begins so, unless it is a number.
+bool is_formula(std::string_view text) {
+  return text.size() > 1 && std::string_view("=+-@\t\r").find(text.front()) != std::string_view::npos &&
+         !parse_number(text.substr(text.front() == '+' ? 1 : 0));
+}
+
 std::string escape_csv(std::string_view text) {
+  if (is_formula(text)) return escape_csv(fmt::format("'{}", text));
   if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
   std::string quoted = "\"";
   for (const char c : text) {

@@ -14,13 +14,15 @@ struct ScannedRow {
   // The fields that the table of a row's fields calls scanned: what names the episode and its parts, their digests,
   // key, outcome and started_at; all else as in a new row.
   EpisodeRow row;
-  // Of the line's bytes but for the values of wall times. Equal: the rows agree in every other field. Different: they
-  // may still agree, written in two ways (row_differences knows).
+  // Of the line's bytes but for the values of wall times, under a key that each process draws. Equal: the rows agree in
+  // every other field, but for a chance of 2^-128, and nobody can make two rows that are. Different: they may still
+  // agree, written in two ways (row_differences knows).
   std::array<unsigned char, 16> fingerprint{};
 };
 
 // Throws InputError, as row_from_json words it, for a line that is no JSON object as far as it is looked at (values of
-// numbers are not), another schema, a name that is missing or no text, and a key that is not episode_key of the row.
+// numbers are not), another schema, a name that is missing or no text, a field that is there twice, and a key that is
+// not episode_key of the row.
 ScannedRow scan_row(std::string_view line);
 // The same into a row that may be of another line: its memory is used again. After a throw it is of neither.
 void scan_row(std::string_view line, ScannedRow& scanned);

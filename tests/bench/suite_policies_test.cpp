@@ -96,8 +96,10 @@ TEST(SuitePolicies, TheNameOfADescriptorIsWhatTablesShowUnlessTheSuiteNamesIt) {
   EXPECT_THAT(refusal("[" + (folder / "file.yaml") + ", " + (folder / "same.yaml") + "]"),
               HasSubstr("'mywave' is there twice; names tell rows apart ({name: ..., use: ...} gives another)"));
   write_file(folder / "spaces.yaml", process_descriptor("my wave"));
-  EXPECT_THAT(refusal("[" + (folder / "spaces.yaml") + "]"),
-              HasSubstr("spaces.yaml: name: expected letters, digits and _ . + - only, found 'my wave'"));
+  EXPECT_THAT(
+      refusal("[" + (folder / "spaces.yaml") + "]"),
+      HasSubstr(
+          "spaces.yaml: name: expected letters, digits and _ . + - only, none of + and - first, found 'my wave'"));
   EXPECT_THAT(refusal("[" + (folder / "nowhere.yaml") + "]"), HasSubstr("nowhere.yaml"));
 }
 

@@ -43,6 +43,16 @@ TEST(ParseJson, RefusesWhatNestsDeeper) {
   EXPECT_EQ(refusal(std::string(2'000'000, '[')), expected);  // never closed
 }
 
+TEST(ParseJson, RefusesAKeyThatIsThereTwice) {
+  const auto twice = [](const std::string& key) {
+    return "x.json: expected each key of an object once, found '" + key + "' twice";
+  };
+  EXPECT_EQ(refusal(R"({"a": 1, "b": 2, "a": 1})"), twice("a"));
+  EXPECT_EQ(refusal(R"({"a": [{"b": {}}, {"b": {"c": 1, "d": [], "\u0063": 2}}]})"), twice("c"));
+  EXPECT_EQ(refusal(R"([{"a": {"a": {"a": 1}, "b": 1, "b": 2}}])"), twice("b"));
+  EXPECT_EQ(parse_json(R"({"a": {"a": {"a": 1}}, "b": [{"a": 1}, {"a": 2}]})", "x.json").size(), 2U);
+}
+
 TEST(ParseJson, AFaultIsOneSentenceThatBeginsWithTheDocument) {
   EXPECT_THAT(refusal("{"), StartsWith("x.json: not valid JSON: parse error at line 1, column 2"));
   EXPECT_THAT(refusal("{\"a\": 1e999}"), HasSubstr("number overflow parsing '1e999'"));

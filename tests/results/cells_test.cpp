@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "duet/results/analyses/text_table.h"
+
 namespace duet {
 namespace {
 
@@ -21,6 +23,13 @@ TEST(Cells, WithoutAnIntervalANumberStandsAlone) {
   EXPECT_EQ(points(-0.047), "-4.7");
   EXPECT_EQ(decimals(0.5, kNoInterval, 2), "0.50");
   EXPECT_EQ(short_number(13.84, {.low = 9.876, .high = 100.4}), "13.8 [9.88, 100]");
+}
+
+// A spreadsheet computes a cell that begins with one of four signs; a number is none of these.
+TEST(CsvTable, HasNoFormula) {
+  const TextTable table = {.header = {"name", "value"},
+                           .rows = {{"=1+2", "-4.5"}, {"-2+3", "+1.5e-3"}, {"@SUM(A1)", "-"}, {"+a,b", "1"}}};
+  EXPECT_EQ(csv_table(table), "name,value\r\n'=1+2,-4.5\r\n'-2+3,+1.5e-3\r\n'@SUM(A1),-\r\n\"'+a,b\",1\r\n");
 }
 
 TEST(Cells, NothingIsMinusZero) {

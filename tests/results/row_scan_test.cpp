@@ -107,6 +107,12 @@ TEST(RowScan, RefusesWhatIsNoRow) {
   EXPECT_THAT(refusal_of(with(line, "\"episode\":7", "\"episode\":-7")), HasSubstr("whole number"));
   EXPECT_THAT(refusal_of(with(line, "\"outcome\":\"fell\"", "\"outcome\":\"flew\"")), HasSubstr("key 'outcome'"));
   EXPECT_THAT(refusal_of(with(line, "\"episode\":7", "\"episode\":8")), HasSubstr("the row was changed"));
+  for (const char* twice : {"\"success\":true", "\"success\":false", "\"outcome\":\"ok\"", "\"wall_s\":1"}) {
+    EXPECT_THAT(refusal_of(with(line, "{", std::string("{") + twice + ",")), HasSubstr("each key once, found '"));
+    EXPECT_THAT(test::thrown_message<InputError>(
+                    [&] { row_from_json(parse_json(with(line, "{", std::string("{") + twice + ","), "episode row")); }),
+                HasSubstr("each key of an object once, found '"));
+  }
 }
 
 }  // namespace
