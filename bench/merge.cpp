@@ -13,6 +13,7 @@
 #include "duet/bench/suite_names.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/results/rows/folder_lock.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/run_union.h"
@@ -207,22 +208,14 @@ void merge_to_folder(const MergeInputs& inputs, const MergeOptions& options, Mer
   const std::string& folder = options.output;
   if (fs::exists(folder))
     throw InputError(fmt::format("'{}' is there already: choose another folder for the merged run", folder));
-  const std::string partial = fs::path(folder).lexically_normal().string() + ".partial", rows = partial + ".rows";
-  fs::remove_all(partial);
-  if (const fs::path parent = fs::path(partial).parent_path(); !parent.empty()) fs::create_directories(parent);
-  try {
-    summary.rows = merge_rows(inputs.sources(), inputs.runs().front().info, rows, options.budget);
-    summary.written = summary.rows.violations == 0;
-    if (!summary.written) return;
-    fill(folder, partial, inputs, summary.rows, options.argv);
-    fs::rename(rows, in(partial, "episodes.jsonl"));
-    fs::rename(partial, folder);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(partial, ignored);
-    fs::remove(rows, ignored);
-    throw;
-  }
+  const ScratchFolder scratch = ScratchFolder::beside(folder);
+  const std::string partial = scratch / "run", rows = scratch / "rows";
+  summary.rows = merge_rows(inputs.sources(), inputs.runs().front().info, rows, options.budget);
+  summary.written = summary.rows.violations == 0;
+  if (!summary.written) return;
+  fill(folder, partial, inputs, summary.rows, options.argv);
+  fs::rename(rows, in(partial, "episodes.jsonl"));
+  scratch.publish("run", folder);
 }
 
 std::string text_at(const nlohmann::json& object, const char* key) {

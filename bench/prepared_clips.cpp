@@ -39,8 +39,17 @@ void PreparedClips::keep(const std::string& source, const PairedMotion& clip) co
 }
 
 void remove_prepared_clips(const std::string& folder) {
+  namespace fs = std::filesystem;
+  const fs::path prepared = fs::path(folder) / "prepared";
   std::error_code ignored;
-  std::filesystem::remove_all(std::filesystem::path(folder) / "prepared", ignored);
+  if (!fs::is_directory(fs::symlink_status(prepared, ignored))) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(prepared, ignored)) {
+    const fs::path name = entry.path().filename();
+    const std::string digest = name.stem().string();
+    const bool is_digest = digest.size() == 32 && digest.find_first_not_of("0123456789abcdef") == std::string::npos;
+    if (is_digest && name.extension() == ".npz") fs::remove(entry.path(), ignored);
+  }
+  fs::remove(prepared, ignored);  // where nobody has put anything else into it
 }
 
 std::string program_identity() {

@@ -27,7 +27,7 @@ class PreparedClips {
   std::string folder_, made_by_;
 };
 
-// Removes them from a run folder.
+// Removes them, and nothing else, from a run folder.
 void remove_prepared_clips(const std::string& folder);
 
 // This program: version, and size and time of its file (core/share.h), so that a program that was built anew trusts

@@ -16,7 +16,9 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
+#include "duet/core/text.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/run_files.h"
 #include "duet/robots/card_reader.h"
 
 namespace duet {
@@ -276,6 +278,35 @@ void find_clips(std::vector<std::string>& files, const std::vector<RunInput>& in
   }
 }
 
+[[noreturn]] void fail_place(const std::string& of, const std::string& expected, const std::string& named,
+                             const std::string& folder) {
+  throw InputError(
+      fmt::format("{}: {}: expected {}, found '{}'", in(folder, "suite.yaml"), of, expected, shown(named)));
+}
+
+// A file that the run keeps is the one that suite.yaml names.
+void require_kept_place(const RunInput& input, const std::string& named, const std::string& folder) {
+  if (input.kept && from_folder(named, folder) != fs::path(input.file).lexically_normal().string())
+    fail_place(input.of, fmt::format("the file '{}' that the run keeps", shown(input.file)), named, folder);
+}
+
+// What is read for tables and pages; policies and controllers are found by their digests.
+void require_kept_places(const Suite& suite, const std::vector<RunInput>& inputs, const std::string& folder) {
+  std::vector<const RunInput*> clips;
+  std::map<std::string, const RunInput*> first;
+  for (const RunInput& input : inputs) {
+    if (input.of == kClips) clips.push_back(&input);
+    first.emplace(input.of, &input);
+  }
+  for (std::size_t i = 0; i < std::min(clips.size(), suite.clips.files.size()); ++i)
+    require_kept_place(*clips[i], suite.clips.files[i], folder);
+  for (const auto& [of, named] : {std::pair{"contact_limits", &suite.contact_limits}, {"robot", &suite.robot}}) {
+    if (named->empty() || is_shipped_card(*named)) continue;
+    if (!first.contains(of)) fail_place(of, "a file that inputs/inputs.json lists", *named, folder);
+    require_kept_place(*first.at(of), *named, folder);
+  }
+}
+
 template <typename Actor>
 void rebase_actor(Actor& actor, const std::function<void(std::string&)>& rebase) {
   if (actor.use.ends_with(".yaml")) rebase(actor.use);
@@ -330,27 +361,50 @@ void keep_inputs(const KeptSuite& kept, const std::string& folder) {
 
 bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }
 
+Suite suite_of_head(const Run& run) {
+  Suite suite = parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
+  require_kept_places(suite, has_inputs(run.path) ? read_inputs(run.path) : std::vector<RunInput>(), run.path);
+  return suite;
+}
+
+std::string clips_fault(const Run& run, const Suite& suite) {
+  if (suite.clips.files.empty()) return "";
+  if (!has_inputs(run.path)) return "the run has no index of what it was made from";
+  std::size_t i = 0;
+  for (const RunInput& input : read_inputs(run.path)) {
+    if (input.of != kClips || i == suite.clips.files.size()) continue;
+    const std::string& file = suite.clips.files[i++];
+    const std::string name = shown(fs::path(file).filename().string());
+    if (!fs::exists(file)) return fmt::format("'{}' is not there", name);
+    if (sha256_file(file) != input.sha256) return fmt::format("'{}' is not what the run was made from", name);
+  }
+  return i < suite.clips.files.size() ? "the run's index does not list all of them" : "";
+}
+
 Suite suite_of_run(const Run& run, const InputPlaces& places) {
   const std::vector<RunInput> inputs = read_inputs(run.path);
   for (const RunInput& input : inputs)
     if (input.kept) check_kept(input, run.path);
-  Suite suite = parse_suite(run.info.suite_yaml, in(run.path, "suite.yaml"));
+  Suite suite = suite_of_head(run);
   find_clips(suite.clips.files, inputs, places.clips, run.path);
   find_files("policy", suite.policies, places.skipped_policies, inputs, run.path);
   find_files("controller", suite.controllers, places.skipped_controllers, inputs, run.path);
   return suite;
 }
 
-Withheld without_clips(const std::string& run) {
-  Withheld withheld;
+PublishedInputs published_inputs(const std::string& run, bool without_clips) {
+  PublishedInputs published;
+  if (!has_inputs(run)) return published;
+  require_plain_files(run);
   std::vector<RunInput> inputs = read_inputs(run);
   for (RunInput& input : inputs) {
-    if (input.of != kClips || !input.kept) continue;
-    withheld.files.insert(input.file);
-    input.kept = false;
+    if (without_clips && input.of == kClips) input.kept = false;
+    if (!input.kept) continue;
+    check_kept(input, run);
+    published.files.insert(fs::path(input.file).lexically_normal().generic_string());
   }
-  if (!withheld.files.empty()) withheld.replaced[kIndex] = to_json(inputs).dump(2) + "\n";
-  return withheld;
+  published.texts[kIndex] = dumped(to_json(inputs), 2) + "\n";
+  return published;
 }
 
 }  // namespace duet

@@ -60,8 +60,17 @@ struct InputPlaces {
 // and found. Policies and controllers in `skipped` are not looked at.
 Suite suite_of_run(const Run& run, const InputPlaces& places = {});
 
-// What is left out where the clips of a run may not be passed on: the files, and an index that has their SHA-256 alone.
-// Empty for a run that keeps no clip.
-Withheld without_clips(const std::string& run);
+// The suite of a run without a look at its networks: what tables and pages need. Throws InputError for a file that the
+// run keeps and suite.yaml names elsewhere: a run that came from others has no say over what is read in its place.
+Suite suite_of_head(const Run& run);
+
+// Why the clips of a suite_of_head cannot be shown, as the end of a sentence: one is not there, or is not what the run
+// was made from. Empty where they can.
+std::string clips_fault(const Run& run, const Suite& suite);
+
+// What is published of the files that a run keeps: those of its index and no others. `without_clips`: but for the
+// clips, of which the index then has the SHA-256 alone. Throws InputError for a file that is not what the index says.
+// Nothing of a run that has no index.
+PublishedInputs published_inputs(const std::string& run, bool without_clips);
 
 }  // namespace duet

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "duet/bench/clips.h"
 #include "duet/bench/progress.h"
+#include "duet/bench/run_inputs.h"
 #include "duet/bench/scoring.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -21,14 +21,6 @@ constexpr const char* kNullAndLift =
     "Null: the same episodes with a robot that holds its neutral pose. Lift is success minus the null arm's on the "
     "same "
     "episodes.";
-
-// The first of a suite's files that is not there, without its folder; "" where all are: recordings that may not be
-// passed on are not in a published run, and what a run was made of may have been moved.
-std::string absent_clip(const Suite& suite) {
-  const auto is_absent = [](const std::string& file) { return !std::filesystem::exists(file); };
-  const auto absent = std::ranges::find_if(suite.clips.files, is_absent);
-  return absent == suite.clips.files.end() ? "" : std::filesystem::path(*absent).filename().string();
-}
 
 StickFigure human_figure(const std::string& label, const HumanMotion& motion, int frame) {
   StickFigure figure{label, {}, {}};
@@ -132,7 +124,7 @@ std::vector<TrainingCurves> training_curves(const std::vector<std::string>& file
 ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses, bool with_clips,
                              const std::vector<std::string>& curve_files, int threads, Progress& progress) {
   ReportContent content;
-  const Suite suite = parse_suite(run.info.suite_yaml, run.path + "/suite.yaml");
+  const Suite suite = suite_of_head(run);
   content.curves = training_curves(curve_files);
   content.title = fmt::format("{} {}", suite.name, suite.version);
   content.environment = run.info.environment;
@@ -143,9 +135,8 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   content.columns = metric_columns();
   content.episodes = run.rows;
   if (!with_clips || !suite.references.empty()) return content;
-  if (const std::string absent = absent_clip(suite); !absent.empty()) {
-    content.notes.push_back(
-        fmt::format("Key frames and loss curves of the clips are left out: '{}' is not there.", absent));
+  if (const std::string fault = clips_fault(run, suite); !fault.empty()) {
+    content.notes.push_back(fmt::format("Key frames and loss curves of the clips are left out: {}.", fault));
     return content;
   }
 

@@ -2,7 +2,6 @@
 #include "duet/datasets/dataset.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <memory>
@@ -11,33 +10,14 @@
 #include "duet/bench/benchmarks/timer.h"
 #include "duet/core/file.h"
 #include "duet/core/npy.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/motion/synthesis.h"
 
 namespace duet {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr int kRecordings = 48;
 constexpr double kRecordedRate = 120.0;  // of optical motion capture, as in Inter-X [Hz]
-
-// A folder that is gone afterwards.
-class TemporaryFolder {
- public:
-  TemporaryFolder() : path_(fs::temp_directory_path() / fmt::format("duet-bench-{}", getpid())) {
-    fs::create_directories(path_ / "recordings");
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] std::string operator/(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  fs::path path_;
-};
 
 // (T, 2, 24, 3) at 120 Hz. Its seconds.
 double write_recording(const std::string& path, int index) {
@@ -59,7 +39,8 @@ double write_recording(const std::string& path, int index) {
 }
 
 std::vector<BenchmarkFigure> time_dataset(const BenchmarkOptions& options) {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
+  std::filesystem::create_directory(folder / "recordings");
   double recorded = 0.0;
   for (int i = 0; i < kRecordings; ++i)
     recorded += write_recording(folder / fmt::format("recordings/r{:02}.npy", i), i);

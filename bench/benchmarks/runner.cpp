@@ -1,13 +1,11 @@
 #include "duet/bench/runner.h"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <filesystem>
 
 #include "duet/bench/benchmarks/parts.h"
 #include "duet/bench/benchmarks/timer.h"
 #include "duet/bench/suite.h"
+#include "duet/core/scratch_folder.h"
 
 namespace duet {
 namespace {
@@ -26,16 +24,13 @@ policies: [replay]
 
 // Wall time of the suite with a number of threads, in a folder that is removed again. [s]
 double run_seconds(const Suite& suite, int threads) {
-  const std::string folder =
-      (std::filesystem::temp_directory_path() / ("duet-bench-" + std::to_string(getpid()))).string();
+  const ScratchFolder folder;
   RunOptions options;
   options.threads = threads;
   Progress quiet(Progress::Style::kQuiet);
   const double begin = wall_seconds();
-  run_suite(suite, folder, options, quiet);
-  const double seconds = wall_seconds() - begin;
-  std::filesystem::remove_all(folder);
-  return seconds;
+  run_suite(suite, folder / "run", options, quiet);
+  return wall_seconds() - begin;
 }
 
 std::vector<BenchmarkFigure> time_scaling(const BenchmarkOptions& options) {

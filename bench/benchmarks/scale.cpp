@@ -17,8 +17,10 @@
 #include "duet/bench/cluster/run_status.h"
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/run_episode.h"
+#include "duet/bench/shell_word.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/merge_files.h"
 #include "duet/results/rows/row_merge.h"
@@ -44,22 +46,14 @@ constexpr double kShardOfTwoMinutes = 120.0;  // [s]
 class ScaleRun {
  public:
   explicit ScaleRun(std::int64_t shards) {
-    fs::create_directories(folder_);
     suite_ = parse_suite(kScaleSuite, "bench-scale");
     if (!is_available("mujoco")) throw MissingError("bench scale needs the engine mujoco");
     PlanOptions options;
     options.shards = shards;
     plan_run(suite_, run(), options, stop_, quiet_);
   }
-  ~ScaleRun() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  ScaleRun(const ScaleRun&) = delete;
-  ScaleRun& operator=(const ScaleRun&) = delete;
-
-  [[nodiscard]] std::string folder() const { return folder_; }
-  [[nodiscard]] std::string run() const { return folder_ + "/run"; }
+  [[nodiscard]] const std::string& folder() const { return folder_.path(); }
+  [[nodiscard]] std::string run() const { return folder_ / "run"; }
   WorkSummary work(std::int64_t shard) { return work_shard(run(), shard, {}, stop_, quiet_); }
   // What the attempts so far have: it is all to be done again.
   void forget() const { fs::remove_all(run() + "/attempts"); }
@@ -73,7 +67,7 @@ class ScaleRun {
   }
 
  private:
-  std::string folder_ = (fs::temp_directory_path() / fmt::format("duet-scale-{}", ::getpid())).string();
+  ScratchFolder folder_;
   Suite suite_;
   StopSign stop_;
   Progress quiet_{Progress::Style::kQuiet};
@@ -100,9 +94,10 @@ Spent run_workers(const ScaleRun& run, int shards, int at_once) {
   for (int first = 0; first < shards; first += at_once) {
     std::vector<std::FILE*> workers;
     for (int shard = first; shard < std::min(shards, first + at_once); ++shard)
-      workers.push_back(::popen(
-          fmt::format("exec '{}' work '{}' --shard {} -j 1 --quiet >/dev/null", program, run.run(), shard).c_str(),
-          "r"));
+      workers.push_back(::popen(fmt::format("exec {} work {} --shard {} -j 1 --quiet >/dev/null", shell_word(program),
+                                            shell_word(run.run()), shard)
+                                    .c_str(),
+                                "r"));
     for (std::FILE* worker : workers)
       if (worker == nullptr || ::pclose(worker) != 0) throw InputError("bench scale: a worker failed");
   }

@@ -1,7 +1,6 @@
 #include "duet/bench/cli/hw_episodes.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <array>
 #include <filesystem>
@@ -21,6 +20,7 @@
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/hardware/dds/twin_over_dds.h"
 #include "duet/hardware/twin_in_process.h"
 
@@ -137,7 +137,7 @@ class TwinEpisodes {
                                      .twin = twin,
                                      .lock_step = clock_ == TwinClock::kLockStep,
                                      .more = {},
-                                     .socket = fmt::format("/tmp/duet-guard-{}.socket", getpid())};
+                                     .socket = scratch_ / "guard.socket"};
     return std::make_unique<TwinOverDds>(options, setup(), std::move(walker), &log);
   }
 
@@ -247,6 +247,7 @@ class TwinEpisodes {
   Suite suite_;
   Bodies bodies_;
   const SuiteController& walker_;
+  ScratchFolder scratch_;  // of the guard's socket
   PairedEpisodes episodes_;
   std::vector<GuardedRun> runs_;
   long dropped_ = 0;

@@ -4,6 +4,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/run_inputs.h"
+#include "duet/bench/shell_word.h"
 #include "duet/bench/suite.h"
 #include "duet/core/file.h"
 #include "duet/results/rows/published.h"
@@ -28,15 +29,15 @@ std::string suite_from_there(const std::string& run, const std::string& folder) 
 
 void run_publish(Session& session, const PublishArguments& arguments) {
   require_whole(open_run(arguments.run), arguments.run, arguments.partial, "publish");
-  Withheld withheld = arguments.without_clips ? without_clips(arguments.run) : Withheld{};
-  if (has_inputs(arguments.run)) withheld.replaced["suite.yaml"] = suite_from_there(arguments.run, arguments.folder);
-  publish_run(arguments.run, arguments.folder, withheld);
+  PublishedInputs inputs = published_inputs(arguments.run, arguments.without_clips);
+  if (has_inputs(arguments.run)) inputs.texts["suite.yaml"] = suite_from_there(arguments.run, arguments.folder);
+  publish_run(arguments.run, arguments.folder, inputs);
   const Run run = load_run(arguments.folder);
   const std::vector<std::string> notes = completeness_notes({arguments.folder}, {run});
   print(session,
         with_notes("md",
                    fmt::format("{}: {} rows of {} {}; `duet report {}` builds its tables", arguments.folder,
-                               run.rows.size(), run.info.suite, run.info.suite_version, arguments.folder),
+                               run.rows.size(), run.info.suite, run.info.suite_version, shell_word(arguments.folder)),
                    notes),
         {{"published", arguments.folder}, {"rows", run.rows.size()}, {"notes", notes}});
 }

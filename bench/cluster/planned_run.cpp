@@ -22,7 +22,7 @@ ShardPlan checked_plan(const std::string& path, const Suite& suite) {
   return plan;
 }
 
-Suite suite_of_head(const Run& head, bool allow_programs) {
+Suite suite_of_planned(const Run& head, bool allow_programs) {
   Suite suite = suite_of_run(head);
   suite.allow_programs = allow_programs;
   return suite;
@@ -69,7 +69,7 @@ void require_planned_identity(const RunInfo& info, const RunIdentity& here, cons
 PlannedRun::PlannedRun(std::string path, bool allow_programs)
     : head_(load_run_head(path)),
       plan_(checked_plan(path, parse_suite(head_.info.suite_yaml, path + "/suite.yaml"))),
-      suite_(suite_of_head(head_, allow_programs)),
+      suite_(suite_of_planned(head_, allow_programs)),
       identity_(identity_of(suite_)),
       bodies_(with_outlines(Bodies(suite_), plan_, suite_)),
       episodes_(suite_, bodies_) {

@@ -1,17 +1,19 @@
 #include "duet/bench/replay/replay_source.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <map>
 
 #include "duet/bench/clips.h"
+#include "duet/bench/run_inputs.h"
+#include "duet/bench/shell_word.h"
 #include "duet/bench/verification.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/npz.h"
 #include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/core/text.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/robots/robot_cards.h"
@@ -21,24 +23,6 @@ namespace duet {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Gone with its owner.
-class ScratchFolder {
- public:
-  ScratchFolder() : path_(fs::temp_directory_path() / fmt::format("duet-replay-{}", getpid())) {
-    fs::create_directories(path_);
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] std::string path() const { return path_.string(); }
-
- private:
-  fs::path path_;
-};
 
 std::string recording_file(const std::string& folder, const EpisodeRow& row) {
   return (fs::path(folder) / (row.key.substr(0, 16) + ".npz")).string();
@@ -124,7 +108,7 @@ ReplayScene scene_of(const Run& run, const ChosenScene& chosen, const ReplayChoi
       continue;
     }
     ReplayTrack& track = scene.tracks.emplace_back(track_of(*row, file, choice));
-    track.repeat = fmt::format("duet replay {} --episodes {:.16} --run-again", run.path, row->key);
+    track.repeat = fmt::format("duet replay {} --episodes {:.16} --run-again", shell_word(run.path), row->key);
     track.origin = !again                              ? "kept by the run"
                    : repeat->second == row->state_hash ? "run again: the same states, bit for bit"
                                                        : "run again: NOT the states that the run had";
@@ -245,7 +229,7 @@ double ReplayScene::disagreement() const {
 
 ReplayContent replay_of_run(const Run& run, const ReplayChoice& choice, Progress& progress) {
   const ChosenRows chosen = chosen_rows(run.rows, choice);
-  const Suite suite = parse_suite(run.info.suite_yaml, run.path + "/suite.yaml");
+  const Suite suite = suite_of_head(run);
   const ScratchFolder scratch;
   ReplayContent content;
   content.title = fmt::format("{} {}", suite.name, suite.version);

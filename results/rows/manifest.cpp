@@ -12,6 +12,7 @@
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/run_files.h"
 
 namespace duet {
 namespace {
@@ -57,6 +58,7 @@ void check_published(const std::string& folder) {
     if (!stays_below(name))
       throw InputError(
           fmt::format("{}: key 'files': expected names of files in the folder, found '{}'", path, shown(name)));
+    require_plain_file(folder, name);
     const std::string found = sha256_file(file_of(folder, name));
     if (digest != found)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", file_of(folder, name),

@@ -8,8 +8,10 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/run_directory.h"
+#include "duet/results/rows/run_files.h"
 
 namespace duet {
 namespace {
@@ -17,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kRows = "episodes.jsonl";
-constexpr const char* kInputs = "inputs";  // what the run was made from, where it keeps it
 constexpr std::array kFiles = {"run.json", "env.json", "suite.yaml", "resumed.jsonl"};  // where they are
 
 std::string in(const std::string& folder, const std::string& name) { return (fs::path(folder) / name).string(); }
@@ -57,42 +58,33 @@ nlohmann::json description_of(const Run& run) {
           {"without", without}};
 }
 
-// Copies what the run keeps of its inputs, but for what is withheld.
-void copy_inputs(const std::string& source, const std::string& folder, const Withheld& withheld) {
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(in(source, kInputs))) {
-    const std::string name = entry.path().lexically_relative(source).generic_string();
-    if (!entry.is_regular_file() || withheld.files.contains(name)) continue;
+void copy_inputs(const std::string& source, const std::string& folder, const PublishedInputs& inputs) {
+  for (const std::string& name : inputs.files) {
+    require_plain_file(source, name);
     fs::create_directories(fs::path(in(folder, name)).parent_path());
-    fs::copy_file(entry.path(), in(folder, name));
+    fs::copy_file(in(source, name), in(folder, name));
   }
-  for (const auto& [name, text] : withheld.replaced) write_file(in(folder, name), text);
+  for (const auto& [name, text] : inputs.texts) write_file(in(folder, name), text);
 }
 
-void fill(const std::string& folder, const std::string& source, const Run& run, const Withheld& withheld) {
+void fill(const std::string& folder, const std::string& source, const Run& run, const PublishedInputs& inputs) {
   write_file(in(folder, kRows), lean_rows(run));
   for (const char* name : kFiles)
     if (fs::exists(in(source, name))) write_file(in(folder, name), without_places(read_file(in(source, name))));
-  if (fs::exists(in(source, kInputs))) copy_inputs(source, folder, withheld);
+  copy_inputs(source, folder, inputs);
   write_manifest(folder, description_of(run));
 }
 
 }  // namespace
 
-void publish_run(const std::string& run, const std::string& folder, const Withheld& withheld) {
+void publish_run(const std::string& run, const std::string& folder, const PublishedInputs& inputs) {
   if (fs::exists(folder))
     throw InputError(fmt::format("'{}' is there already: what is published stays; choose another folder", folder));
   const Run loaded = load_run(run);
   if (loaded.rows.empty()) throw InputError(fmt::format("'{}' has no rows to publish", run));
-  const std::string partial = fs::path(folder).lexically_normal().string() + ".partial";
-  fs::remove_all(partial);
-  try {
-    fill(partial, run, loaded, withheld);
-    fs::rename(partial, folder);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove_all(partial, ignored);
-    throw;
-  }
+  const ScratchFolder scratch = ScratchFolder::beside(folder);
+  fill(scratch / "run", run, loaded, inputs);
+  scratch.publish("run", folder);
 }
 
 }  // namespace duet

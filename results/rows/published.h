@@ -11,15 +11,16 @@
 
 namespace duet {
 
-// Files of a run, named from its folder, that are not published, and texts that stand in the place of others.
-struct Withheld {
-  std::set<std::string> files;
-  std::map<std::string, std::string> replaced;
+// What is published beside rows, suite and environment: files of the run, named from its folder, and texts that stand
+// under such a name.
+struct PublishedInputs {
+  std::set<std::string> files = {};
+  std::map<std::string, std::string> texts = {};
 };
 
 // Writes `folder` at once: it is there whole or not at all. Files that the run names by their places on its machine are
-// named from the working folder. Throws InputError for what is no run or a run without rows,
-// and where `folder` is there already.
-void publish_run(const std::string& run, const std::string& folder, const Withheld& withheld = {});
+// named from the working folder. Nothing else of the run is copied. Throws InputError for what is no run or a run
+// without rows, for a file that is a link, and where `folder` is there already.
+void publish_run(const std::string& run, const std::string& folder, const PublishedInputs& inputs = {});
 
 }  // namespace duet

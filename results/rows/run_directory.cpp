@@ -14,6 +14,7 @@
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/manifest.h"
 #include "duet/results/rows/name_digests.h"
+#include "duet/results/rows/run_files.h"
 #include "duet/results/rows/run_litter.h"
 #include "duet/results/rows/run_rows.h"
 
@@ -53,11 +54,12 @@ bool is_fresh(const std::string& folder) {
   });
 }
 
-// What this program writes into the folder; none of it may be a link.
+// What this program writes into the folder and reads from it; none of it may be a link.
 void refuse_links(const std::string& folder) {
   for (const char* name :
        {"run.json", "env.json", "suite.yaml", "episodes.jsonl", "resumed.jsonl", "lock", "trajectories", "prepared"})
     static_cast<void>(inside(folder, name));
+  require_plain_files(folder);
 }
 
 void create_folder(const std::string& folder) {
@@ -170,7 +172,6 @@ void RunDirectory::release(const std::string& key) { lock_->unlock(lock_place(ke
 
 bool RunDirectory::append(const EpisodeRow& row) {
   require(!row.key.empty(), "an episode row without a key");
-  require(!has(row.key), fmt::format("the episode {} is already in '{}'", row.key, path_));
   require(row.suite_hash == suite_hash_, fmt::format("a row of suite hash {} does not belong in '{}' (suite hash {})",
                                                      row.suite_hash, path_, suite_hash_));
   const ScopedLock writing(*lock_, kWriting);
@@ -205,6 +206,7 @@ bool RunDirectory::is_finished() {
 Run load_run_head(const std::string& path) {
   if (!is_run(path))
     throw InputError(fmt::format("'{}' is not a run directory (no run.json){}", path, runs_hint(path)));
+  require_plain_files(path);
   check_published(path);
   Run run;
   run.path = path;

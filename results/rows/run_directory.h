@@ -39,9 +39,10 @@ class RunDirectory {
   // Looks into the folder first. What is claimed is given back by append(), by release() or by the end of the process.
   Claim claim(const std::string& key);
   void release(const std::string& key);
-  // True: on disk when it returns. False: another process has appended the episode meanwhile, this row is left out.
+  // True: on disk when it returns. False: the folder has the episode by now, and this row is left out; where processes
+  // share a folder without locks, another may have appended it before or after this one has looked.
   // Throws StorageError (a full disk); the file then ends with the last whole row. std::invalid_argument for a key that
-  // is empty or already there and for a row of another suite. Not thread-safe.
+  // is empty and for a row of another suite. Not thread-safe.
   bool append(const EpisodeRow& row);
 
   // Notes in run.json that this part of a suite of `episodes` is asked for; `count` counts what all parts have.
@@ -76,9 +77,9 @@ struct Run {
   std::vector<std::string> warnings;  // sentences: rows that were left out because an equal one is there
 };
 
-// Throws InputError: not a run directory, a broken row (file and line), a key that is not the row's, an episode twice
-// with rows that differ, a row of another suite or of another policy or controller under one name, a published run that
-// is not what was published (results/rows/published.h).
+// Throws InputError: not a run directory, a file of it that is a link (results/rows/run_files.h), a broken row (file
+// and line), a key that is not the row's, an episode twice with rows that differ, a row of another suite or of another
+// policy or controller under one name, a published run that is not what was published (results/rows/published.h).
 Run load_run(const std::string& path);
 
 // The same without its rows, which are not looked at.

@@ -7,6 +7,7 @@
 
 #include "duet/bench/bodies.h"
 #include "duet/bench/clips.h"
+#include "duet/bench/prepared_clips.h"
 #include "duet/bench/run_inputs.h"
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
@@ -143,7 +144,7 @@ class PublishedWithoutClips : public KeptRun {
   void SetUp() override {
     KeptRun::SetUp();
     make_run(load_suite(scratch_ / "here/suite.yaml"), scratch_ / "run");
-    publish_run(scratch_ / "run", scratch_ / "published", without_clips(scratch_ / "run"));
+    publish_run(scratch_ / "run", scratch_ / "published", published_inputs(scratch_ / "run", true));
     fs::copy(scratch_ / "here/mine.safetensors", scratch_ / "published/mine.safetensors");
     fs::create_directories(scratch_ / "elsewhere/below");
     fs::copy(scratch_ / "here/wave.npz", scratch_ / "elsewhere/renamed.npz");
@@ -214,9 +215,55 @@ TEST_F(KeptRun, NothingIsWrittenThroughALinkInTheFolder) {
   fs::remove_all(scratch_ / "run/inputs");
   fs::create_directory(scratch_ / "away");
   fs::create_symlink(scratch_ / "away", scratch_ / "run/inputs");
-  EXPECT_THAT(test::thrown_message<StorageError>([&] { make_run(suite, scratch_ / "run"); }),
+  EXPECT_THAT(test::thrown_message<InputError>([&] { make_run(suite, scratch_ / "run"); }),
               AllOf(HasSubstr("run/inputs"), HasSubstr("is a symbolic link")));
   EXPECT_TRUE(fs::is_empty(scratch_ / "away"));
+}
+
+// Pages show clips: of the run, and of nobody's else.
+TEST_F(KeptRun, AFileInThePlaceOfAKeptOneIsRefused) {
+  make_run(load_suite(scratch_ / "here/suite.yaml", {{"policies", "[replay]"}}), scratch_ / "run");
+  const std::string suite = read_file(scratch_ / "run/suite.yaml");
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    write_file(scratch_ / "run/suite.yaml", suite);
+    replace_in(scratch_ / "run/suite.yaml", from, to);
+    return test::thrown_message<InputError>([&] { suite_of_head(load_run(scratch_ / "run")); });
+  };
+  EXPECT_THAT(refusal("inputs/clips/0000_wave.npz", "../here/wave.npz"),
+              HasSubstr("clips: expected the file 'inputs/clips/0000_wave.npz' that the run keeps, found '"));
+  EXPECT_THAT(refusal("inputs/contact_limits.yaml", scratch_ / "here/limits.yaml"),
+              HasSubstr("contact_limits: expected the file 'inputs/contact_limits.yaml' that the run keeps"));
+  write_file(scratch_ / "run/suite.yaml", suite);
+  const duet::Run run = load_run(scratch_ / "run");
+  EXPECT_EQ(clips_fault(run, suite_of_head(run)), "");
+  fs::remove(scratch_ / "run/inputs/inputs.json");  // and with it what the clips are to be
+  replace_in(scratch_ / "run/suite.yaml", "contact_limits: \"inputs/contact_limits.yaml\"\n", "");
+  EXPECT_EQ(clips_fault(run, suite_of_head(load_run(scratch_ / "run"))),
+            "the run has no index of what it was made from");
+}
+
+TEST_F(KeptRun, PublishesNoFileThatItsIndexDoesNotName) {
+  make_run(load_suite(scratch_ / "here/suite.yaml", {{"policies", "[replay]"}}), scratch_ / "run");
+  write_file(scratch_ / "run/inputs/x.txt", "secret");
+  const PublishedInputs inputs = published_inputs(scratch_ / "run", false);
+  EXPECT_THAT(inputs.files, testing::ElementsAre("inputs/clips/0000_wave.npz", "inputs/clips/0001_shake.npz",
+                                                 "inputs/contact_limits.yaml"));
+  write_file(scratch_ / "run/inputs/contact_limits.yaml", "secret");
+  EXPECT_THAT(test::thrown_message<InputError>([&] { published_inputs(scratch_ / "run", false); }),
+              HasSubstr("it is not what the run was made from"));
+}
+
+TEST_F(KeptRun, PreparedClipsAreRemovedAndNothingElse) {
+  const std::string mine = scratch_ / "run/prepared/notes.txt",
+                    made = scratch_ / "run/prepared/0123456789abcdef0123456789abcdef.npz";
+  write_file(mine, "mine");
+  write_file(made, "made");
+  remove_prepared_clips(scratch_ / "run");
+  EXPECT_FALSE(fs::exists(made));
+  EXPECT_EQ(read_file(mine), "mine");
+  fs::remove(mine);
+  remove_prepared_clips(scratch_ / "run");
+  EXPECT_FALSE(fs::exists(scratch_ / "run/prepared"));
 }
 
 TEST_F(KeptRun, AnIndexThatLeadsOutOfTheFolderIsRefused) {

@@ -115,7 +115,46 @@ TEST_F(Published, OfNothingIsRefusedAndLeavesNothing) {
   EXPECT_THAT(thrown_message<InputError>([&] { publish_run(scratch_ / "empty", scratch_ / "tiny"); }),
               HasSubstr("no rows"));
   EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny"));
-  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny.partial"));
+  for (const auto& entry : std::filesystem::directory_iterator(scratch_ / "."))
+    EXPECT_THAT(entry.path().filename().string(), testing::AnyOf("run", "empty"));
+}
+
+TEST_F(Published, LeavesWhatOthersHaveBesideIt) {
+  write_file(scratch_ / "tiny.partial/precious", "mine");
+  publish_run(scratch_ / "run", scratch_ / "tiny");
+  EXPECT_EQ(read_file(scratch_ / "tiny.partial/precious"), "mine");
+  EXPECT_EQ(load_run(scratch_ / "tiny").rows.size(), 3U);
+}
+
+TEST_F(Published, HasTheFilesThatAreNamedAndNoOthers) {
+  write_file(scratch_ / "run/inputs/a.txt", "named");
+  write_file(scratch_ / "run/inputs/b.txt", "not named");
+  publish_run(scratch_ / "run", scratch_ / "tiny", {.files = {"inputs/a.txt"}, .texts = {{"inputs/c.txt", "made"}}});
+  EXPECT_EQ(read_file(scratch_ / "tiny/inputs/a.txt"), "named");
+  EXPECT_EQ(read_file(scratch_ / "tiny/inputs/c.txt"), "made");
+  EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny/inputs/b.txt"));
+}
+
+// Of a file that is named, of one that is not, and of a folder on the way.
+TEST_F(Published, ALinkIsRefused) {
+  write_file(scratch_ / "secret/a.txt", "secret");
+  const auto refusal = [&](const std::string& link, const std::string& target) {
+    std::filesystem::create_directories(scratch_ / "run/inputs");
+    std::filesystem::create_symlink(scratch_ / target, scratch_ / link);
+    std::string said = thrown_message<InputError>(
+        [&] { publish_run(scratch_ / "run", scratch_ / "tiny", {.files = {"inputs/a.txt"}}); });
+    std::filesystem::remove(scratch_ / link);
+    EXPECT_FALSE(std::filesystem::exists(scratch_ / "tiny"));
+    return said;
+  };
+  EXPECT_THAT(refusal("run/inputs/a.txt", "secret/a.txt"), HasSubstr("inputs/a.txt' is a symbolic link"));
+  EXPECT_THAT(refusal("run/inputs/x.txt", "secret/a.txt"), HasSubstr("inputs/x.txt' is a symbolic link"));
+  EXPECT_THAT(refusal("run/resumed.jsonl", "secret/a.txt"), HasSubstr("resumed.jsonl' is a symbolic link"));
+  std::filesystem::remove_all(scratch_ / "run/inputs");
+  std::filesystem::create_symlink(scratch_ / "secret", scratch_ / "run/inputs");
+  EXPECT_THAT(thrown_message<InputError>(
+                  [&] { publish_run(scratch_ / "run", scratch_ / "tiny", {.files = {"inputs/a.txt"}}); }),
+              HasSubstr("inputs' is a symbolic link"));
 }
 
 // What this project publishes.

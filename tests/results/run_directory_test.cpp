@@ -1,6 +1,7 @@
 #include "duet/results/rows/run_directory.h"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -128,12 +129,40 @@ TEST(RunDirectory, RefusesAFolderOfSomethingElse) {
   EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "file", tiny_run()); }), HasSubstr("file"));
 }
 
+// A file system without locks lets two processes run one episode; the first row stands, whoever has looked when.
+TEST(RunDirectory, AnEpisodeThatAnotherHasAppendedMeanwhileIsLeftOut) {
+  const ScratchFolder scratch;
+  RunDirectory one = RunDirectory::open(scratch / "run", tiny_run()),
+               other = RunDirectory::open(scratch / "run", tiny_run());
+  const EpisodeRow row = episode("replay", "hug", 0, true), next = episode("replay", "hug", 1, true);
+  EXPECT_TRUE(one.append(row));
+  EXPECT_EQ(other.claim(next.key), Claim::kMine);  // and has looked
+  EXPECT_TRUE(other.has(row.key));
+  EXPECT_FALSE(other.append(row));
+  EXPECT_TRUE(other.append(next));
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 2U);
+}
+
+TEST(LoadRun, ALinkAPipeOrADeviceInThePlaceOfAFileIsRefused) {
+  const ScratchFolder scratch;
+  const auto refusal = [&] { return thrown_message<InputError>([&] { load_run(scratch / "run"); }); };
+  for (const std::string name : {"run.json", "env.json", "suite.yaml", "episodes.jsonl"}) {
+    RunDirectory::open(scratch / "run", tiny_run()).append(episode("replay", "hug", 0, true));
+    std::filesystem::rename(scratch / ("run/" + name), scratch / name);
+    std::filesystem::create_symlink(scratch / name, scratch / ("run/" + name));
+    EXPECT_THAT(refusal(), HasSubstr(name + "' is a symbolic link, which may lead out of the folder")) << name;
+    std::filesystem::remove(scratch / ("run/" + name));
+    ASSERT_EQ(mkfifo((scratch / ("run/" + name)).c_str(), 0600), 0);
+    EXPECT_THAT(refusal(), HasSubstr(name + "' is a device, a pipe or a socket")) << name;
+    std::filesystem::remove_all(scratch / "run");
+  }
+}
+
 TEST(RunDirectory, RefusesTheSameEpisodeTwiceAndRowsOfAnotherSuite) {
   const ScratchFolder scratch;
   RunDirectory run = RunDirectory::open(scratch / "run", tiny_run());
-  run.append(episode("replay", "hug", 0, true));
-  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(episode("replay", "hug", 0, false)); }),
-              HasSubstr("is already in"));
+  EXPECT_TRUE(run.append(episode("replay", "hug", 0, true)));
+  EXPECT_FALSE(run.append(episode("replay", "hug", 0, false)));
   EpisodeRow foreign = episode("replay", "hug", 1, true);
   foreign.suite_hash = "another";
   EXPECT_THAT(thrown_message<std::invalid_argument>([&] { run.append(foreign); }), HasSubstr("suite hash another"));
