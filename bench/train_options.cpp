@@ -3,11 +3,16 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 #include <sstream>
 
 #include "duet/bench/suite_names.h"
+#include "duet/core/names.h"
 #include "duet/core/number.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -135,6 +140,34 @@ FieldTable<PolicyTraining> learning_fields() {
           &T::split)};
 }
 
+const std::set<std::string>& training_flags() {
+  static const std::set<std::string> flags = {"quiet", "smoke"};
+  return flags;
+}
+
+// What a value of this option was expected to be; "" where it is one.
+template <typename Training>
+std::string expected_of(const FieldTable<Training>& table, const std::string& name, const std::string& value,
+                        const std::string& what) {
+  std::vector<std::string> known = field_names(table);
+  std::erase_if(known, [](const std::string& other) { return other == "output" || other == "seed"; });
+  if (std::ranges::find(known, name) == known.end()) {
+    known.insert(known.end(), training_flags().begin(), training_flags().end());
+    throw InputError(fmt::format("{}: {}", what, unknown_name_message("option of a training", name, known)));
+  }
+  Training defaults;
+  return set_field(*find_field(table, name), defaults, value);
+}
+
+// "--round-clips" -> "round_clips"; throws for a word that is no option.
+std::string option_name(const std::string& word, const std::string& what) {
+  if (!word.starts_with("--"))
+    throw InputError(fmt::format("{}: expected an option of `duet train`, found '{}'", what, shown(word)));
+  std::string name = word.substr(2, word.find('=') - 2);
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
+
 }  // namespace
 
 const FieldTable<WbcTraining>& wbc_training_fields() {
@@ -178,6 +211,60 @@ const FieldTable<PolicyTraining>& policy_training_fields() {
     return fields;
   }();
   return table;
+}
+
+std::vector<std::string> training_names() {
+  std::vector<std::string> names = {"wbc"};
+  for (const std::string& variant : dstar_variants()) names.push_back(variant);
+  return names;
+}
+
+void check_training_option(const std::string& train, const std::string& name, const std::string& value,
+                           const std::string& what) {
+  const std::vector<std::string> known = training_names();
+  if (std::ranges::find(known, train) == known.end())
+    throw InputError(fmt::format("{}: {}", what, unknown_name_message("training", train, known)));
+  std::string expected;
+  if (training_flags().contains(name)) {
+    expected = value.empty() ? "" : "no value of a flag";
+  } else if (train == "wbc") {
+    expected = expected_of(wbc_training_fields(), name, value, what);
+  } else {
+    expected = expected_of(policy_training_fields(), name, value, what);
+  }
+  if (!expected.empty())
+    throw InputError(fmt::format("{}: option '{}': expected {}, found '{}'", what, name, expected, shown(value)));
+}
+
+TrainingOptions parse_training_options(const std::string& train, const std::vector<std::string>& words,
+                                       const std::string& what) {
+  TrainingOptions options;
+  for (auto word = words.begin(); word != words.end();) {
+    const std::string name = option_name(*word, what);
+    const std::size_t equals = word->find('=');
+    std::vector<std::string> values;
+    if (equals != std::string::npos) values.push_back(word->substr(equals + 1));
+    const bool takes_more = equals == std::string::npos && !training_flags().contains(name);
+    for (++word; takes_more && word != words.end() && !word->starts_with("--"); ++word) values.push_back(*word);
+    const std::string value = fmt::format("{}", fmt::join(values, " "));
+    check_training_option(train, name, value, what);
+    if (!options.emplace(name, value).second)
+      throw InputError(fmt::format("{}: expected the option '{}' once, found it twice", what, name));
+  }
+  return options;
+}
+
+std::vector<std::string> training_command(const std::string& train, const TrainingOptions& options, std::uint64_t seed,
+                                          const std::string& folder) {
+  std::vector<std::string> words = {"train", train};
+  for (const auto& [name, value] : options) {
+    std::string& option = words.emplace_back("--" + name);
+    std::ranges::replace(option, '_', '-');
+    if (!training_flags().contains(name)) words.push_back(value);
+  }
+  for (const std::string& word : {std::string("--seed"), std::to_string(seed), std::string("-o"), folder})
+    words.push_back(word);
+  return words;
 }
 
 }  // namespace duet

@@ -45,30 +45,36 @@ std::string action_of(const PolicyDescriptor& descriptor) {
 
 }  // namespace
 
-std::vector<PolicyProgram> programs_of(const SuitePolicy& policy) {
+std::vector<NamedProgram> programs_of(const SuitePolicy& policy) {
   if (!policy.use.ends_with(".yaml")) return {};
   const PolicyDescriptor descriptor = read_policy_descriptor(policy.use);
   if (descriptor.kind != PolicyKind::kProcess) return {};
-  return {{policy.name, policy.use, action_of(descriptor), in_trusted_folder(policy.use)}};
+  return {{fmt::format("policy '{}'", shown(policy.name)), policy.use, action_of(descriptor),
+           in_trusted_folder(policy.use)}};
 }
 
-std::vector<PolicyProgram> programs_of(const Suite& suite, const std::vector<std::string>& skipped) {
-  std::vector<PolicyProgram> programs;
+NamedProgram program_in(const std::string& who, const std::string& file, const std::vector<std::string>& command) {
+  const std::string folder = fs::absolute(file).parent_path().lexically_normal().string();
+  return {who, file, fmt::format("runs '{}' in '{}'", command_line(command), shown(folder, kLongestCommand)),
+          in_trusted_folder(file)};
+}
+
+std::vector<NamedProgram> programs_of(const Suite& suite, const std::vector<std::string>& skipped) {
+  std::vector<NamedProgram> programs;
   for (const SuitePolicy& policy : suite.policies) {
     if (std::find(skipped.begin(), skipped.end(), policy.name) != skipped.end()) continue;
-    for (PolicyProgram& program : programs_of(policy)) programs.push_back(std::move(program));
+    for (NamedProgram& program : programs_of(policy)) programs.push_back(std::move(program));
   }
   return programs;
 }
 
-std::string describe(const PolicyProgram& program) {
-  return fmt::format("policy '{}' of {} {}", shown(program.policy), shown(program.descriptor, kLongestCommand),
-                     program.action);
+std::string describe(const NamedProgram& program) {
+  return fmt::format("{} of {} {}", program.who, shown(program.file, kLongestCommand), program.action);
 }
 
-void require_allowed(const std::vector<PolicyProgram>& programs, bool allowed) {
+void require_allowed(const std::vector<NamedProgram>& programs, bool allowed) {
   std::vector<std::string> refused;
-  for (const PolicyProgram& program : programs)
+  for (const NamedProgram& program : programs)
     if (!allowed && !program.trusted) refused.push_back(describe(program));
   if (!refused.empty())
     throw InputError(fmt::format("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: {}",

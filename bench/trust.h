@@ -1,5 +1,5 @@
-// Which programs a suite would start or talk to, and whether the user allowed it (docs/trust.md): a suite, or the run
-// of somebody else, is data until the user says otherwise. Thread-safe.
+// Which programs a suite or a plan would start or talk to, and whether the user allowed it (docs/trust.md): a suite, or
+// the run of somebody else, is data until the user says otherwise. Thread-safe.
 #pragma once
 
 #include <string>
@@ -9,24 +9,26 @@
 
 namespace duet {
 
-// A policy of a suite that is a program of its own.
-struct PolicyProgram {
-  std::string policy;      // name in the suite
-  std::string descriptor;  // file
-  std::string action;      // "runs 'python3 wave_policy.py' in '/folder'" or "connects to 'localhost:7000'"
-  bool trusted = false;    // its descriptor lies in a trusted folder
+// A policy of a suite that is a program of its own, or a training of a plan.
+struct NamedProgram {
+  std::string who;       // "policy 'wave_policy'", "training 'plain-1'"
+  std::string file;      // that names it: a descriptor, a plan
+  std::string action;    // "runs 'python3 wave_policy.py' in '/folder'" or "connects to 'localhost:7000'"
+  bool trusted = false;  // the file lies in a trusted folder
 };
 
 // Of the suite's policies but those in `skipped`. Throws InputError for a descriptor that is broken.
-std::vector<PolicyProgram> programs_of(const Suite& suite, const std::vector<std::string>& skipped = {});
+std::vector<NamedProgram> programs_of(const Suite& suite, const std::vector<std::string>& skipped = {});
 // Of one policy; none where it is no descriptor, or one of a network.
-std::vector<PolicyProgram> programs_of(const SuitePolicy& policy);
+std::vector<NamedProgram> programs_of(const SuitePolicy& policy);
+// A program that `file` names and that runs in the file's folder.
+NamedProgram program_in(const std::string& who, const std::string& file, const std::vector<std::string>& command);
 
 // One line for each: "policy 'wave_policy' of FILE runs 'python3 wave_policy.py' in 'FOLDER'".
-std::string describe(const PolicyProgram& program);
+std::string describe(const NamedProgram& program);
 
 // Throws InputError with the list where there is a program that is neither allowed nor in a trusted folder.
-void require_allowed(const std::vector<PolicyProgram>& programs, bool allowed);
+void require_allowed(const std::vector<NamedProgram>& programs, bool allowed);
 
 // Whether a descriptor and the folder that its program runs in both lie in a folder of $DUET_TRUSTED_FOLDERS (absolute
 // paths with ':' between them), links followed.

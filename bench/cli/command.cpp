@@ -110,7 +110,8 @@ void add_threads(CLI::App* command, int& threads, const std::string& what) {
 
 void add_allow_programs(CLI::App& command, bool& allowed) {
   command.add_flag("--allow-programs", allowed,
-                   "start the programs, and connect to the servers, that policy descriptors name (docs/trust.md)");
+                   "start the programs, and connect to the servers, that policy descriptors name, and the trainings of "
+                   "a plan (docs/trust.md)");
 }
 
 std::vector<std::string> command_names(const CLI::App& app) {

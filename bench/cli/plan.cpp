@@ -7,6 +7,7 @@
 #include "duet/bench/cluster/plan_run.h"
 #include "duet/bench/cluster/training_jobs.h"
 #include "duet/bench/interrupt.h"
+#include "duet/bench/shell_word.h"
 #include "duet/core/file.h"
 #include "duet/core/number.h"
 #include "duet/core/parallel.h"
@@ -62,7 +63,9 @@ std::string text_of(const ShardPlan& plan, const std::string& run) {
                   format_duration(all), format_duration(least), format_duration(most));
   for (const auto& [name, cost] : plan.costs)
     text += fmt::format("  {:<24} {:.4g} s of a core per second of motion\n", name, cost);
-  return text + fmt::format("go on with `duet work {} --shard 0`, or `duet submit {} --slurm`\n", run, run);
+  const std::string path = shell_word(run), leave = trainings ? " --allow-programs" : "";
+  return text + fmt::format("go on with `duet work {} --shard 0{}`, or `duet submit {} --slurm{}`\n", path, leave, path,
+                            leave);
 }
 
 void plan_trainings_of(Session& session, const PlanArguments& arguments) {

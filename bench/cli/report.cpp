@@ -8,6 +8,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/replay/report_replays.h"
+#include "duet/bench/shell_word.h"
 #include "duet/bench/story.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
@@ -131,7 +132,8 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   add_analyses(analyses, json);
   print(session, with_notes("md", run_text(tables, analyses), notes), json);
   if (arguments.replays.scenes == 0)
-    suggest_next(session, fmt::format("duet replay {} -o {}/replay.html", arguments.runs.front(), folder));
+    suggest_next(session, fmt::format("duet replay {} -o {}", shell_word(arguments.runs.front()),
+                                      shell_word(folder + "/replay.html")));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/clips.h"
 #include "duet/bench/retarget_comparison.h"
+#include "duet/bench/shell_word.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -130,7 +131,7 @@ void run_retarget(const Session& session, const RetargetArguments& arguments) {
   }
   if (made.size() > kListed) text += fmt::format("... and {} more in {}\n", made.size() - kListed, arguments.output);
   print(session, text, {{"paired", results}});
-  suggest_next(session, fmt::format("duet run demo --clips {} -o runs/mine", arguments.output));
+  suggest_next(session, fmt::format("duet run demo --clips {} -o runs/mine", shell_word(arguments.output)));
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "duet/bench/interrupt.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/runner.h"
+#include "duet/bench/shell_word.h"
 #include "duet/bench/story.h"
 #include "duet/bench/trust.h"
 #include "duet/core/file.h"
@@ -83,7 +84,7 @@ void print_plan(const Session& session, const Suite& suite) {
   const std::string hash = suite_hash(suite);
   nlohmann::json programs = nlohmann::json::array();
   std::string text;
-  for (const PolicyProgram& program : programs_of(suite)) {
+  for (const NamedProgram& program : programs_of(suite)) {
     programs.push_back(describe(program));
     text += fmt::format("\n# program: {}", describe(program));
   }
@@ -130,8 +131,9 @@ void run_suite_command(Session& session, RunArguments arguments) {
   if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
   add_analyses(analyses, json);
   print_result(session, summary.end, with_notes("md", run_text(tables, analyses), notes), json);
-  suggest_next(session, summary.end == RunEnd::kComplete ? fmt::format("duet report {} --replays 3", arguments.output)
-                                                         : fmt::format("{}", fmt::join(session.argv, " ")));
+  suggest_next(session, summary.end == RunEnd::kComplete
+                            ? fmt::format("duet report {} --replays 3", shell_word(arguments.output))
+                            : shell_words(session.argv));
 }
 
 namespace {

@@ -3,22 +3,44 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
+#include <iterator>
+#include <sstream>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cluster/slurm_script.h"
+#include "duet/bench/cluster/training_jobs.h"
+#include "duet/bench/trust.h"
+#include "duet/results/rows/run_directory.h"
 
 namespace duet::cli {
 namespace {
 
 struct SubmitArguments {
-  std::string run;
+  std::string run, program;
   bool slurm = false, dry_run = false;
   SlurmOptions options;
 };
 
+// Workers would refuse what was not allowed; this says so before they are queued.
+void check_programs(const SubmitArguments& arguments) {
+  const ShardPlan plan = read_shard_plan(arguments.run);
+  if (plan.kind == ShardPlan::Kind::kTrainings)
+    return require_allowed(programs_of(plan, arguments.run), arguments.options.allow_programs);
+  const std::string suite = arguments.run + "/suite.yaml";
+  require_allowed(programs_of(parse_suite(load_run_head(arguments.run).info.suite_yaml, suite)),
+                  arguments.options.allow_programs);
+}
+
+std::vector<std::string> words_of(const std::string& program) {
+  std::istringstream text(program);
+  return {std::istream_iterator<std::string>(text), {}};
+}
+
 void run_submit(Session& session, SubmitArguments arguments) {
+  check_programs(arguments);
+  arguments.options.program = words_of(arguments.program);
   if (arguments.options.program.empty())
-    arguments.options.program = std::filesystem::read_symlink("/proc/self/exe").string();
+    arguments.options.program = {std::filesystem::read_symlink("/proc/self/exe").string()};
   const RunStatus status = run_status(arguments.run);
   const SlurmJobs jobs = slurm_jobs(status, arguments.run, arguments.options);
   write_slurm_scripts(jobs, arguments.run);
@@ -63,7 +85,9 @@ void add_submit(CLI::App& app, Session& session) {
   command->add_option("--sbatch", options.more,
                       "a further option of sbatch, whole: --sbatch=--exclude=n7 (repeatable)");
   command->add_option("--set-up", options.set_up, "a line that the scripts run first: 'module load gcc' (repeatable)");
-  command->add_option("--program", options.program, "how the nodes call duet (default: this program's path)");
+  command->add_option("--program", arguments->program,
+                      "how the nodes call duet, words with spaces between them (default: this program's path)");
+  add_allow_programs(*command, options.allow_programs);
   command->add_option("--at-once", options.at_once, "workers at the same time, 0 for no limit")
       ->check(CLI::Range(0, 1'000'000));
   command->add_option("--largest-array", options.largest_array, "shards of one array (MaxArraySize)")

@@ -6,6 +6,7 @@
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/field_options.h"
+#include "duet/bench/shell_word.h"
 #include "duet/bench/synth_options.h"
 #include "duet/core/digest.h"
 #include "duet/core/parallel.h"
@@ -55,7 +56,7 @@ void run_synth(const Session& session, SynthArguments arguments) {
   });
   progress.finish();
   print(session, fmt::format("{} clips in {}", total, arguments.output), {{"clips", written}});
-  suggest_next(session, fmt::format("duet retarget {} -o paired", arguments.output));
+  suggest_next(session, fmt::format("duet retarget {} -o paired", shell_word(arguments.output)));
 }
 
 }  // namespace

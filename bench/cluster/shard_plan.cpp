@@ -10,11 +10,13 @@
 #include "duet/backends/factory.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/results/rows/episode_row.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/name_digests.h"
+#include "duet/results/rows/run_files.h"
 
 namespace duet {
 namespace {
@@ -24,8 +26,6 @@ using Kind = ShardPlan::Kind;
 
 constexpr const char* kPlanSchema = "duet.plan/1";
 constexpr std::int64_t kMostShards = 1'000'000;
-
-std::string plan_file(const std::string& run) { return (std::filesystem::path(run) / "plan.json").string(); }
 
 // Blocks of one engine, which follow one another.
 struct EngineBlocks {
@@ -64,7 +64,7 @@ void cut_engine(const EngineBlocks& engine, std::vector<Shard>& shards) {
                 .end = block->end,
                 .cost = block->cost,
                 .keys = {},
-                .argument = {}};
+                .training = {}};
     const double until = engine.cost * static_cast<double>(i + 1) / static_cast<double>(engine.shards);
     const std::int64_t others = engine.shards - i - 1;  // each is to have a block at least
     // Up to the block whose middle lies behind the cut.
@@ -82,7 +82,9 @@ void cut_engine(const EngineBlocks& engine, std::vector<Shard>& shards) {
 json to_json(const Shard& shard) {
   json object = {{"name", shard.name}, {"begin", shard.begin}, {"end", shard.end}, {"cost_s", shard.cost}};
   if (!shard.keys.empty()) object["keys"] = shard.keys;
-  if (!shard.argument.empty()) object["arguments"] = shard.argument;
+  if (const PlannedTraining& training = shard.training; !training.train.empty())
+    object.update(
+        {{"train", training.train}, {"arm", training.arm}, {"seed", training.seed}, {"options", training.options}});
   return object;
 }
 
@@ -96,13 +98,24 @@ const json& list_at(JsonFields& fields, const std::string& key, const std::strin
   return list;
 }
 
-std::vector<std::string> texts_at(JsonFields& fields, const std::string& key, const std::string& what) {
-  std::vector<std::string> texts;
-  for (const json& text : list_at(fields, key, what)) {
-    if (!text.is_string()) fail_plan(what, fmt::format("texts under the key '{}'", key));
-    texts.push_back(text.get<std::string>());
+// Everything that `duet train` is told follows from these, and all of it is known.
+PlannedTraining read_training(JsonFields& fields, const std::string& name, const std::string& what) {
+  PlannedTraining training{fields.text("train"), fields.text("arm"), fields.unsigned_integer("seed"), {}};
+  const json& options = fields.at("options");
+  if (!options.is_object()) fail_plan(what, "an object under the key 'options'");
+  for (const auto& [option, value] : options.items()) {
+    if (!value.is_string()) fail_plan(what, fmt::format("a text under the option '{}'", shown(option)));
+    check_training_option(training.train, option, value.get<std::string>(), what);
+    training.options[option] = value.get<std::string>();
   }
-  return texts;
+  const std::vector<std::string> known = training_names();
+  if (std::ranges::find(known, training.train) == known.end())
+    throw InputError(fmt::format("{}: {}", what, unknown_name_message("training", training.train, known)));
+  if (!is_arm_name(training.arm))
+    fail_plan(what, fmt::format("an arm of letters, digits, '_' and '.', found '{}'", shown(training.arm)));
+  if (name != training.name())
+    fail_plan(what, fmt::format("the name '{}' of its arm and seed, found '{}'", training.name(), shown(name)));
+  return training;
 }
 
 Shard read_shard(const json& object, Kind kind, const std::string& what) {
@@ -113,7 +126,7 @@ Shard read_shard(const json& object, Kind kind, const std::string& what) {
   shard.end = fields.integer("end");
   shard.cost = fields.number("cost_s");
   if (kind == Kind::kEpisodes) shard.keys = fields.text("keys");
-  if (kind == Kind::kTrainings) shard.argument = texts_at(fields, "arguments", what);
+  if (kind == Kind::kTrainings) shard.training = read_training(fields, shard.name, what);
   fields.refuse_unknown();
   if (shard.begin < 0 || shard.end <= shard.begin || shard.end - shard.begin > 10'000'000)
     fail_plan(what, fmt::format("0 <= begin < end, found {} and {}", shard.begin, shard.end));
@@ -172,6 +185,14 @@ std::vector<Shard> cut_shards(const std::vector<PlanBlock>& blocks, std::int64_t
   return shards;
 }
 
+bool is_arm_name(const std::string& name) {
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
+  return !name.empty() && name.size() <= 64 && name.front() != '.' &&
+         name.find_first_not_of(kLetters) == std::string::npos;
+}
+
+std::string plan_file(const std::string& run) { return (std::filesystem::path(run) / "plan.json").string(); }
+
 bool has_shard_plan(const std::string& run) { return std::filesystem::exists(plan_file(run)); }
 
 void write_shard_plan(const ShardPlan& plan, const std::string& run) {
@@ -190,6 +211,7 @@ ShardPlan read_shard_plan(const std::string& run) {
   const std::string path = plan_file(run);
   if (!has_shard_plan(run))
     throw InputError(fmt::format("'{}' is no run that was planned (no plan.json): `duet plan` makes one", run));
+  require_plain_files(run);
   const json object = parse_json(read_text(path), path);
   JsonFields fields(object, path);
   if (const std::string schema = fields.text("schema"); schema != kPlanSchema)

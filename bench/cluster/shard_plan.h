@@ -8,17 +8,28 @@
 #include <string>
 #include <vector>
 
+#include "duet/bench/train_options.h"
+
 namespace duet {
 
 // Digests of what runs: "duet", and each engine's module by its name; "" for one that is absent.
 using ProgramDigests = std::map<std::string, std::string>;
 
+// A shard that is a training, in the folder trainings/ARM-SEED of the run.
+struct PlannedTraining {
+  std::string train, arm;  // train: one of training_names()
+  std::uint64_t seed = 0;
+  TrainingOptions options;
+
+  [[nodiscard]] std::string name() const { return arm + "-" + std::to_string(seed); }
+};
+
 struct Shard {
-  std::string name;                   // the engine of its episodes, or a training's "ARM-SEED"
-  std::int64_t begin = 0, end = 0;    // places, the last one not in it; of a training 0 and 1
-  double cost = 0.0;                  // predicted, of one core [s]
-  std::string keys;                   // SHA-256 of the episodes' keys in their order; of a training empty
-  std::vector<std::string> argument;  // of a training: of `duet`
+  std::string name;                 // the engine of its episodes, or that of the training
+  std::int64_t begin = 0, end = 0;  // places, the last one not in it; of a training one place
+  double cost = 0.0;                // predicted, of one core [s]
+  std::string keys;                 // SHA-256 of the episodes' keys in their order; of a training empty
+  PlannedTraining training;         // of episodes empty
 
   [[nodiscard]] std::int64_t episodes() const { return end - begin; }
 };
@@ -52,8 +63,12 @@ inline constexpr double kShardSeconds = 240.0;  // predicted cost of a shard of 
 // blocks.
 std::vector<Shard> cut_shards(const std::vector<PlanBlock>& blocks, std::int64_t count);
 
+// Whether an arm of trainings may be called so: letters, digits, '_' and '.', none of them first a '.'.
+bool is_arm_name(const std::string& name);
+
 // Whether the folder is a run that was planned.
 bool has_shard_plan(const std::string& run);
+std::string plan_file(const std::string& run);  // its path
 void write_shard_plan(const ShardPlan& plan, const std::string& run);
 // Throws InputError: no plan there; file, key, expected, found.
 ShardPlan read_shard_plan(const std::string& run);

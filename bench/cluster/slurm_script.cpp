@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 
+#include "duet/bench/shell_word.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -20,20 +21,30 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// As one word of a shell.
-std::string shell_word(const std::string& text) {
-  std::string word = "'";
-  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return word + "'";
-}
-
 void require_one_line(const std::string& text, const char* what) {
   require(text.find_first_of("\n\r") == std::string::npos, fmt::format("{}: expected one line, found several", what));
 }
 
-std::string sbatch_line(const char* option, const std::string& value) {
+// sbatch reads a line of its own as a shell does, but for what a backslash means.
+std::string sbatch_word(const char* option, const std::string& value) {
   require_one_line(value, option);
-  return value.empty() ? "" : fmt::format("#SBATCH --{}={}\n", option, value);
+  if (shell_word(value) == value) return value;
+  const bool has_double = value.find('"') != std::string::npos, has_single = value.find('\'') != std::string::npos;
+  require(value.find('\\') == std::string::npos && !(has_double && has_single),
+          fmt::format("{}: expected a text without a backslash and with one kind of quotes at most, found '{}'", option,
+                      shown(value)));
+  return has_double ? fmt::format("'{}'", value) : fmt::format("\"{}\"", value);
+}
+
+std::string sbatch_line(const char* option, const std::string& value) {
+  return value.empty() ? "" : fmt::format("#SBATCH --{}={}\n", option, sbatch_word(option, value));
+}
+
+// What jobs print, in the run's folder. A '%' in a name of a file is written twice.
+std::string output_line(const std::string& run, const char* pattern) {
+  std::string folder;
+  for (const char c : (fs::path(run) / "slurm" / "").string()) folder += c == '%' ? std::string("%%") : std::string{c};
+  return sbatch_line("output", folder + pattern);
 }
 
 std::string common_lines(const SlurmOptions& options) {
@@ -44,18 +55,21 @@ std::string common_lines(const SlurmOptions& options) {
 
 std::string set_up_lines(const SlurmOptions& options, const std::string& run) {
   require_one_line(run, "the run directory");
-  require_one_line(options.program, "--program");
+  const std::string program = shell_words(options.program);
+  require_one_line(program, "--program");
   std::string text =
       "\n# What the site needs comes here: modules, a container, another place of the run on this node.\n"
       "#   module load gcc\n"
-      "#   DUET='apptainer exec duet.sif duet'\n"
+      "#   DUET='apptainer exec duet.sif duet'    # words with a space between them\n"
       "#   DUET_RUN=/scratch/$USER/run\n";
   for (const std::string& line : options.set_up) {
     require_one_line(line, "--set-up");
     text += line + "\n";
   }
-  return text +
-         fmt::format("DUET=${{DUET:-{}}}\nDUET_RUN=${{DUET_RUN:-{}}}\n", shell_word(options.program), shell_word(run));
+  return text + fmt::format(
+                    "if [ -n \"${{DUET:-}}\" ]; then read -ra duet <<<\"$DUET\"; else duet=({}); fi\n"
+                    "run={}\nrun=${{DUET_RUN:-$run}}\n",
+                    program, shell_word(run));
 }
 
 constexpr std::string_view kArrayBody = R"(
@@ -66,7 +80,7 @@ trap pass_on TERM                        # scancel, a node that is drained, pree
 trap 'limit=1; pass_on' USR1             # the time limit is near: the worker stops, and the task is put back
 
 for try in $(seq 24); do
-  $DUET work "$DUET_RUN" --shard "$shard" -j "$threads" --quiet &
+  "${duet[@]}" work "$run" --shard "$shard" -j "$threads" --quiet $allow &
   worker=$!
   wait "$worker"; code=$?
   while [ "$code" -gt 128 ] && kill -0 "$worker" 2>/dev/null; do wait "$worker"; code=$?; done
@@ -85,7 +99,7 @@ std::string array_script(const std::string& run, const SlurmOptions& options) {
       "#!/bin/bash\n# A worker for each shard of a planned run. `duet submit --slurm` wrote this; it may be\n"
       "# edited and given to sbatch by hand: sbatch --array=0-9 array.sh\n";
   text += "#SBATCH --job-name=duet\n#SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --signal=B:USR1@60\n";
-  text += sbatch_line("output", fs::path(run) / "slurm" / "%A_%a.out");
+  text += output_line(run, "%A_%a.out");
   text += fmt::format("#SBATCH --ntasks=1\n#SBATCH --cpus-per-task={}\n", options.threads);
   text += common_lines(options) + sbatch_line("mem", options.memory);
   for (const std::string& option : options.more) {
@@ -93,16 +107,18 @@ std::string array_script(const std::string& run, const SlurmOptions& options) {
     text += fmt::format("#SBATCH {}\n", option);
   }
   text += set_up_lines(options, run);
-  return text + fmt::format("threads={}\n", options.threads) + std::string(kArrayBody);
+  return text +
+         fmt::format("threads={}\nallow={}\n", options.threads, options.allow_programs ? "--allow-programs" : "") +
+         std::string(kArrayBody);
 }
 
 std::string merge_script(const std::string& run, const SlurmOptions& options) {
   std::string text =
       "#!/bin/bash\n# Merges what the workers have done. Runs when they have ended, whatever became of them.\n"
       "#SBATCH --job-name=duet-merge\n#SBATCH --ntasks=1\n#SBATCH --cpus-per-task=1\n";
-  text += sbatch_line("output", fs::path(run) / "slurm" / "merge.out") + common_lines(options);
+  text += output_line(run, "merge.out") + common_lines(options);
   text += set_up_lines(options, run);
-  return text + "exec $DUET merge \"$DUET_RUN\"\n";
+  return text + "exec \"${duet[@]}\" merge \"$run\"\n";
 }
 
 struct PipeCloser {

@@ -13,11 +13,12 @@ namespace duet {
 struct SlurmOptions {
   std::string partition, account, qos, time = "01:00:00", memory, constraint;  // as sbatch reads them; empty: not said
   int threads = 1;                                                             // of a worker
-  int at_once = 0;                  // workers at the same time; 0: as many as there are places
-  std::vector<std::string> more;    // further options of sbatch, whole: "--exclude=n7"
-  std::vector<std::string> set_up;  // lines that the script runs first: "module load ..."
-  std::string program;              // how the nodes call this program
-  int largest_array = 1000;         // shards of one array (MaxArraySize)
+  int at_once = 0;                   // workers at the same time; 0: as many as there are places
+  std::vector<std::string> more;     // further options of sbatch, whole: "--exclude=n7"
+  std::vector<std::string> set_up;   // lines that the script runs first: "module load ..."
+  std::vector<std::string> program;  // words by which the nodes call duet: {"apptainer", "exec", "duet.sif", "duet"}
+  bool allow_programs = false;       // the workers may start what the plan names (bench/trust.h)
+  int largest_array = 1000;          // shards of one array (MaxArraySize)
 };
 
 struct SlurmJobs {
@@ -27,7 +28,7 @@ struct SlurmJobs {
 };
 
 // Of the shards that are not done. `run`: as the nodes find it. Throws std::invalid_argument for an option with a line
-// end in it and where nothing is left to do.
+// end in it, for a value that sbatch has no quotes for, and where nothing is left to do.
 SlurmJobs slurm_jobs(const RunStatus& status, const std::string& run, const SlurmOptions& options);
 
 struct SlurmSubmission {

@@ -17,6 +17,7 @@
 
 #include "duet/bench/cluster/attempt.h"
 #include "duet/bench/suite_section.h"
+#include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -31,12 +32,6 @@ constexpr const char* kTrainingsSchema = "duet.trainings/1";
 constexpr std::chrono::milliseconds kChildGlance(50);
 constexpr double kMostMinutes = 1.0e5;
 
-bool is_plain_word(const std::string& name) {
-  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_.";
-  return !name.empty() && name.size() <= 64 && name.front() != '.' &&
-         name.find_first_not_of(kLetters) == std::string::npos;
-}
-
 std::vector<std::string> texts_of(const YAML::Node& list, const YamlSection& section, const std::string& what) {
   std::vector<std::string> texts;
   if (!list.IsSequence())
@@ -50,15 +45,24 @@ std::vector<std::string> texts_of(const YAML::Node& list, const YamlSection& sec
 }
 
 void read_arms(const YamlSection& top, TrainingList& list) {
+  std::vector<std::string> common;
+  if (top.has("arguments")) common = texts_of(top.node("arguments"), top, "arguments");
   const YAML::Node arms = top.node("arms");
   if (!arms.IsMap() || arms.size() == 0)
     top.fail(top.line("arms"), fmt::format("arms: expected a mapping of names, found {}", describe(arms)));
   for (const auto& arm : arms) {
     const std::string name = arm.first.Scalar();
-    if (!is_plain_word(name))
+    if (!is_arm_name(name))
       top.fail(top.line("arms"),
                fmt::format("arms: expected names of letters, digits, '_' and '.', found '{}'", shown(name)));
-    list.arms[name] = texts_of(arm.second, top, "arm '" + name + "'");
+    const std::string what = fmt::format("arm '{}'", name);
+    std::vector<std::string> words = common;
+    for (std::string& word : texts_of(arm.second, top, what)) words.push_back(std::move(word));
+    try {
+      list.arms[name] = parse_training_options(list.train, words, what);
+    } catch (const InputError& error) {
+      top.fail(top.line("arms"), error.what());
+    }
   }
 }
 
@@ -118,11 +122,9 @@ TrainingList parse_trainings(const std::string& yaml, const std::string& file) {
     top.fail(top.line("schema"), fmt::format("expected schema {}, found {}", kTrainingsSchema, shown(schema)));
   TrainingList list;
   list.train = top.text("train");
-  const std::vector<std::string> known = {
-      "wbc", "dstar", "dp", "no_phase_attention", "no_spatial_reasoning", "one_stream", "no_language"};
+  const std::vector<std::string> known = training_names();
   if (std::ranges::find(known, list.train) == known.end())
     top.fail(top.line("train"), unknown_name_message("training", list.train, known));
-  if (top.has("arguments")) list.arguments = texts_of(top.node("arguments"), top, "arguments");
   read_arms(top, list);
   read_seeds(top, list);
   list.minutes = top.optional_number("minutes").value_or(list.minutes);
@@ -139,21 +141,16 @@ ShardPlan plan_trainings(const TrainingList& list, const std::string& directory)
   ShardPlan plan;
   plan.kind = ShardPlan::Kind::kTrainings;
   plan.program = program_digests({});
-  for (const auto& [arm, more] : list.arms) {
+  for (const auto& [arm, options] : list.arms) {
     for (const std::uint64_t seed : list.seeds) {
       const auto place = static_cast<std::int64_t>(plan.shards.size());
-      Shard shard{.name = fmt::format("{}-{}", arm, seed),
-                  .begin = place,
-                  .end = place + 1,
-                  .cost = 60.0 * list.minutes,
-                  .keys = {},
-                  .argument = {"train", list.train}};
-      shard.argument.insert(shard.argument.end(), list.arguments.begin(), list.arguments.end());
-      shard.argument.insert(shard.argument.end(), more.begin(), more.end());
-      for (const std::string& word :
-           {std::string("--seed"), std::to_string(seed), std::string("-o"), "trainings/" + shard.name})
-        shard.argument.push_back(word);
-      plan.shards.push_back(std::move(shard));
+      PlannedTraining training{list.train, arm, seed, options};
+      plan.shards.push_back({.name = training.name(),
+                             .begin = place,
+                             .end = place + 1,
+                             .cost = 60.0 * list.minutes,
+                             .keys = {},
+                             .training = std::move(training)});
     }
   }
   plan.episodes = static_cast<std::int64_t>(plan.shards.size());
@@ -161,9 +158,33 @@ ShardPlan plan_trainings(const TrainingList& list, const std::string& directory)
   return plan;
 }
 
-WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, const StopSign& stop) {
-  require_same_program(plan.program, program_digests({}), run);
+namespace {
+
+std::vector<std::string> command_of(const PlannedTraining& training) {
+  return training_command(training.train, training.options, training.seed, "trainings/" + training.name());
+}
+
+NamedProgram program_of(const PlannedTraining& training, const std::string& run) {
+  std::vector<std::string> command = command_of(training);
+  command.insert(command.begin(), "duet");
+  return program_in(fmt::format("training '{}'", training.name()), plan_file(run), command);
+}
+
+}  // namespace
+
+std::vector<NamedProgram> programs_of(const ShardPlan& plan, const std::string& run) {
+  std::vector<NamedProgram> programs;
+  for (const Shard& shard : plan.shards)
+    if (!shard.training.train.empty()) programs.push_back(program_of(shard.training, run));
+  return programs;
+}
+
+WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, bool allow_programs,
+                          const StopSign& stop) {
   const Shard& job = shard_of(plan, shard);
+  require_allowed({program_of(job.training, run)}, allow_programs);
+  require_same_program(plan.program, program_digests({}), run);
+  static_cast<void>(inside(run, "trainings/" + job.name));
   WorkSummary summary;
   summary.planned = 1;
   for (const AttemptRecord& attempt : read_attempts(run, shard))
@@ -172,7 +193,7 @@ WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::in
   AttemptWriter attempt(run, new_attempt(shard, shard_plan_digest(run)));
   attempt.began(job.name);
   const auto begin = StopSign::Clock::now();
-  summary.exit_code = wait_for(start_child(run, job.argument), stop);
+  summary.exit_code = wait_for(start_child(run, command_of(job.training)), stop);
   const double seconds = std::chrono::duration<double>(StopSign::Clock::now() - begin).count();
   const std::string how = ending_of(summary.exit_code);
   if (how != "stopped") attempt.did(job.name, how == "complete" ? "ok" : "error", seconds);

@@ -10,14 +10,14 @@
 #include "duet/bench/cluster/shard_plan.h"
 #include "duet/bench/cluster/work_summary.h"
 #include "duet/bench/stop_sign.h"
+#include "duet/bench/trust.h"
 
 namespace duet {
 
 // A file of trainings (duet.trainings/1): what `duet train` is given.
 struct TrainingList {
-  std::string train;                                     // "wbc", "dstar", "dp"
-  std::vector<std::string> arguments;                    // of every training
-  std::map<std::string, std::vector<std::string>> arms;  // name -> what is added to them
+  std::string train;                            // one of training_names()
+  std::map<std::string, TrainingOptions> arms;  // name -> options, those of every training included
   std::vector<std::uint64_t> seeds;
   double minutes = 10.0;  // that one takes, as far as is known: for `duet submit` and `duet status`
 };
@@ -29,8 +29,13 @@ TrainingList parse_trainings(const std::string& yaml, const std::string& file);
 // InputError for a folder that is planned already or is not empty.
 ShardPlan plan_trainings(const TrainingList& list, const std::string& directory);
 
+// What its shards start, for require_allowed (bench/trust.h): one that is complete, too.
+std::vector<NamedProgram> programs_of(const ShardPlan& plan, const std::string& run);
+
 // Runs the shard's training in this process's place, as a child that gets its signals, unless it is complete. The
-// child goes on from its last checkpoint. Throws InputError for another program than was planned with.
-WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, const StopSign& stop);
+// child goes on from its last checkpoint. Throws InputError for another program than was planned with, and for a
+// training that is not allowed.
+WorkSummary work_training(const std::string& run, const ShardPlan& plan, std::int64_t shard, bool allow_programs,
+                          const StopSign& stop);
 
 }  // namespace duet

@@ -189,7 +189,7 @@ WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOpt
                        Progress& progress) {
   const ShardPlan plan = read_shard_plan(run);
   static_cast<void>(shard_of(plan, shard));
-  if (plan.kind == ShardPlan::Kind::kTrainings) return work_training(run, plan, shard, stop);
+  if (plan.kind == ShardPlan::Kind::kTrainings) return work_training(run, plan, shard, options.allow_programs, stop);
   return ShardWorker(run, shard, options, stop).work(progress);
 }
 

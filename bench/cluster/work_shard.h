@@ -21,8 +21,8 @@ inline constexpr double kSilence = 300.0;
 
 struct WorkOptions {
   int threads = 1;
-  bool retry_errors = false;  // episodes that ended with an error run again, those that killed their workers too
-  bool allow_programs = false;
+  bool retry_errors = false;    // episodes that ended with an error run again, those that killed their workers too
+  bool allow_programs = false;  // those of policies, and trainings
 };
 
 // Throws InputError and MissingError as PlannedRun, StorageError for a disk that takes no row (nothing is lost, no

@@ -6,5 +6,5 @@ run=$(realpath "$1")
 shift
 duet=${DUET:-duet}
 "$duet" status "$run" --unfinished |
-  parallel --jobs "${JOBS:-100%}" --retries 4 "$@" "$duet" work "$run" --shard {} --quiet
+  parallel --quote --jobs "${JOBS:-100%}" --retries 4 "$@" "$duet" work "$run" --shard {} --quiet
 exec "$duet" merge "$run"

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "duet/core/file.h"
 #include "duet/results/rows/run_directory.h"
@@ -139,7 +140,7 @@ TEST_F(ClusterCommand, SubmitWritesScriptsOfWhatIsLeft) {
               AllOf(HasSubstr("#SBATCH --partition=cpu\n"), HasSubstr("#SBATCH --account=lab\n"),
                     HasSubstr("#SBATCH --time=00:20:00\n"), HasSubstr("#SBATCH --mem=2G\n"),
                     HasSubstr("#SBATCH --cpus-per-task=2\n"), HasSubstr("#SBATCH --exclude=n7\n"),
-                    HasSubstr("\nmodule load gcc\n"), HasSubstr("'apptainer exec duet.sif duet'"),
+                    HasSubstr("\nmodule load gcc\n"), HasSubstr("else duet=(apptainer exec duet.sif duet); fi"),
                     HasSubstr("#SBATCH --requeue\n"), HasSubstr("# --array=1 "), HasSubstr("not submitted")));
   const std::string script = run_ + "/slurm/array.sh";
   EXPECT_EQ(read_file(script).substr(0, 12), "#!/bin/bash\n");
@@ -192,6 +193,43 @@ TEST_F(ClusterCommand, TheScriptStartsAWorkerAgainThatCrashed) {
   EXPECT_EQ(status().at("errors"), 2);
 }
 
+// sbatch reads its lines as a shell reads words, and a '%' in the name of a file as a pattern.
+TEST_F(ClusterCommand, ARunMayHaveASpaceAndOtherSignsInItsName) {
+  for (const std::string name : {"50% of $HOME's runs; `x`", "two \"words\""}) {
+    const std::string odd = folder_ / name, quoted = "'" + std::regex_replace(odd, std::regex("'"), "'\\''") + "'";
+    plan();
+    fs::rename(run_, odd);
+    const Answer submitted = duet("submit --program '/a b/duet' " + quoted);
+    ASSERT_EQ(submitted.code, 0) << submitted.err;
+    const bool has_double = name.find('"') != std::string::npos;
+    const std::string path = std::regex_replace(odd, std::regex("%"), "%%"), mark = has_double ? "'" : "\"";
+    const std::string script = odd + "/slurm/array.sh";
+    EXPECT_THAT(read_file(script), HasSubstr("#SBATCH --output=" + mark + path + "/slurm/%A_%a.out" + mark + "\n"));
+    stand_in("worker", "printf '%s|' \"$@\" > '" + (folder_ / "said") + "'\n");
+    const std::string run_script = "DUET=worker PATH='" + (folder_ / "bin") + "':$PATH SLURM_ARRAY_TASK_ID=0 bash '" +
+                                   std::regex_replace(script, std::regex("'"), "'\\''") + "'";
+    EXPECT_EQ(WEXITSTATUS(std::system(run_script.c_str())), 0);
+    EXPECT_EQ(read_file(folder_ / "said"), "work|" + odd + "|--shard|0|-j|1|--quiet|");
+  }
+  plan();
+  const std::string none = folder_ / "back\\slash";
+  fs::rename(run_, none);
+  const Answer refused = duet("submit '" + none + "'");
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("output: expected a text without a backslash"));
+}
+
+TEST_F(ClusterCommand, HintsAreCommandsThatAShellTakes) {
+  write_file(folder_ / "suite.yaml",
+             "schema: duet.suite/1\nname: c\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+             "engines: [playback]\ncontrollers: [pd]\npolicies: [replay]\nstart: clip\n");
+  const Answer planned =
+      duet("plan -q " + (folder_ / "suite.yaml") + " --cost playback/pd=0.01 -o '" + (folder_ / "a run") + "'");
+  ASSERT_EQ(planned.code, 0) << planned.err;
+  EXPECT_THAT(planned.out, AllOf(HasSubstr("`duet work '" + (folder_ / "a run") + "' --shard 0`"),
+                                 HasSubstr("`duet submit '" + (folder_ / "a run") + "' --slurm`")));
+}
+
 TEST_F(ClusterCommand, BadInputIsOneSentence) {
   plan();
   const auto refusal = [&](const std::string& arguments) {
@@ -232,13 +270,13 @@ TEST_F(TrainingJobs, AreShardsOfAPlan) {
   list(kList);
   const Answer planned = plan_list();
   ASSERT_EQ(planned.code, 0) << planned.err;
-  EXPECT_THAT(planned.out, HasSubstr("4 trainings in 4 shards"));
-  const Answer work = duet("work -q " + run_ + " --shard 2");
+  EXPECT_THAT(planned.out, AllOf(HasSubstr("4 trainings in 4 shards"), HasSubstr("--shard 0 --allow-programs`")));
+  const Answer work = duet("work -q --allow-programs " + run_ + " --shard 2");
   EXPECT_EQ(work.code, 0) << work.err << work.out;
   EXPECT_TRUE(fs::exists(run_ + "/trainings/plain-1"));
   EXPECT_EQ(status().at("done"), 1);
   EXPECT_EQ(status().at("unfinished"), "0-1,3");
-  const Answer again = duet("work -q --json " + run_ + " --shard 2");
+  const Answer again = duet("work -q --json --allow-programs " + run_ + " --shard 2");
   EXPECT_EQ(nlohmann::json::parse(again.out).at("already_there"), 1);
   EXPECT_THAT(duet("merge " + run_).err, HasSubstr("is not a run directory"));
   EXPECT_THAT(plan_list().err, HasSubstr("is not empty"));
@@ -246,9 +284,9 @@ TEST_F(TrainingJobs, AreShardsOfAPlan) {
 
 TEST_F(TrainingJobs, OneThatFailsIsSaidToHaveFailed) {
   std::string text = kList;
-  list(text.replace(text.find("'64'"), 4, "nonsense"));
+  list(text.replace(text.find("g1]"), 2, "nobody"));
   ASSERT_EQ(plan_list().code, 0);
-  EXPECT_EQ(duet("work -q " + run_ + " --shard 0").code, 2);
+  EXPECT_NE(duet("work -q --allow-programs " + run_ + " --shard 0").code, 0);
   EXPECT_EQ(status().at("shards")[0].at("state"), "failed");
 }
 
@@ -271,6 +309,75 @@ TEST_F(TrainingJobs, AListThatIsNoneIsRefused) {
   EXPECT_THAT(refusal("plain: []", "plain: [[7]]"), HasSubstr("arm 'plain': expected texts"));
   EXPECT_THAT(refusal("minutes: 0.5", "minutes: -1"), HasSubstr("minutes: expected above 0"));
   EXPECT_THAT(refusal("minutes:", "minute:"), HasSubstr("minute"));
+  EXPECT_THAT(refusal("'64'", "'6x'"), HasSubstr("option 'steps': expected a whole number"));
+  EXPECT_THAT(refusal("--environments", "--seed"), HasSubstr("unknown option of a training 'seed'"));
+  EXPECT_THAT(refusal("--quiet", "--allow-programs"), HasSubstr("unknown option of a training 'allow_programs'"));
+  EXPECT_THAT(refusal("[--stage, stand,", "[run, --stage, stand,"), HasSubstr("expected an option of `duet train`"));
+  EXPECT_THAT(refusal("plain: []", "plain: [--steps, '3']"), HasSubstr("the option 'steps' once, found it twice"));
+}
+
+TEST_F(TrainingJobs, NeedLeaveAsProgramsOfPoliciesDo) {
+  list(kList);
+  ASSERT_EQ(plan_list().code, 0);
+  const std::string command =
+      "runs 'duet train wbc --card g1 --environments 4 --quiet --stage stand --steps 64 "
+      "--threads 1 --seed 1 -o trainings/other-1' in '";
+  const Answer work = duet("work -q " + run_ + " --shard 0");
+  EXPECT_EQ(work.code, 2);
+  EXPECT_THAT(work.err, AllOf(HasSubstr("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: training "
+                                        "'other-1' of "),
+                              HasSubstr(command)));
+  EXPECT_FALSE(fs::exists(run_ + "/trainings"));
+  const Answer submit = duet("submit " + run_);
+  EXPECT_EQ(submit.code, 2);
+  EXPECT_THAT(submit.err, AllOf(HasSubstr("expected --allow-programs"), HasSubstr("training 'plain-2'")));
+  EXPECT_FALSE(fs::exists(run_ + "/slurm"));
+  EXPECT_EQ(duet("submit --allow-programs " + run_).code, 0);
+  EXPECT_THAT(read_file(run_ + "/slurm/array.sh"), HasSubstr("\nallow=--allow-programs\n"));
+  EXPECT_EQ(duet_program("submit " + run_, "DUET_TRUSTED_FOLDERS='" + (folder_ / "") + "'").code, 0);
+  EXPECT_THAT(read_file(run_ + "/slurm/array.sh"), HasSubstr("\nallow=\n"));
+}
+
+// As a stranger would write it: a plan that this very program has made, with other words in it.
+TEST_F(TrainingJobs, APlanSaysNothingButArmSeedAndKnownOptions) {
+  list(kList);
+  ASSERT_EQ(plan_list().code, 0);
+  const std::string file = run_ + "/plan.json";
+  const nlohmann::json honest = nlohmann::json::parse(read_file(file));
+  const auto refusal = [&](const char* key, const nlohmann::json& value) {
+    nlohmann::json plan = honest;
+    plan.at("shards")[0][key] = value;
+    write_file(file, plan.dump());
+    std::string said;
+    for (const std::string command : {"work -q --allow-programs --shard 0 ", "submit --allow-programs ", "status "}) {
+      const Answer answer = duet(command + run_);
+      EXPECT_EQ(answer.code, 2) << command << key << value;
+      EXPECT_EQ(std::ranges::count(answer.err, '\n'), 1) << answer.err;
+      said = answer.err;
+    }
+    EXPECT_FALSE(fs::exists(run_ + "/trainings"));
+    return said;
+  };
+  EXPECT_THAT(refusal("arguments", {"run", "s.yaml", "--allow-programs", "-o", "out"}),
+              HasSubstr("unknown key 'arguments'"));
+  EXPECT_THAT(refusal("train", "run"), HasSubstr("unknown training 'run'"));
+  EXPECT_THAT(refusal("train", "pack"), HasSubstr("unknown training 'pack'"));
+  EXPECT_THAT(refusal("arm", "../../x"), HasSubstr("expected an arm of letters"));
+  EXPECT_THAT(refusal("seed", "1; touch x"), HasSubstr("key 'seed'"));
+  EXPECT_THAT(refusal("name", "../x"), HasSubstr("expected the name 'other-1' of its arm and seed"));
+  EXPECT_THAT(refusal("options", {{"output", "/tmp/x"}}), HasSubstr("unknown option of a training 'output'"));
+  EXPECT_THAT(refusal("options", {{"allow_programs", ""}}), HasSubstr("unknown option of a training"));
+  EXPECT_THAT(refusal("options", {{"steps", "1 --card x"}}), HasSubstr("expected a whole number"));
+  EXPECT_THAT(refusal("options", {{"quiet", "x"}}), HasSubstr("expected no value of a flag"));
+}
+
+TEST_F(TrainingJobs, AFolderThatIsALinkIsRefused) {
+  list(kList);
+  ASSERT_EQ(plan_list().code, 0);
+  fs::create_directory(folder_ / "away");
+  fs::create_symlink(folder_ / "away", run_ + "/trainings");
+  EXPECT_THAT(duet("work -q --allow-programs --shard 0 " + run_).err, HasSubstr("trainings' is a symbolic link"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "away"));
 }
 
 }  // namespace
