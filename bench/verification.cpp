@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <set>
 #include <tuple>
@@ -18,6 +17,7 @@
 #include "duet/core/parallel.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
 #include "duet/metrics/detector.h"
 #include "duet/results/rows/name_digests.h"
 #include "duet/results/rows/published.h"
@@ -29,10 +29,6 @@ namespace {
 using Block = std::tuple<std::string, std::string, std::string, std::string, std::string>;
 
 Block block_of(const EpisodeRow& row) { return {row.engine, row.controller, row.policy, row.perturbation, row.task}; }
-
-constexpr std::array kNames = {&EpisodeRow::engine, &EpisodeRow::controller, &EpisodeRow::task,
-                               &EpisodeRow::perturbation, &EpisodeRow::policy};
-using NamesOfRows = std::array<std::set<std::string>, kNames.size()>;
 
 std::string text_of(const Block& block) {
   const auto& [engine, controller, policy, perturbation, task] = block;
@@ -85,6 +81,7 @@ class Verifier {
   Verification verify() {
     for (const EpisodeRow& row : run_.rows) check_row(row);
     check_missing();
+    check_unsupported();
     repeat();
     return std::move(result_);
   }
@@ -156,56 +153,101 @@ class Verifier {
     if (ran) check("robot_digest", planned.robot_digest, row.robot_digest);
   }
 
-  // What run.json says that was asked for must be there.
+  // What run.json says that was asked for must be there; what it says that nobody asked for is said.
   void check_missing() {
     std::set<std::string> keys;
-    NamesOfRows ran;
-    for (const EpisodeRow& row : run_.rows) {
-      keys.insert(row.key);
-      for (std::size_t i = 0; i < kNames.size(); ++i) ran[i].insert(row.*kNames[i]);
-    }
-    std::map<Block, std::pair<int, int>> counts;  // missing, all
+    for (const EpisodeRow& row : run_.rows) keys.insert(row.key);
+    std::map<Block, std::pair<int, int>> missing, not_asked;  // how many, of how many
     for (std::size_t i = 0; i < plan_.size(); ++i) {
-      const EpisodeRow& row = planned_[i];
-      if (!is_wanted(plan_[i], row, ran)) continue;
-      auto& [missing, all] = counts[block_of(row)];
+      const bool wanted = is_wanted(plan_[i]), there = keys.contains(planned_[i].key);
+      result_.asked += wanted ? 1 : 0;
+      auto& [count, all] = (wanted ? missing : not_asked)[block_of(planned_[i])];
       ++all;
-      if (!keys.contains(row.key)) ++missing;
+      count += there ? 0 : 1;
     }
+    result_.episodes = std::ssize(plan_);
+    result_.missing = sentences(missing, "are not in the run");
+    result_.not_asked = sentences(not_asked, "were not asked for, as run.json says");
+  }
+
+  static std::vector<std::string> sentences(const std::map<Block, std::pair<int, int>>& counts, const char* what) {
+    std::vector<std::string> sentences;
     for (const auto& [block, count] : counts)
       if (count.first > 0)
-        result_.missing.push_back(
-            fmt::format("{}: {} of {} episodes are not in the run", text_of(block), count.first, count.second));
+        sentences.push_back(fmt::format("{}: {} of {} episodes {}", text_of(block), count.first, count.second, what));
+    return sentences;
   }
 
-  // A run without a plan is taken for one part: of names that have rows, every combination.
-  [[nodiscard]] bool is_wanted(const EpisodeSpec& spec, const EpisodeRow& row, const NamesOfRows& ran) const {
-    if (run_.info.plan)
-      return std::ranges::any_of(run_.info.plan->parts,
-                                 [&](const RunPart& part) { return belongs(spec, spec.clip->task, part); });
-    for (std::size_t i = 0; i < kNames.size(); ++i) {
-      const bool of_no_policy = kNames[i] == &EpisodeRow::policy && row.arm == "null";
-      if (!of_no_policy && !ran[i].contains(row.*kNames[i])) return false;
+  // A run that does not say what was asked for is held against the whole suite: else who leaves rows out would leave
+  // that out, too.
+  [[nodiscard]] bool is_wanted(const EpisodeSpec& spec) const {
+    return !run_.info.plan || std::ranges::any_of(run_.info.plan->parts, [&](const RunPart& part) {
+      return belongs(spec, spec.clip->task, part);
+    });
+  }
+
+  // Why this machine cannot run the episode of a row; empty where it can.
+  [[nodiscard]] std::string lack_of(const EpisodeRow& row) const {
+    if (!can_run_in(row.engine)) return fmt::format("engine '{}' is not on this machine", row.engine);
+    if (const auto absent = bodies_.absent().find(row.controller);
+        absent != bodies_.absent().end() && row.engine != kPlaybackEngine)
+      return absent->second;
+    return bodies_.policy(row.controller, row.policy).refusal;
+  }
+
+  // An episode that has nothing to say against its engine, controller and policy is set up here and stopped at once:
+  // what refuses it there would refuse it here.
+  [[nodiscard]] bool is_refused_here(const EpisodeRow& row) const {
+    const EpisodeSpec& spec = plan_[place_.at(row.key)];
+    try {
+      return run_episode(
+                 spec, suite_, identity_, bodies_.robot(spec.controller), "",
+                 {.policy = bodies_.policy(spec.controller, spec.policy).make, .stop_asked = [] { return true; }})
+                 .outcome == Outcome::kUnsupported;
+    } catch (const EpisodeInterrupted&) {
+      return false;
     }
-    return true;
   }
 
-  [[nodiscard]] bool is_repeatable(const EpisodeRow& row) const {
-    const bool here = can_run_in(row.engine) && !bodies_.absent().contains(row.controller);
-    return here && row.outcome != Outcome::kTimedOut && row.outcome != Outcome::kUnsupported;
-  }
-
-  // Without replacement, from a seeded shuffle; in the order of the run.
-  std::vector<const EpisodeRow*> sample() {
-    std::vector<const EpisodeRow*> rows;
+  // A row that says so takes an episode out of the count: it must be so here, too, where this machine has all of it.
+  void check_unsupported() {
+    std::vector<const EpisodeRow*> marked;
     for (const EpisodeRow& row : run_.rows)
-      if (place_.contains(row.key)) (is_repeatable(row) ? rows.push_back(&row) : void(++result_.not_repeatable));
-    result_.repeatable = static_cast<int>(rows.size());
-    if (options_.all) return rows;
-    Random random(options_.seed, stream_key({"verify"}));
+      if (row.outcome == Outcome::kUnsupported && place_.contains(row.key) && lack_of(row).empty())
+        marked.push_back(&row);
+    std::vector<char> refused(marked.size());
+    parallel_for_each(static_cast<int>(marked.size()), options_.threads,
+                      [&](int i) { refused[i] = is_refused_here(*marked[i]) ? 1 : 0; });
+    for (std::size_t i = 0; i < marked.size(); ++i)
+      if (refused[i] == 0)
+        result_.faults.push_back(fmt::format("{}: is marked as unsupported ({}), and this machine runs it",
+                                             text_of(*marked[i]), shown(marked[i]->message)));
+  }
+
+  // Some of them, without replacement, from a seeded shuffle.
+  void draw(std::vector<const EpisodeRow*>& rows, const char* stream) const {
+    if (options_.all) return;
+    Random random(options_.seed, stream_key({stream}));
     for (std::size_t i = 0; i + 1 < rows.size(); ++i)
       std::swap(rows[i], rows[i + static_cast<std::size_t>(random.below(static_cast<int>(rows.size() - i)))]);
     rows.resize(std::min(rows.size(), static_cast<std::size_t>(options_.episodes)));
+  }
+
+  // In the order of the run. Rows that timed out are drawn apart: they are few, and the ones to look at.
+  std::vector<const EpisodeRow*> sample() {
+    std::vector<const EpisodeRow*> rows, time_outs;
+    for (const EpisodeRow& row : run_.rows) {
+      if (!place_.contains(row.key)) continue;
+      if (const std::string lack = lack_of(row); !lack.empty()) {
+        ++result_.not_run[lack];
+      } else if (row.outcome != Outcome::kUnsupported) {  // check_unsupported
+        (row.outcome == Outcome::kTimedOut ? time_outs : rows).push_back(&row);
+      }
+    }
+    result_.repeatable = static_cast<int>(rows.size() + time_outs.size());
+    draw(rows, "verify");
+    draw(time_outs, "verify time-outs");
+    rows.insert(rows.end(), time_outs.begin(), time_outs.end());
     std::ranges::sort(rows);
     return rows;
   }
@@ -228,7 +270,13 @@ class Verifier {
       now.trace = {};
       now.feet = {};
     }
-    return {row, now.state_hash, row_differences(row, now)};
+    const bool there = row.outcome == Outcome::kTimedOut, here = now.outcome == Outcome::kTimedOut;
+    if (there && here) return {row, now.state_hash, {}, "timed out there and here"};
+    RepeatedEpisode repeat{row, now.state_hash, row_differences(row, now)};
+    if (there)
+      repeat.time_out = fmt::format("timed out there, ends here in {:.1f} s ({})", now.wall_s, to_string(now.outcome));
+    if (here) repeat.time_out = fmt::format("ended there in {:.1f} s, times out here", row.wall_s);
+    return repeat;
   }
 
   [[nodiscard]] EpisodeRow run_planned(const EpisodeSpec& spec, const std::string& folder) const {
@@ -256,8 +304,19 @@ class Verifier {
 }  // namespace
 
 int Verification::different() const {
-  return static_cast<int>(
-      std::ranges::count_if(repeats, [](const RepeatedEpisode& repeat) { return !repeat.differences.empty(); }));
+  return static_cast<int>(std::ranges::count_if(
+      repeats, [](const RepeatedEpisode& repeat) { return !repeat.differences.empty() && repeat.time_out.empty(); }));
+}
+
+int Verification::timed_out() const {
+  return static_cast<int>(std::ranges::count_if(
+      repeats, [](const RepeatedEpisode& repeat) { return !repeat.differences.empty() && !repeat.time_out.empty(); }));
+}
+
+int Verification::rows_not_run() const {
+  int rows = 0;
+  for (const auto& [why, count] : not_run) rows += count;
+  return rows;
 }
 
 Verification verify_run(const Run& run, const VerifyOptions& options, Progress& progress) {

@@ -1,5 +1,6 @@
 // Whether the rows of a run are what its suite makes: each must be an episode of the suite's plan, none may be left
-// out, and episodes that are run again must give the same row, field by field.
+// out, none may be marked as not supported that this machine runs, and episodes that are run again must give the same
+// row, field by field. What cannot be found out so: docs/trust.md, "What verify cannot tell".
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,7 @@ namespace duet {
 
 struct VerifyOptions {
   int episodes = 5;  // run again, drawn at random
-  bool all = false;  // run all again
+  bool all = false;  // run all again; else, beside those drawn, as many of the rows that timed out
   std::uint64_t seed = 1;
   int threads = 1;
   bool allow_programs = false;  // Suite::allow_programs
@@ -27,14 +28,23 @@ struct RepeatedEpisode {
   EpisodeRow row;                            // as stored
   std::string state_hash;                    // now
   std::vector<FieldDifference> differences;  // first: stored, second: now
+  // Where it timed out there or here: in both, no field is compared; in one of them, how it ended in the other is a
+  // difference that a slow or busy machine makes, too: "timed out there, ends here in 1.2 s".
+  std::string time_out = "";
 };
 
 struct Verification {
-  std::vector<std::string> faults;         // of rows that are not what the suite plans; sentences
-  std::vector<std::string> missing;        // of episodes that are not there; sentences
-  std::vector<RepeatedEpisode> repeats;    // in the order of the run's rows
-  int repeatable = 0, not_repeatable = 0;  // rows; timed out, or of an engine that this machine lacks
+  std::vector<std::string> faults;       // of rows that are not what the suite plans; sentences
+  std::vector<std::string> missing;      // of episodes that are not there; sentences
+  std::vector<std::string> not_asked;    // of episodes of the suite that run.json says nobody asked for; sentences
+  std::vector<RepeatedEpisode> repeats;  // in the order of the run's rows
+  int repeatable = 0;                    // rows that this machine can run
+  std::map<std::string, int> not_run;    // why -> rows that need what this machine lacks
+  std::int64_t asked = 0, episodes = 0;  // of the suite: those that were asked for, all
+  // Repeats that differ; those that timed out there or here and ended in the other are counted apart.
   [[nodiscard]] int different() const;
+  [[nodiscard]] int timed_out() const;
+  [[nodiscard]] int rows_not_run() const;
 };
 
 // A sentence for rows that differ: that they were made on another machine than `here` (describe_machine()); "" where it

@@ -13,6 +13,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/bench/fixtures.h"
+#include "tests/bench/program.h"
 #include "tests/bench/verified_run.h"
 #include "tests/support.h"
 
@@ -214,6 +215,132 @@ TEST_F(ForgedRun, SeedAndProfileOfAnother) {
 TEST_F(ForgedRun, AnyOtherFieldChanged) {
   forge_main([](EpisodeRow& row) { row.frames += 1; });
   EXPECT_THAT(objection(run_), StartsWith("differs: frames: "));
+}
+
+// A row that is not supported counts for nobody in most tables.
+TEST_F(ForgedRun, FailuresMarkedAsUnsupported) {
+  forge_main([](EpisodeRow& row) {
+    row.outcome = Outcome::kUnsupported;
+    row.message = "engine 'playback' is not here";
+    row.success = false;
+  });
+  EXPECT_THAT(objection(run_), AllOf(HasSubstr("(main arm): is marked as unsupported (engine 'playback' is not here)"),
+                                     HasSubstr("and this machine runs it")));
+}
+
+TEST_F(ForgedRun, NullArmMarkedAsUnsupported) {
+  forge([](EpisodeRow& row) {
+    if (row.arm == "null") row.outcome = Outcome::kUnsupported;
+  });
+  EXPECT_THAT(objection(run_), HasSubstr("(null arm): is marked as unsupported"));
+}
+
+TEST_F(ForgedRun, RivalsMarkedAsTimedOut) {
+  forge_main([](EpisodeRow& row) {
+    row.outcome = Outcome::kTimedOut;
+    row.success = false;
+  });
+  Progress quiet(Progress::Style::kQuiet);
+  // Also where few are drawn: rows that timed out are drawn apart.
+  const Verification found = verify_run(load_run(run_), {.episodes = 1}, quiet);
+  EXPECT_EQ(found.repeats.size(), 2U);
+  EXPECT_EQ(found.timed_out(), 1);
+  EXPECT_EQ(found.different(), 0);
+  const Verification all = verify_run(load_run(run_), {.all = true}, quiet);
+  EXPECT_EQ(all.timed_out(), 2);
+  for (const RepeatedEpisode& repeat : all.repeats)
+    if (repeat.row.arm == "main") {
+      EXPECT_THAT(repeat.time_out, AllOf(StartsWith("timed out there, ends here in "), HasSubstr(" s (ok)")));
+      EXPECT_THAT(differences_text(repeat.differences), HasSubstr("outcome: \"timeout\", \"ok\""));
+    }
+}
+
+// With the part of run.json that has asked for them.
+TEST_F(ForgedRun, ABlockLeftOutTogetherWithItsPlanIsSaid) {
+  std::vector<std::string> forged;
+  for (const EpisodeRow& row : load_run(run_).rows)
+    if (row.task != "wave") forged.push_back(to_json(row).dump());
+  write(forged);
+  nlohmann::json json = nlohmann::json::parse(read_file(run_ + "/run.json"));
+  json["plan"]["parts"] = {{{"tasks", {"handshake"}}}};
+  json["plan"]["asked"] = 2;
+  write_file(run_ + "/run.json", json.dump());
+  Progress quiet(Progress::Style::kQuiet);
+  const Verification found = verify_run(load_run(run_), {.all = true}, quiet);
+  EXPECT_THAT(found.missing, IsEmpty());
+  EXPECT_THAT(found.not_asked,
+              testing::Contains("wave of playback/pd/replay clean: 1 of 1 episodes were not asked for, "
+                                "as run.json says"));
+  EXPECT_EQ(found.asked, 2);
+  EXPECT_EQ(found.episodes, 4);
+}
+
+// A run of several policies without its plan is one of the policies that are left, and no part.
+TEST_F(ForgedRun, APolicyLeftOutTogetherWithThePlan) {
+  make_run(parse_suite("schema: duet.suite/1\nname: two\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+                       "engines: [playback]\ncontrollers: [pd]\npolicies: [replay, replay_dense]\nstart: clip\n",
+                       "two.yaml"),
+           scratch_ / "two");
+  run_ = scratch_ / "two";
+  std::vector<std::string> forged;
+  for (const EpisodeRow& row : load_run(run_).rows)
+    if (row.policy != "replay_dense") forged.push_back(to_json(row).dump());
+  write(forged);
+  nlohmann::json json = nlohmann::json::parse(read_file(run_ + "/run.json"));
+  json.erase("plan");
+  write_file(run_ + "/run.json", json.dump());
+  EXPECT_EQ(objection(run_), "wave of playback/pd/replay_dense clean: 1 of 1 episodes are not in the run");
+}
+
+TEST_F(ForgedRun, AFieldGivenTwice) {
+  std::vector<std::string> forged = lines();
+  forged.front().insert(1, "\"success\":true,");
+  write(forged);
+  EXPECT_THAT(objection(run_), HasSubstr("episodes.jsonl:1: episode row: expected each key of an object once, found "
+                                         "'success' twice"));
+}
+
+TEST(VerifyCommand, AllIsAllOfTheSuite) {
+  const test::ScratchFolder folder;
+  write_file(folder / "suite.yaml", resolved_yaml(test::playback_suite()));
+  ASSERT_EQ(test::duet_program("run -q " + (folder / "suite.yaml") + " --tasks wave -o " + (folder / "run")).code, 0);
+  const test::Answer all = test::duet_program("verify -q --all " + (folder / "run"));
+  EXPECT_EQ(all.code, 5);
+  EXPECT_THAT(all.out, AllOf(HasSubstr("LEFT OUT  handshake of playback/pd/replay clean: 1 of 1 episodes"),
+                             HasSubstr("a part of its suite: 2 of 4 episodes were asked for"),
+                             HasSubstr("2 of 2 episodes repeat bit for bit")));
+  EXPECT_EQ(test::duet_program("verify -q --all --partial " + (folder / "run")).code, 0);
+  EXPECT_EQ(test::duet_program("verify -q " + (folder / "run")).code, 0);
+}
+
+TEST(VerifyCommand, ATimeOutThatEndsHereIsADifferenceUnlessItMayBe) {
+  const test::ScratchFolder folder;
+  make_run(test::playback_suite(), folder / "run");
+  std::string text;
+  for (EpisodeRow row : load_run(folder / "run").rows) {
+    if (row.arm == "main") row.outcome = Outcome::kTimedOut;
+    if (row.arm == "main") row.success = false;
+    text += to_json(row).dump() + "\n";
+  }
+  write_file(folder / "run/episodes.jsonl", text);
+  const test::Answer answer = test::duet_program("verify -q -k 1 " + (folder / "run"));
+  EXPECT_EQ(answer.code, 5);
+  EXPECT_THAT(answer.out, AllOf(HasSubstr("TIMEOUT "), HasSubstr("timed out there, ends here in ")));
+  EXPECT_EQ(test::duet_program("verify -q --all --allow-timeouts " + (folder / "run")).code, 0);
+}
+
+// Rows of an engine that this machine does not have are no rows that were held against something.
+TEST(VerifyCommand, AllIsNotAllWhereRowsCannotRunHere) {
+  const test::ScratchFolder folder;
+  write_file(folder / "suite.yaml", resolved_yaml(test::playback_suite()));
+  const std::string engines = "DUET_ENGINES='" + (folder / "none") + "'";
+  const test::Answer made = test::duet_program(
+      "run -q " + (folder / "suite.yaml") + " -s 'engines=[playback, ode]' -o " + (folder / "run"), engines);
+  ASSERT_EQ(made.code, 3) << made.err;
+  const test::Answer all = test::duet_program("verify -q --all " + (folder / "run"), engines);
+  EXPECT_EQ(all.code, 4) << all.out;
+  EXPECT_THAT(all.out, HasSubstr("; 4 rows were not run: engine 'ode' is not on this machine"));
+  EXPECT_EQ(test::duet_program("verify -q " + (folder / "run"), engines).code, 0);
 }
 
 TEST(Verification, DrawsAsManyAsAskedForAndSaysOfHowMany) {
