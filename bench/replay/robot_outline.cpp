@@ -12,7 +12,7 @@ namespace duet {
 namespace {
 
 constexpr double kThickestAnkle = 0.045, kSocket = 0.045;  // [m]
-constexpr double kInstep = 0.35, kInstepRadius = 0.012;    // of the way from a sole to the ankle; [m]
+constexpr double kInstep = 0.5, kInstepInward = 0.1;       // of the ankle's height; of the way to the ankle
 constexpr double kBarPart = 0.9;                           // of the thinner of what it joins
 constexpr double kJoined = 0.6;                            // overlap that is no gap, as a part of the thinner radius
 
@@ -38,11 +38,13 @@ OutlineHull foot_hull(const RobotModel& robot, int link, const Kinematics& stand
     foot.shapes.push_back(shape);
     lowest = std::min(lowest, standing.shape_position(shape).z() - robot.shapes[shape].radius);
   }
-  const double ankle = std::clamp(standing.p_WL(link).z() - lowest, 0.01, kThickestAnkle);
+  const double height = standing.p_WL(link).z() - lowest;
+  const double ankle = std::clamp(0.85 * height, 0.01, kThickestAnkle);
+  const Eigen::Vector3d up = standing.R_WL(link).transpose() * Eigen::Vector3d(0.0, 0.0, kInstep * height);
   for (const int shape : foot.shapes) {
     const OutlineSphere sole{robot.shapes[shape].X_LS.p, robot.shapes[shape].radius};
     foot.spheres.push_back(sole);
-    foot.spheres.push_back({(1.0 - kInstep) * sole.center, std::max(sole.radius, std::min(kInstepRadius, ankle))});
+    foot.spheres.push_back({(1.0 - kInstepInward) * (sole.center + up), sole.radius});
   }
   foot.spheres.push_back({Eigen::Vector3d::Zero(), ankle});
   return foot;
