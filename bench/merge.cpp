@@ -164,7 +164,8 @@ class MergeInputs {
       if (node.environment.is_null()) node.environment = header.environment;
       ++node.attempts;
     }
-    const std::string from = header.node.empty() ? attempt.rows_file : fmt::format("{} on {}", path, header.node);
+    const std::string from =
+        header.node.empty() ? attempt.rows_file : fmt::format("{} on {}", attempt.rows_file, header.node);
     sources_.push_back({.path = attempt.rows_file,
                         .from = from,
                         .run = number,

@@ -281,8 +281,9 @@ void add_verdict_and_record(Keys& keys) {
       With::kClips));
   keys.push_back(
       group_key("limits", {field<Suite>({.name = "wall_s_per_episode",
-                                         .meaning = "an episode past it is a time-out (a failure); waiting for "
-                                                    "plans is not counted",
+                                         .meaning = "an episode that computes for longer is a time-out (a "
+                                                    "failure, and run again by the same command); plans, and time in "
+                                                    "which the process was stopped, are not counted",
                                          .unit = "s",
                                          .range = {0.0, 1.0e6, false}},
                                         &Suite::wall_limit)}));

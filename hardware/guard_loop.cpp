@@ -59,12 +59,6 @@ void take_readings(RobotWire& wire, RobotGuard& guard, double now) {
   if (const double heard = wire.executor_heard(now); heard != kNever) guard.executor_heard(heard);
 }
 
-double monotonic_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 void LcmVelocity::send(const VelocityCommand& velocity) {
   if (calls_++ % kVelocityEvery != 0) return;
   LcmBuffer buffer;

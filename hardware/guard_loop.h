@@ -4,15 +4,13 @@
 
 #include <functional>
 
+#include "duet/core/awake_time.h"
 #include "duet/hardware/datagram_socket.h"
 #include "duet/hardware/guard_message.h"
 #include "duet/hardware/robot_guard.h"
 #include "duet/hardware/robot_wire.h"
 
 namespace duet {
-
-// CLOCK_MONOTONIC [s].
-double monotonic_seconds();
 
 // Velocities as HOMIE's processes and the twin take them, 50 times a second.
 class LcmVelocity final : public VelocitySink {

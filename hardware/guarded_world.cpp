@@ -127,7 +127,7 @@ const Eigen::VectorXd& GuardedWorld::target(const Reference& reference) {
   return target_;
 }
 
-Outcome GuardedWorld::advance(int tick, const PointTracks&, const Deadline&) {
+Outcome GuardedWorld::advance(int tick, const PointTracks&, Deadline&) {
   tick_ = tick + 1;
   if (!next()) return Outcome::kError;
   take_state();

@@ -42,7 +42,7 @@ class GuardedWorld final : public World {
   // What is sent; of the executed joints what is asked, before the limiter.
   const Eigen::VectorXd& target(const Reference& reference) override;
   // A guard that has gone or ended the run is kError, a robot that fell kFell; while it holds, the episode goes on.
-  Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) override;
+  Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override;
   [[nodiscard]] std::string message() const override { return message_; }
 
   // Plans to stand for so long after the episode [s]; then whoever is next may have the robot.

@@ -1,5 +1,6 @@
 #include "duet/rollout/policy_reference.h"
 
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -22,7 +23,6 @@ void PolicyReference::begin(const RobotState& start) {
 }
 
 const Reference* PolicyReference::at(const Present& present) {
-  waited_ = {};
   look(present);
   if (present.tick % kTicksPerPlan == 0) plan(present.tick);
   if (policy_.faults().dead) return nullptr;
@@ -40,8 +40,7 @@ void PolicyReference::look(const Present& present) {
 void PolicyReference::plan(int tick) {
   const auto begin = std::chrono::steady_clock::now();
   std::vector<Reference> plan = policy_.plan(history_.at(tick));
-  waited_ = std::chrono::steady_clock::now() - begin;
-  milliseconds_.push_back(std::chrono::duration<double, std::milli>(waited_).count());
+  milliseconds_.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
   if (!plan.empty()) on_their_way_.push_back({tick, std::move(plan)});
 }
 

@@ -31,7 +31,6 @@ class PolicyReference final : public ReferenceSource {
 
   void begin(const RobotState& start) override;
   const Reference* at(const Present& present) override;
-  [[nodiscard]] Duration waited() const override { return waited_; }
   [[nodiscard]] std::string message() const override { return policy_.faults().message; }
   // Late plans, faults and times of this episode.
   void finish(Rollout& rollout) const;
@@ -53,7 +52,6 @@ class PolicyReference final : public ReferenceSource {
   Scheduler scheduler_;
   std::deque<SentPlan> on_their_way_;
   std::vector<double> milliseconds_;
-  Duration waited_{};
 };
 
 }  // namespace duet

@@ -1,7 +1,6 @@
 // Who says where the robot shall be: one 36-D reference a tick.
 #pragma once
 
-#include <chrono>
 #include <string>
 
 #include "duet/backends/backend.h"
@@ -20,14 +19,11 @@ struct Present {
 
 class ReferenceSource {
  public:
-  using Duration = std::chrono::steady_clock::duration;
   virtual ~ReferenceSource() = default;
   // Before tick 0, where engine and controller stand in `start`.
   virtual void begin(const RobotState& start) = 0;
   // The reference of this tick; ticks come in order from 0. Valid until the next call. Null: there is none any more.
   virtual const Reference* at(const Present& present) = 0;
-  // Wall time of the last at() that is no part of the simulation: a wait for a program.
-  [[nodiscard]] virtual Duration waited() const { return {}; }
   // Why there is no reference any more.
   [[nodiscard]] virtual std::string message() const { return ""; }
 };

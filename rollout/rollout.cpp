@@ -105,7 +105,7 @@ class Simulated final : public World {
     return command_.q_target;
   }
 
-  Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) override {
+  Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override {
     if (!partner.empty())
       backend_.set_partner(partner_joints(partner, tick), partner_velocities(partner, tick, kTickRate));
     disturbance_.act(tick, backend_);
@@ -147,7 +147,7 @@ class Moved final : public World {
     reference_ = reference;
     return reference_.q;
   }
-  Outcome advance(int, const PointTracks&, const Deadline&) override {
+  Outcome advance(int, const PointTracks&, Deadline&) override {
     follower_.go_to(reference_, kTick);
     return has_fallen(follower_.state(), episode_.fall) ? Outcome::kFell : Outcome::kOk;
   }
@@ -177,15 +177,17 @@ Rollout roll_out(const Episode& episode, World& world, ReferenceSource& source, 
   if (somebody) recording.partner = PointTracks(episode.ticks, kSmplJoints);
   world.begin(episode.start);
   source.begin(episode.start);
-  Deadline deadline(episode.wall_limit, episode.stop_asked);  // from here on: a program that starts is not simulated
+  // From here on: a program that starts is not simulated.
+  Deadline deadline(episode.wall_limit, episode.stop_asked, episode.clock);
   Sha256 hash;
   HumanJoints partner;
 
   int tick = 0;
   for (; tick < episode.ticks && recording.outcome == Outcome::kOk; ++tick) {
     if (somebody) partner = partner_joints(others, tick);
+    deadline.pause();  // a plan is the policy's, which has limits of its own
     const Reference* reference = source.at({tick, world.state(), somebody ? &partner : nullptr});
-    deadline.extend(source.waited());
+    deadline.go_on();
     if (reference == nullptr) {
       recording.outcome = Outcome::kError;
       break;

@@ -15,6 +15,7 @@
 #include "duet/metrics/contact_safety.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
+#include "duet/rollout/deadline.h"
 #include "duet/rollout/perturbation.h"
 #include "duet/rollout/reference_source.h"
 #include "duet/rollout/world.h"
@@ -40,8 +41,9 @@ struct EpisodeConditions {
   // policy's.
   Perturbation perturbation;
   std::uint64_t perturbation_seed = 0;
-  FallRule fall;                        // the robot's own, RobotModel::fall
-  double wall_limit = 120.0;            // what a ReferenceSource waits for is not counted [s]
+  FallRule fall;              // the robot's own, RobotModel::fall
+  double wall_limit = 120.0;  // what a ReferenceSource takes is not counted (rollout/deadline.h) [s]
+  EpisodeClock clock = {};
   std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
   std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
 };

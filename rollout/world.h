@@ -25,7 +25,7 @@ class World {
   // What the joints are sent for this reference [rad]. Valid until the next call.
   virtual const Eigen::VectorXd& target(const Reference& reference) = 0;
   // The 20 ms of this tick. `partner`: SMPL joints, frame 0 at tick 0; empty: nobody.
-  virtual Outcome advance(int tick, const PointTracks& partner, const Deadline& deadline) = 0;
+  virtual Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) = 0;
   // Why it ended the episode; empty: what the outcome says of itself.
   [[nodiscard]] virtual std::string message() const { return ""; }
   // What it measured.

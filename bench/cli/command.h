@@ -15,7 +15,7 @@ enum ExitCode : int {
   kExitOk = 0,
   kExitGate = 1,           // a gate, regression check or comparison failed
   kExitUsage = 2,          // usage, configuration or input
-  kExitErrors = 3,         // finished, with errored episodes or clips
+  kExitErrors = 3,         // finished, with episodes or clips that have no result: errors, time-outs, unsupported ones
   kExitMissing = 4,        // engine, asset or device that is not there
   kExitDeterminism = 5,    // verify: other hashes
   kExitResumable = 75,     // stopped early (time limit, SIGTERM, SIGHUP): the same command goes on

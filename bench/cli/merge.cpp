@@ -52,8 +52,9 @@ std::string text_of(const MergeSummary& summary, const MergeArguments& arguments
   const std::string& to = arguments.options.output.empty() ? arguments.runs.front() : arguments.options.output;
   text += fmt::format("{}: {} episodes of {} runs; {} that more than one had are equal and there once", to, rows.rows,
                       arguments.runs.size(), rows.folded);
-  if (rows.superseded > 0) text += fmt::format("; {} errors gave way to another row", rows.superseded);
+  if (rows.superseded > 0) text += fmt::format("; {} errors and time-outs gave way to another row", rows.superseded);
   if (rows.errors > 0) text += fmt::format("; {} ended with an error", rows.errors);
+  if (rows.timeouts > 0) text += fmt::format("; {} timed out", rows.timeouts);
   if (rows.torn > 0) text += fmt::format("; {} last lines were not whole and are left out", rows.torn);
   return text + gaps_text(summary);
 }
@@ -72,6 +73,7 @@ nlohmann::json json_of(const MergeSummary& summary, const MergeArguments& argume
           {"folded", rows.folded},
           {"superseded", rows.superseded},
           {"errors", rows.errors},
+          {"timeouts", rows.timeouts},
           {"torn", rows.torn},
           {"planned", summary.planned},
           {"missing", gaps},

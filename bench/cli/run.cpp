@@ -29,8 +29,7 @@ int exit_code(RunEnd end) {
 
 int exit_code(const RunSummary& summary) {
   if (summary.end != RunEnd::kComplete) return exit_code(summary.end);
-  const bool faults = summary.outcomes.contains("error") || summary.outcomes.contains("unsupported");
-  return faults ? kExitErrors : kExitOk;
+  return has_faults(summary.outcomes) ? kExitErrors : kExitOk;
 }
 
 std::string describe(const RunSummary& summary, const Suite& suite, const std::string& output) {
@@ -111,6 +110,7 @@ void run_suite_command(Session& session, RunArguments arguments) {
   const RunSummary summary = run_watched(suite, arguments, progress);
   session.exit_code = exit_code(summary);
   for (const std::string& warning : summary.warnings) warn(warning);
+  warn_of_timeouts(summary.outcomes);
   note(session, describe(summary, suite, arguments.output));
   const Run run = open_run(arguments.output);
   const std::vector<std::string> notes = notes_of({arguments.output}, {run}, run.rows);
@@ -195,7 +195,8 @@ void add_run(CLI::App& app, Session& session) {
   command
       ->add_option("--time-limit", options.time_limit, "of the command [s], 0 for none; stops resumable (exit code 75)")
       ->check(time_limit_check());
-  command->add_flag("--retry-errors", options.retry_errors, "run episodes again that ended with an error");
+  command->add_flag("--retry-errors", options.retry_errors,
+                    "run episodes again that ended with an error; those that timed out always run again");
   command->add_flag("--dry-run", arguments->dry_run,
                     "print the resolved suite, its hash and the programs that it would start; run nothing");
   command->callback([&session, arguments] { run_suite_command(session, *arguments); });

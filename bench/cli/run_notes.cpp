@@ -47,6 +47,19 @@ std::vector<std::string> slow_policy_notes(const std::vector<EpisodeRow>& rows) 
 
 }  // namespace
 
+bool has_faults(const std::map<std::string, int>& outcomes) {
+  return outcomes.contains("error") || outcomes.contains("timeout") || outcomes.contains("unsupported");
+}
+
+void warn_of_timeouts(const std::map<std::string, int>& outcomes) {
+  const auto found = outcomes.find("timeout");
+  if (found == outcomes.end()) return;
+  warn(
+      fmt::format("{} of the episodes passed `limits.wall_s_per_episode` and count as failures; the same command runs "
+                  "them again",
+                  found->second));
+}
+
 Run open_run(const std::string& path) {
   Run run = load_run(path);
   for (const std::string& warning : run.warnings) warn(warning);

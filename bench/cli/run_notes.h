@@ -2,6 +2,7 @@
 // that are missing.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,11 @@ std::vector<std::string> notes_of(const std::vector<std::string>& paths, const s
 // A file's text with the notes, as its format has them (md, csv, tex, svg; json: before its own in the key "notes");
 // unchanged without any.
 std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes);
+
+// Whether episodes ended without a result: errors, time-outs, unsupported ones. `outcomes`: how many of each.
+bool has_faults(const std::map<std::string, int>& outcomes);
+// Says on standard error that episodes timed out, and what runs them again.
+void warn_of_timeouts(const std::map<std::string, int>& outcomes);
 
 // Throws InputError for a run whose episodes are not all there, unless `allowed`; `action` is what is refused.
 void require_whole(const Run& run, const std::string& path, bool allowed, const std::string& action);

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/run_notes.h"
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/interrupt.h"
 #include "duet/core/file.h"
@@ -34,8 +35,7 @@ int code_of(RunEnd end) {
 int code_of(const WorkSummary& summary) {
   if (summary.end != RunEnd::kComplete) return code_of(summary.end);
   if (summary.exit_code != 0) return summary.exit_code;
-  const bool faults = summary.outcomes.contains("error") || summary.outcomes.contains("unsupported");
-  return faults ? kExitErrors : kExitOk;
+  return has_faults(summary.outcomes) ? kExitErrors : kExitOk;
 }
 
 std::string text_of(const WorkSummary& summary, const WorkArguments& arguments) {
@@ -59,6 +59,7 @@ void run_work(Session& session, const WorkArguments& arguments) {
   try {
     const WorkSummary summary = work_shard(arguments.run, arguments.shard, arguments.options, stop, progress);
     session.exit_code = code_of(summary);
+    warn_of_timeouts(summary.outcomes);
     print(session, text_of(summary, arguments),
           {{"run", arguments.run},
            {"shard", arguments.shard},
@@ -88,8 +89,9 @@ void add_work(CLI::App& app, Session& session) {
   add_threads(command, arguments->options.threads, "episodes at the same time");
   command->add_option("--time-limit", arguments->time_limit, "of the command [s], 0 for none")
       ->check(CLI::Range(0.0, 1.0e9));
-  command->add_flag("--retry-errors", arguments->options.retry_errors,
-                    "run episodes again that ended with an error, those that killed their workers too");
+  command->add_flag(
+      "--retry-errors", arguments->options.retry_errors,
+      "run episodes again that ended with an error, those that killed their workers too (time-outs always run again)");
   add_allow_programs(*command, arguments->options.allow_programs);
   command->callback([&session, arguments] { run_work(session, *arguments); });
 }

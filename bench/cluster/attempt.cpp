@@ -228,6 +228,14 @@ std::vector<AttemptRecord> read_attempts(const std::string& run, std::int64_t sh
   return attempts;
 }
 
+std::vector<std::string> rows_files(const std::string& run, std::int64_t shard) {
+  const fs::path folder = fs::path(run) / shard_folder(shard);
+  std::vector<std::string> paths;
+  for (const std::string& name : names_in_folder(folder.string()))
+    if (name.ends_with(".jsonl")) paths.push_back((folder / name).string());
+  return paths;
+}
+
 std::vector<std::int64_t> attempted_shards(const std::string& run) {
   std::vector<std::int64_t> shards;
   for (const std::string& name : names_in_folder((fs::path(run) / "attempts").string())) {

@@ -49,6 +49,7 @@ class AttemptWriter {
   void did(const std::string& key, const std::string& outcome, double seconds);
   // `how`: "complete", "stopped", "storage".
   void ended(const std::string& how);
+  [[nodiscard]] const std::string& journal() const { return journal_; }
   // Of the journal, for crash_note.h.
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
@@ -85,6 +86,9 @@ std::optional<AttemptRecord> parse_journal(std::string_view text, const std::str
 // All of a shard, by the names of their files; none where nobody began. One whose journal has no whole header, or is
 // gone, has rows and nothing else.
 std::vector<AttemptRecord> read_attempts(const std::string& run, std::int64_t shard);
+
+// Paths of the rows of all of a shard's attempts; those without a row have no such file.
+std::vector<std::string> rows_files(const std::string& run, std::int64_t shard);
 
 // Numbers of the shards that have a folder, sorted.
 std::vector<std::int64_t> attempted_shards(const std::string& run);

@@ -5,12 +5,13 @@
 
 #include <algorithm>
 #include <array>
-#include <set>
+#include <map>
 
 #include "duet/bench/cluster/attempt.h"
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/progress.h"
 #include "duet/results/rows/merge_files.h"
+#include "duet/results/rows/row_identity.h"
 #include "duet/results/rows/row_scan.h"
 
 namespace duet {
@@ -20,13 +21,18 @@ constexpr std::array kStates = {ShardState::kDone, ShardState::kRunning, ShardSt
                                 ShardState::kWaiting};
 constexpr std::size_t kMostShardLines = 20;
 
-struct Tally {
-  std::set<std::string> done, errors;  // keys; an error gives way
-};
+using Tally = std::map<std::string, Outcome>;  // by key: of the row that stands
+
+// Of an episode or a training; a journal may say anything.
+Outcome outcome_of(const AttemptRecord::Done& done) {
+  for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut})
+    if (done.outcome == to_string(mishap)) return mishap;
+  return Outcome::kOk;
+}
 
 void count_done(const AttemptRecord& attempt, NodeStatus& node, Tally& tally) {
   for (const AttemptRecord::Done& done : attempt.done) {
-    (done.outcome == "error" ? tally.errors : tally.done).insert(done.key);
+    note_outcome(done.key, outcome_of(done), tally);
     ++node.done;
     node.errors += done.outcome == "error" ? 1 : 0;
     node.seconds += done.seconds;
@@ -38,7 +44,7 @@ void count_rows(const AttemptRecord& attempt, Tally& tally) {
   LineFile lines(attempt.rows_file);
   while (const auto line = lines.next()) {
     const EpisodeRow row = scan_row(*line).row;
-    (row.outcome == Outcome::kError ? tally.errors : tally.done).insert(row.key);
+    note_outcome(row.key, row.outcome, tally);
   }
 }
 
@@ -73,9 +79,9 @@ ShardStatus shard_status(const std::string& run, const Shard& shard, std::int64_
       ++node.lost;
     }
   }
-  for (const std::string& key : tally.done) tally.errors.erase(key);
-  result.errors = std::ssize(tally.errors);
-  result.done = std::ssize(tally.done) + result.errors;
+  result.errors = std::ranges::count_if(tally, [](const auto& known) { return known.second == Outcome::kError; });
+  result.timeouts = std::ranges::count_if(tally, [](const auto& known) { return known.second == Outcome::kTimedOut; });
+  result.done = std::ssize(tally);
   result.state = state_of(result, status.kind == ShardPlan::Kind::kTrainings);
   return result;
 }
@@ -165,6 +171,7 @@ RunStatus run_status(const std::string& run) {
     status.shards.push_back(shard_status(run, plan.shards[i], static_cast<std::int64_t>(i), now, status));
     status.done += status.shards.back().done;
     status.errors += status.shards.back().errors;
+    status.timeouts += status.shards.back().timeouts;
     status.running += status.shards.back().running;
   }
   status.seconds_left = seconds_left(plan, status);
@@ -173,8 +180,10 @@ RunStatus run_status(const std::string& run) {
 
 std::string status_text(const RunStatus& status) {
   const bool trainings = status.kind == ShardPlan::Kind::kTrainings;
-  std::string text = fmt::format("{} of {} {} done, {} with errors; {} workers at it", status.done, status.episodes,
-                                 trainings ? "trainings" : "episodes", status.errors, status.running);
+  std::string text =
+      fmt::format("{} of {} {} done, {} with errors{}; {} workers at it", status.done, status.episodes,
+                  trainings ? "trainings" : "episodes", status.errors,
+                  status.timeouts > 0 ? fmt::format(", {} timed out", status.timeouts) : "", status.running);
   if (status.seconds_left >= 0.0 && !status.is_complete())
     text += fmt::format(", about {} left", format_duration(status.seconds_left));
   text += "\nshards:";
@@ -194,6 +203,7 @@ nlohmann::json status_json(const RunStatus& status) {
                       {"episodes", shard.episodes},
                       {"done", shard.done},
                       {"errors", shard.errors},
+                      {"timeouts", shard.timeouts},
                       {"attempts", shard.attempts},
                       {"running", shard.running},
                       {"crashes", shard.crashes},
@@ -205,6 +215,7 @@ nlohmann::json status_json(const RunStatus& status) {
   return {{"episodes", status.episodes},
           {"done", status.done},
           {"errors", status.errors},
+          {"timeouts", status.timeouts},
           {"running", status.running},
           {"complete", status.is_complete()},
           {"seconds_left", status.seconds_left < 0.0 ? nlohmann::json(nullptr) : nlohmann::json(status.seconds_left)},

@@ -19,9 +19,9 @@ std::string_view to_string(ShardState state);
 
 struct ShardStatus {
   ShardState state = ShardState::kWaiting;
-  std::int64_t number = 0, episodes = 0, done = 0, errors = 0;
-  std::int64_t attempts = 0, running = 0, crashes = 0;  // running: attempts that may be at work
-  std::vector<std::string> nodes;                       // of those
+  std::int64_t number = 0, episodes = 0, done = 0, errors = 0, timeouts = 0;  // done: with a row of any outcome
+  std::int64_t attempts = 0, running = 0, crashes = 0;                        // running: attempts that may be at work
+  std::vector<std::string> nodes;                                             // of those
 };
 
 struct NodeStatus {
@@ -31,7 +31,7 @@ struct NodeStatus {
 
 struct RunStatus {
   ShardPlan::Kind kind = ShardPlan::Kind::kEpisodes;
-  std::int64_t episodes = 0, done = 0, errors = 0, running = 0;
+  std::int64_t episodes = 0, done = 0, errors = 0, timeouts = 0, running = 0;
   double seconds_left = -1.0;  // at the rate so far, by as many workers as are running; below 0: none is
   std::vector<ShardStatus> shards;
   std::map<std::string, NodeStatus> nodes;

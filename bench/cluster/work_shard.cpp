@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -19,38 +22,65 @@
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/results/rows/merge_files.h"
+#include "duet/results/rows/row_identity.h"
 #include "duet/results/rows/row_scan.h"
 
 namespace duet {
 namespace {
 
+// The rows of all workers of a shard, each read once: workers look at them as they grow.
+class ShardRows {
+ public:
+  ShardRows(const PlannedRun& run, std::int64_t shard) : run_(run), shard_(shard) {}
+
+  // Those that were not there at the last look.
+  void look(const std::function<void(const EpisodeRow&)>& each) {
+    for (const std::string& path : rows_files(run_.path(), shard_)) {
+      Read& read = read_[path];
+      LineFile lines(path, read.bytes);
+      while (const std::optional<std::string_view> line = lines.next()) {
+        each(row_of(*line, path, ++read.lines));
+        read.bytes += line->size() + 1;
+      }
+    }
+  }
+
+ private:
+  struct Read {
+    std::uint64_t bytes = 0;
+    int lines = 0;
+  };
+
+  [[nodiscard]] EpisodeRow row_of(std::string_view line, const std::string& path, int number) const {
+    const std::string& hash = run_.info().suite_hash;
+    try {
+      EpisodeRow row = scan_row(line).row;
+      if (row.suite_hash != hash)
+        throw InputError(fmt::format("a row of suite hash {:.12}, expected {:.12}", row.suite_hash, hash));
+      return row;
+    } catch (const InputError& error) {
+      throw InputError(
+          fmt::format("{}:{}: {}; remove the file, and its episodes run again", path, number, error.what()));
+    }
+  }
+
+  const PlannedRun& run_;
+  std::int64_t shard_;
+  std::map<std::string, Read> read_;  // by path
+};
+
 // What earlier attempts at a shard leave to do.
 struct ShardHistory {
-  std::set<std::string> done, errors;                       // keys with a row; errors: with no other one
+  std::map<std::string, Outcome> outcomes;                  // by key: of the row that stands
   std::map<std::string, std::vector<std::string>> crashes;  // key -> signals
   std::map<std::string, int> losses;
 };
 
-void add_rows(const std::string& file, const std::string& suite_hash, ShardHistory& history) {
-  LineFile lines(file);
-  while (const auto line = lines.next()) {
-    try {
-      const EpisodeRow row = scan_row(*line).row;
-      if (row.suite_hash != suite_hash)
-        throw InputError(fmt::format("a row of suite hash {:.12}, expected {:.12}", row.suite_hash, suite_hash));
-      (row.outcome == Outcome::kError ? history.errors : history.done).insert(row.key);
-    } catch (const InputError& error) {
-      throw InputError(
-          fmt::format("{}:{}: {}; remove the file, and its episodes run again", file, lines.line(), error.what()));
-    }
-  }
-}
-
-ShardHistory history_of(const PlannedRun& run, std::int64_t shard) {
+ShardHistory history_of(const PlannedRun& run, std::int64_t shard, ShardRows& rows) {
   ShardHistory history;
   const std::int64_t now = file_system_time(run.path());
+  rows.look([&](const EpisodeRow& row) { note_outcome(row.key, row.outcome, history.outcomes); });
   for (const AttemptRecord& attempt : read_attempts(run.path(), shard)) {
-    add_rows(attempt.rows_file, run.info().suite_hash, history);
     for (const AttemptRecord::Crash& crash : attempt.crashes) history.crashes[crash.key].push_back(crash.signal);
     const bool lost = attempt.end.empty() && attempt.crashes.empty() && !may_be_alive(attempt, now, kSilence);
     for (const std::string& key : attempt.open) history.losses[key] += lost ? 1 : 0;
@@ -81,7 +111,7 @@ class ShardWorker {
         shard_.keys)
       throw InputError(
           fmt::format("{}/plan.json: shard {}: the keys of its episodes are not those of the plan", path, number));
-    history_ = history_of(run_, number);
+    history_ = history_of(run_, number, rows_);
     if (run_.suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
   }
 
@@ -110,18 +140,37 @@ class ShardWorker {
     summary_.planned = shard_.episodes();
     for (std::int64_t place = shard_.begin; place < shard_.end; ++place) {
       const std::string key = run_.key_at(place);
-      const bool there = history_.done.contains(key) || (!options_.retry_errors && history_.errors.contains(key));
-      if (there) ++summary_.already_there;
-      if (!there) places.push_back(place);
+      if (is_there(key))
+        ++summary_.already_there;
+      else
+        places.push_back(place);
     }
     return places;
   }
 
+  // A time-out runs again.
+  [[nodiscard]] bool is_there(const std::string& key) const {
+    const auto known = history_.outcomes.find(key);
+    if (known == history_.outcomes.end()) return false;
+    return has_ended(known->second) || (known->second == Outcome::kError && !options_.retry_errors);
+  }
+
+  // Whether another worker has made a row of it since this one began.
+  bool is_done_by_others(const std::string& key) {
+    const std::lock_guard lock(mutex_);
+    rows_.look([&](const EpisodeRow& row) { new_.insert(row.key); });
+    if (!new_.contains(key)) return false;
+    ++summary_.already_there;
+    return true;
+  }
+
   void roll_out(const std::vector<std::int64_t>& places, AttemptWriter& attempt, Progress& progress) {
     progress.start(fmt::format("shard {} ({})", number_, shard_.name), static_cast<int>(places.size()), "episodes");
+    // Workers of one shard begin at places of their own, and meet where others have been.
+    const std::size_t first = std::hash<std::string>()(attempt.journal()) % places.size();
     parallel_for_each(static_cast<int>(places.size()), options_.threads, [&](int i) {
       if (stop_.asked()) return;
-      take(places[static_cast<std::size_t>(i)], attempt);
+      take(places[(first + static_cast<std::size_t>(i)) % places.size()], attempt);
       progress.advance();
     });
     progress.finish();
@@ -129,6 +178,7 @@ class ShardWorker {
 
   void take(std::int64_t place, AttemptWriter& attempt) {
     const std::string key = run_.key_at(place);
+    if (is_done_by_others(key)) return;
     const std::string poison = options_.retry_errors ? "" : poison_of(key, history_);
     if (!poison.empty()) {
       record(poisoned_row(place, poison), attempt, true);
@@ -177,7 +227,9 @@ class ShardWorker {
   Shard shard_;
   WorkOptions options_;
   const StopSign& stop_;
+  ShardRows rows_{run_, number_};
   ShardHistory history_;
+  std::set<std::string> new_;  // keys of rows that were made since this worker began, by anybody
   std::string trajectories_;
   std::mutex mutex_;
   WorkSummary summary_;

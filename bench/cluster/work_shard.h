@@ -1,5 +1,6 @@
 // One shard of a planned run by one worker (`duet work`): what is missing of it, into files of the worker's own.
-// Anything that can count may start workers, also two of one shard at once: both then make the same rows.
+// Anything that can count may start workers, also many of one shard at once: rows of one episode are equal, and each
+// worker leaves out what another one has done.
 #pragma once
 
 #include <cstdint>

@@ -26,20 +26,14 @@ using Result = MessageSocket::Result;
 
 bool would_block(int error) { return error == EAGAIN || error == EWOULDBLOCK; }
 
-// Rounded up, so that poll does not spin over the last millisecond.
-int milliseconds_until(Deadline deadline) {
-  const auto rest = std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-  return static_cast<int>(std::clamp<std::int64_t>(rest.count(), 0, 1000000));
-}
-
-bool poll_until(int descriptor, short events, Deadline deadline, const std::function<bool()>& stop_asked) {
-  constexpr int kSlice = 100;  // between two questions whether to stop [ms]
+bool poll_until(int descriptor, short events, AwakeDeadline& deadline, const std::function<bool()>& stop_asked) {
+  constexpr std::chrono::milliseconds kSlice(100);  // between two looks at the clock and questions whether to stop
   while (true) {
     pollfd entry{.fd = descriptor, .events = events, .revents = 0};
-    const int count = poll(&entry, 1, std::min(milliseconds_until(deadline), kSlice));
+    const int count = poll(&entry, 1, static_cast<int>(std::min(deadline.left(), kSlice).count()));
     if (count > 0) return true;
     if (count < 0 && errno != EINTR) return false;
-    if (std::chrono::steady_clock::now() >= deadline || (stop_asked && stop_asked())) return false;
+    if (deadline.passed() || (stop_asked && stop_asked())) return false;
   }
 }
 
@@ -48,7 +42,7 @@ bool poll_until(int descriptor, short events, Deadline deadline, const std::func
 }
 
 void connect_socket(int descriptor, const sockaddr* name, socklen_t size, const std::string& address,
-                    Deadline deadline) {
+                    AwakeDeadline& deadline) {
   if (connect(descriptor, name, size) == 0) return;
   if (errno != EINPROGRESS) refuse_connection(address, std::strerror(errno));
   if (!poll_until(descriptor, POLLOUT, deadline, {})) refuse_connection(address, "no answer in time");
@@ -77,7 +71,7 @@ class OpenSocket {
   int descriptor_;
 };
 
-int connect_local(const std::string& path, Deadline deadline) {
+int connect_local(const std::string& path, AwakeDeadline& deadline) {
   sockaddr_un name{.sun_family = AF_UNIX, .sun_path = {}};
   if (path.size() >= sizeof name.sun_path)
     refuse_connection(path, fmt::format("expected a path of less than {} bytes", sizeof name.sun_path));
@@ -87,7 +81,7 @@ int connect_local(const std::string& path, Deadline deadline) {
   return opened.release();
 }
 
-int connect_tcp(const std::string& host, const std::string& port, const std::string& address, Deadline deadline) {
+int connect_tcp(const std::string& host, const std::string& port, const std::string& address, AwakeDeadline& deadline) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
@@ -113,11 +107,11 @@ MessageSocket::MessageSocket(int descriptor) : descriptor_(descriptor) {
 
 MessageSocket::~MessageSocket() { close(descriptor_); }
 
-Result MessageSocket::wait(short events, Deadline deadline) const {
+Result MessageSocket::wait(short events, AwakeDeadline& deadline) const {
   return poll_until(descriptor_, events, deadline, stop_asked_) ? Result::kDone : Result::kLate;
 }
 
-Result MessageSocket::flush(Deadline deadline) {
+Result MessageSocket::flush(AwakeDeadline& deadline) {
   while (!outgoing_.empty()) {
     const ssize_t sent = ::send(descriptor_, outgoing_.data(), outgoing_.size(), MSG_NOSIGNAL);
     if (sent > 0) {
@@ -131,13 +125,13 @@ Result MessageSocket::flush(Deadline deadline) {
   return Result::kDone;
 }
 
-Result MessageSocket::send(std::string_view message, Deadline deadline) {
+Result MessageSocket::send(std::string_view message, AwakeDeadline& deadline) {
   if (const Result result = flush(deadline); result != Result::kDone) return result;
   outgoing_ = framed(message);
   return flush(deadline);
 }
 
-Result MessageSocket::receive(std::string& message, Deadline deadline) {
+Result MessageSocket::receive(std::string& message, AwakeDeadline& deadline) {
   std::array<char, 65536> bytes{};
   while (true) {
     if (std::optional<std::string> next = incoming_.next()) {
@@ -162,7 +156,7 @@ SocketPair connected_pair() {
   return {ends[0], ends[1]};
 }
 
-int connect_to(const std::string& address, Deadline deadline) {
+int connect_to(const std::string& address, AwakeDeadline& deadline) {
   const std::size_t colon = address.rfind(':');
   if (address.find('/') != std::string::npos || colon == std::string::npos) return connect_local(address, deadline);
   return connect_tcp(address.substr(0, colon), address.substr(colon + 1), address, deadline);

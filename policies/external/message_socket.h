@@ -1,18 +1,17 @@
 // Messages over one connected stream socket, with a deadline for each call: never blocks past it, never raises SIGPIPE.
+// Time in which this process was stopped does not count (core/awake_time.h): the answer may lie there since.
 // One owner, not thread-safe.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "duet/core/awake_time.h"
 #include "duet/policies/external/message.h"
 
 namespace duet {
-
-using Deadline = std::chrono::steady_clock::time_point;
 
 class MessageSocket {
  public:
@@ -31,13 +30,13 @@ class MessageSocket {
   MessageSocket& operator=(const MessageSocket&) = delete;
 
   // kLate: the message is not sent, or its rest follows with the next call. What an earlier call left goes first.
-  Result send(std::string_view message, Deadline deadline);
+  Result send(std::string_view message, AwakeDeadline& deadline);
   // Throws InputError as MessageBuffer::next.
-  Result receive(std::string& message, Deadline deadline);
+  Result receive(std::string& message, AwakeDeadline& deadline);
 
  private:
-  Result flush(Deadline deadline);
-  [[nodiscard]] Result wait(short events, Deadline deadline) const;
+  Result flush(AwakeDeadline& deadline);
+  [[nodiscard]] Result wait(short events, AwakeDeadline& deadline) const;
 
   int descriptor_;
   std::function<bool()> stop_asked_;
@@ -52,6 +51,6 @@ struct SocketPair {
 SocketPair connected_pair();
 
 // Connects to a server: the path of a local socket, or "host:port" (TCP). Throws MissingError naming it and the reason.
-int connect_to(const std::string& address, Deadline deadline);
+int connect_to(const std::string& address, AwakeDeadline& deadline);
 
 }  // namespace duet

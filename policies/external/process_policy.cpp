@@ -25,8 +25,6 @@ using Type = PolicyMessage::Type;
 
 constexpr milliseconds kToEnd{200};  // for a process that has closed its connection or was told goodbye
 
-Deadline in(milliseconds time) { return std::chrono::steady_clock::now() + time; }
-
 std::vector<std::string> names_of(const std::vector<int>& joints, const RobotModel& robot) {
   std::vector<std::string> names;
   names.reserve(joints.size());
@@ -49,7 +47,8 @@ class ProcessPolicy final : public Policy {
 
   ~ProcessPolicy() override {
     if (!socket_) return;
-    static_cast<void>(socket_->send(bye_message(), in(milliseconds(0))));
+    AwakeDeadline at_once(milliseconds(0));
+    static_cast<void>(socket_->send(bye_message(), at_once));
     socket_.reset();
     if (child_) static_cast<void>(child_->ended(kToEnd));
   }
@@ -107,8 +106,9 @@ class ProcessPolicy final : public Policy {
     const std::string& address = descriptor_.socket;
     const bool tcp = address.find('/') == std::string::npos && address.find(':') != std::string::npos;
     const std::string path = (std::filesystem::path(descriptor_.folder()) / address).string();
+    AwakeDeadline deadline{milliseconds(descriptor_.start_ms)};
     try {
-      socket_.emplace(connect_to(tcp ? address : path, in(milliseconds(descriptor_.start_ms))));
+      socket_.emplace(connect_to(tcp ? address : path, deadline));
     } catch (const MissingError& error) {
       die(error.what());
     }
@@ -128,7 +128,7 @@ class ProcessPolicy final : public Policy {
 
   // A message that the policy cannot do without an answer to. Plans that arrive before it are of an earlier episode.
   std::optional<PolicyMessage> exchange(const std::string& message, Type expected, const char* question) {
-    const Deadline deadline = in(milliseconds(descriptor_.start_ms));
+    AwakeDeadline deadline{milliseconds(descriptor_.start_ms)};
     const auto late = [&] { die(fmt::format("no answer to '{}' within {} ms", question, descriptor_.start_ms)); };
     const Result sent = socket_->send(message, deadline);
     while (std::optional<PolicyMessage> answer = next(sent, deadline, late)) {
@@ -147,7 +147,7 @@ class ProcessPolicy final : public Policy {
   std::optional<PolicyMessage> ask(const std::string& message, int tick) {
     const bool waits = descriptor_.deadline_ms == 0;
     const int limit = waits ? descriptor_.hang_ms : descriptor_.deadline_ms;
-    const Deadline deadline = in(milliseconds(limit));
+    AwakeDeadline deadline{milliseconds(limit)};
     const auto late = [&] {
       const std::string fault = fmt::format("no plan for tick {} within {} ms", tick, limit);
       if (waits) return die(fault);
@@ -167,7 +167,7 @@ class ProcessPolicy final : public Policy {
 
   // The next message; none where a fault was counted. `sent`: how sending the question went.
   template <typename Late>
-  std::optional<PolicyMessage> next(Result sent, Deadline deadline, const Late& late) {
+  std::optional<PolicyMessage> next(Result sent, AwakeDeadline& deadline, const Late& late) {
     std::string text;
     Result result = sent;
     try {
@@ -177,7 +177,7 @@ class ProcessPolicy final : public Policy {
       die(error.what());
       return std::nullopt;
     }
-    if (result == Result::kDone && std::chrono::steady_clock::now() > deadline) result = Result::kLate;
+    if (result == Result::kDone && deadline.passed()) result = Result::kLate;
     if (result == Result::kClosed) lose_connection();
     if (result == Result::kLate && !stopped()) late();
     if (result != Result::kDone) return std::nullopt;

@@ -38,7 +38,7 @@ struct EntryHead {
   std::uint32_t place_bytes, time_bytes, source, length;
   std::uint64_t offset;
   std::array<unsigned char, 16> fingerprint;
-  bool error;
+  Outcome outcome;
 };
 
 }  // namespace
@@ -47,8 +47,10 @@ bool is_before(const RowEntry& a, const RowEntry& b) {
   return std::tie(a.place, a.source, a.offset) < std::tie(b.place, b.source, b.offset);
 }
 
-LineFile::LineFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rbe")) {
-  if (!file_ && errno != ENOENT) throw InputError(fmt::format("cannot read '{}': {}", path_, last_reason()));
+LineFile::LineFile(std::string path, std::uint64_t begin)
+    : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rbe")), next_(begin) {
+  const bool there = file_ && ::fseeko(file_.get(), static_cast<off_t>(begin), SEEK_SET) == 0;
+  if (!there && errno != ENOENT) throw InputError(fmt::format("cannot read '{}': {}", path_, last_reason()));
 }
 
 // More of the file behind what is there; false at its end.
@@ -102,7 +104,7 @@ EntryStream::EntryStream(const std::string& output, const std::vector<RowEntry>&
                          .length = entry.length,
                          .offset = entry.offset,
                          .fingerprint = entry.fingerprint,
-                         .error = entry.error});
+                         .outcome = entry.outcome});
     bytes += entry.place;
     bytes += entry.started_at;
     if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
@@ -124,7 +126,7 @@ bool EntryStream::next() {
   entry_.source = head.source;
   entry_.length = head.length;
   entry_.offset = head.offset;
-  entry_.error = head.error;
+  entry_.outcome = head.outcome;
   entry_.place.resize(head.place_bytes);
   entry_.started_at.resize(head.time_bytes);
   const bool whole = std::fread(entry_.place.data(), 1, head.place_bytes, file_.get()) == head.place_bytes &&

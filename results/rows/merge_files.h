@@ -13,6 +13,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "duet/core/outcome.h"
+
 namespace duet {
 
 // Where a row stands, and what decides about it.
@@ -22,7 +24,7 @@ struct RowEntry {
   std::string started_at;
   std::uint32_t source = 0, length = 0;  // length: of the line without its newline [bytes]
   std::uint64_t offset = 0;
-  bool error = false;  // an outcome of its own that gives way
+  Outcome outcome = Outcome::kOk;
 };
 
 // By place, then source and offset.
@@ -37,7 +39,8 @@ using OpenFile = std::unique_ptr<std::FILE, CloseFile>;
 // and for a line of more than kMostTextBytes.
 class LineFile {
  public:
-  explicit LineFile(std::string path);
+  // From the byte `begin` on, where a line begins.
+  explicit LineFile(std::string path, std::uint64_t begin = 0);
   // Without its newline; valid until the next call.
   std::optional<std::string_view> next();
   [[nodiscard]] std::uint64_t offset() const { return offset_; }  // of the last line

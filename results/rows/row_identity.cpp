@@ -65,6 +65,19 @@ nlohmann::json repeatable(const EpisodeRow& row) {
 
 }  // namespace
 
+bool has_ended(Outcome outcome) { return outcome != Outcome::kError && outcome != Outcome::kTimedOut; }
+
+Stands which_stands(Outcome first, Outcome second) {
+  const auto weight = [](Outcome outcome) { return has_ended(outcome) ? 2 : outcome == Outcome::kTimedOut ? 1 : 0; };
+  if (weight(first) != weight(second)) return weight(first) > weight(second) ? Stands::kFirst : Stands::kSecond;
+  return has_ended(first) ? Stands::kBothAgreed : Stands::kEither;
+}
+
+void note_outcome(const std::string& key, Outcome outcome, std::map<std::string, Outcome>& outcomes) {
+  const auto [known, is_new] = outcomes.try_emplace(key, outcome);
+  if (!is_new && which_stands(known->second, outcome) == Stands::kSecond) known->second = outcome;
+}
+
 std::vector<FieldDifference> row_differences(const EpisodeRow& first, const EpisodeRow& second) {
   const nlohmann::json left = repeatable(first), right = repeatable(second);
   Differences found;

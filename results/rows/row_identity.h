@@ -1,13 +1,30 @@
-// Where two rows differ that should be of one and the same episode. An episode repeats bit for bit, so equal rows agree
-// in every field that does not measure wall time; what is compared is their JSON, so that a new field is compared too.
+// Several rows of one and the same episode: which of them stands, and where two differ that should not. An episode
+// repeats bit for bit, so equal rows agree in every field that does not measure wall time; what is compared is their
+// JSON, so that a new field is compared too.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
 #include "duet/results/rows/episode_row.h"
 
 namespace duet {
+
+// Whether an episode came to an end of its own. An error and a time-out are mishaps of a machine or a program: another
+// try may end otherwise.
+bool has_ended(Outcome outcome);
+
+// Which of two rows of one episode stands, in a folder, in a union and in a merge alike.
+enum class Stands {
+  kFirst,  // the other one gives way: an error to any other row, a time-out to one of an episode that has ended
+  kSecond,
+  kEither,      // two errors or two time-outs: they need not agree
+  kBothAgreed,  // both have ended: rows that differ in a field that repeats are a fault
+};
+Stands which_stands(Outcome first, Outcome second);
+// Of many rows: notes the outcome of the one that stands, by key.
+void note_outcome(const std::string& key, Outcome outcome, std::map<std::string, Outcome>& outcomes);
 
 struct FieldDifference {
   std::string field;          // "success", "metrics.jpe", "verdicts.0.values.distance"

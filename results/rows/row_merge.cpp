@@ -105,7 +105,7 @@ class MergeIndexer {
                         .source = source,
                         .length = static_cast<std::uint32_t>(line.size()),
                         .offset = lines.offset(),
-                        .error = row.outcome == Outcome::kError});
+                        .outcome = row.outcome});
   }
 
   // A million rows name a dozen of things.
@@ -216,16 +216,17 @@ class MergeJudge {
   // The one that stands; of a group whose rows differ any of them.
   RowEntry judge(std::vector<RowEntry> group) {
     count_sources(group);
-    const bool all_errors = std::ranges::all_of(group, &RowEntry::error);
     const std::size_t before = group.size();
-    if (!all_errors) std::erase_if(group, [](const RowEntry& entry) { return entry.error; });
+    leave_those_that_stand(group);
     merged_.superseded += static_cast<std::int64_t>(before - group.size());
+    const Outcome outcome = group.front().outcome;
     std::ranges::sort(group, {}, [](const RowEntry& entry) { return std::pair(entry.source, entry.offset); });
-    // Messages of errors may name places and times: errors are not compared.
-    if (!all_errors && group.size() > 1) compare(group);
+    // Messages of errors may name places and times: those need not agree.
+    if (which_stands(outcome, outcome) == Stands::kBothAgreed && group.size() > 1) compare(group);
     merged_.folded += static_cast<std::int64_t>(group.size()) - 1;
     ++merged_.rows;
-    merged_.errors += all_errors ? 1 : 0;
+    merged_.errors += outcome == Outcome::kError ? 1 : 0;
+    merged_.timeouts += outcome == Outcome::kTimedOut ? 1 : 0;
     RowEntry stands = earliest(group);
     if (const std::string& node = sources_[stands.source].node; !node.empty()) ++merged_.of_node[node];
     return stands;
@@ -234,6 +235,13 @@ class MergeJudge {
   [[nodiscard]] MergedRows& merged() { return merged_; }
 
  private:
+  static void leave_those_that_stand(std::vector<RowEntry>& group) {
+    Outcome best = group.front().outcome;
+    for (const RowEntry& entry : group)
+      if (which_stands(best, entry.outcome) == Stands::kSecond) best = entry.outcome;
+    std::erase_if(group, [&](const RowEntry& entry) { return which_stands(best, entry.outcome) == Stands::kFirst; });
+  }
+
   void count_sources(const std::vector<RowEntry>& group) {
     std::set<int> runs, shards;
     for (const RowEntry& entry : group) {

@@ -31,9 +31,9 @@ struct NodeAgreement {
 struct MergedRows {
   std::int64_t rows = 0;                         // of the result
   std::int64_t folded = 0;                       // left out: equal to another one
-  std::int64_t superseded = 0;                   // left out: errors of episodes that have another row
+  std::int64_t superseded = 0;                   // left out: errors and time-outs of episodes that have another row
   int torn = 0;                                  // files whose last line is not whole
-  std::int64_t errors = 0;                       // rows of the result whose outcome is `error`
+  std::int64_t errors = 0, timeouts = 0;         // rows of the result with these outcomes
   std::map<int, std::int64_t> of_run, of_shard;  // how many different episodes each has
   std::map<std::string, std::int64_t> of_node;   // rows of the result
   std::map<NodePair, NodeAgreement> agreement;
@@ -48,7 +48,7 @@ struct MergeBudget {
 };
 
 // Writes the rows by engine, controller, perturbation, arm, policy, task, clip and episode to `output`, at once: it is
-// there whole or as it was. Of equal rows the earliest stays, and an error gives way to any other row of its episode.
+// there whole or as it was. Of equal rows the earliest stays; errors and time-outs give way (row_identity.h).
 // Where rows differ nothing is written. Throws InputError: a broken row (file and line), one of another suite, a name
 // of two digests; StorageError.
 MergedRows merge_rows(const std::vector<RowSource>& sources, const RunInfo& info, const std::string& output,

@@ -14,6 +14,7 @@
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/manifest.h"
 #include "duet/results/rows/name_digests.h"
+#include "duet/results/rows/row_identity.h"
 #include "duet/results/rows/run_files.h"
 #include "duet/results/rows/run_litter.h"
 #include "duet/results/rows/run_rows.h"
@@ -137,10 +138,10 @@ void RunDirectory::read_rows(const RunInfo& info) {
   lines_ = std::make_unique<LineAppender>(file);
   suite_hash_ = info.suite_hash;
   const RunRows rows = read_run_rows(file, info);
-  for (const EpisodeRow& row : rows.rows()) keys_[row.key] = {row.outcome == Outcome::kError, true};
+  for (const EpisodeRow& row : rows.rows()) keys_[row.key] = {row.outcome, true};
 }
 
-// What others have appended. A row of theirs that is no error stands, whatever was there before.
+// What others have appended.
 void RunDirectory::read_appended(bool cut) {
   const std::string text = lines_->read_appended(cut);
   for (std::size_t begin = 0; begin < text.size();) {
@@ -149,7 +150,8 @@ void RunDirectory::read_appended(bool cut) {
                                            beside(path_, "episodes.jsonl") + ": a row of another process");
     const EpisodeRow row = row_from_json(json);
     const auto [known, is_new] = keys_.try_emplace(row.key);
-    known->second = {row.outcome == Outcome::kError && (is_new || known->second.error), false};
+    const bool stands = is_new || which_stands(known->second.outcome, row.outcome) != Stands::kFirst;
+    known->second = {stands ? row.outcome : known->second.outcome, false};
     begin = end + 1;
   }
 }
@@ -178,7 +180,7 @@ bool RunDirectory::append(const EpisodeRow& row) {
   read_appended(true);
   const bool first = !has(row.key);
   if (first) lines_->append(dumped(duet::to_json(row)));
-  if (first) keys_[row.key] = {row.outcome == Outcome::kError, false};
+  if (first) keys_[row.key] = {row.outcome, false};
   release(row.key);
   return first;
 }

@@ -23,10 +23,10 @@ enum class Claim { kMine, kDone, kTaken };
 
 class RunDirectory {
  public:
-  // Creates the folder, or opens it to resume. With `retry_errors` an episode that ended with an error before counts as
-  // not there. Throws InputError: the folder holds a run of another suite (names both) or with another policy or
-  // controller under one name (names it and both digests), is not a run and not empty, is published, has two rows of
-  // one episode that differ; StorageError: it cannot be written, a link in it.
+  // Creates the folder, or opens it to resume. An episode that timed out before counts as not there; with
+  // `retry_errors` one that ended with an error does too. Throws InputError: the folder holds a run of another suite
+  // (names both) or with another policy or controller under one name (names it and both digests), is not a run and not
+  // empty, is published, has two rows of one episode that differ; StorageError: it cannot be written, a link in it.
   static RunDirectory open(const std::string& path, const RunInfo& info, bool retry_errors = false);
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -53,13 +53,15 @@ class RunDirectory {
 
  private:
   struct Known {
-    bool error = false, from_before = false;  // from_before: in the folder when this process opened it
+    Outcome outcome = Outcome::kOk;
+    bool from_before = false;  // in the folder when this process opened it
   };
   RunDirectory() = default;
   void read_rows(const RunInfo& info);
   void read_appended(bool cut);
   [[nodiscard]] bool may_run_again(const Known& known) const {
-    return retry_errors_ && known.error && known.from_before;
+    if (!known.from_before) return false;
+    return known.outcome == Outcome::kTimedOut || (retry_errors_ && known.outcome == Outcome::kError);
   }
 
   std::string path_, suite_hash_;

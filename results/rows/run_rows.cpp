@@ -50,9 +50,9 @@ void RunRows::add(std::string_view line) {
 
 void RunRows::add_again(EpisodeRow row, std::size_t place) {
   EpisodeRow& before = rows_[place];
-  if (before.outcome == Outcome::kError || row.outcome == Outcome::kError) {
+  if (const Stands stands = which_stands(before.outcome, row.outcome); stands != Stands::kBothAgreed) {
     ++superseded_;
-    if (before.outcome != Outcome::kError) return;
+    if (stands == Stands::kFirst) return;
     before = std::move(row);
     lines_[place] = line_;
     return;

@@ -1,5 +1,5 @@
 // episodes.jsonl as rows: which of several rows of one episode stands. Rows are only ever appended; equal rows of two
-// processes count once, an error gives way to any other row of its episode.
+// processes count once, errors and time-outs give way (results/rows/row_identity.h).
 #pragma once
 
 #include <cstddef>
@@ -26,7 +26,7 @@ class RunRows {
 
   [[nodiscard]] const std::vector<EpisodeRow>& rows() const { return rows_; }
   [[nodiscard]] std::vector<EpisodeRow> take() { return std::move(rows_); }
-  // Rows left out because an equal one is there, and errors that another row stands for.
+  // Rows left out because an equal one is there, and errors and time-outs that another row stands for.
   [[nodiscard]] int equal() const { return equal_; }
   [[nodiscard]] int superseded() const { return superseded_; }
 

@@ -123,8 +123,14 @@ void add_row(const EpisodeRow& row, const std::string& run, std::map<std::string
   const auto [found, is_new] = rows.try_emplace(row.key, Origin{row, run});
   if (is_new) return;
   Origin& first = found->second;
+  const Stands stands = which_stands(first.row.outcome, row.outcome);
+  if (stands == Stands::kFirst || stands == Stands::kSecond) {
+    ++result.superseded;
+    if (stands == Stands::kSecond) first = {row, run};
+    return;
+  }
   const std::vector<FieldDifference> differences = row_differences(first.row, row);
-  if (!differences.empty()) {
+  if (stands == Stands::kBothAgreed && !differences.empty()) {
     result.conflicts.push_back(fmt::format("{} {} of {}/{}/{} {} is not the same in '{}' and '{}': {}", row.clip,
                                            row.episode, row.engine, row.controller, row.policy, row.perturbation,
                                            first.run, run, differences_text(differences)));

@@ -11,8 +11,9 @@
 namespace duet {
 
 struct RunUnion {
-  Run run;         // rows by engine, controller, perturbation, arm, policy, task, clip and episode
-  int folded = 0;  // rows that more than one run has, equal in every field that repeats
+  Run run;             // rows by engine, controller, perturbation, arm, policy, task, clip and episode
+  int folded = 0;      // rows that more than one run has, equal in every field that repeats
+  int superseded = 0;  // errors and time-outs of episodes that have another row
   std::vector<std::string>
       conflicts;  // of those that are not equal: the episode, both runs, the fields with both values
 };

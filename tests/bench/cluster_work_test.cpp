@@ -4,6 +4,7 @@
 
 #include <ctime>
 #include <filesystem>
+#include <mutex>
 #include <thread>
 
 #include "duet/bench/cluster/attempt.h"
@@ -102,6 +103,47 @@ TEST_F(ClusterWork, WorkIsDoneOnceAndTwiceAtOnceIsTheSame) {
   expect_reference();
 }
 
+TEST_F(ClusterWork, ATimeOutOfOneWorkerGivesWayToTheRowOfAnother) {
+  plan();
+  work(0);
+  work(1);
+  const std::string mine = files(0, ".jsonl").front();
+  const std::string rows = read_file(mine);
+  const std::string other = fs::path(mine).replace_filename("n2-1-00000000.jsonl").string();
+  std::string late = rows;
+  late.replace(late.find("\"outcome\":\"ok\""), 14, "\"outcome\":\"timeout\"");
+  write_file(other, late);
+  EXPECT_EQ(merge().rows.superseded, 1);
+  expect_reference();
+  fs::remove(other);
+  write_file(mine, late);
+  EXPECT_EQ(run_status(run_).timeouts, 0);  // its journal says that all went well
+  EXPECT_EQ(work(0).run, 1);
+  merge();
+  expect_reference();
+}
+
+// Many at once: each does what nobody has done when it begins with it.
+TEST_F(ClusterWork, AWorkerLeavesOutWhatAnotherOneDoesMeanwhile) {
+  plan(test::playback_suite(), 1);
+  std::int64_t made = 0;
+  {
+    std::vector<std::thread> workers;
+    std::mutex mutex;
+    for (int i = 0; i < 8; ++i)
+      workers.emplace_back([&] {
+        const WorkSummary summary = work(0);
+        const std::lock_guard lock(mutex);
+        EXPECT_EQ(summary.already_there + summary.run, 4);
+        made += summary.run;
+      });
+    for (std::thread& worker : workers) worker.join();
+  }
+  EXPECT_LT(made, 8 * 4);
+  EXPECT_EQ(merge().rows.rows, 4);
+  expect_reference();
+}
+
 TEST_F(ClusterWork, ATornRowRunsAgain) {
   plan();
   work(0);
@@ -143,7 +185,8 @@ TEST_F(ClusterWork, ARowThatDiffersIsToldWithBothNodesAndOneCanBeLeftOut) {
   const MergeSummary found = merge();
   EXPECT_FALSE(found.written);
   EXPECT_EQ(found.rows.violations, 1);
-  EXPECT_THAT(found.rows.conflicts.front(), HasSubstr("run on n1' and '" + run_ + " on n2': fell: false, true"));
+  EXPECT_THAT(found.rows.conflicts.front(),
+              HasSubstr(mine + " on n1' and '" + other + ".jsonl on n2': fell: false, true"));
   EXPECT_EQ(found.rows.agreement.at({"n1", "n2"}).compared, 2);
   const MergeSummary without = merge_runs({run_}, {.without_nodes = {"n2"}});
   EXPECT_TRUE(without.written);

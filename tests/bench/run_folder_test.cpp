@@ -157,6 +157,25 @@ TEST_F(RunFolder, RetryErrorsRunsThemAgainAndNothingElse) {
   EXPECT_TRUE(read_file(folder_ / "run/episodes.jsonl").starts_with(text));  // append-only
 }
 
+TEST_F(RunFolder, TimeOutsAreSaidAndTheSameCommandRunsThemAgain) {
+  write_suite("[wave, handshake]", 1, "limits: {wall_s_per_episode: 1.0e-9}\n");
+  const Ended late = bash("$D run $o/suite.yaml -o $o/run -q 2>&1 >/dev/null");
+  EXPECT_EQ(late.code, 3);
+  EXPECT_THAT(late.text, HasSubstr("duet: warning: 4 of the episodes passed `limits.wall_s_per_episode`"));
+  write_suite();
+  ASSERT_EQ(bash("$D run $o/suite.yaml -o $o/good -q").code, 0);
+  std::vector<EpisodeRow> before = rows("good");
+  before[1].outcome = Outcome::kTimedOut;
+  before[1].success = false;
+  std::string text;
+  for (const EpisodeRow& row : before) text += to_json(row).dump() + "\n";
+  write_file(folder_ / "good/episodes.jsonl", text);
+  const Ended again = bash("$D run $o/suite.yaml -o $o/good");
+  EXPECT_EQ(again.code, 0);
+  EXPECT_THAT(again.text, HasSubstr("3 were there, 1 run now: 1 ok"));
+  EXPECT_EQ(rows("good")[1].outcome, Outcome::kOk);
+}
+
 TEST_F(RunFolder, NothingIsWrittenThroughALinkOfARunThatCameFromElsewhere) {
   write_suite();
   ASSERT_EQ(bash("$D run $o/suite.yaml -o $o/run -q").code, 0);

@@ -108,6 +108,23 @@ TEST(PolicyMessage, DuetSpeaksJson) {
   EXPECT_EQ(last["first"].get<int>() + last["size"].get<int>(), kObservationSize);
 }
 
+// The answer that came while this process was stopped is there when it goes on.
+TEST(PolicySocket, TimeInWhichTheProcessWasStoppedIsNotWaitedFor) {
+  const SocketPair pair = connected_pair();
+  MessageSocket socket(pair.ours);
+  double now = 0.0;
+  int looks = 0;
+  AwakeDeadline stopped(std::chrono::milliseconds(1), AwakeTime([&] {
+                          if (++looks == 3) EXPECT_EQ(write(pair.theirs, "\0\0\0\0", 4), 4);
+                          return now += 180.0;
+                        }));
+  std::string message;
+  EXPECT_EQ(socket.receive(message, stopped), MessageSocket::Result::kDone);
+  AwakeDeadline silent(std::chrono::milliseconds(1), AwakeTime([&] { return now += 0.5; }));
+  EXPECT_EQ(socket.receive(message, silent), MessageSocket::Result::kLate);
+  close(pair.theirs);
+}
+
 // "host:port" is TCP; with a slash it is a path, colons and all.
 TEST(PolicySocket, APathMayHaveAColon) {
   const test::ScratchFolder folder;
@@ -119,7 +136,8 @@ TEST(PolicySocket, APathMayHaveAColon) {
   path.copy(address.sun_path, path.size());
   ASSERT_EQ(bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
   ASSERT_EQ(listen(listener, 1), 0);
-  const int connected = connect_to(path, std::chrono::steady_clock::now() + std::chrono::seconds(5));
+  AwakeDeadline deadline(std::chrono::seconds(5));
+  const int connected = connect_to(path, deadline);
   EXPECT_GE(connected, 0);
   close(connected);
   close(listener);

@@ -13,6 +13,21 @@ using test::full_row;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
+TEST(RowIdentity, MishapsGiveWayToWhatEnded) {
+  constexpr Outcome kEnded[] = {Outcome::kOk, Outcome::kFell, Outcome::kDiverged, Outcome::kUnsupported};
+  for (const Outcome ended : kEnded) {
+    for (const Outcome other : kEnded) EXPECT_EQ(which_stands(ended, other), Stands::kBothAgreed);
+    for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut}) {
+      EXPECT_EQ(which_stands(ended, mishap), Stands::kFirst);
+      EXPECT_EQ(which_stands(mishap, ended), Stands::kSecond);
+    }
+  }
+  EXPECT_EQ(which_stands(Outcome::kError, Outcome::kTimedOut), Stands::kSecond);
+  EXPECT_EQ(which_stands(Outcome::kTimedOut, Outcome::kError), Stands::kFirst);
+  for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut})
+    EXPECT_EQ(which_stands(mishap, mishap), Stands::kEither);
+}
+
 TEST(RowIdentity, WallTimesAreNoDifference) {
   EpisodeRow row = full_row();
   row.started_at = "2027-01-01T00:00:00Z";

@@ -47,13 +47,13 @@ EpisodeRow row_number(int number) {
   return row;
 }
 
-// The same episode as some machine ran it: another time, and now and then an error.
+// The same episode as some machine ran it: another time, and now and then an error or a time-out.
 EpisodeRow as_run(int number, Random& random) {
   EpisodeRow row = row_number(number);
   row.started_at = "2026-01-02T03:04:0" + std::to_string(random.below(3)) + "Z";
   row.wall_s = 0.5 * random.below(4);
-  if (!random.chance(0.2)) return row;
-  row.outcome = Outcome::kError;
+  if (!random.chance(0.3)) return row;
+  row.outcome = random.chance(0.5) ? Outcome::kError : Outcome::kTimedOut;
   row.success = false;
   row.message = "killed its worker " + std::to_string(random.below(3)) + " times";
   row.metrics.clear();
@@ -90,24 +90,24 @@ TEST_F(RowMerge, IsAssociativeCommutativeAndIdempotent) {
   }
 }
 
-TEST_F(RowMerge, HasEachEpisodeOnceAndAnErrorOnlyWhereNothingElseIs) {
+TEST_F(RowMerge, HasEachEpisodeOnceAndAMishapOnlyWhereNothingElseIs) {
   for (std::uint64_t seed = 100; seed < 120; ++seed) {
     Random random(seed, 1);
     const std::vector<EpisodeRow> first = some_rows(random), second = some_rows(random);
-    std::map<std::string, bool> is_error;
+    std::map<std::string, Outcome> wanted;
     for (const auto* rows : {&first, &second})
       for (const EpisodeRow& row : *rows) {
-        const auto [known, is_new] = is_error.try_emplace(row.key, true);
-        known->second = known->second && row.outcome == Outcome::kError;
+        const auto [known, is_new] = wanted.try_emplace(row.key, row.outcome);
+        if (known->second == Outcome::kError || row.outcome == Outcome::kOk) known->second = row.outcome;
       }
     const std::string text = merged({source("a", first), source("b", second)}, 4);
-    std::map<std::string, bool> found;
+    std::map<std::string, Outcome> found;
     for (std::size_t begin = 0, end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
       const EpisodeRow row = row_from_json(parse_json(text.substr(begin, end - begin), "row"));
-      EXPECT_TRUE(found.try_emplace(row.key, row.outcome == Outcome::kError).second);
+      EXPECT_TRUE(found.try_emplace(row.key, row.outcome).second);
     }
-    EXPECT_EQ(found, is_error) << seed;
-    EXPECT_EQ(result_.rows, std::ssize(is_error));
+    EXPECT_EQ(found, wanted) << seed;
+    EXPECT_EQ(result_.rows, std::ssize(wanted));
     EXPECT_EQ(result_.rows + result_.folded + result_.superseded, std::ssize(first) + std::ssize(second));
   }
 }

@@ -93,6 +93,22 @@ TEST(RunDirectory, AKilledRunLosesOnlyTheLineItWasWriting) {
   EXPECT_EQ(load_run(scratch / "run").dropped_lines, 0);
 }
 
+TEST(RunDirectory, AnEpisodeThatTimedOutRunsAgainAndItsRowGivesWay) {
+  const ScratchFolder scratch;
+  EpisodeRow row = episode("replay", "hug", 0, false);
+  row.outcome = Outcome::kTimedOut;
+  RunDirectory first = RunDirectory::open(scratch / "run", tiny_run());
+  first.append(row);
+  EXPECT_EQ(first.claim(row.key), Claim::kDone);  // by the process that saw it time out it is not tried twice
+  RunDirectory second = RunDirectory::open(scratch / "run", tiny_run());
+  EXPECT_EQ(second.claim(row.key), Claim::kMine);
+  EXPECT_TRUE(second.append(episode("replay", "hug", 0, true)));
+  const std::vector<EpisodeRow> rows = load_run(scratch / "run").rows;
+  ASSERT_EQ(rows.size(), 1U);
+  EXPECT_EQ(rows[0].outcome, Outcome::kOk);
+  EXPECT_EQ(RunDirectory::open(scratch / "run", tiny_run()).claim(row.key), Claim::kDone);
+}
+
 TEST(RunDirectory, ARunKilledWhileItWasCreatedCanStartAgain) {
   const ScratchFolder scratch;
   std::filesystem::create_directories(scratch / "run");

@@ -93,6 +93,23 @@ TEST(RunUnion, UnequalRowsOfOneEpisodeAreNamedWithTheFieldsAndBothRuns) {
               HasSubstr("state_hash: \"\", \"another\"; success: false, true (1 such episode)"));
 }
 
+TEST(RunUnion, ATimeOutGivesWayInEitherOrder) {
+  duet::Run late = run_of("b", "mine");
+  late.rows[0].outcome = late.rows[1].outcome = Outcome::kTimedOut;
+  late.rows[0].success = false;
+  duet::Run later = late;
+  later.rows[1].outcome = Outcome::kError;
+  for (const std::vector<duet::Run>& runs :
+       {std::vector{run_of("a", "mine"), late}, std::vector{late, run_of("a", "mine")},
+        std::vector{later, late, run_of("a", "mine")}}) {
+    const RunUnion both = unite(runs);
+    EXPECT_THAT(both.conflicts, IsEmpty());
+    EXPECT_THAT(both.run.rows, testing::Each(testing::Field(&EpisodeRow::outcome, Outcome::kOk)));
+    EXPECT_EQ(both.folded + both.superseded, 6 * (static_cast<int>(runs.size()) - 1));
+  }
+  EXPECT_THAT(unite({late, late}).conflicts, IsEmpty());
+}
+
 TEST(RunUnion, OneNameForTwoPoliciesIsRefusedWithBothDigests) {
   duet::Run other = run_of("b", "mine");
   other.info.policies["mine"] = std::string(64, 'b');

@@ -89,6 +89,38 @@ TEST(Rollout, WallLimitEndsAsTimedOut) {
   EXPECT_FALSE(rollout.interrupted);
 }
 
+// A clock that a test moves on with each look of the episode.
+EpisodeClock clock_of(double& wall, double& computed, double wall_step, double computed_step) {
+  return {.wall = [&wall, wall_step] { return wall += wall_step; },
+          .computed = [&computed, computed_step] { return computed += computed_step; }};
+}
+
+TEST(Rollout, AnEpisodeWhoseProcessWasStoppedLosesNothing) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const Rollout expected = roll(parts, setup);
+  double wall = 0.0, computed = 0.0;
+  setup.clock = clock_of(wall, computed, 9.0, 1e-6);  // stopped between any two looks for three times the limit
+  setup.wall_limit = 3.0;
+  const Rollout stopped = roll(parts, setup);
+  EXPECT_GT(wall, 1000.0);
+  EXPECT_EQ(stopped.recording.outcome, expected.recording.outcome);
+  EXPECT_EQ(stopped.state_hash, expected.state_hash);
+}
+
+TEST(Rollout, AnEpisodeThatComputesForLongOrWaitsForTenTimesAsLongTimesOut) {
+  const Parts parts;
+  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  setup.wall_limit = 3.0;
+  double wall = 0.0, computed = 0.0;
+  setup.clock = clock_of(wall, computed, 1e-6, 0.5);
+  EXPECT_EQ(roll(parts, setup).recording.outcome, Outcome::kTimedOut);
+  wall = computed = 0.0;
+  setup.clock = clock_of(wall, computed, 0.9, 1e-6);
+  EXPECT_EQ(roll(parts, setup).recording.outcome, Outcome::kTimedOut);
+  EXPECT_GT(wall, kWaitingShare * setup.wall_limit);
+}
+
 TEST(Rollout, StopRequestMarksTheEpisodeInterrupted) {
   const Parts parts;
   RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);

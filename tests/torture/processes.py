@@ -1,11 +1,13 @@
 """Signals, closed streams, time limits: exit codes, and that the run goes on."""
 
+import contextlib
 import os
+import random
 import signal
 import subprocess
 import time
 
-from common import QUICK, limit_files
+from common import QUICK, limit_files, rows_of
 
 LONG = ["-s", "clips.synth.per_task=300", "-j", "1"]  # minutes of preparation
 
@@ -81,6 +83,42 @@ def time_limits(trials):
     trials.check("a plan without measure: 2 and its count", ended.returncode == 2 and "at most 10000000 episodes" in ended.stderr, ended.stderr)
 
 
+def stopped(trials):
+    """Stopped for three times an episode's limit, `run` and workers make the rows that they would have made."""
+    limit = ["-s", "limits.wall_s_per_episode=1"]
+    wanted_at = trials.fresh("unstopped")
+    seconds = trials.finish(wanted_at, *limit)
+    wanted = rows_of(wanted_at)
+    generator, count = random.Random(trials.seed), 4 if trials.short else 20
+    for number in range(count):
+        out = trials.fresh("stopped")
+        works = number % 2 == 1
+        if works:
+            planned = trials.run(["plan", *trials.command(out, *limit)[2:], "--shards", "1"])
+            trials.check("a plan: 0", planned.returncode == 0, planned.stderr)
+        command = [trials.program, "work", out, "--shard", "0", "-q"] if works else trials.command(out, *limit)
+        processes = [trials.start(command) for _ in range(1 + works)]
+        time.sleep(generator.uniform(0.05, 0.8) * seconds)
+        stop_for(processes[0], 3.0)
+        for process in processes:
+            said = process.communicate(timeout=600)[1]
+            trials.check("a process that was stopped: 0", process.returncode == 0, f"{process.returncode} {said}")
+        if works:
+            merged = trials.run(["merge", out])
+            trials.check("a merge after a stop: 0", merged.returncode == 0, merged.stdout + merged.stderr)
+        trials.check_same_rows("workers, one stopped" if works else "a stopped run", wanted, out)
+    trials.say(f"{count} stops of 3 s, the limit being 1 s: {count // 2} of a run, {count // 2} of one of two workers of a shard")
+
+
+def stop_for(process, seconds):
+    """Stops a process that may have ended already, and lets it go on."""
+    for number in (signal.SIGSTOP, signal.SIGCONT):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process.pid, number)
+        if number == signal.SIGSTOP:
+            time.sleep(seconds)
+
+
 def endless_input(trials):
     """A text without end is refused by name."""
     for arguments in (["run", "/dev/zero", "--dry-run"], ["check", trials.path("reference"), "-b", "/dev/zero"]):
@@ -89,4 +127,4 @@ def endless_input(trials):
         trials.check(f"{arguments[0]} /dev/zero: 2", ended.returncode == 2 and "/dev/zero" in ended.stderr, ended.stderr)
 
 
-TRIALS = [signals, second_signal, nohup, file_size_signal, closed_streams, time_limits, endless_input]
+TRIALS = [signals, second_signal, nohup, file_size_signal, closed_streams, time_limits, stopped, endless_input]
