@@ -108,7 +108,8 @@ EpisodeRow score_again(const Recording& recording, const KeptEpisode& kept, cons
   row.verdicts.clear();
   row.metrics.clear();
   for (const std::string& name : measured_metrics())
-    if (const auto found = kept.row.metrics.find(name); found != kept.row.metrics.end()) row.metrics.insert(*found);
+    if (const auto found = kept.row.metrics.find(name); found != kept.row.metrics.end())
+      row.metrics[name] = found->second;
   row.state_hash = state_hash(recording);
   score_recording(recording, kept.source, kept.rules, robot, row);
   return row;

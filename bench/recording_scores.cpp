@@ -69,7 +69,7 @@ std::map<std::string, double> metrics_of(const Recording& recording, const Robot
 
 void score_kept(const EpisodeRecording& episode, const RobotModel& robot, RecordingScore& score) {
   score.row = score_again(episode.recording, *episode.kept, robot);
-  score.metrics = score.row->metrics;
+  score.metrics = score.row->metrics.map();
   if (episode.recording.frames() >= kShortestScored) add_finite(root_error_parts(episode.recording), score.metrics);
   score.differences = row_differences(episode.kept->row, *score.row);
 }

@@ -25,8 +25,8 @@ struct RunOptions {
   int threads = 1;
   double time_limit = 0.0;                                     // of the whole run [s]; 0 = none
   StopSign::Clock::time_point begin = StopSign::Clock::now();  // of the command: where the time limit counts from
-  bool retry_errors = false;                                   // runs episodes again that ended with an error before, as time-outs
-  std::vector<std::string> engines, controllers, policies;     // where not empty: only these
+  bool retry_errors = false;  // runs episodes again that ended with an error before, as time-outs
+  std::vector<std::string> engines, controllers, policies;  // where not empty: only these
   std::vector<std::string> tasks, perturbations;
   std::vector<std::string> argv;
   DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart

@@ -128,6 +128,12 @@ void add_finite(const std::map<std::string, double>& values, std::map<std::strin
     if (std::isfinite(value)) out[name] = value;
 }
 
+void add_finite(const std::map<std::string, double>& values, NamedNumbers& out) {
+  std::map<std::string, double> all = out.map();
+  add_finite(values, all);
+  out = all;
+}
+
 Readings readings_of(const Suite& suite) {
   Readings readings;
   for (const auto& [option, value] : suite.readings) set_reading(readings, option, value);

@@ -63,5 +63,6 @@ Readings readings_of(const Suite& suite);
 inline constexpr int kShortestScored = 8;
 // Those of the values that are finite.
 void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out);
+void add_finite(const std::map<std::string, double>& values, NamedNumbers& out);
 
 }  // namespace duet

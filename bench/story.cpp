@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "duet/bench/clips.h"
 #include "duet/bench/progress.h"
@@ -105,13 +106,13 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
   return story;
 }
 
-RunTables tables_of(const Run& run) {
+RunTables tables_of(std::vector<EpisodeRow> rows, const Run& run) {
   RunMetrics metrics;
   for (const MetricInfo& metric : metric_catalogue()) {
     metrics.all.push_back(column_of(metric));
     if (metric.group == MetricGroup::kRetargeting) metrics.drifting.push_back(column_of(metric));
   }
-  return run_tables(run.rows, std::move(metrics), run.info.certificate);
+  return run_tables(std::move(rows), std::move(metrics), run.info.certificate, run.file);
 }
 
 std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files) {
@@ -121,7 +122,8 @@ std::vector<TrainingCurves> training_curves(const std::vector<std::string>& file
   return curves;
 }
 
-ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses, bool with_clips,
+ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses,
+                             std::vector<ReportReplay> replays, bool with_clips,
                              const std::vector<std::string>& curve_files, int threads, Progress& progress) {
   ReportContent content;
   const Suite suite = suite_of_head(run);
@@ -133,7 +135,9 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   content.board = tables.board;
   content.analyses = std::move(analyses);
   content.columns = metric_columns();
-  content.episodes = run.rows;
+  content.episodes = listed_episodes(tables.rows, replays);
+  content.all_episodes = tables.rows.size();
+  content.replays = std::move(replays);
   if (!with_clips || !suite.references.empty()) return content;
   if (const std::string fault = clips_fault(run, suite); !fault.empty()) {
     content.notes.push_back(fmt::format("Key frames and loss curves of the clips are left out: {}.", fault));
@@ -144,11 +148,14 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);
   const Readings readings = readings_of(suite);
   std::vector<ClipScore> scores(clips.size());
-  content.stories.resize(clips.size());
+  content.stories.resize(std::min(clips.size(), kMostStories));
+  if (clips.size() > kMostStories)
+    content.notes.push_back(
+        fmt::format("Key frames and loss curves are those of the first {} of {} clips.", kMostStories, clips.size()));
   progress.start("drawing", static_cast<int>(clips.size()), "clips");
   parallel_for_each(static_cast<int>(clips.size()), threads, [&](int i) {
     scores[i] = score_clip(clips[i], robot, {.readings = readings});
-    content.stories[i] = clip_story(clips[i], scores[i], *robot);
+    if (std::cmp_less(i, content.stories.size())) content.stories[i] = clip_story(clips[i], scores[i], *robot);
     progress.advance();
   });
   progress.finish();

@@ -1,6 +1,7 @@
 // What the HTML report shows of clips: key frames as stick figures, loss curves, figures.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,14 +20,18 @@ class Progress;
 ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot);
 
 // What the analyses of a run are made of; the metrics are the catalogue's, and the 18 of retargeting those that drift.
-RunTables tables_of(const Run& run);
+// The rows are the run's, which may be lean.
+RunTables tables_of(std::vector<EpisodeRow> rows, const Run& run);
+
+inline constexpr std::size_t kMostStories = 1000;  // clips that are drawn: some 20 kB each
 
 // Throws InputError for a file that is broken.
 std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files);
 
 // Everything that the report says of runs: their analyses, notes, retargeting figures and stories of their clips, which
-// are made again from the first run's suite (`with_clips`), on `threads` threads.
-ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses, bool with_clips,
+// are made again from the first run's suite (`with_clips`), on `threads` threads. Of `run` the rows are not looked at.
+ReportContent report_content(const Run& run, const RunTables& tables, std::vector<Analysis> analyses,
+                             std::vector<ReportReplay> replays, bool with_clips,
                              const std::vector<std::string>& curve_files, int threads, Progress& progress);
 
 }  // namespace duet

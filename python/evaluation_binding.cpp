@@ -165,7 +165,7 @@ struct TablePair {
 TablePair pair_of(const Analysis& analysis) { return {analysis_markdown(analysis), dumped(analysis_json(analysis))}; }
 
 TablePair table_of(const Run& run, const std::string& name) {
-  const RunTables tables = tables_of(run);
+  const RunTables tables = tables_of(run.rows, run);
   if (name == kLeaderboardName) return pair_of(leaderboard_analysis(tables.leaderboard, tables.metrics.all, false));
   return pair_of(run_analysis(tables, name == "metrics" ? kLeaderboardName : name));
 }

@@ -15,7 +15,7 @@ struct EpisodeClock {
 };
 
 // A world that waits instead of computing, or has a small share of a core, may take so many times the limit.
-inline constexpr double kWaitingShare = 10.0;
+inline constexpr double kWaitingShare = 100.0;
 
 // The limit is on what the thread computes: a process that is stopped, and one of many on a core, loses nothing. One
 // thread makes it and looks at it.

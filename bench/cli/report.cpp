@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <utility>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
@@ -43,13 +44,21 @@ struct ReportArguments {
   int threads = default_threads();
 };
 
-std::vector<Run> load_runs(const std::vector<std::string>& paths) {
+// Rows of one run for tables are held lean; what looks at rows themselves needs them whole, and so do rows that are
+// held against those of another run.
+RowExtent extent_of(const ReportArguments& arguments) {
+  const bool database = std::ranges::find(arguments.formats, "sqlite") != arguments.formats.end();
+  const bool whole = database || arguments.replays.scenes > 0 || arguments.runs.size() > 1;
+  return whole ? RowExtent::kWhole : RowExtent::kLean;
+}
+
+std::vector<Run> load_runs(const ReportArguments& arguments) {
   std::vector<Run> runs;
-  for (const std::string& path : paths) {
+  for (const std::string& path : arguments.runs) {
     if (std::filesystem::is_regular_file(path))
       throw InputError(fmt::format(
           "'{}': expected the folder of a run, found a file; `duet score` judges recordings and motions", path));
-    runs.push_back(open_run(path));
+    runs.push_back(open_run(path, extent_of(arguments)));
   }
   return runs;
 }
@@ -84,24 +93,26 @@ std::vector<ReportReplay> replays_of(const Run& run, const ReportArguments& argu
   }
 }
 
+// The run without its rows, which the tables have.
 std::string html_text(const Run& run, const RunTables& tables, const std::vector<Analysis>& analyses,
                       const std::vector<std::string>& notes, std::vector<ReportReplay> replays,
                       const ReportArguments& arguments, Progress& progress) {
-  ReportContent content =
-      report_content(run, tables, analyses, !arguments.no_clips, arguments.curves, arguments.threads, progress);
-  content.replays = std::move(replays);
+  ReportContent content = report_content(run, tables, analyses, std::move(replays), !arguments.no_clips,
+                                         arguments.curves, arguments.threads, progress);
   content.notes.insert(content.notes.begin(), notes.begin(), notes.end());
   return html_report(content);
 }
 
 void run_report(const Session& session, const ReportArguments& arguments) {
   check_formats(arguments.formats);
-  const std::vector<Run> runs = load_runs(arguments.runs);
-  const Run run = united(runs);
-  const RunTables tables = tables_of(run);
+  std::vector<Run> runs = load_runs(arguments);
+  std::vector<std::string> notes = completeness_notes(arguments.runs, runs);
+  Run run = united(std::move(runs));
+  add_row_notes(run.rows, notes);
+  const bool replays = arguments.replays.scenes > 0;
+  const RunTables tables = tables_of(replays ? run.rows : std::exchange(run.rows, {}), run);
   const std::vector<Analysis> analyses = run_analyses(tables);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
-  std::vector<std::string> notes = notes_of(arguments.runs, runs, run.rows);
   if (arguments.min_effect > 0.0)
     for (std::string& caution : resolution_notes(tables.leaderboard, arguments.min_effect / 100.0))
       notes.push_back(std::move(caution));
@@ -124,7 +135,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
       if (tables.engines.engines.size() > 1) write("engines.svg", engine_plot_svg(tables.engines), "svg");
     }
     if (format == "sqlite") {
-      write_database(run.rows, inside(folder, "results.sqlite"), notes);
+      write_database(tables.rows, inside(folder, "results.sqlite"), notes);
       wrote(inside(folder, "results.sqlite"));
     }
     for (const auto& [file, text] : analysis_files(analyses, format)) write(file, text, format);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <utility>
 
 #include "duet/bench/certificate.h"
 #include "duet/bench/cli/run_command.h"
@@ -112,9 +113,11 @@ void run_suite_command(Session& session, RunArguments arguments) {
   for (const std::string& warning : summary.warnings) warn(warning);
   warn_of_timeouts(summary.outcomes);
   note(session, describe(summary, suite, arguments.output));
-  const Run run = open_run(arguments.output);
-  const std::vector<std::string> notes = notes_of({arguments.output}, {run}, run.rows);
-  const RunTables tables = tables_of(run);
+  Run run = open_run(arguments.output, RowExtent::kLean);
+  std::vector<std::string> notes;
+  if (std::string partial = completeness(run); !partial.empty()) notes.push_back(std::move(partial));
+  add_row_notes(run.rows, notes);
+  const RunTables tables = tables_of(std::exchange(run.rows, {}), run);
   const std::vector<Analysis> analyses = run_analyses(tables, Extent::kRun);
   for (const std::string& fault : policy_fault_notes(tables.leaderboard)) warn(fault);
   nlohmann::json json = {{"run", arguments.output},

@@ -60,8 +60,8 @@ void warn_of_timeouts(const std::map<std::string, int>& outcomes) {
                   found->second));
 }
 
-Run open_run(const std::string& path) {
-  Run run = load_run(path);
+Run open_run(const std::string& path, RowExtent extent) {
+  Run run = load_run(path, extent);
   for (const std::string& warning : run.warnings) warn(warning);
   return run;
 }
@@ -75,15 +75,12 @@ std::vector<std::string> completeness_notes(const std::vector<std::string>& path
   return notes;
 }
 
-std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
-                                  const std::vector<EpisodeRow>& rows) {
-  std::vector<std::string> notes = completeness_notes(paths, runs);
+void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>& notes) {
   for (std::string& slow : slow_policy_notes(rows)) notes.push_back(std::move(slow));
   const std::string repeats = repeats_note(rows);
-  if (repeats.empty()) return notes;
+  if (repeats.empty()) return;
   warn(repeats);
   notes.push_back(repeats);
-  return notes;
 }
 
 std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes) {

@@ -12,13 +12,12 @@
 namespace duet::cli {
 
 // load_run; its warnings go to standard error.
-Run open_run(const std::string& path);
+Run open_run(const std::string& path, RowExtent extent = RowExtent::kWhole);
 
 // "runs/a: 76 of 400 episodes: partial": a line for each run that is not whole; the path where there are several.
 std::vector<std::string> completeness_notes(const std::vector<std::string>& paths, const std::vector<Run>& runs);
-// The same, and which of the `rows`, those of all runs together, repeat others and count once; that is warned of too.
-std::vector<std::string> notes_of(const std::vector<std::string>& paths, const std::vector<Run>& runs,
-                                  const std::vector<EpisodeRow>& rows);
+// Which policies were slow, and which of the rows repeat others and count once; of that is warned, too.
+void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>& notes);
 
 // A file's text with the notes, as its format has them (md, csv, tex, svg; json: before its own in the key "notes");
 // unchanged without any.

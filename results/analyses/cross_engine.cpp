@@ -271,7 +271,7 @@ CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<
   result.ranks = rank_stability(result.success);
   add_rank_reliability(by_engine, options, result.ranks);
   result.drift = metric_drift(by_engine, metrics, options);
-  result.parting = engine_parting(by_engine, options.parting_distance);
+  result.parting = engine_parting(by_engine, options);
   result.forces = force_agreement(by_engine);
   return result;
 }

@@ -52,7 +52,7 @@ double mean_maximum_rank_violation(std::span<const double> reference, std::span<
 double winner_change(std::span<const double> a, std::span<const double> b);
 std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
                                       const CrossEngineOptions& options);
-std::vector<EngineParting> engine_parting(const EngineRows& rows, double distance);
+std::vector<EngineParting> engine_parting(const EngineRows& rows, const CrossEngineOptions& options);
 std::vector<ForceAgreement> force_agreement(const EngineRows& rows);
 
 // Time at which two rows of one episode part, or to which they have not. Null where their traces cannot be compared.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "duet/results/analyses/metric_column.h"
+#include "duet/results/rows/row_file.h"
 #include "duet/results/statistics/statistics.h"
 
 namespace duet {
@@ -16,6 +17,7 @@ struct CrossEngineOptions {
   IntervalOptions intervals = {};
   double parting_distance = 0.05;  // two engines have parted where a point of the traces differs by more [m]
   std::string arm = "main";
+  RowFile file = {};  // where the traces of lean rows are
 };
 
 struct RunEngine {

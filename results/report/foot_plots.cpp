@@ -26,7 +26,7 @@ bool shows_better(const EpisodeRow& a, const EpisodeRow& b) {
 
 }  // namespace
 
-std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
+std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows, const RowFile& file) {
   std::map<std::string, const EpisodeRow*> shown;  // by controller
   for (const EpisodeRow* row : in_episode_order(rows)) {
     if (row->feet.left_mm.empty() || row->arm != "main") continue;
@@ -35,15 +35,15 @@ std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows) {
   }
   std::vector<LinePlot> plots;
   for (const auto& [controller, row] : shown) {
+    const FootTrace feet = file.feet(*row);
     std::vector<double> seconds;
-    for (std::size_t i = 0; i < row->feet.left_mm.size(); ++i)
-      seconds.push_back(static_cast<double>(i) / row->feet.rate_hz);
-    plots.push_back({.title = fmt::format("{}: {} in {}, {} policy{}", controller, row->clip, row->engine, row->policy,
-                                          row->perturbation == "clean" ? "" : ", " + row->perturbation),
-                     .x_label = "time [s]",
-                     .y_label = "height of the sole [m]",
-                     .series = {{"left foot", seconds, metres(row->feet.left_mm)},
-                                {"right foot", seconds, metres(row->feet.right_mm)}}});
+    for (std::size_t i = 0; i < feet.left_mm.size(); ++i) seconds.push_back(static_cast<double>(i) / feet.rate_hz);
+    plots.push_back(
+        {.title = fmt::format("{}: {} in {}, {} policy{}", controller, row->clip, row->engine, row->policy,
+                              row->perturbation == "clean" ? "" : ", " + row->perturbation),
+         .x_label = "time [s]",
+         .y_label = "height of the sole [m]",
+         .series = {{"left foot", seconds, metres(feet.left_mm)}, {"right foot", seconds, metres(feet.right_mm)}}});
   }
   return plots;
 }

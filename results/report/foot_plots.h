@@ -5,11 +5,13 @@
 
 #include "duet/results/report/line_plot.h"
 #include "duet/results/rows/episode_row.h"
+#include "duet/results/rows/row_file.h"
 
 namespace duet {
 
 // In one episode of each controller that has one: of its first by task, clip and number, one that ended well and was
 // clean before others.
-std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows);
+// `file`: where the feet of lean rows are.
+std::vector<LinePlot> foot_plots(const std::vector<EpisodeRow>& rows, const RowFile& file = {});
 
 }  // namespace duet

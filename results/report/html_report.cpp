@@ -125,7 +125,7 @@ std::vector<Section> sections_of(const ReportContent& content) {
   add_analyses(true);
   add("tasks", "Tasks", task_map_html(content.board, content.entries), true);
   add("replays", "Replays", replays_html(content.replays), true);
-  add("episodes", "Episodes", episodes_html(content.episodes, content.replays));
+  add("episodes", "Episodes", episodes_html(content.episodes, content.replays, content.all_episodes));
   add_analyses(false);
   add("leaderboard", "Every engine and task", leaderboard_section(content), content.board.rows.empty());
   add("retargeting", "Retargeting", retargeting_html(content));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <map>
 #include <string>
 #include <utility>
@@ -39,7 +40,8 @@ struct ReportReplay {
 struct ReportContent {
   std::string title;
   Board board;                        // the first screen
-  std::vector<EpisodeRow> episodes;   // section "Episodes"
+  std::vector<EpisodeRow> episodes;   // section "Episodes": of many those of listed_episodes
+  std::size_t all_episodes = 0;       // of which `episodes` are some; 0: they are all
   std::vector<ReportReplay> replays;  // in that section
   nlohmann::json environment;
   std::vector<std::string> notes;  // options and caveats printed with the tables
@@ -50,5 +52,11 @@ struct ReportContent {
   std::vector<ClipStory> stories;
   std::vector<TrainingCurves> curves;  // section "Training"
 };
+
+// The most episodes that a page lists: its size is bounded whatever the run has.
+inline constexpr std::size_t kMostListedEpisodes = 10'000;  // some 250 bytes each
+// All of them, or as many: those first that can be watched, failures before others, each in the order of the rows.
+std::vector<EpisodeRow> listed_episodes(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays,
+                                        std::size_t most = kMostListedEpisodes);
 
 }  // namespace duet

@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <string_view>
 #include <tuple>
 
 #include "duet/results/analyses/leaderboard_rows.h"
@@ -34,6 +36,8 @@ std::string verdict_of(const EpisodeRow& row) {
   return row.outcome == Outcome::kOk ? "failure" : std::string(to_string(row.outcome));
 }
 
+bool failed(const EpisodeRow& row) { return !headline_success(row) && row.arm == "main"; }
+
 }  // namespace
 
 std::string replays_html(const std::vector<ReportReplay>& replays) {
@@ -46,16 +50,37 @@ std::string replays_html(const std::vector<ReportReplay>& replays) {
   return html + "</ul>";
 }
 
-std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays) {
+std::vector<EpisodeRow> listed_episodes(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays,
+                                        std::size_t most) {
+  if (rows.size() <= most) return rows;
+  std::set<std::string_view> watched;
+  for (const ReportReplay& replay : replays) watched.insert(replay.keys.begin(), replay.keys.end());
+  std::vector<EpisodeRow> listed;
+  for (const int rank : {0, 1, 2})
+    for (const EpisodeRow& row : rows) {
+      if (listed.size() == most) return listed;
+      if (rank == (watched.contains(row.key) ? 0 : failed(row) ? 1 : 2)) listed.push_back(row);
+    }
+  return listed;
+}
+
+std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays,
+                          std::size_t all) {
   if (rows.empty()) return "";
   std::vector<const EpisodeRow*> order;
   for (const EpisodeRow& row : rows) order.push_back(&row);
   std::ranges::stable_sort(order, {}, [&](const EpisodeRow* row) {
-    const bool failed = !headline_success(*row) && row->arm == "main";
-    return std::tuple(!failed, address_of(*row, replays).empty(), scene_of(*row), row->arm, row->policy,
+    return std::tuple(!failed(*row), address_of(*row, replays).empty(), scene_of(*row), row->arm, row->policy,
                       row->controller, row->engine);
   });
-  std::string html =
+  std::string html;
+  if (all > rows.size())
+    html = fmt::format(
+        "<p>{} of {} episodes: those with a replay, then failures. <code>duet report RUN --format sqlite</code> has "
+        "them "
+        "all.</p>",
+        rows.size(), all);
+  html +=
       R"(<div class="scroll tall" tabindex="0" role="region" aria-label="Episodes"><table class="sortable compact rows"><caption>Failures first. A key leads to the episode's replay, where there is one; <code>duet replay RUN --episodes KEY</code> makes one of any.</caption><thead><tr>)";
   for (const char* title : {"Task", "Clip", "Policy", "Controller", "Engine", "Perturbation", "Verdict", "Key"})
     html += fmt::format(R"(<th scope="col"><button type="button">{}</button></th>)", title);

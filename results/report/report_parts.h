@@ -21,7 +21,9 @@ std::string task_map_html(const Board& board, const std::vector<LeaderboardEntry
 
 // "" where there are none.
 std::string replays_html(const std::vector<ReportReplay>& replays);
-std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays);
+// `all`: how many there are where `rows` are some of them.
+std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays,
+                          std::size_t all = 0);
 
 // A table cell's drawing: the interval as a bar on [0, 1], the rate as a dot, the null arm (NaN: none) as a tick.
 std::string interval_bar_svg(double rate, const Interval& interval, double null_rate, int width_px);

@@ -34,7 +34,7 @@ Analysis controllers_with_steps(const RunTables& tables) {
   analysis.plots = {
       {.title = "Steps",
        .note = "The lowest point of each sole over the ground, one episode of each controller that walks.",
-       .plots = foot_plots(tables.rows)}};
+       .plots = foot_plots(tables.rows, tables.file)}};
   return analysis;
 }
 
@@ -73,8 +73,10 @@ bool has_walking(const RunTables& tables) {
 
 }  // namespace
 
-RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate) {
+RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
+                     RowFile file) {
   RunTables tables{.rows = std::move(rows),
+                   .file = std::move(file),
                    .metrics = std::move(metrics),
                    .certificate = certificate,
                    .leaderboard = {},
@@ -82,7 +84,7 @@ RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlo
                    .contacts = {},
                    .board = {}};
   tables.leaderboard = leaderboard(tables.rows);
-  tables.engines = cross_engine(tables.rows, tables.metrics.drifting);
+  tables.engines = cross_engine(tables.rows, tables.metrics.drifting, {.file = tables.file});
   tables.contacts = contact_table(tables.rows);
   tables.board = board(tables.rows, tables.leaderboard, tables.engines, tables.contacts);
   return tables;

@@ -24,6 +24,7 @@ struct RunMetrics {
 // What several analyses and the first screen are made of, computed once.
 struct RunTables {
   std::vector<EpisodeRow> rows;
+  RowFile file;  // of lean rows
   RunMetrics metrics;
   nlohmann::json certificate;  // parity certificate; null: none is attached
   std::vector<LeaderboardEntry> leaderboard;
@@ -32,7 +33,8 @@ struct RunTables {
   Board board;
 };
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
-RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate);
+RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
+                     RowFile file = {});
 
 // What ends a run, or all that `duet report` writes.
 enum class Extent { kRun, kReport };

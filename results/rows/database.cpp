@@ -227,7 +227,7 @@ class RowWriter {
     database_.step(episode_.get());
   }
 
-  void write_finite(const std::string& key, const std::map<std::string, double>& values, sqlite3_stmt* statement) {
+  void write_finite(const std::string& key, const NamedNumbers& values, sqlite3_stmt* statement) {
     for (const auto& [name, value] : values) {
       if (!std::isfinite(value)) continue;
       Parameters(statement).add(key).add(name).add(value);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <map>
+#include <string_view>
 #include <tuple>
+#include <utility>
 
 #include "duet/results/rows/row_identity.h"
 #include "duet/results/statistics/row_groups.h"
@@ -13,8 +15,7 @@
 namespace duet {
 namespace {
 
-using Arms = std::tuple<std::string, std::string, std::string, std::string, std::string>;
-using StatesKey = std::tuple<Arms, std::string, std::string, std::string>;  // task, clip, state hash
+using Arms = std::tuple<std::string_view, std::string_view, std::string_view, std::string_view, std::string_view>;
 
 Arms arms_of(const EpisodeRow& row) { return {row.engine, row.controller, row.policy, row.perturbation, row.arm}; }
 
@@ -29,11 +30,18 @@ struct Distinct {
   std::map<Arms, int> repeated;  // how many are left out
 };
 
+// Rows of one clip by arms and state hash: what repeats is among them.
+using SameStates = std::map<std::pair<Arms, std::string_view>, std::vector<const EpisodeRow*>>;
+
 Distinct fold(const std::vector<EpisodeRow>& rows) {
   Distinct distinct;
-  std::map<StatesKey, std::vector<const EpisodeRow*>> seen;
+  distinct.rows.reserve(rows.size());
+  SameStates seen;
+  const EpisodeRow* before = nullptr;
   for (const EpisodeRow* row : in_episode_order(rows)) {
-    std::vector<const EpisodeRow*>& same = seen[{arms_of(*row), row->task, row->clip, row->state_hash}];
+    if (before != nullptr && (row->task != before->task || row->clip != before->clip)) seen.clear();
+    before = row;
+    std::vector<const EpisodeRow*>& same = seen[{arms_of(*row), row->state_hash}];
     const auto is_repeat = [&](const EpisodeRow* first) {
       return first->episode != row->episode && repeats(*first, *row);
     };

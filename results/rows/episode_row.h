@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -40,14 +39,14 @@ struct EpisodeRow {
   std::string detectors;        // version of the detectors' code (metrics/detector.h)
   std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok and fell
   std::vector<Verdict> verdicts;
-  std::map<std::string, double> metrics;  // finite values only; undefined ones are absent
+  NamedNumbers metrics;  // finite values only; undefined ones are absent
   bool fell = false;
   int frames = 0;
   double sim_s = 0.0, wall_s = 0.0;
   double contact_peak_n = 0.0, contact_impulse_ns = 0.0;  // of the human on the robot
   // Finite values only, by dotted name ("human.chest.peak_n"); the ending is the unit: _n [N], _ns [N s], _s [s],
   // _n_cm2 [N/cm^2]; any other: a ratio or a flag (1 or 0).
-  std::map<std::string, double> forces;
+  NamedNumbers forces;
   std::vector<RowContact> contacts;  // with a solid human: the kMostRowContacts of the largest peak force, by begin
   long contacts_total = 0;           // those that are left out included
   StateTrace trace;
@@ -58,6 +57,10 @@ struct EpisodeRow {
   RowPolicyTime policy_ms;
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
+
+  // No field: where its line begins in its file, of a row that is held without what no table reads
+  // (results/rows/row_file.h) [bytes]; below 0: the row is whole.
+  std::int64_t line_at = -1;
 };
 
 // What is done with a field beside reading and writing it.
@@ -65,6 +68,7 @@ struct RowFieldUse {
   bool scanned = false;           // found without reading the row (results/rows/row_scan.h)
   bool repeats = true;            // false: a wall time, in which equal rows differ (results/rows/row_identity.h)
   bool heavy = false;             // a trace: it stands in rows only, and not in published ones
+  bool tabled = true;             // false: no table is made of it
   std::string_view columns = "";  // of a part: what its columns in results.sqlite begin with; "" for its name
   void (*check)(const EpisodeRow&) = nullptr;  // throws InputError for a value that the type allows and the field not
 };

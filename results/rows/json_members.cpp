@@ -41,14 +41,13 @@ nlohmann::json json_value(const std::optional<bool>& value, bool) {
   return value.has_value() ? nlohmann::json(*value) : nlohmann::json(nullptr);
 }
 nlohmann::json json_value(Outcome value, bool) { return std::string(to_string(value)); }
-nlohmann::json json_value(const std::map<std::string, double>& values, bool finite) {
-  if (!finite) return numbers_or_null(values);
+nlohmann::json json_value(const NamedNumbers& values, bool finite) {
   nlohmann::json json = nlohmann::json::object();
   for (const auto& [name, value] : values)
-    if (std::isfinite(value)) json[name] = value;
+    if (!finite || std::isfinite(value)) json[name] = number_or_null(value);
   return json;
 }
-nlohmann::json json_value(const std::map<std::string, bool>& values, bool) { return values; }
+nlohmann::json json_value(const NamedFlags& values, bool) { return values.map(); }
 nlohmann::json json_value(const std::vector<std::string>& values, bool) { return values; }
 nlohmann::json json_value(const std::vector<int>& values, bool) { return values; }
 nlohmann::json json_value(const std::vector<std::vector<int>>& values, bool) { return values; }
@@ -74,12 +73,10 @@ void read_value(JsonFields& fields, const std::string& key, bool, Outcome& value
     throw InputError(fmt::format("{}: key '{}': {}", fields.what(), key, error.what()));
   }
 }
-void read_value(JsonFields& fields, const std::string& key, bool finite, std::map<std::string, double>& values) {
+void read_value(JsonFields& fields, const std::string& key, bool finite, NamedNumbers& values) {
   values = fields.numbers(key, !finite);
 }
-void read_value(JsonFields& fields, const std::string& key, bool, std::map<std::string, bool>& values) {
-  values = fields.booleans(key);
-}
+void read_value(JsonFields& fields, const std::string& key, bool, NamedFlags& values) { values = fields.booleans(key); }
 void read_value(JsonFields& fields, const std::string& key, bool, std::vector<std::string>& values) {
   values = checked_list<std::string>(fields.at(key), key_place(fields, key), "names",
                                      [](const nlohmann::json& name) { return name.is_string(); });
@@ -105,10 +102,10 @@ std::string_view value_words(ValueType<double>, bool finite) { return finite ? "
 std::string_view value_words(ValueType<bool>, bool) { return "true, false"; }
 std::string_view value_words(ValueType<std::optional<bool>>, bool) { return "true, false, null"; }
 std::string_view value_words(ValueType<Outcome>, bool) { return "text"; }
-std::string_view value_words(ValueType<std::map<std::string, double>>, bool finite) {
+std::string_view value_words(ValueType<NamedNumbers>, bool finite) {
   return finite ? "name: number" : "name: number or null";
 }
-std::string_view value_words(ValueType<std::map<std::string, bool>>, bool) { return "name: true, false"; }
+std::string_view value_words(ValueType<NamedFlags>, bool) { return "name: true, false"; }
 std::string_view value_words(ValueType<std::vector<std::string>>, bool) { return "list of texts"; }
 std::string_view value_words(ValueType<std::vector<int>>, bool) { return "list of integers"; }
 std::string_view value_words(ValueType<std::vector<std::vector<int>>>, bool) { return "list of lists of integers"; }

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -13,6 +12,7 @@
 
 #include "duet/core/outcome.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/results/rows/named_values.h"
 
 namespace duet {
 
@@ -22,8 +22,8 @@ template <typename Owner, typename... More>
 struct JsonMember {
   std::string_view name;
   std::variant<std::string Owner::*, int Owner::*, long Owner::*, std::uint64_t Owner::*, double Owner::*,
-               bool Owner::*, std::optional<bool> Owner::*, Outcome Owner::*, std::map<std::string, double> Owner::*,
-               std::map<std::string, bool> Owner::*, std::vector<std::string> Owner::*, std::vector<int> Owner::*,
+               bool Owner::*, std::optional<bool> Owner::*, Outcome Owner::*, NamedNumbers Owner::*,
+               NamedFlags Owner::*, std::vector<std::string> Owner::*, std::vector<int> Owner::*,
                std::vector<std::vector<int>> Owner::*, More Owner::*...>
       member;
   std::string_view meaning;    // part of a sentence
@@ -41,8 +41,8 @@ nlohmann::json json_value(double value, bool finite);
 nlohmann::json json_value(bool value, bool finite);
 nlohmann::json json_value(const std::optional<bool>& value, bool finite);
 nlohmann::json json_value(Outcome value, bool finite);
-nlohmann::json json_value(const std::map<std::string, double>& values, bool finite);
-nlohmann::json json_value(const std::map<std::string, bool>& values, bool finite);
+nlohmann::json json_value(const NamedNumbers& values, bool finite);
+nlohmann::json json_value(const NamedFlags& values, bool finite);
 nlohmann::json json_value(const std::vector<std::string>& values, bool finite);
 nlohmann::json json_value(const std::vector<int>& values, bool finite);
 nlohmann::json json_value(const std::vector<std::vector<int>>& values, bool finite);
@@ -56,8 +56,8 @@ void read_value(JsonFields& fields, const std::string& key, bool finite, double&
 void read_value(JsonFields& fields, const std::string& key, bool finite, bool& value);
 void read_value(JsonFields& fields, const std::string& key, bool finite, std::optional<bool>& value);
 void read_value(JsonFields& fields, const std::string& key, bool finite, Outcome& value);
-void read_value(JsonFields& fields, const std::string& key, bool finite, std::map<std::string, double>& values);
-void read_value(JsonFields& fields, const std::string& key, bool finite, std::map<std::string, bool>& values);
+void read_value(JsonFields& fields, const std::string& key, bool finite, NamedNumbers& values);
+void read_value(JsonFields& fields, const std::string& key, bool finite, NamedFlags& values);
 void read_value(JsonFields& fields, const std::string& key, bool finite, std::vector<std::string>& values);
 void read_value(JsonFields& fields, const std::string& key, bool finite, std::vector<int>& values);
 void read_value(JsonFields& fields, const std::string& key, bool finite, std::vector<std::vector<int>>& values);
@@ -74,8 +74,8 @@ std::string_view value_words(ValueType<double>, bool finite);
 std::string_view value_words(ValueType<bool>, bool finite);
 std::string_view value_words(ValueType<std::optional<bool>>, bool finite);
 std::string_view value_words(ValueType<Outcome>, bool finite);
-std::string_view value_words(ValueType<std::map<std::string, double>>, bool finite);
-std::string_view value_words(ValueType<std::map<std::string, bool>>, bool finite);
+std::string_view value_words(ValueType<NamedNumbers>, bool finite);
+std::string_view value_words(ValueType<NamedFlags>, bool finite);
 std::string_view value_words(ValueType<std::vector<std::string>>, bool finite);
 std::string_view value_words(ValueType<std::vector<int>>, bool finite);
 std::string_view value_words(ValueType<std::vector<std::vector<int>>>, bool finite);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <limits>
-#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -16,10 +15,10 @@ struct Verdict {           // of one detector
   std::string version;     // "paper", "robot"
   std::string thresholds;  // "paper", "strict"
   bool success = false;
-  std::map<std::string, bool> parts;
-  std::map<std::string, double> values;   // NaN where undefined (null in JSON, as for any other that is not finite)
-  std::map<std::string, double> margins;  // likewise
-  int frames = 0;                         // number of evidence frames
+  NamedFlags parts;
+  NamedNumbers values;   // NaN where undefined (null in JSON, as for any other that is not finite)
+  NamedNumbers margins;  // likewise
+  int frames = 0;        // number of evidence frames
 };
 
 // Where a few points were, to tell when two engines part on one episode.

@@ -342,6 +342,27 @@ class RowReading {
 
 void scan_row(std::string_view line, ScannedRow& scanned) { RowReading(line, scanned); }
 
+std::string_view scan_member(std::string_view line, std::string_view name) {
+  MemberScanner members(line);
+  for (MemberScanner::Member member; members.next(member);)
+    if (member.name == name) return member.value;
+  return {};
+}
+
+std::string without_members(std::string_view line, std::span<const std::string_view> names) {
+  std::string text;
+  std::size_t done = 0;
+  MemberScanner members(line);
+  for (MemberScanner::Member member; members.next(member);) {
+    if (std::ranges::find(names, member.name) == names.end()) continue;
+    const auto begin = static_cast<std::size_t>(member.value.data() - line.data());
+    text += line.substr(done, begin - done);
+    text += member.value.starts_with('[') ? "[]" : "null";
+    done = begin + member.value.size();
+  }
+  return text += line.substr(done);
+}
+
 ScannedRow scan_row(std::string_view line) {
   ScannedRow scanned;
   scan_row(line, scanned);

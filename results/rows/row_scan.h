@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <span>
+#include <string>
 #include <string_view>
 
 #include "duet/results/rows/episode_row.h"
@@ -26,5 +28,10 @@ struct ScannedRow {
 ScannedRow scan_row(std::string_view line);
 // The same into a row that may be of another line: its memory is used again. After a throw it is of neither.
 void scan_row(std::string_view line, ScannedRow& scanned);
+
+// The value of a member of a line, as JSON text; empty where there is none. Throws InputError as scan_row.
+std::string_view scan_member(std::string_view line, std::string_view name);
+// The line with null for a member of each of these names, and [] for one that is a list. Throws InputError as scan_row.
+std::string without_members(std::string_view line, std::span<const std::string_view> names);
 
 }  // namespace duet

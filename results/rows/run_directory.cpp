@@ -219,10 +219,12 @@ Run load_run_head(const std::string& path) {
   return run;
 }
 
-Run load_run(const std::string& path) {
+Run load_run(const std::string& path, RowExtent extent) {
   Run run = load_run_head(path);
   bool torn = false;
-  RunRows rows = read_run_rows(beside(path, "episodes.jsonl"), run.info, &torn);
+  const std::string file = beside(path, "episodes.jsonl");
+  if (extent == RowExtent::kLean && std::filesystem::exists(file)) run.file = RowFile(file);
+  RunRows rows = read_run_rows(file, run.info, &torn, extent);
   run.dropped_lines = torn ? 1 : 0;
   if (rows.equal() > 0)
     run.warnings.push_back(

@@ -14,7 +14,9 @@
 #include "duet/core/file.h"
 #include "duet/results/rows/episode_row.h"
 #include "duet/results/rows/folder_lock.h"
+#include "duet/results/rows/row_file.h"
 #include "duet/results/rows/run_info.h"
+#include "duet/results/rows/run_rows.h"
 
 namespace duet {
 
@@ -75,6 +77,7 @@ struct Run {
   std::string path;  // the folder
   RunInfo info;
   std::vector<EpisodeRow> rows;  // in file order, last incomplete line dropped, each episode once
+  RowFile file;                  // of lean rows (results/rows/row_file.h)
   int dropped_lines = 0;
   std::vector<std::string> warnings;  // sentences: rows that were left out because an equal one is there
 };
@@ -82,7 +85,8 @@ struct Run {
 // Throws InputError: not a run directory, a file of it that is a link (results/rows/run_files.h), a broken row (file
 // and line), a key that is not the row's, an episode twice with rows that differ, a row of another suite or of another
 // policy or controller under one name, a published run that is not what was published (results/rows/published.h).
-Run load_run(const std::string& path);
+// Lean rows are for tables alone; Run::file has what they lack.
+Run load_run(const std::string& path, RowExtent extent = RowExtent::kWhole);
 
 // The same without its rows, which are not looked at.
 Run load_run_head(const std::string& path);

@@ -142,6 +142,21 @@ void add_row(const EpisodeRow& row, const std::string& run, std::map<std::string
 
 }  // namespace
 
+namespace {
+
+// Of a run the rows are distinct.
+Run united_alone(Run run) {
+  std::vector<EpisodeRow> rows = std::move(run.rows);
+  const auto count = static_cast<std::int64_t>(rows.size());
+  run.rows.clear();
+  run.info = united_info({run}, {count}, count);
+  std::ranges::sort(rows, [](const EpisodeRow& a, const EpisodeRow& b) { return place_of(a) < place_of(b); });
+  run.rows = std::move(rows);
+  return run;
+}
+
+}  // namespace
+
 RunUnion unite(const std::vector<Run>& runs) {
   require(!runs.empty(), "expected a run at least, found none");
   require_one_suite(runs);
@@ -175,7 +190,9 @@ RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t
   return info;
 }
 
-Run united(const std::vector<Run>& runs) {
+Run united(std::vector<Run> runs) {
+  require(!runs.empty(), "expected a run at least, found none");
+  if (runs.size() == 1) return united_alone(std::move(runs.front()));
   RunUnion result = unite(runs);
   if (!result.conflicts.empty())
     throw InputError(fmt::format("{} ({} such {})", result.conflicts.front(), result.conflicts.size(),

@@ -30,7 +30,8 @@ RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t
 // The environments of all, each once, the first by its text with the others in `others`.
 nlohmann::json united_environment(const std::vector<Run>& runs);
 
-// unite() where a conflict is an error: throws InputError with the first and how many there are.
-Run united(const std::vector<Run>& runs);
+// unite() where a conflict is an error: throws InputError with the first and how many there are. Rows of one run alone
+// are moved, and may be lean.
+Run united(std::vector<Run> runs);
 
 }  // namespace duet

@@ -104,6 +104,29 @@ std::set<std::string> force_names(const EngineRows& rows) {
   return names;
 }
 
+struct Traced {
+  const EpisodeRow& row;
+  const StateTrace& trace;
+};
+
+std::optional<Lifetime> time_together(const Traced& a, const Traced& b, double distance) {
+  const auto points = shared_points(a.trace, b.trace);
+  const std::size_t frames = std::min(a.trace.mm.size(), b.trace.mm.size());
+  if (frames == 0 || points.empty() || a.trace.rate_hz != b.trace.rate_hz) return std::nullopt;
+  const auto time = [&](std::size_t frame) { return static_cast<double>(frame) / a.trace.rate_hz; };
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    for (const auto& [i, j] : points) {
+      if (distance_mm(a.trace.mm[frame], i, b.trace.mm[frame], j) > 1000.0 * distance) {
+        return Lifetime{.time = time(frame), .ended = true};
+      }
+    }
+  }
+  // Where one alone falls or diverges, they part where its trace ends, unless the other's ended before.
+  const bool a_alone = broke_down(a.row) && !broke_down(b.row) && a.trace.mm.size() == frames;
+  const bool b_alone = broke_down(b.row) && !broke_down(a.row) && b.trace.mm.size() == frames;
+  return Lifetime{.time = time(frames - 1), .ended = a_alone || b_alone};
+}
+
 }  // namespace
 
 std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
@@ -133,31 +156,21 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
 }
 
 std::optional<Lifetime> time_together(const EpisodeRow& a, const EpisodeRow& b, double distance) {
-  const auto points = shared_points(a.trace, b.trace);
-  const std::size_t frames = std::min(a.trace.mm.size(), b.trace.mm.size());
-  if (frames == 0 || points.empty() || a.trace.rate_hz != b.trace.rate_hz) return std::nullopt;
-  const auto time = [&](std::size_t frame) { return static_cast<double>(frame) / a.trace.rate_hz; };
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    for (const auto& [i, j] : points) {
-      if (distance_mm(a.trace.mm[frame], i, b.trace.mm[frame], j) > 1000.0 * distance) {
-        return Lifetime{.time = time(frame), .ended = true};
-      }
-    }
-  }
-  // Where one alone falls or diverges, they part where its trace ends, unless the other's ended before.
-  const bool a_alone = broke_down(a) && !broke_down(b) && a.trace.mm.size() == frames;
-  const bool b_alone = broke_down(b) && !broke_down(a) && b.trace.mm.size() == frames;
-  return Lifetime{.time = time(frames - 1), .ended = a_alone || b_alone};
+  return time_together({a, a.trace}, {b, b.trace}, distance);
 }
 
-std::vector<EngineParting> engine_parting(const EngineRows& rows, double distance) {
+std::vector<EngineParting> engine_parting(const EngineRows& rows, const CrossEngineOptions& options) {
   std::map<EnginePair, Watched> watched;
   for (const auto& [combination, episodes] : rows.physics()) {
     for (const auto& [id, row_of] : episodes) {
+      std::map<std::string, StateTrace> traces;
+      if (row_of.size() > 1)
+        for (const auto& [engine, row] : row_of) traces[engine] = options.file.trace(*row);
       for (auto a = row_of.begin(); a != row_of.end(); ++a) {
         for (auto b = std::next(a); b != row_of.end(); ++b) {
           Watched& pair = watched[{combination.controller, a->first, b->first}];
-          const std::optional<Lifetime> lifetime = time_together(*a->second, *b->second, distance);
+          const std::optional<Lifetime> lifetime = time_together(
+              {*a->second, traces.at(a->first)}, {*b->second, traces.at(b->first)}, options.parting_distance);
           lifetime.has_value() ? pair.lifetimes.push_back(*lifetime) : void(++pair.without_trace);
         }
       }

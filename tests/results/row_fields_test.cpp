@@ -33,8 +33,8 @@ struct AnotherValue {
   void operator()(bool& value) const { value = true; }
   void operator()(std::optional<bool>& value) const { value = false; }
   void operator()(Outcome& value) const { value = Outcome::kDiverged; }
-  void operator()(std::map<std::string, double>& values) const { values = {{"a", 0.5}}; }
-  void operator()(std::map<std::string, bool>& values) const { values = {{"a", true}}; }
+  void operator()(NamedNumbers& values) const { values = {{"a", 0.5}}; }
+  void operator()(NamedFlags& values) const { values = {{"a", true}}; }
   void operator()(std::vector<std::string>& values) const { values = {"root"}; }
   void operator()(std::vector<int>& values) const { values = {1, 2, 3}; }
   void operator()(std::vector<std::vector<int>>& values) const { values = {{1, 2, 3}}; }

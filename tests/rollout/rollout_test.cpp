@@ -108,7 +108,7 @@ TEST(Rollout, AnEpisodeWhoseProcessWasStoppedLosesNothing) {
   EXPECT_EQ(stopped.state_hash, expected.state_hash);
 }
 
-TEST(Rollout, AnEpisodeThatComputesForLongOrWaitsForTenTimesAsLongTimesOut) {
+TEST(Rollout, AnEpisodeThatComputesForLongOrWaitsForMuchLongerTimesOut) {
   const Parts parts;
   RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
   setup.wall_limit = 3.0;

@@ -94,10 +94,10 @@ def stopped(trials):
         out = trials.fresh("stopped")
         works = number % 2 == 1
         if works:
-            planned = trials.run(["plan", *trials.command(out, *limit)[2:], "--shards", "1"])
+            planned = trials.run(["plan", *trials.command(out, *limit)[2:], "--shards", "2"])  # one of each engine
             trials.check("a plan: 0", planned.returncode == 0, planned.stderr)
-        command = [trials.program, "work", out, "--shard", "0", "-q"] if works else trials.command(out, *limit)
-        processes = [trials.start(command) for _ in range(1 + works)]
+        shards = [[trials.program, "work", out, "--shard", shard, "-q"] for shard in "1010"]
+        processes = [trials.start(command) for command in (shards if works else [trials.command(out, *limit)])]
         time.sleep(generator.uniform(0.05, 0.8) * seconds)
         stop_for(processes[0], 3.0)
         for process in processes:
@@ -107,7 +107,7 @@ def stopped(trials):
             merged = trials.run(["merge", out])
             trials.check("a merge after a stop: 0", merged.returncode == 0, merged.stdout + merged.stderr)
         trials.check_same_rows("workers, one stopped" if works else "a stopped run", wanted, out)
-    trials.say(f"{count} stops of 3 s, the limit being 1 s: {count // 2} of a run, {count // 2} of one of two workers of a shard")
+    trials.say(f"{count} stops of 3 s, the limit being 1 s: {count // 2} of a run, {count // 2} of one of two workers of each shard")
 
 
 def stop_for(process, seconds):
