@@ -10,6 +10,7 @@
 #include "duet/core/order_statistics.h"
 #include "duet/core/require.h"
 #include "duet/formats/column_binding.h"
+#include "duet/formats/motion_support.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
@@ -23,7 +24,10 @@ constexpr double kLongestMotion = 86'400.0;  // [s]: what any rate turns into a 
 constexpr double kLimitMargin = 0.1;         // [rad] beyond the card's limits that still counts as inside
 constexpr double kLowestBase = 0.2, kHighestBase = 2.0;  // plausible height of the base over its standing height
 constexpr double kSameBodies = 0.05;                     // [m] mean distance at which bodies agree with our kinematics
-constexpr int kSampled = 60;                             // frames that detection looks at
+constexpr double kStandingLow = 0.7, kStandingHigh = 1.3;  // height of the base over its standing height
+constexpr int kTellingBodies = 8;                          // as many tell an order by the nearest of them
+constexpr double kOftenQuick = 0.02;                       // share of steps
+constexpr int kSampled = 60;                               // frames that detection looks at
 
 [[noreturn]] void refuse_file(const FileMotion& file, const std::string& fault) {
   throw InputError(fmt::format("'{}': {}", file.path, fault));
@@ -57,6 +61,7 @@ class Interpreter {
     choose_orders();
     fill();
     judge_bodies();
+    say_doubts();
     return std::move(result_);
   }
 
@@ -119,13 +124,32 @@ class Interpreter {
     AngleUnit unit = options_.angles.value_or(layout_.angles);
     const double in_radians = share_in_limits(1.0), in_degrees = share_in_limits(kDegree);
     const char* why = options_.angles ? "as told" : "as documented";
-    if (!options_.angles && unit == AngleUnit::kRadians && in_radians < kOften && in_degrees >= kOften) {
+    const bool beyond_a_turn = file_.q.size() > 0 && file_.q.cwiseAbs().maxCoeff() > 2.0 * std::numbers::pi;
+    if (!options_.angles && unit == AngleUnit::kRadians && in_radians < kOften && in_degrees >= kOften &&
+        beyond_a_turn) {
       unit = AngleUnit::kDegrees;
       why = "detected";
     }
     fact_.radians = unit == AngleUnit::kDegrees ? kDegree : 1.0;
     say(fmt::format("angles: {} ({}): within the joint limits {:.1f} % as rad, {:.1f} % as deg", to_string(unit), why,
                     100.0 * in_radians, 100.0 * in_degrees));
+  }
+
+  // A root that is nowhere near a robot's height along z, and is along another axis, is in a file with another axis up.
+  void require_up() const {
+    for (int axis = 0; axis < 2; ++axis) {
+      std::vector<double> heights;
+      for (const Eigen::Vector3d& p : file_.position) heights.push_back(std::abs(p[axis]));
+      const double height = quantile(std::move(heights), 0.5);
+      for (const double metres : {1.0, 0.01, 0.001}) {
+        const double share = height * metres / robot_.standing_height;
+        if (share < kStandingLow || share > kStandingHigh) continue;
+        refuse_file(file_,
+                    fmt::format("expected z up, but the root's median height is that of robot '{}' along {} ({:.4g} "
+                                "units); turn the file, or say its unit of length with --units",
+                                robot_.name, axis == 0 ? "x" : "y", height));
+      }
+    }
   }
 
   void choose_metres() {
@@ -148,6 +172,7 @@ class Interpreter {
         break;
       }
     }
+    if (!options_.metres && robot_.standing_height > 0.0 && !plausible(fact_.metres)) require_up();
     say(
         fmt::format("length: {:g} m a unit ({}): the root's median height is {:.4g} units, {:.3f} m; '{}' stands at "
                     "{:.3f} m",
@@ -263,12 +288,94 @@ class Interpreter {
   // Bodies other than the base itself tell the order of joints and bodies.
   [[nodiscard]] bool has_witness() const { return file_.bodies.points() >= 3 && !body_links(fact_.bodies).empty(); }
 
+  // Every so many frames of the motion under one choice of what is open.
+  [[nodiscard]] RobotMotion motion_of(const FactChoice& fact, int every) const {
+    RobotMotion motion;
+    motion.rate_hz = result_.motion.rate_hz;
+    motion.joint_names = robot_.joint_names();
+    motion.q.resize(robot_.dof(), (file_.frames() + every - 1) / every);
+    for (int t = 0; t < file_.frames(); t += every) {
+      motion.root.push_back(root(t, fact.quaternion));
+      motion.q.col(t / every) = angles(t, fact.joints);
+    }
+    return motion;
+  }
+
+  // With the order of quaternions that speaks least against it.
+  [[nodiscard]] MotionSupport support(TreeOrder joints) const {
+    FactChoice fact = fact_;
+    fact.joints = joints;
+    if (file_.quaternion_witness) fact.quaternion = *file_.quaternion_witness;
+    const MotionSupport documented = support_of(robot_, motion_of(fact, stride()));
+    if (options_.quaternion || file_.quaternion_witness || file_.quaternion.empty()) return documented;
+    fact.quaternion = fact.quaternion == QuaternionOrder::kXyzw ? QuaternionOrder::kWxyz : QuaternionOrder::kXyzw;
+    const MotionSupport other = support_of(robot_, motion_of(fact, stride()));
+    return other.doubts() < documented.doubts() ? other : documented;
+  }
+
+  // Mean distance of the robot's links from the nearest body of the file. [m]
+  [[nodiscard]] double nearest_bodies(TreeOrder joints) {
+    const double metres = file_.bodies_in_base ? 1.0 : fact_.metres;
+    double sum = 0.0, count = 0.0;
+    for (int t = 0; t < file_.frames(); t += stride()) {
+      kinematics_.update(file_.bodies_in_base ? Pose() : root(t, fact_.quaternion), angles(t, joints));
+      for (int link = 0; link < static_cast<int>(robot_.links.size()); ++link) {
+        double nearest = std::numeric_limits<double>::infinity();
+        for (int b = 0; b < file_.bodies.points(); ++b)
+          nearest = std::min(nearest, (kinematics_.p_WL(link) - metres * file_.bodies.at(t, b)).norm());
+        sum += nearest;
+        count += 1.0;
+      }
+    }
+    return sum / count;
+  }
+
+  // Columns without names and without bodies that tell: by the robot's own body, where it speaks for one order alone.
+  void choose_joints() {
+    const TreeOrder documented = fact_.joints;
+    const TreeOrder other = documented == TreeOrder::kDepthFirst ? TreeOrder::kBreadthFirst : TreeOrder::kDepthFirst;
+    if (options_.joints || columns(documented) == columns(other)) {
+      say(fmt::format("joints: {}, {}; the file does not name them", to_string(documented),
+                      options_.joints ? "as told" : "as documented"));
+      return;
+    }
+    const MotionSupport here = support(documented), there = support(other);
+    std::string figures =
+        fmt::format("as {}: {}; as {}: {}", to_string(documented), here.text(), to_string(other), there.text());
+    bool better =
+        there.doubts() < here.doubts() && (there.doubts() == 0 || (there.fits_limits() && !here.fits_limits()));
+    if (file_.bodies.points() >= kTellingBodies) {
+      const double near = nearest_bodies(documented), far = nearest_bodies(other);
+      figures += fmt::format("; the links are {:.3f} m and {:.3f} m from the nearest bodies of the file", near, far);
+      better =
+          std::min(near, far) < kSameBodies && std::max(near, far) > 2.0 * std::min(near, far) ? far < near : better;
+    }
+    if (!better && !options_.angles && !here.fits_limits() && !there.fits_limits())
+      refuse_file(file_,
+                  fmt::format("neither order of the joints fits robot '{}', and the file does not name them ({}); "
+                              "say the order with --joints, or name the columns",
+                              robot_.name, figures));
+    if (better) fact_.joints = other;
+    say(fmt::format("joints: {}, {}; the file does not name them ({})", to_string(fact_.joints),
+                    better ? "detected" : "as documented", figures));
+  }
+
+  // What speaks against the motion as it was read; nobody shall take it unseen.
+  void say_doubts() {
+    const MotionSupport support = support_of(robot_, result_.motion);
+    if (support.doubts() > 0) say(fmt::format("doubt: {}", support.text()));
+    const double quick = share_too_quick(robot_, result_.motion);
+    if (quick > kOftenQuick)
+      say(fmt::format("doubt: at {} Hz a joint is quicker than its limit in {:.1f} % of the steps",
+                      result_.motion.rate_hz, 100.0 * quick));
+    if (result_.kinematics_error && *result_.kinematics_error > kSameBodies)
+      say("doubt: the file's bodies are elsewhere than its joints put them");
+  }
+
   void choose_orders() {
     const bool by_bodies = has_witness() && choose_by_bodies();
+    if (file_.joint_names.empty() && !by_bodies) choose_joints();
     if (!file_.quaternion.empty() && !(by_bodies && !file_.bodies_in_base)) choose_quaternion();
-    if (file_.joint_names.empty() && !by_bodies)
-      say(fmt::format("joints: {}, {}; the file does not name them", to_string(fact_.joints),
-                      options_.joints ? "as told" : "as documented"));
     const double height = sole_height(fact_.quaternion);
     if (std::isfinite(height)) say(fmt::format("lower sole: {:.3f} m over the floor (median)", height));
   }
@@ -317,7 +424,7 @@ class Interpreter {
     const auto on_floor = [](double h) { return std::abs(h) <= kSolesOnFloor; };
     if (!options_.quaternion && file_.quaternion_witness) {
       fact_.quaternion = *file_.quaternion_witness;
-      why = "another array of the file says";
+      why = "the file says";
     } else if (!options_.quaternion && !on_floor(height) && on_floor(other_height) &&
                std::abs(height - other_height) >= kClearlyElsewhere) {
       fact_.quaternion = other;
@@ -328,15 +435,9 @@ class Interpreter {
   }
 
   void fill() {
-    RobotMotion& motion = result_.motion;
-    motion.joint_names = robot_.joint_names();
-    motion.q.resize(robot_.dof(), file_.frames());
-    for (int t = 0; t < file_.frames(); ++t) {
-      motion.root.push_back(root(t, fact_.quaternion));
-      motion.q.col(t) = angles(t, fact_.joints);
-    }
+    result_.motion = motion_of(fact_, 1);
     try {
-      validate(motion, fmt::format("'{}'", file_.path));
+      validate(result_.motion, fmt::format("'{}'", file_.path));
     } catch (const std::invalid_argument& error) {
       throw InputError(error.what());
     }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -10,36 +11,165 @@
 
 #include "duet/core/number.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
 #include "duet/formats/file_arrays.h"
 
 namespace duet {
 namespace {
 
 constexpr Eigen::Index kRootColumns = 7;
+constexpr std::string_view kBonesJoint = "_dof";
+const std::array<std::string, 8> kToolsRoot = {"time",    "root_x",  "root_y",  "root_z",
+                                               "root_qx", "root_qy", "root_qz", "root_qw"};
+constexpr std::string_view kToolsJoint = "dof_";
 
-// ---- Unitree and LAFAN1: no names
-
-bool is_unitree(const MotionSource& source) {
-  return source.table && source.table->columns.empty() && source.table->values.rows() > kRootColumns;
+// From the meta line, else from the mean step of the column of times.
+std::optional<double> rate_of(const CsvTable& table) {
+  for (const char* key : {"sample_rate", "fps"}) {
+    const auto found = table.meta.find(key);
+    if (found == table.meta.end()) continue;
+    if (const std::optional<double> rate = parse_number(found->second); rate && *rate > 0.0) return rate;
+    throw InputError(fmt::format("'{}': {}: expected a rate above 0 Hz, found '{}'", table.name, key, found->second));
+  }
+  const int time = table.find(kToolsRoot[0]);
+  if (time < 0 || table.rows() < 2) return std::nullopt;
+  const double span = table.values(time, table.rows() - 1) - table.values(time, 0);
+  if (!(span > 0.0))
+    throw InputError(fmt::format("'{}': column 'time': expected ascending times, found {} s in all", table.name, span));
+  return (table.rows() - 1) / span;
 }
 
-// "60" of "take_102.bvh_60hz.csv".
+// ---- Unitree and LAFAN1: without names, or with a line of them
+
+// What a column of the root is called: an axis, of its position or of its quaternion.
+struct RootColumn {
+  char axis = '\0';
+  bool rotation = false;
+};
+
+// "root_x", "pos_x", "x" and "qw", "quat_w", "rot_x", ...; none for a joint.
+std::optional<RootColumn> root_column(std::string name) {
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (name.empty() || std::string_view("xyzw").find(name.back()) == std::string_view::npos) return std::nullopt;
+  const char axis = name.back();
+  name.pop_back();
+  for (const std::string_view part : {"root", "base", "pelvis", "_", ".", " "})
+    for (std::size_t at = name.find(part); at != std::string::npos; at = name.find(part)) name.erase(at, part.size());
+  for (const std::string_view turn : {"q", "quat", "quaternion", "rot", "rotation", "orientation", "ori"})
+    if (name == turn) return RootColumn{axis, true};
+  for (const std::string_view place : {"", "p", "pos", "position", "t", "trans", "translate", "translation"})
+    if (name == place && axis != 'w') return RootColumn{axis, false};
+  return std::nullopt;
+}
+
+// Columns of x, y, z and of the quaternion's x, y, z, w; -1 where no name says so.
+std::array<int, kRootColumns> named_root(const CsvTable& table) {
+  std::array<int, kRootColumns> row{};
+  row.fill(-1);
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const std::optional<RootColumn> found = root_column(table.columns[c]);
+    if (!found) continue;
+    const std::size_t place = std::string_view("xyzw").find(found->axis) + (found->rotation ? 3 : 0);
+    if (row[place] < 0) row[place] = static_cast<int>(c);
+  }
+  return row;
+}
+
+bool names_a_root(const CsvTable& table) {
+  const std::array<int, kRootColumns> row = named_root(table);
+  return std::all_of(row.begin(), row.end(), [](int column) { return column >= 0; });
+}
+
+bool is_unitree(const MotionSource& source) {
+  if (!source.table || source.table->values.rows() <= kRootColumns) return false;
+  if (source.table->columns.empty()) return true;
+  return source.table->find(kToolsRoot[4]) < 0 && names_a_root(*source.table);
+}
+
+// Rates that recordings have, the common ones and those of NTSC.
+bool is_common_rate(double rate_hz) {
+  for (const double common :
+       {20.0, 24.0, 25.0, 30.0, 48.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 144.0, 200.0, 240.0, 250.0, 500.0, 1000.0})
+    if (std::abs(rate_hz - common) < 1e-9 || std::abs(rate_hz - common / 1.001) < 0.01) return true;
+  return false;
+}
+
+// The whole number that ends at `end`, and where it begins.
+std::size_t digits_before(std::string_view text, std::size_t end) {
+  while (end > 0 && std::isdigit(static_cast<unsigned char>(text[end - 1])) != 0) --end;
+  return end;
+}
+
+// "60" of "take_102.bvh_60hz.csv", 119.88 of "walk_119.88hz.csv". In "take_119_88hz.csv" both 88 and 119.88 can be
+// meant: the one that recordings have. Throws InputError where that decides nothing.
 std::optional<double> rate_in_name(const std::string& path) {
   std::string name = std::filesystem::path(path).filename().string();
   for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  const std::size_t unit = name.find("hz");
+  std::size_t unit = std::min(name.find("hz"), name.find("fps"));
   if (unit == std::string::npos) return std::nullopt;
-  std::size_t begin = unit;
-  while (begin > 0 && (std::isdigit(static_cast<unsigned char>(name[begin - 1])) != 0)) --begin;
-  const std::optional<double> rate = parse_number(std::string_view(name).substr(begin, unit - begin));
-  return rate && *rate > 0.0 ? rate : std::nullopt;
+  if (unit > 1 && std::string_view("_- ").find(name[unit - 1]) != std::string_view::npos) --unit;
+  const std::string_view text(name.data(), unit);
+  const std::size_t begin = digits_before(text, unit);
+  const std::optional<double> whole = parse_number(text.substr(begin));
+  if (!whole || *whole <= 0.0) return std::nullopt;
+  if (begin < 2 || std::string_view("._").find(text[begin - 1]) == std::string_view::npos) return whole;
+  const std::size_t first = digits_before(text, begin - 1);
+  const bool word = first > 0 && std::isalpha(static_cast<unsigned char>(text[first - 1])) != 0;
+  if (first == begin - 1 || word) return whole;
+  const std::optional<double> decimal =
+      parse_number(fmt::format("{}.{}", text.substr(first, begin - 1 - first), text.substr(begin)));
+  if (!decimal || text[begin - 1] == '.') return decimal;
+  if (is_common_rate(*whole) != is_common_rate(*decimal)) return is_common_rate(*whole) ? whole : decimal;
+  throw InputError(
+      fmt::format("'{}': the file's name may say {} Hz or {} Hz; say which with --rate", path, *whole, *decimal));
 }
 
-FileMotion read_unitree(const MotionSource& source, const RobotModel& /*robot*/,
-                        const RobotMotionOptions& /*options*/) {
+// The name of a joint without what writers put around it.
+std::string bare_joint(const std::string& column) {
+  std::string_view name = column;
+  if (name.starts_with(kToolsJoint)) name.remove_prefix(kToolsJoint.size());
+  if (name.ends_with(kBonesJoint)) name.remove_suffix(kBonesJoint.size());
+  return std::string(name);
+}
+
+bool counts_frames(std::string_view column) {
+  for (const std::string_view name : {"time", "Time", "timestamp", "t", "frame", "Frame", "index"})
+    if (column == name) return true;
+  return false;
+}
+
+// Root and joints as the line of names says, wherever they stand.
+void take_named_columns(const CsvTable& table, FileMotion& motion) {
+  const std::array<int, kRootColumns> root = named_root(table);
+  if (!names_a_root(table))
+    throw InputError(
+        fmt::format("'{}': line 1 names columns, but not the root's x, y, z and quaternion (root_x, "
+                    "root_y, root_z, qx, qy, qz, qw): {}",
+                    table.name, shown(fmt::format("{}", fmt::join(table.columns, ", ")), kShownSentence)));
+  std::vector<int> rows;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const int column = static_cast<int>(c);
+    if (std::find(root.begin(), root.end(), column) != root.end() || counts_frames(table.columns[c])) continue;
+    motion.joint_names.push_back(bare_joint(table.columns[c]));
+    rows.push_back(column);
+  }
+  const Eigen::MatrixXd qpos = rows_of(table.values, {root.begin(), root.end()});
+  take_qpos(qpos, 0, motion);
+  motion.q = rows_of(table.values, rows);
+  motion.quaternion_witness = QuaternionOrder::kXyzw;
+  motion.evidence.emplace_back("root: its columns are bound by name");
+}
+
+FileMotion read_unitree(const MotionSource& source, const RobotModel& /*robot*/, const RobotMotionOptions& options) {
   FileMotion motion{.path = source.path};
-  const Eigen::MatrixXd& rows = source.table->values;
-  take_qpos(rows, rows.rows() - kRootColumns, motion);
+  const CsvTable& table = *source.table;
+  if (table.columns.empty()) {
+    take_qpos(table.values, table.values.rows() - kRootColumns, motion);
+  } else {
+    take_named_columns(table, motion);
+    motion.rate_hz = rate_of(table);
+  }
+  if (options.rate_hz || motion.rate_hz) return motion;
   motion.rate_hz = rate_in_name(source.path);
   if (motion.rate_hz) motion.evidence.push_back(fmt::format("the file's name says {} Hz", *motion.rate_hz));
   return motion;
@@ -54,7 +184,6 @@ MotionFiles write_unitree(const RobotMotion& motion, const RobotModel& robot, co
 
 const std::array<std::string, 7> kBonesRoot = {"Frame",        "root_translateX", "root_translateY", "root_translateZ",
                                                "root_rotateX", "root_rotateY",    "root_rotateZ"};
-constexpr std::string_view kBonesJoint = "_dof";
 constexpr double kCentimetre = 0.01;
 constexpr double kDegree = std::numbers::pi / 180.0;
 
@@ -110,27 +239,7 @@ MotionFiles write_bones(const RobotMotion& motion, const RobotModel& robot, cons
 
 // ---- hhtools
 
-const std::array<std::string, 8> kToolsRoot = {"time",    "root_x",  "root_y",  "root_z",
-                                               "root_qx", "root_qy", "root_qz", "root_qw"};
-constexpr std::string_view kToolsJoint = "dof_";
-
 bool is_hhtools(const MotionSource& source) { return source.table && source.table->find(kToolsRoot[4]) >= 0; }
-
-// From the meta line, else from the mean step of the column of times.
-std::optional<double> rate_of(const CsvTable& table) {
-  for (const char* key : {"sample_rate", "fps"}) {
-    const auto found = table.meta.find(key);
-    if (found == table.meta.end()) continue;
-    if (const std::optional<double> rate = parse_number(found->second); rate && *rate > 0.0) return rate;
-    throw InputError(fmt::format("'{}': {}: expected a rate above 0 Hz, found '{}'", table.name, key, found->second));
-  }
-  const int time = table.find(kToolsRoot[0]);
-  if (time < 0 || table.rows() < 2) return std::nullopt;
-  const double span = table.values(time, table.rows() - 1) - table.values(time, 0);
-  if (!(span > 0.0))
-    throw InputError(fmt::format("'{}': column 'time': expected ascending times, found {} s in all", table.name, span));
-  return (table.rows() - 1) / span;
-}
 
 FileMotion read_hhtools(const MotionSource& source, const RobotModel& /*robot*/,
                         const RobotMotionOptions& /*options*/) {
@@ -164,7 +273,7 @@ std::vector<RobotMotionFormat> table_formats() {
   return {
       {.name = "unitree",
        .about = "Unitree's LAFAN1 retargeting and what follows it (rl_sar; a rate in the file's name counts)",
-       .holds = "CSV without names: x, y, z, quaternion, n joint angles",
+       .holds = "CSV: x, y, z, quaternion, n joint angles; bound by name where the first line names them",
        .evidence = "unitreerobotics/LAFAN1_Retargeting_Dataset README; whole_body_tracking csv_to_npz.py",
        .licence = "see the data set's card",
        .ending = ".csv",

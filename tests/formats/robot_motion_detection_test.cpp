@@ -3,9 +3,12 @@
 
 #include <numbers>
 
+#include "duet/core/require.h"
 #include "duet/formats/robot_motion_format.h"
+#include "duet/formats/tree_order.h"
 #include "tests/formats/known_motion.h"
 #include "tests/formats/motion_files.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {
@@ -99,6 +102,88 @@ TEST(RobotMotionFormat, ARateInTheNameOfAUnitreeFileCounts) {
   EXPECT_EQ(read_bytes(bytes, "walk.csv").motion.rate_hz, 30.0);
   EXPECT_EQ(read_bytes(bytes, "hz.csv").motion.rate_hz, 30.0);
   EXPECT_EQ(read_bytes(bytes, "a_60hz.csv", {.rate_hz = 20.0}).motion.rate_hz, 20.0);
+}
+
+TEST(RobotMotionFormat, ARateInANameIsReadWholeOrAskedFor) {
+  const std::string bytes = file_of(known_motion(robot("g1")), "unitree");
+  for (const auto& [name, rate] : {std::pair{"walk_119.88hz.csv", 119.88},
+                                   {"walk_119_88Hz.csv", 119.88},
+                                   {"u_29_97hz.csv", 29.97},
+                                   {"take_3_60hz.csv", 60.0},
+                                   {"walk2_50hz.csv", 50.0},
+                                   {"dance_120_hz.csv", 120.0},
+                                   {"dance_25fps.csv", 25.0}})
+    EXPECT_EQ(read_bytes(bytes, name).motion.rate_hz, rate) << name;
+  EXPECT_THAT(test::thrown_message<InputError>([&] { read_bytes(bytes, "take_77_33hz.csv"); }),
+              HasSubstr("the file's name may say 33 Hz or 77.33 Hz; say which with --rate"));
+  EXPECT_EQ(read_bytes(bytes, "take_77_33hz.csv", {.rate_hz = 33.0}).motion.rate_hz, 33.0);
+}
+
+// A motion that stands, with everything off zero, so that each fact tells.
+RobotMotion standing_motion() {
+  RobotMotion motion = known_motion(robot("g1"));
+  const RobotState state = robot("g1").standing_state();
+  for (int t = 0; t < motion.frames(); ++t) {
+    const double s = 0.1 * t;
+    motion.q.col(t) = robot("g1").neutral;
+    for (const char* name : {"left_shoulder_pitch_joint", "right_elbow_joint", "left_elbow_joint"})
+      motion.q(robot("g1").joint_index(name), t) += 0.4 * std::sin(s);
+    motion.root[t] = {yaw_rotation(0.3 + 0.01 * t), state.X_WB.p};
+  }
+  return motion;
+}
+
+TEST(RobotMotionFormat, ALineOfNamesBindsAUnitreeTable) {
+  const RobotMotion motion = standing_motion();
+  const Eigen::MatrixXd rows = parse_csv_table(file_of(motion, "unitree"), "x.csv").values;
+  std::vector<std::string> names = {"root_x", "root_y", "root_z", "qx", "qy", "qz", "qw"};
+  for (const std::string& joint : motion.joint_names) names.push_back(joint);
+  std::vector<int> order(names.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = static_cast<int>((i * 5 + 3) % order.size());
+  std::vector<std::string> shuffled;
+  for (const int c : order) shuffled.push_back(names[static_cast<std::size_t>(c)]);
+  Eigen::MatrixXd mixed(rows.rows(), rows.cols());
+  for (std::size_t i = 0; i < order.size(); ++i) mixed.row(static_cast<Eigen::Index>(i)) = rows.row(order[i]);
+  for (const char* format : {"", "unitree"}) {
+    const RobotMotionFile read = read_bytes(csv_text(shuffled, mixed), "x.csv", {.rate_hz = 50.0}, format);
+    EXPECT_LT(distance(read.motion, motion), kSame);
+    EXPECT_THAT(read.evidence, Contains(HasSubstr("29, bound by name")));
+  }
+  names[3] = "left_foo";
+  EXPECT_THAT(test::thrown_message<InputError>(
+                  [&] { read_bytes(csv_text(names, rows), "x.csv", {.rate_hz = 50.0}, "unitree"); }),
+              HasSubstr("line 1 names columns, but not the root's x, y, z and quaternion"));
+}
+
+TEST(RobotMotionFormat, TheOrderOfUnnamedJointsIsToldByTheRobotsBody) {
+  const RobotMotion motion = standing_motion();
+  const Eigen::MatrixXd rows = parse_csv_table(file_of(motion, "unitree"), "x.csv").values;
+  const std::vector<int> joints = joints_in_order(robot("g1"), TreeOrder::kBreadthFirst);
+  Eigen::MatrixXd breadth = rows;
+  for (std::size_t i = 0; i < joints.size(); ++i)
+    breadth.row(7 + static_cast<Eigen::Index>(i)) = rows.row(7 + joints[i]);
+  const RobotMotionFile read = read_bytes(csv_text({}, breadth), "x.csv", {.rate_hz = 50.0});
+  EXPECT_LT(distance(read.motion, motion), kSame);
+  EXPECT_THAT(read.evidence, Contains(HasSubstr("joints: breadth-first, detected")));
+  EXPECT_THAT(read.evidence, testing::Not(Contains(testing::StartsWith("doubt"))));
+  const RobotMotionFile told =
+      read_bytes(csv_text({}, breadth), "x.csv", {.rate_hz = 50.0, .joints = TreeOrder::kDepthFirst});
+  EXPECT_THAT(told.evidence, Contains(testing::StartsWith("doubt: within the limits")));
+  Eigen::MatrixXd negated = rows;
+  negated.bottomRows(29) *= -1.0;
+  negated.bottomRows(29).setConstant(-3.5);
+  EXPECT_THAT(test::thrown_message<InputError>([&] { read_bytes(csv_text({}, negated), "x.csv", {.rate_hz = 50.0}); }),
+              HasSubstr("say the order with --joints, or name the columns"));
+}
+
+TEST(RobotMotionFormat, AnotherAxisUpAndAWrongClockAreNotPassedOver) {
+  const RobotMotion motion = standing_motion();
+  Eigen::MatrixXd rows = parse_csv_table(file_of(motion, "unitree"), "x.csv").values;
+  EXPECT_THAT(read_bytes(csv_text({}, rows), "x.csv", {.rate_hz = 5000.0}).evidence,
+              Contains(HasSubstr("doubt: at 5000 Hz a joint is quicker than its limit")));
+  rows.row(1).swap(rows.row(2));
+  EXPECT_THAT(test::thrown_message<InputError>([&] { read_bytes(csv_text({}, rows), "x.csv", {.rate_hz = 50.0}); }),
+              HasSubstr("expected z up, but the root's median height is that of robot 'g1' along y"));
 }
 
 TEST(RobotMotionFormat, NamedJointsAreBoundByNameInAnyOrder) {

@@ -191,7 +191,7 @@ TEST(RobotMotionFormat, PhcKeepsTheRootAndTheJointsAsRotationVectors) {
   const RobotMotion motion = known_motion(robot("g1"));
   const RobotMotionFile read = read_bytes(file_of(motion, "phc"), "x.pkl");
   EXPECT_THAT(read.evidence, Contains(HasSubstr("pose_aa: its root is")));
-  EXPECT_THAT(read.evidence, Contains(HasSubstr("root rotation: xyzw (another array of the file says)")));
+  EXPECT_THAT(read.evidence, Contains(HasSubstr("root rotation: xyzw (the file says)")));
 }
 
 TEST(RobotMotionFormat, PhcIsReadAsJoblibDumpsIt) {
