@@ -43,7 +43,7 @@ Archive open_archive(std::string_view bytes, const std::string& name) {
   Source source(zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error.value));
   if (!source) fail(name, zip_error_strerror(&error.value));
   Archive archive(zip_open_from_source(source.get(), ZIP_RDONLY, &error.value));
-  if (!archive) fail(name, fmt::format("not a zip archive or truncated ({})", zip_error_strerror(&error.value)));
+  if (!archive) fail(name, "not a zip archive or truncated");
   // The archive owns the source from here on.
   static_cast<void>(source.release());  // NOLINT(bugprone-unused-return-value)
   return archive;

@@ -106,7 +106,7 @@ InteractionClip read_clip(const Npz& npz) {
                {});
   const double rate_hz = get_rate(npz);
   const std::vector<int> columns = get_joint_columns(npz);
-  InteractionClip clip{.id = npz.text("id"),
+  InteractionClip clip{.id = get_id(npz, "id"),
                        .task = get_task(npz),
                        .a = get_motion(npz, "a", rate_hz, columns),
                        .b = get_motion(npz, "b", rate_hz, columns),

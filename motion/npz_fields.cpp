@@ -53,6 +53,14 @@ void put_task(Npz& npz, Task task, Person reactor, const Phases& phases, double 
   npz.set_number("rate_hz", rate_hz);
 }
 
+std::string get_id(const Npz& npz, const std::string& key) {
+  constexpr std::size_t kLongestId = 200;  // [bytes]: an id stands in names of files and in every row
+  std::string id = npz.text(key);
+  if (id.empty() || shown(id, kLongestId) != id)
+    refuse(npz, key, fmt::format("expected 1 to {} printable characters, found '{}'", kLongestId, shown(id)));
+  return id;
+}
+
 Task get_task(const Npz& npz) {
   const std::string name = npz.text("task");
   try {
@@ -76,6 +84,9 @@ Phases get_phases(const Npz& npz) {
 double get_rate(const Npz& npz) {
   const double rate_hz = npz.number("rate_hz");
   if (!(rate_hz > 0.0)) refuse(npz, "rate_hz", fmt::format("expected a positive rate, found {}", rate_hz));
+  if (rate_hz < kLowestRate)
+    refuse(npz, "rate_hz",
+           fmt::format("expected {} Hz or more, as people's motions have, found {}", kLowestRate, rate_hz));
   return rate_hz;
 }
 

@@ -32,9 +32,12 @@ void check_schema(const Npz& npz, const std::string& schema, std::int64_t versio
 
 // "task", "reactor" ("A" or "B"), "phases" ([act_begin, act_end]), "rate_hz".
 void put_task(Npz& npz, Task task, Person reactor, const Phases& phases, double rate_hz);
+// 1 to 200 printable characters.
+std::string get_id(const Npz& npz, const std::string& key);
 Task get_task(const Npz& npz);
 Person get_reactor(const Npz& npz);
 Phases get_phases(const Npz& npz);
+inline constexpr double kLowestRate = 5.0;  // of motions of people [Hz]
 double get_rate(const Npz& npz);
 
 // "human_joint_names": the 24 names, in the order of the columns of every human motion in the archive.

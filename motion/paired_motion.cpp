@@ -90,7 +90,7 @@ PairedMotion read_paired_motion(const Npz& npz) {
                {kLossPrefix});
   const double rate_hz = get_rate(npz);
   const std::vector<int> columns = get_joint_columns(npz);
-  PairedMotion motion{.clip_id = npz.text("clip_id"),
+  PairedMotion motion{.clip_id = get_id(npz, "clip_id"),
                       .task = get_task(npz),
                       .phases = get_phases(npz),
                       .reactor = get_reactor(npz),

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 
@@ -18,9 +19,13 @@ namespace {
 constexpr double kOddTilt = 10.0 * std::numbers::pi / 180.0;  // [rad] of both people's mean upright
 constexpr double kOddFloor = 0.15;                            // [m]
 constexpr double kWrongFloor = 0.5;                           // [m] no shoe, step or noise explains it
-constexpr double kBackwards = -0.3;  // mean cosine of the toes with the heading; people's are above 0.8
-constexpr double kLeastToe = 0.02;   // a toe that is level with its ankle says nothing [m]
-constexpr double kAverted = -0.5;    // mean cosine of the heading with the way to the partner, in the act
+constexpr double kBackwards = -0.3;      // mean cosine of the toes with the heading; people's are above 0.8
+constexpr double kLeastToe = 0.02;       // a toe that is level with its ankle says nothing [m]
+constexpr double kOnePlace = 0.1;        // of two pelvises: no two people stand so, not even in a hug [m]
+constexpr double kContactApart = 1.0;    // of two joints that are said to touch: more than a body is between them [m]
+constexpr double kContactMissing = 3.0;  // the same: no reach, pose or step explains it [m]
+constexpr double kFarApart = 6.0;        // of two people who act together [m]
+constexpr double kAverted = -0.5;        // mean cosine of the heading with the way to the partner, in the act
 
 using Person3 = PointTracks::ConstFrame;
 
@@ -133,6 +138,42 @@ void judge_facing(const InteractionClip& clip, Plausibility& found) {
     found.oddities.push_back("the two turn their backs on one another during the act: left and right may be exchanged");
 }
 
+// Share of the frames in which both pelvises are at one place.
+double share_at_one_place(const InteractionClip& clip) {
+  int together = 0;
+  for (int t = 0; t < clip.frames(); ++t)
+    together += (clip.a.joints.at(t, kPelvis) - clip.b.joints.at(t, kPelvis)).norm() < kOnePlace ? 1 : 0;
+  return static_cast<double>(together) / clip.frames();
+}
+
+// How near the joints of an annotated contact come. [m]
+double nearest(const InteractionClip& clip, const ContactWindow& window) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int t = window.begin; t < window.end; ++t)
+    nearest = std::min(nearest, (clip.a.joints.at(t, window.joint_a) - clip.b.joints.at(t, window.joint_b)).norm());
+  return nearest;
+}
+
+void judge_distance(const InteractionClip& clip, Plausibility& found) {
+  if (share_at_one_place(clip) > 0.5)
+    found.faults.push_back(fmt::format(
+        "the two people are at one place: their pelvises are within {} m of one another in {:.0f} % of the frames",
+        kOnePlace, 100.0 * share_at_one_place(clip)));
+  for (const ContactWindow& window : clip.contacts) {
+    const double gap = nearest(clip, window);
+    if (gap < kContactApart) continue;
+    (gap < kContactMissing ? found.oddities : found.faults)
+        .push_back(fmt::format("{} of A and {} of B are said to touch in frames [{}, {}) and stay {:.4g} m apart",
+                               kSmplNames[window.joint_a], kSmplNames[window.joint_b], window.begin, window.end, gap));
+    return;
+  }
+  double apart = std::numeric_limits<double>::infinity();
+  for (int t = 0; t < clip.frames(); ++t)
+    apart = std::min(apart, (clip.a.joints.at(t, kPelvis) - clip.b.joints.at(t, kPelvis)).norm());
+  if (apart > kFarApart)
+    found.oddities.push_back(fmt::format("the two people never come nearer to one another than {:.4g} m", apart));
+}
+
 }  // namespace
 
 double stature(const HumanMotion& person) {
@@ -154,6 +195,7 @@ Plausibility judge_people(const InteractionClip& clip) {
   judge_floor("B", clip.b, found);
   judge_sides("A", clip.a, found);
   judge_sides("B", clip.b, found);
+  judge_distance(clip, found);
   if (found.faults.empty()) judge_facing(clip, found);
   return found;
 }

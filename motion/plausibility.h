@@ -34,7 +34,7 @@ struct Plausibility {
   std::vector<std::string> oddities;
 };
 
-// Stature, up axis, floor, and left against right. The clip is valid.
+// Stature, up axis, floor, left against right, and how far the two are apart. The clip is valid.
 Plausibility judge_people(const InteractionClip& clip);
 
 // A clip from a file that others may have written, and what its reader should know: phases that were proposed,

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <stdexcept>
+#include <system_error>
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -21,15 +22,18 @@ constexpr const char* kStandsIn = "g1";  // the robot of the paper
 
 // The cards of one share folder, by their place in it.
 void add_cards(const std::string& share, std::map<std::string, std::string>& found) {
-  std::error_code ignored;
-  for (const auto& robot : fs::directory_iterator(fs::path(share) / "robots", ignored)) {
+  std::error_code ignored, error;
+  for (const auto& robot : fs::directory_iterator(fs::path(share) / "robots", error)) {
     if (!robot.is_directory(ignored)) continue;
-    for (const auto& file : fs::directory_iterator(robot.path(), ignored)) {
+    for (const auto& file : fs::directory_iterator(robot.path(), error)) {
       if (file.path().extension() != ".yaml") continue;
       const fs::path place = fs::path("robots") / robot.path().filename() / file.path().filename();
       found.emplace(place.string(), (fs::path(share) / place).string());
     }
   }
+  // A share folder without robots is none of ours; one that cannot be looked into is a fault.
+  if (error == std::errc::too_many_files_open || error == std::errc::too_many_files_open_in_system)
+    throw MissingError(fmt::format("cannot look for robots in '{}': {}", share, error.message()));
 }
 
 void refuse_repeats(const std::vector<RobotCardFile>& cards) {

@@ -318,7 +318,7 @@ TEST(CommandLine, EveryRefusalNamesItsFile) {
   EXPECT_EQ(refusal("check -q " + (folder / "hug") + " -b " + (folder / "golden.json")),
             "duet: " + (folder / "golden.json") + ": golden baseline: key 'suite' is missing\n");
   for (const char* command : {"score -q ", "retarget -q -o x "})
-    EXPECT_THAT(refusal(command + (folder / "slow.npz")), HasSubstr("slow.npz: resample: "));
+    EXPECT_THAT(refusal(command + (folder / "slow.npz")), HasSubstr("slow.npz': key 'rate_hz': expected 5 Hz or more"));
   EXPECT_THAT(refusal("retarget -q -o x " + clip + " --card " + (folder / "fewer.yaml") + " --urdf " +
                       std::filesystem::path(g1).replace_filename("g1.urdf").string()),
               HasSubstr("fewer.yaml: robot 'g1': expected the 16 retarget pairs"));

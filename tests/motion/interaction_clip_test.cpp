@@ -185,6 +185,11 @@ TEST(InteractionClip, ReadingNamesFileKeyAndFault) {
   const std::vector<BadFile> cases = {
       {"key 'schema': expected 'duet.interaction_clip', found 'other'", with_text("schema", "other")},
       {"key 'schema_version': expected 1, found 2", with_integers("schema_version", {2}, {})},
+      {"key 'id': expected 1 to 200 printable characters, found ''", with_text("id", "")},
+      {"key 'id': expected 1 to 200 printable characters, found 'two\\nlines'", with_text("id", "two\nlines")},
+      {"key 'id': expected 1 to 200 printable characters", with_text("id", std::string(201, 'x'))},
+      {"key 'rate_hz': expected 5 Hz or more, as people's motions have, found 0.1",
+       with_number(good, "rate_hz", 0, 0.1)},
       {"unknown key 'fase'", with_text("fase", "x")},
       {"did you mean 'phases'?", with_text("phase", "x")},
       {"key 'task': unknown task 'hugg'", with_text("task", "hugg")},

@@ -102,6 +102,21 @@ TEST(Plausibility, PeopleBackToBackInTheActAreNoted) {
   EXPECT_THAT(found.oddities, ::testing::Contains(HasSubstr("turn their backs on one another")));
 }
 
+TEST(Plausibility, PeopleAtOnePlaceAndContactsThatAreMetresApartAreRefused) {
+  InteractionClip one_place = synthetic();
+  one_place.b = one_place.a;
+  EXPECT_THAT(refusal(one_place), HasSubstr("the two people are at one place: their pelvises are within 0.1 m"));
+  InteractionClip far = synthetic();
+  ASSERT_FALSE(far.contacts.empty());
+  for (int t = 0; t < far.frames(); ++t)
+    for (int j = 0; j < kSmplJoints; ++j) far.b.joints.at(t, j).x() += 100.0;
+  EXPECT_THAT(refusal(far), HasSubstr("are said to touch in frames ["));
+  far.contacts.clear();
+  const Plausibility found = judge_people(far);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.oddities, ::testing::Contains(HasSubstr("never come nearer to one another than")));
+}
+
 TEST(Plausibility, AFaultThatIsTakenIsNoted) {
   const InteractionClip giants = changed(synthetic(), [](const auto& p) { return 2.0 * p; });
   const ForeignClip read = read_foreign_clip(Npz::parse(clip_bytes(giants), "giants.npz"), Implausible::kTaken);
