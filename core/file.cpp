@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "duet/core/no_data.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -158,11 +159,13 @@ std::string read_file(const std::string& path, std::int64_t most) {
     const ssize_t count = ::read(file.get(), buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail_to_read(path, errno);
-    if (count == 0) return bytes;
+    if (count == 0) break;
     bytes.append(buffer, static_cast<std::size_t>(count));
     if (static_cast<std::int64_t>(bytes.size()) > limit)
       throw InputError(fmt::format("cannot read '{}': expected at most {} bytes, found more", path, limit));
   }
+  refuse_no_data(path, bytes);
+  return bytes;
 }
 
 void write_file(const std::string& path, std::string_view bytes, Durability durability) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
@@ -42,6 +43,7 @@ Hdf5Bytes::Hdf5Bytes(const std::string& path) : path_(path), file_(path, std::io
   std::error_code error;
   const bool plain = std::filesystem::is_regular_file(path, error);
   if (!file_ || !plain) throw InputError(fmt::format("cannot read '{}': no such file", shown(path)));
+  require_data(path);
   size_ = std::filesystem::file_size(path, error);
   if (error) throw InputError(fmt::format("cannot read '{}': {}", shown(path), error.message()));
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "duet/core/half.h"
 #include "duet/core/npy_header.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -123,6 +124,10 @@ NpyArray::Values read_values(const NpyType& type, std::string_view data, std::si
   const bool swapped = type.big_endian != (std::endian::native == std::endian::big);
   switch (type.kind) {
     case 'f':
+      if (type.size == 2)
+        return read_items<double>(data, count, type.size, [swapped](const char* at) {
+          return number_of_half(read_value<std::uint16_t>(at, swapped));
+        });
       if (type.size == 4) return read_as<float, double>(data, count, swapped);
       return read_as<double, double>(data, count, swapped);
     case 'i':

@@ -22,7 +22,7 @@ NpyType parse_type(std::string_view text, bool objects) {
   const auto refuse = [&]() -> InputError {
     if (text.find('O') != std::string_view::npos)
       return InputError(fmt::format("object arrays ('{}') hold Python code and are not read", shown(text)));
-    return InputError(fmt::format("expected type f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", shown(text)));
+    return InputError(fmt::format("expected type f2, f4, f8, i1..i8, u1..u8, b1, U or S, found '{}'", shown(text)));
   };
   if (text.size() < 3 || std::string_view("<>|=").find(text[0]) == std::string_view::npos) throw refuse();
   NpyType type{text[1], text[0] == '>', 0};
@@ -32,7 +32,7 @@ NpyType parse_type(std::string_view text, bool objects) {
   const auto is_one_of = [&](std::initializer_list<std::size_t> sizes) {
     return std::find(sizes.begin(), sizes.end(), type.size) != sizes.end();
   };
-  const bool known = (type.kind == 'f' && is_one_of({4, 8})) || (type.kind == 'b' && is_one_of({1})) ||
+  const bool known = (type.kind == 'f' && is_one_of({2, 4, 8})) || (type.kind == 'b' && is_one_of({1})) ||
                      ((type.kind == 'i' || type.kind == 'u') && is_one_of({1, 2, 4, 8})) || type.kind == 'S' ||
                      type.kind == 'U';
   if (!known) throw refuse();

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/npy.h"
 #include "duet/core/npy_header.h"
@@ -83,18 +84,19 @@ bool holds_objects(std::string_view entry) {
   return entry.substr(0, kHeader).find("'descr': '|O'") != std::string_view::npos;
 }
 
-// A scalar is stored as shape () or, by some writers, as (1,).
+// A scalar is stored as shape () or, by some writers, as (1,) or (1, 1).
 std::vector<long> scalar_shape(const Npz& npz, const std::string& key) {
-  const NpyArray& array = npz.array(key);
-  return array.shape == std::vector<std::size_t>{1} ? std::vector<long>{1} : std::vector<long>{};
+  const std::vector<std::size_t>& shape = npz.array(key).shape;
+  const bool ones = std::all_of(shape.begin(), shape.end(), [](std::size_t size) { return size == 1; });
+  return ones ? std::vector<long>(shape.size(), 1) : std::vector<long>{};
 }
 
 }  // namespace
 
-Npz Npz::load(const std::string& path) { return parse(read_file(path), path); }
+Npz Npz::load(const std::string& path) { return parse(read_data(path), path); }
 
 Npz Npz::load(const std::string& path, const std::vector<std::string>& only) {
-  return parse(read_file(path), path, only);
+  return parse(read_data(path), path, only);
 }
 
 void Npz::take(const std::string& entry, const std::string& content, std::size_t& held) {

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "duet/core/half.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 
@@ -18,6 +19,12 @@ double read_number(const char* bytes, bool big_endian) {
   std::memcpy(&value, ordered, sizeof(T));
   return static_cast<double>(value);
 }
+double read_half(const char* bytes, bool big_endian) {
+  const auto low = static_cast<unsigned char>(bytes[big_endian ? 1 : 0]);
+  const auto high = static_cast<unsigned char>(bytes[big_endian ? 0 : 1]);
+  return number_of_half(static_cast<std::uint16_t>(high << 8 | low));
+}
+
 static_assert(std::endian::native == std::endian::little);
 
 struct ItemType {
@@ -27,13 +34,14 @@ struct ItemType {
 
 ItemType item_type(const Pickle& pickle, const PickleNode& node, const PickleNode& dtype, const std::string& what) {
   if (dtype.byte_order == '\0') pickle.fail(node.offset, what + ": the dtype has no state");
+  if (dtype.text == "f2") return {2, read_half};
   if (dtype.text == "f4") return {4, read_number<float>};
   if (dtype.text == "f8") return {8, read_number<double>};
   if (dtype.text == "i4") return {4, read_number<std::int32_t>};
   if (dtype.text == "i8") return {8, read_number<std::int64_t>};
   std::string found;
   for (const unsigned char c : dtype.text.substr(0, 20)) found += c >= 0x20 && c < 0x7f ? static_cast<char>(c) : '?';
-  pickle.fail(node.offset, fmt::format("{}: expected numbers of type f4, f8, i4 or i8, found '{}'", what, found));
+  pickle.fail(node.offset, fmt::format("{}: expected numbers of type f2, f4, f8, i4 or i8, found '{}'", what, found));
 }
 
 // The bytes of a node; protocol 2 keeps them as UTF-8 text of code points below 256.

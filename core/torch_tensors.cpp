@@ -9,6 +9,7 @@
 #include <memory>
 #include <utility>
 
+#include "duet/core/half.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/zip.h"
@@ -30,11 +31,7 @@ double number_at(const char* at) {
 double half_at(const char* at) {
   std::uint16_t bits;
   std::memcpy(&bits, at, sizeof bits);
-  const int exponent = bits >> 10 & 0x1f;
-  const double fraction = bits & 0x3ff;
-  const double sign = (bits & 0x8000) != 0 ? -1.0 : 1.0;
-  if (exponent == 0x1f) return fraction == 0.0 ? sign * HUGE_VAL : std::nan("");
-  return sign * (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(1024.0 + fraction, exponent - 25));
+  return number_of_half(bits);
 }
 
 struct TensorType {

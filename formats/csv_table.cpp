@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "duet/core/number.h"
+#include "duet/core/csv.h"
 #include "duet/core/require.h"
 #include "duet/core/split.h"
 #include "duet/core/text.h"
@@ -13,73 +13,39 @@
 namespace duet {
 namespace {
 
-constexpr std::size_t kMostColumns = 4096;
-
-void read_meta(std::string_view line, CsvTable& table) {
-  const std::string_view text = trimmed(line.substr(1));
+void read_meta(std::string_view comment, CsvTable& table) {
+  const std::string_view text = trimmed(comment.substr(1));
   const std::size_t mark = text.find_first_of(":=");
   if (mark != std::string_view::npos)
     table.meta.emplace(std::string(trimmed(text.substr(0, mark))), std::string(trimmed(text.substr(mark + 1))));
 }
 
-class TableReader {
- public:
-  explicit TableReader(const std::string& name) { table_.name = name; }
+// Text that is no number; "nan" and "inf" are numbers that are refused later.
+bool names_columns(std::span<const std::string> fields) {
+  return std::any_of(fields.begin(), fields.end(), [](const std::string& field) {
+    const bool letters = field.find_first_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_") == 0;
+    return letters && field != "nan" && field != "inf" && field != "NaN";
+  });
+}
 
-  void take(std::string_view line, int number) {
-    if (line.front() == '#') return read_meta(line, table_);
-    fields_ = split(line, ',');
-    for (std::string_view& field : fields_) field = trimmed(field);
-    if (fields_.size() > kMostColumns)
-      fail(number, fmt::format("expected at most {} columns, found {}", kMostColumns, fields_.size()));
-    if (values_.empty() && table_.columns.empty() && names_columns()) return take_names(number);
-    if (width_ == 0) width_ = fields_.size();
-    if (fields_.size() != width_)
-      fail(number, fmt::format("expected {} columns as in the lines before, found {}", width_, fields_.size()));
-    for (std::size_t c = 0; c < width_; ++c) take_number(number, c);
+std::vector<std::string> column_names(const CsvReader& rows) {
+  std::vector<std::string> columns;
+  for (const std::string& field : rows.fields()) {
+    if (std::find(columns.begin(), columns.end(), field) != columns.end())
+      rows.fail(fmt::format("column '{}' stands twice", shown(field)));
+    columns.push_back(field);
   }
+  return columns;
+}
 
-  CsvTable finish() {
-    if (values_.empty()) throw InputError(fmt::format("'{}': expected lines of numbers, found none", table_.name));
-    const auto rows = static_cast<Eigen::Index>(values_.size() / width_);
-    table_.values = Eigen::Map<const Eigen::MatrixXd>(values_.data(), static_cast<Eigen::Index>(width_), rows);
-    return std::move(table_);
+void take_numbers(const CsvReader& rows, std::vector<double>& values) {
+  const auto fields = rows.fields();
+  for (std::size_t c = 0; c < fields.size(); ++c) {
+    const std::optional<double> value = rows.number(fields[c]);
+    if (!value) rows.fail(fmt::format("column {}: expected a finite number, found '{}'", c + 1, shown(fields[c])));
+    values.push_back(*value);
   }
-
- private:
-  [[noreturn]] void fail(int line, const std::string& fault) const {
-    throw InputError(fmt::format("'{}': line {}: {}", table_.name, line, fault));
-  }
-
-  // Text that is no number; "nan" and "inf" are numbers that are refused later.
-  [[nodiscard]] bool names_columns() const {
-    return std::any_of(fields_.begin(), fields_.end(), [](std::string_view field) {
-      const bool letters = field.find_first_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_") == 0;
-      return letters && field != "nan" && field != "inf" && field != "NaN";
-    });
-  }
-
-  void take_names(int line) {
-    width_ = fields_.size();
-    for (const std::string_view field : fields_) {
-      if (std::find(table_.columns.begin(), table_.columns.end(), field) != table_.columns.end())
-        fail(line, fmt::format("column '{}' stands twice", shown(field)));
-      table_.columns.emplace_back(field);
-    }
-  }
-
-  void take_number(int line, std::size_t column) {
-    const std::optional<double> value = parse_number(fields_[column]);
-    if (!value)
-      fail(line, fmt::format("column {}: expected a finite number, found '{}'", column + 1, shown(fields_[column])));
-    values_.push_back(*value);
-  }
-
-  CsvTable table_;
-  std::vector<std::string_view> fields_;
-  std::vector<double> values_;
-  std::size_t width_ = 0;
-};
+}
 
 }  // namespace
 
@@ -95,16 +61,27 @@ int CsvTable::get(std::string_view column) const {
 }
 
 CsvTable parse_csv_table(std::string_view text, const std::string& name) {
-  TableReader reader(name);
-  int number = 0;
-  for (std::size_t begin = 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string_view line = trimmed(text.substr(begin, end - begin));
-    ++number;
-    if (!line.empty()) reader.take(line, number);
-    begin = end + 1;
+  CsvTable table;
+  table.name = name;
+  std::vector<double> values;
+  std::size_t width = 0;
+  CsvReader rows(text, name);
+  while (rows.next()) {
+    if (rows.blank()) continue;
+    const bool names = width == 0 && names_columns(rows.fields());
+    if (width == 0) width = rows.fields().size();
+    if (rows.fields().size() != width)
+      rows.fail(fmt::format("expected {} columns as in the lines before, found {}", width, rows.fields().size()));
+    if (names)
+      table.columns = column_names(rows);
+    else
+      take_numbers(rows, values);
   }
-  return reader.finish();
+  for (const std::string_view comment : rows.comments()) read_meta(comment, table);
+  if (values.empty()) throw InputError(fmt::format("'{}': expected lines of numbers, found none", name));
+  const auto count = static_cast<Eigen::Index>(values.size() / width);
+  table.values = Eigen::Map<const Eigen::MatrixXd>(values.data(), static_cast<Eigen::Index>(width), count);
+  return table;
 }
 
 std::string csv_text(std::span<const std::string> columns, const Eigen::MatrixXd& values) {

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/formats/pickle_fields.h"
@@ -99,7 +99,7 @@ PickledMotion parse_motion_pickle(std::string_view bytes, const std::string& nam
 }
 
 PickledMotion read_motion_pickle(const std::string& path) {
-  return parse_motion_pickle(read_file(path, kMostMotionBytes), path);
+  return parse_motion_pickle(read_data(path, kMostMotionBytes), path);
 }
 
 }  // namespace duet

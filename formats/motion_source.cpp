@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/joblib.h"
 #include "duet/core/npy.h"
@@ -36,7 +37,7 @@ MotionSource open_folder(const std::string& path) {
     if (source.files.size() == kMostFolderFiles)
       throw InputError(
           fmt::format("'{}': expected the folder of one motion, found more than {} files", path, kMostFolderFiles));
-    std::string content = read_file(inside(path, name), left);
+    std::string content = read_data(inside(path, name), left);
     left -= static_cast<std::int64_t>(content.size());
     source.files.emplace(name, std::move(content));
   }
@@ -86,7 +87,7 @@ MotionSource motion_source(std::string bytes, const std::string& name) {
 
 MotionSource open_motion_source(const std::string& path) {
   if (std::filesystem::is_directory(path)) return open_folder(path);
-  return motion_source(read_file(path, kMostSourceBytes), path);
+  return motion_source(read_data(path, kMostSourceBytes), path);
 }
 
 }  // namespace duet

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
@@ -49,9 +50,11 @@ std::string read_external(const std::string& folder, const ExternalPlace& place,
   const fs::path file = fs::path(folder) / place.location;
   const auto size = static_cast<std::int64_t>(fs::file_size(file));
   const std::int64_t length = place.length.value_or(size - std::min(size, place.offset));
-  if (place.offset > size || length > size - place.offset)
+  if (place.offset > size || length > size - place.offset) {
+    require_data(file.string());
     refuse(fmt::format("expected {} bytes from {} on in '{}', found a file of {} (truncated?)", length, place.offset,
                        place.location, size));
+  }
   if (length > kMostExternalBytes)
     refuse(fmt::format("expected at most {} bytes in '{}', found {}", kMostExternalBytes, place.location, length));
   std::string bytes(static_cast<std::size_t>(length), '\0');

@@ -7,13 +7,14 @@
 #include <cstring>
 #include <filesystem>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/nn/external_data.h"
 #include "duet/nn/mlp_file.h"
 #include "duet/nn/network_engines.h"
 #include "duet/nn/onnx_network.h"
+#include "duet/nn/torch_archive.h"
 #include "duet/nn/torch_script.h"
 
 namespace duet {
@@ -51,6 +52,21 @@ std::unique_ptr<Network> mlp_network(const SafeTensors& content, const std::stri
 
 bool is_zip(std::string_view bytes) { return bytes.starts_with("PK"); }
 
+// Weights that a training saved say nothing of the network that they belong to.
+[[noreturn]] void refuse_checkpoint(const std::string& path, std::string_view what) {
+  throw InputError(fmt::format(
+      "'{}': this is {}, a training checkpoint: it holds weights and says nothing of the network; export the "
+      "network itself to ONNX (torch.onnx.export) or TorchScript (torch.jit.script)",
+      path, what));
+}
+
+// What its first bytes, or the names in its directory, say of a file of weights alone.
+void check_is_network(std::string_view bytes, const std::string& path) {
+  if (bytes.starts_with('\x80')) refuse_checkpoint(path, "a pickle");
+  if (bytes.starts_with("\x89HDF")) refuse_checkpoint(path, "an HDF5 file");
+  if (is_zip(bytes) && !holds_torch_code(bytes, path)) refuse_checkpoint(path, "a file of torch.save or of NumPy");
+}
+
 // A header length that fits and a brace: no ONNX model begins so.
 bool is_safetensors(std::string_view bytes) {
   std::uint64_t length = 0;
@@ -76,15 +92,17 @@ std::unique_ptr<Network> load_network(const std::string& path, const std::string
   const std::vector<std::string> engines = network_engines();
   require(std::ranges::find(engines, engine) != engines.end(),
           fmt::format("no network engine '{}' in this build. It has: {}", engine, fmt::join(engines, ", ")));
+  require_data(path);
   if (engine == "libtorch") return libtorch_network(path);
-  const std::string bytes = read_file(path);
+  const std::string bytes = read_data(path);
+  check_is_network(bytes, path);
   if (is_zip(bytes)) return torch_script_network(bytes, path);
   if (is_safetensors(bytes)) return mlp_network(parse_safetensors(bytes, path), path);
   return onnx_network(bytes, path, folder_of(path));
 }
 
 LoadedFiles network_files(const std::string& path) {
-  const std::string bytes = read_file(path), folder = folder_of(path);
+  const std::string bytes = read_data(path), folder = folder_of(path);
   LoadedFiles files = {{"network", path}};
   if (is_zip(bytes) || is_safetensors(bytes)) return files;
   for (const std::string& location : external_locations(bytes))

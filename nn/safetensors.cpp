@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/json.h"
 #include "duet/core/require.h"
@@ -248,7 +249,7 @@ std::string header_text(const Json& header) {
 
 }  // namespace
 
-SafeTensors read_safetensors(const std::string& path) { return parse_safetensors(read_file(path), path); }
+SafeTensors read_safetensors(const std::string& path) { return parse_safetensors(read_data(path), path); }
 
 SafeTensors parse_safetensors(std::string_view bytes, const std::string& file) { return Reader(bytes, file).read(); }
 

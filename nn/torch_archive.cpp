@@ -43,6 +43,16 @@ void TorchArchive::refuse(const std::string& problem) const {
   throw InputError(fmt::format("'{}': TorchScript: {}", file, shown(problem, kShownSentence)));
 }
 
+bool holds_torch_code(std::string_view bytes, const std::string& file) {
+  bool found = false;
+  const auto is_code = [&](const std::string& entry) {
+    found = found || entry.find("/code/") != std::string::npos || entry.starts_with("code/");
+    return false;  // the name is enough
+  };
+  read_zip(bytes, file, kLimits, is_code, [](const std::string&, const std::string&) {});
+  return found;
+}
+
 TorchArchive read_torch_archive(std::string_view bytes, const std::string& file) {
   TorchArchive archive{.file = file};
   read_zip(bytes, file, kLimits, [&](const std::string& entry, const std::string& content) {

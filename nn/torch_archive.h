@@ -22,4 +22,8 @@ struct TorchArchive {
 // in little-endian order.
 TorchArchive read_torch_archive(std::string_view bytes, const std::string& file);
 
+// Whether the archive holds a module's code ("policy/code/..."): one of torch.save has tensors alone. Throws InputError
+// where it is no whole archive.
+bool holds_torch_code(std::string_view bytes, const std::string& file);
+
 }  // namespace duet

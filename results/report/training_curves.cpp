@@ -8,15 +8,14 @@
 #include <iterator>
 #include <limits>
 
-#include "duet/core/file.h"
+#include "duet/core/csv.h"
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
-#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
 namespace {
 
-constexpr std::size_t kMostColumns = 1000;
 constexpr std::string_view kClockColumn = "minutes";
 
 // Two values or more, all the same.
@@ -26,32 +25,25 @@ bool is_level(const std::vector<double>& values) {
   return finite.size() > 1 && std::ranges::count(finite, finite.front()) == std::ssize(finite);
 }
 
-std::vector<std::string> cells_of(std::string_view line) {
-  std::vector<std::string> cells;
-  for (const std::string_view cell : split(line, ',')) cells.emplace_back(trimmed(cell));
-  return cells;
-}
-
-std::vector<std::string> read_header(std::string_view line, const std::string& name) {
-  std::vector<std::string> columns = cells_of(line);
-  if (columns.size() < 2)
-    throw InputError(fmt::format("{}:1: expected two or more columns, found {}", name, columns.size()));
-  if (columns.size() > kMostColumns)
-    throw InputError(fmt::format("{}:1: expected at most {} columns, found {}", name, kMostColumns, columns.size()));
+std::vector<std::string> read_header(const CsvReader& row) {
+  const std::vector<std::string> columns(row.fields().begin(), row.fields().end());
+  if (columns.size() < 2) row.fail(fmt::format("expected two or more columns, found {}", columns.size()));
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    if (columns[i].empty()) throw InputError(fmt::format("{}:1: column {} has no name", name, i + 1));
+    if (columns[i].empty()) row.fail(fmt::format("column {} has no name", i + 1));
     if (std::count(columns.begin(), columns.end(), columns[i]) > 1)
-      throw InputError(fmt::format("{}:1: column '{}' is there twice", name, shown(columns[i])));
+      row.fail(fmt::format("column '{}' is there twice", shown(columns[i])));
   }
   return columns;
 }
 
-double read_cell(const std::string& cell, const std::string& column, const std::string& place) {
+// What a training writes where it has no number: nothing, or what C and Python call it.
+double read_cell(const CsvReader& row, const std::string& cell, const std::string& column) {
+  if (const std::optional<double> value = row.number(cell)) return *value;
   if (cell.empty()) return std::numeric_limits<double>::quiet_NaN();
   char* end = nullptr;
   const double value = std::strtod(cell.c_str(), &end);
-  if (*end != '\0')
-    throw InputError(fmt::format("{}: column '{}': expected a number, found '{}'", place, shown(column), shown(cell)));
+  if (*end != '\0' || std::isfinite(value))
+    row.fail(fmt::format("column '{}': expected a number, found '{}'", shown(column), shown(cell)));
   return value;
 }
 
@@ -59,31 +51,25 @@ double read_cell(const std::string& cell, const std::string& column, const std::
 
 TrainingCurves parse_curves(std::string_view csv, const std::string& name) {
   TrainingCurves curves{.title = name, .columns = {}, .values = {}};
-  int number = 0;
-  for (std::size_t begin = 0; begin < csv.size();) {
-    const std::size_t end = std::min(csv.find('\n', begin), csv.size());
-    const std::string_view line = trimmed(csv.substr(begin, end - begin));
-    begin = end + 1;
-    ++number;
+  CsvReader rows(csv, name);
+  while (rows.next()) {
+    if (rows.blank()) continue;
     if (curves.columns.empty()) {
-      curves.columns = read_header(line, name);
+      curves.columns = read_header(rows);
       curves.values.resize(curves.columns.size());
       continue;
     }
-    if (line.empty()) continue;
-    const std::string place = fmt::format("{}:{}", name, number);
-    const std::vector<std::string> cells = cells_of(line);
-    if (cells.size() != curves.columns.size())
-      throw InputError(fmt::format("{}: expected {} cells, found {}", place, curves.columns.size(), cells.size()));
-    for (std::size_t i = 0; i < cells.size(); ++i)
-      curves.values[i].push_back(read_cell(cells[i], curves.columns[i], place));
+    if (rows.fields().size() != curves.columns.size())
+      rows.fail(fmt::format("expected {} cells, found {}", curves.columns.size(), rows.fields().size()));
+    for (std::size_t i = 0; i < curves.columns.size(); ++i)
+      curves.values[i].push_back(read_cell(rows, rows.fields()[i], curves.columns[i]));
   }
   if (curves.values.empty() || curves.values.front().empty())
-    throw InputError(fmt::format("{}: expected a line of column names and lines of values, found none", name));
+    throw InputError(fmt::format("'{}': expected a line of column names and lines of values, found none", shown(name)));
   return curves;
 }
 
-TrainingCurves load_curves(const std::string& path) { return parse_curves(read_text(path), path); }
+TrainingCurves load_curves(const std::string& path) { return parse_curves(read_plain_text(path), path); }
 
 std::vector<LinePlot> curve_plots(const TrainingCurves& curves) {
   std::vector<LinePlot> plots;

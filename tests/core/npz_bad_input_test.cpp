@@ -107,7 +107,7 @@ TEST(Npy, RefusesObjectsAndUnknownTypes) {
   EXPECT_EQ(refusal(npy_of("|O", "(1,)", "cos\nsystem\n")), "object arrays ('|O') hold Python code and are not read");
   EXPECT_THROW(parse_npy(npy_of("|O8", "(1,)", "12345678")), InputError);
   EXPECT_EQ(refusal(npy_of("<c16", "(1,)", std::string(16, ' '))),
-            "expected type f4, f8, i1..i8, u1..u8, b1, U or S, found '<c16'");
+            "expected type f2, f4, f8, i1..i8, u1..u8, b1, U or S, found '<c16'");
   for (const char* type : {"<f2", "<f16", "<i3", "<u16", "|b2", "<M8[ns]", "|V8", "f8", "<f", "", "<f8x", "<f-8",
                            "<U99999999999999999999", "<U2147483648"})
     EXPECT_THROW(parse_npy(npy_of(type, "(1,)", std::string(8, ' '))), InputError) << type;

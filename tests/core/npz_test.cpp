@@ -1,9 +1,12 @@
 #include "duet/core/npz.h"
 
+#include <fmt/format.h>
+
 #include <cstring>
 #include <limits>
 
 #include "duet/core/file.h"
+#include "duet/core/npy.h"
 #include "duet/core/require.h"
 #include "duet/core/zip.h"
 #include "tests/support.h"
@@ -25,6 +28,29 @@ Npz some_archive() {
 }
 
 Npz reopened(const Npz& npz) { return Npz::parse(npz.bytes(), "a.npz"); }
+
+TEST(Npy, NumbersOfHalfPrecisionAreRead) {
+  for (const bool big_endian : {false, true}) {
+    std::string header =
+        fmt::format("{{'descr': '{}f2', 'fortran_order': False, 'shape': (5,), }}\n", big_endian ? '>' : '<');
+    std::string bytes =
+        "\x93NUMPY\x01" + std::string(1, '\0') + static_cast<char>(header.size()) + std::string(1, '\0') + header;
+    for (const unsigned half : {0x3c00U, 0xc000U, 0x0001U, 0x7bffU, 0x8000U}) {
+      const char low = static_cast<char>(half & 0xff), high = static_cast<char>(half >> 8);
+      bytes += big_endian ? std::string{high, low} : std::string{low, high};
+    }
+    EXPECT_EQ(std::get<std::vector<double>>(parse_npy(bytes).values),
+              (std::vector<double>{1.0, -2.0, 0x1p-24, 65504.0, 0.0}));
+  }
+}
+
+TEST(Npz, ANumberIsOneWhateverItsShape) {
+  Npz npz;
+  npz.set("fps", std::vector<double>{30.0}, {1, 1});
+  npz.set("two", std::vector<double>{30.0, 60.0}, {2});
+  EXPECT_EQ(npz.number("fps"), 30.0);
+  EXPECT_THROW((void)npz.number("two"), InputError);
+}
 
 TEST(Npz, ReturnsWhatWasWritten) {
   const Npz npz = reopened(some_archive());

@@ -81,6 +81,23 @@ TEST(Annotations, ABadFileIsRefusedByLine) {
   EXPECT_THAT(refusal(std::string(kHeader) + "a,,,,,\na,,,,,\n"), HasSubstr("line 3: clip 'a' is there twice"));
 }
 
+TEST(Annotations, WhatSpreadsheetsWriteIsTaken) {
+  const std::string plain = std::string(kHeader) + "a,hug,B,1.5,2,\"fine, so far\"\n";
+  std::string semicolons =
+      "\xef\xbb\xbf"
+      "clip;task;reactor;act_begin_s;act_end_s;note\r\na;hug;B;1,5;2;fine, so far\r\n;;;;;\r\n";
+  std::string filled = "clip,task,reactor,act_begin_s,act_end_s,note,,\na,hug,B,1.5,2,\"fine, so far\",,\n,,,,,,,\n";
+  std::string quoted =
+      "\"clip\",\"task\",\"reactor\",\"act_begin_s\",\"act_end_s\",\"note\"\n\"a\",\"hug\",\"B\",\"1.5\",\"2\",\"fine, "
+      "so far\"\n";
+  for (const std::string& text : {plain, semicolons, filled, quoted}) {
+    const Annotation read = parse_annotations(text, "f").at("a");
+    EXPECT_EQ(read.task, Task::kHug) << text;
+    EXPECT_EQ(read.act_begin, 1.5) << text;
+    EXPECT_EQ(read.note, "fine, so far") << text;
+  }
+}
+
 TEST(Annotations, LineEndsOfOtherSystemsAreTaken) {
   const Annotations read =
       parse_annotations("clip,task,reactor,act_begin_s,act_end_s,note\r\na,hug,B,1,2,fine\r\n", "f");

@@ -25,12 +25,13 @@ TEST(ClipLabels, AreReadWithWhatPeopleTypeAroundThem) {
 }
 
 TEST(ClipLabels, RefusalsNameFileLineExpectedAndFound) {
-  EXPECT_EQ(refusal(""), "'labels.csv', line 1: expected the header 'clip,label', found an empty file");
-  EXPECT_EQ(refusal("clip;label\n"), "'labels.csv', line 1: expected the header 'clip,label', found 'clip;label'");
-  EXPECT_EQ(refusal("clip,label\na\n"), "'labels.csv', line 2: expected 2 fields (clip,label), found 'a'");
-  EXPECT_EQ(refusal("clip,label\na,b\nc,d,e\n"), "'labels.csv', line 3: expected 2 fields (clip,label), found 'c,d,e'");
-  EXPECT_EQ(refusal("clip,label\n,hug\n"), "'labels.csv', line 2: expected a clip's name before the comma, found none");
-  EXPECT_EQ(refusal("clip,label\na,hug\na,wave\n"), "'labels.csv', line 3: clip 'a' is there twice");
+  EXPECT_EQ(refusal(""), "'labels.csv': expected the header 'clip,label', found nothing");
+  EXPECT_EQ(refusal("clip;name\n"), "'labels.csv': line 1: expected the header 'clip,label', found 'clip,name'");
+  EXPECT_EQ(refusal("clip,label\na\n"), "'labels.csv': line 2: expected 2 fields (clip,label), found 'a'");
+  EXPECT_EQ(refusal("clip,label\na,b\nc,d,e\n"), "'labels.csv': line 3: expected 2 fields (clip,label), found 'c,d,e'");
+  EXPECT_EQ(refusal("clip,label\n,hug\n"),
+            "'labels.csv': line 2: expected a clip's name in the first field, found none");
+  EXPECT_EQ(refusal("clip,label\na,hug\na,wave\n"), "'labels.csv': line 3: clip 'a' is there twice");
   EXPECT_THAT(test::thrown_message<InputError>([] { (void)read_clip_labels("/nowhere/labels.csv"); }),
               HasSubstr("/nowhere/labels.csv"));
 }

@@ -245,7 +245,7 @@ TEST(Pickle, BrokenArraysAreRefused) {
   EXPECT_THAT(with([&](PickleWriter& out) {
                 out.array({3, 2}, six, "O");
               }),
-              HasSubstr("expected numbers of type f4, f8, i4 or i8, found 'O'"));
+              HasSubstr("expected numbers of type f2, f4, f8, i4 or i8, found 'O'"));
   EXPECT_THAT(with([&](PickleWriter& out) {
                 out.array({3, 2}, six, "f8", "=");
               }),

@@ -225,7 +225,7 @@ TEST(RobotMotionBadInput, BrokenTablesAreRefused) {
   EXPECT_THAT(refusal("a,b\n", "x.csv"), HasSubstr("expected lines of numbers, found none"));
   EXPECT_THAT(refusal("# only words\n", "x.csv"), HasSubstr("expected lines of numbers, found none"));
   EXPECT_THAT(refusal("1,,3\n", "x.csv"), HasSubstr("line 1: column 2: expected a finite number, found ''"));
-  EXPECT_THAT(refusal(std::string(5000, ','), "x.csv"), HasSubstr("expected at most 4096 columns, found 5001"));
+  EXPECT_THAT(refusal(std::string(5000, ','), "x.csv"), HasSubstr("expected at most 4096 columns, found more"));
   std::string rate = file_of("hhtools");
   rate.replace(0, rate.find('\n'), "# fps: fast");
   EXPECT_THAT(refusal(rate, "x.csv"), HasSubstr("fps: expected a rate above 0 Hz, found 'fast'"));

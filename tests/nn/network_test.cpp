@@ -133,9 +133,18 @@ TEST(Network, FilesThatAreNoNetworksAreRefused) {
     write_file(folder / "net", bytes);
     return test::thrown_message<InputError>([&] { load_network(folder / "net"); });
   };
-  EXPECT_THAT(refusal(""), HasSubstr("expected an ONNX model, found bytes that are not one (truncated?)"));
+  EXPECT_THAT(refusal(""), HasSubstr("net': the file is empty"));
+  EXPECT_THAT(refusal("\x08"), HasSubstr("expected an ONNX model"));
+  // What a training keeps: torch.save, a pickle, NumPy's archive.
+  const std::string saved = zip_bytes({{"model_100/data.pkl", "x"}, {"model_100/data/0", "1234"}});
+  for (const std::string& weights : {saved, std::string("\x80\x02}q."), zip_bytes({{"w.npy", "x"}})})
+    EXPECT_THAT(refusal(weights), HasSubstr("a training checkpoint: it holds weights and says nothing of the network; "
+                                            "export the network itself"));
+  EXPECT_THAT(refusal("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\n"), HasSubstr("Git LFS pointer"));
+  EXPECT_THAT(refusal("<!DOCTYPE html><html>404</html>"), HasSubstr("HTML page"));
   EXPECT_THAT(refusal("hello, this is a text"), HasSubstr("net': expected an ONNX model"));
-  EXPECT_THAT(refusal(zip_bytes({{"a/data.pkl", "x"}})), HasSubstr("TorchScript of another kind; needs libtorch"));
+  EXPECT_THAT(refusal(zip_bytes({{"a/data.pkl", "x"}, {"a/code/m.py", ""}})),
+              HasSubstr("TorchScript of another kind; needs libtorch"));
   EXPECT_THAT(refusal("PK and no more"), HasSubstr("not a zip archive or truncated"));
   EXPECT_THAT(test::thrown_message<InputError>([&] { load_network(folder / "none"); }), HasSubstr("none"));
 }

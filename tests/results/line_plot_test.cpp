@@ -130,6 +130,13 @@ TEST(TrainingCurves, ColumnsByHeaderAgainstTheFirst) {
   EXPECT_THAT(line_plot_svg(plots[1]), HasSubstr("<svg"));
 }
 
+TEST(TrainingCurves, TablesOfSpreadsheetsGiveTheSame) {
+  const TrainingCurves curves = parse_curves("steps,return\n0,1.5\n10,2.5\n", "c.csv");
+  for (const char* text :
+       {"\xef\xbb\xbfsteps;return\r\n0;1,5\r\n10;2,5\r\n", "\"steps\",\"return\",\r0,1.5,\r10,2.5,\r"})
+    EXPECT_EQ(parse_curves(text, "c.csv").values, curves.values) << text;
+}
+
 TEST(TrainingCurves, LevelColumnsAndASecondClockAreNotDrawn) {
   const std::vector<LinePlot> plots =
       curve_plots(parse_curves("steps,minutes,return,loss\n0,0.1,1,0\n10,0.2,2,0\n", "c.csv"));
@@ -139,11 +146,11 @@ TEST(TrainingCurves, LevelColumnsAndASecondClockAreNotDrawn) {
 
 TEST(TrainingCurves, BadInputIsNamedByFileLineAndColumn) {
   const auto refusal = [](const char* csv) { return thrown_message<InputError>([&] { parse_curves(csv, "c.csv"); }); };
-  EXPECT_EQ(refusal("steps,return\n1,x\n"), "c.csv:2: column 'return': expected a number, found 'x'");
-  EXPECT_EQ(refusal("steps,return\n1\n"), "c.csv:2: expected 2 cells, found 1");
-  EXPECT_EQ(refusal("steps\n1\n"), "c.csv:1: expected two or more columns, found 1");
-  EXPECT_EQ(refusal("steps,\n1,2\n"), "c.csv:1: column 2 has no name");
-  EXPECT_EQ(refusal("a,a\n1,2\n"), "c.csv:1: column 'a' is there twice");
+  EXPECT_EQ(refusal("steps,return\n1,x\n"), "'c.csv': line 2: column 'return': expected a number, found 'x'");
+  EXPECT_EQ(refusal("steps,return\n1\n"), "'c.csv': line 2: expected 2 cells, found 1");
+  EXPECT_EQ(refusal("steps\n1\n"), "'c.csv': line 1: expected two or more columns, found 1");
+  EXPECT_EQ(refusal("steps,,falls\n1,2,3\n"), "'c.csv': line 1: column 2 has no name");
+  EXPECT_EQ(refusal("a,a\n1,2\n"), "'c.csv': line 1: column 'a' is there twice");
   EXPECT_THAT(refusal(""), HasSubstr("found none"));
   EXPECT_THAT(refusal("a,b\n"), HasSubstr("found none"));
   EXPECT_THAT(thrown_message<InputError>([] { load_curves("nowhere.csv"); }), HasSubstr("nowhere.csv"));
