@@ -14,6 +14,7 @@ namespace duet {
 namespace {
 
 constexpr double kWholeRate = 5e-4;                       // relative; 29.97 Hz is 1e-3 from 30 Hz
+constexpr double kSameRate = 1e-6;                        // relative; of digits that differ in the last place
 constexpr double kLowestRate = 0.01, kHighestRate = 1e5;  // [Hz]
 constexpr double kHorizontalSine = 0.34;                  // arms within 20 degrees of horizontal
 constexpr double kStraightArm = 0.95;                     // shoulder to wrist, of the arm's length
@@ -57,6 +58,17 @@ bool has_t_pose(const BvhPerson& person, UpAxis up) {
          jump > kJump * largest_step(second, positions_at(person, 2));
 }
 
+double rate_of(const Bvh& bvh) {
+  const double rate_hz = 1.0 / bvh.frame_time;
+  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
+    throw InputError(
+        fmt::format("'{}': a frame time of {} s is out of range "
+                    "({:g} to {:g} Hz); state the rate",
+                    bvh.name, bvh.frame_time, kLowestRate, kHighestRate));
+  const double whole = std::round(rate_hz);
+  return whole > 0.0 && std::abs(rate_hz - whole) <= kWholeRate * whole ? whole : rate_hz;
+}
+
 double rest_stature(const BvhPerson& person) {
   return stature(smpl_positions(person.skeleton, global_poses(person.bvh, zero_local_poses(person.bvh))));
 }
@@ -76,33 +88,40 @@ BvhFinding<UpAxis> find_up_axis(const BvhPerson& a, const BvhPerson& b, const Bv
                           up == UpAxis::kY ? "y" : "z", mean.x(), mean.y(), mean.z())};
 }
 
-BvhFinding<double> find_rate(const BvhPerson& a, const BvhOptions& options) {
+BvhFinding<double> find_rate(const BvhPerson& a, const BvhPerson& b, const BvhOptions& options) {
   if (options.rate_hz) {
     require(std::isfinite(*options.rate_hz) && *options.rate_hz > 0.0,
             fmt::format("BVH import: expected a positive rate, found {} Hz", *options.rate_hz));
     return {*options.rate_hz,
             fmt::format("rate: {} Hz (as told; frame time {} s)", *options.rate_hz, a.bvh.frame_time)};
   }
-  const double rate_hz = 1.0 / a.bvh.frame_time;
-  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
-    throw InputError(fmt::format("'{}': a frame time of {} s is out of range ({:g} to {:g} Hz); state the rate",
-                                 a.bvh.name, a.bvh.frame_time, kLowestRate, kHighestRate));
-  const double whole = std::round(rate_hz);
-  const bool snap = whole > 0.0 && std::abs(rate_hz - whole) <= kWholeRate * whole;
-  return {snap ? whole : rate_hz,
-          fmt::format("rate: {:g} Hz (frame time {} s)", snap ? whole : rate_hz, a.bvh.frame_time)};
+  const double rate_hz = rate_of(a.bvh);
+  if (std::abs(rate_hz - rate_of(b.bvh)) > kSameRate * rate_hz)
+    throw InputError(
+        fmt::format("'{}' has a frame time of {} s and '{}' {} s: "
+                    "expected two people at the same rate; "
+                    "state the rate",
+                    a.bvh.name, a.bvh.frame_time, b.bvh.name, b.bvh.frame_time));
+  return {rate_hz, fmt::format("rate: {:g} Hz (frame time {} s)", rate_hz, a.bvh.frame_time)};
 }
 
-BvhFinding<bool> find_t_pose(const BvhPerson& a, const BvhPerson& b, UpAxis up, const BvhOptions& options) {
+BvhFinding<std::array<int, 2>> find_first_frames(const BvhPerson& a, const BvhPerson& b, UpAxis up,
+                                                 const BvhOptions& options) {
   if (options.drop_t_pose)
-    return {*options.drop_t_pose, *options.drop_t_pose ? "frame 0 dropped (as told)" : "frame 0 kept (as told)"};
+    return *options.drop_t_pose ? BvhFinding<std::array<int, 2>>{{1, 1}, "frame 0 dropped (as told)"}
+                                : BvhFinding<std::array<int, 2>>{{0, 0}, "frame 0 kept (as told)"};
   const bool in_a = has_t_pose(a, up);
   const bool in_b = has_t_pose(b, up);
-  if (in_a != in_b)
-    throw InputError(fmt::format("frame 0 of '{}' is an added T pose, frame 0 of '{}' is not: state whether to drop it",
-                                 (in_a ? a : b).bvh.name, (in_a ? b : a).bvh.name));
-  return {in_a, in_a ? "frame 0 dropped: an added T pose (straight horizontal arms, then a jump)"
-                     : "frame 0 kept: not an added T pose"};
+  if (in_a && in_b)
+    return {{1, 1},
+            "frame 0 dropped: an added T pose (straight horizontal arms, then "
+            "a jump)"};
+  if (!in_a && !in_b) return {{0, 0}, "frame 0 kept: not an added T pose"};
+  const std::string whose =
+      fmt::format("an added T pose of '{}' (straight horizontal arms, then a jump)", (in_a ? a : b).bvh.name);
+  const int more = (in_a ? a : b).bvh.frames - (in_a ? b : a).bvh.frames;
+  if (more == 1) return {{in_a ? 1 : 0, in_b ? 1 : 0}, "frame 0 dropped from one file: " + whose};
+  return {{1, 1}, "frame 0 dropped: " + whose};
 }
 
 BvhFinding<double> find_metres_per_unit(const BvhPerson& a, const BvhPerson& b, const BvhOptions& options) {

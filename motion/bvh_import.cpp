@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
@@ -8,6 +10,7 @@
 #include "duet/motion/bvh.h"
 #include "duet/motion/bvh_detection.h"
 #include "duet/motion/bvh_kinematics.h"
+#include "duet/motion/people/joint_layout.h"
 #include "duet/motion/phase_proposal.h"
 #include "duet/motion/plausibility.h"
 
@@ -17,22 +20,13 @@ namespace {
 struct Conversion {
   Eigen::Quaterniond R_WF;  // from the file's axes to W
   double metres_per_unit = 1.0;
-  int first_frame = 0;
+  std::array<int, 2> first_frame = {0, 0};  // of A, of B
   double rate_hz = 0.0;
   double output_rate_hz = 0.0;
   int output_frames = 0;
 };
 
 std::string file_name(const std::string& path) { return std::filesystem::path(path).filename().string(); }
-
-void check_same_clock(const Bvh& a, const Bvh& b) {
-  if (a.frames != b.frames)
-    throw InputError(fmt::format("'{}' has {} frames and '{}' {}: expected two people of the same length", a.name,
-                                 a.frames, b.name, b.frames));
-  if (std::abs(a.frame_time - b.frame_time) > 1e-6 * a.frame_time)
-    throw InputError(fmt::format("'{}' has a frame time of {} s and '{}' {} s: expected two people at the same rate",
-                                 a.name, a.frame_time, b.name, b.frame_time));
-}
 
 void put_positions(HumanMotion& motion, int t, const SmplPositions& positions, const Conversion& to) {
   motion.joints.frame(t) = to.metres_per_unit * (to.R_WF.toRotationMatrix() * positions);
@@ -46,15 +40,17 @@ Eigen::Quaterniond reference_facing(const BvhPerson& person, const Conversion& t
   return yaw_rotation(heading(rest, 0));
 }
 
-HumanMotion convert(const BvhPerson& person, const Conversion& to) {
+HumanMotion convert(const BvhPerson& person, int first_frame, const Conversion& to) {
   HumanMotion motion{
       .rate_hz = to.output_rate_hz, .joints = PointTracks(to.output_frames, kSmplJoints), .rotations = {}};
   motion.rotations.reserve(static_cast<std::size_t>(to.output_frames) * kSmplJoints);
   const Eigen::Quaterniond R_FR = to.R_WF.conjugate() * reference_facing(person, to);
   for (int t = 0; t < to.output_frames; ++t) {
-    const double index = to.first_frame + t * (to.rate_hz / to.output_rate_hz);
+    const double index = first_frame + t * (to.rate_hz / to.output_rate_hz);
     const std::vector<Pose> poses = global_poses(person.bvh, local_poses_at(person.bvh, index));
     put_positions(motion, t, smpl_positions(person.skeleton, poses), to);
+    for (const int side : {0, 1})
+      if (person.skeleton.lacks_toe[side]) put_toe(motion.joints.frame(t), side);
     for (const BvhPoint& point : person.skeleton.points)
       motion.rotations.push_back((to.R_WF * poses[point.rotation].R * R_FR).normalized());
   }
@@ -80,21 +76,30 @@ Conversion plan(const BvhPerson& a, const BvhPerson& b, const BvhOptions& option
   require(std::isfinite(options.output_rate_hz) && options.output_rate_hz > 0.0,
           fmt::format("BVH import: expected a positive output rate, found {} Hz", options.output_rate_hz));
   const BvhFinding<UpAxis> up = find_up_axis(a, b, options);
-  const BvhFinding<bool> t_pose = find_t_pose(a, b, up.value, options);
-  const BvhFinding<double> rate = find_rate(a, options);
+  const BvhFinding<std::array<int, 2>> first = find_first_frames(a, b, up.value, options);
+  const BvhFinding<double> rate = find_rate(a, b, options);
   const BvhFinding<double> unit = find_metres_per_unit(a, b, options);
-  const int first = t_pose.value ? 1 : 0;
-  const int frames = a.bvh.frames - first;
+  const std::array<int, 2> lengths = {a.bvh.frames - first.value[0], b.bvh.frames - first.value[1]};
+  const int frames = std::min(lengths[0], lengths[1]);
   if (frames < 2)
     throw InputError(fmt::format("'{}': expected at least 2 frames of motion, found {}", a.bvh.name, frames));
   verdict = {fmt::format("joint names: {} ('{}'), {} ('{}')", a.skeleton.naming, file_name(a.bvh.name),
                          b.skeleton.naming, file_name(b.bvh.name)),
-             up.sentence, t_pose.sentence, rate.sentence, unit.sentence};
+             up.sentence, first.sentence, rate.sentence, unit.sentence};
+  if (lengths[0] != lengths[1])
+    verdict.push_back(
+        fmt::format("length: '{}' has {} frames and '{}' {}: the "
+                    "first {} of both are taken",
+                    file_name(a.bvh.name), lengths[0], file_name(b.bvh.name), lengths[1], frames));
+  for (const BvhPerson* person : {&a, &b})
+    for (const auto* notes : {&person->bvh.notes, &person->skeleton.notes})
+      for (const std::string& note : *notes)
+        verdict.push_back(fmt::format("'{}': {}", file_name(person->bvh.name), note));
   const Eigen::Quaterniond R_WF(
       Eigen::AngleAxisd(up.value == UpAxis::kY ? 0.5 * std::numbers::pi : 0.0, Eigen::Vector3d::UnitX()));
   Conversion to{.R_WF = R_WF,
                 .metres_per_unit = unit.value,
-                .first_frame = first,
+                .first_frame = first.value,
                 .rate_hz = rate.value,
                 .output_rate_hz = options.output_rate_hz,
                 .output_frames = output_frames(a.bvh, frames, rate.value, options.output_rate_hz)};
@@ -115,17 +120,16 @@ BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, 
 }
 
 BvhImport import_bvh_pair(const Bvh& bvh_a, const Bvh& bvh_b, Task task, const BvhOptions& options) {
-  const BvhPerson a{.bvh = bvh_a, .skeleton = find_smpl_joints(bvh_a)};
-  const BvhPerson b{.bvh = bvh_b, .skeleton = find_smpl_joints(bvh_b)};
-  check_same_clock(a.bvh, b.bvh);
+  const BvhPerson a{.bvh = bvh_a, .skeleton = find_smpl_joints(bvh_a, options.skeleton)};
+  const BvhPerson b{.bvh = bvh_b, .skeleton = find_smpl_joints(bvh_b, options.skeleton)};
   BvhImport result;
   const Conversion to = plan(a, b, options, result.verdict);
   InteractionClip& clip = result.clip;
   try {
     clip.id = stem(bvh_a.name) + "-" + stem(bvh_b.name);
     clip.task = task;
-    clip.a = convert(a, to);
-    clip.b = convert(b, to);
+    clip.a = convert(a, to.first_frame[0], to);
+    clip.b = convert(b, to.first_frame[1], to);
     validate(clip);
   } catch (const std::invalid_argument& error) {
     throw InputError(fmt::format("'{}', '{}': {}", bvh_a.name, bvh_b.name, error.what()));
@@ -136,7 +140,7 @@ BvhImport import_bvh_pair(const Bvh& bvh_a, const Bvh& bvh_b, Task task, const B
                  {"file_b", file_name(bvh_b.name)},
                  {"metres_per_unit", fmt::format("{}", to.metres_per_unit)},
                  {"source_rate_hz", fmt::format("{}", to.rate_hz)},
-                 {"first_frame", fmt::format("{}", to.first_frame)},
+                 {"first_frame", fmt::format("{}", to.first_frame[0])},
                  {"phases", "proposed"}};
   result.verdict.push_back(fmt::format("floor: lowest toe joint at {:.3f} m (A) and {:.3f} m (B); heights kept",
                                        lowest_toe(clip.a), lowest_toe(clip.b)));

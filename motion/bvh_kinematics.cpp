@@ -20,7 +20,7 @@ Pose local_pose(const BvhJoint& joint, const double* values) {
   for (const int channel : joint.channels) {
     const double value = *values++;
     if (channel < 3) {
-      X.p[channel] = value;
+      if (!joint.keeps_offset) X.p[channel] = value;
     } else {
       const double angle = value * (std::numbers::pi / 180.0);
       X.R = X.R * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(channel - 3)));

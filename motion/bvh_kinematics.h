@@ -8,8 +8,9 @@
 
 namespace duet {
 
-// Pose of each joint in its parent at a frame. Rotation channels multiply in file order; a position channel replaces
-// that component of the OFFSET (as Blender and MotionBuilder read it).
+// Pose of each joint in its parent at a frame. Rotation channels multiply in
+// file order; a position channel replaces that component of the OFFSET (as
+// Blender and MotionBuilder read it), unless the joint keeps it.
 std::vector<Pose> local_poses(const Bvh& bvh, int frame);
 
 // The same at a time between two frames: slerp of rotations, linear positions. `index` counts frames and may be

@@ -11,6 +11,7 @@
 #include "duet/bench/cli/people_arguments.h"
 #include "duet/bench/cli/robot_motion_options.h"
 #include "duet/core/clock.h"
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -128,11 +129,18 @@ void import_robot(const Session& session, const ImportArguments& arguments) {
         json);
 }
 
+// Endings of files that robots' motions have: what is wrong with one that no format of people knows, their reader says.
+bool ends_like_robot_motion(const std::string& path) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  return ending == ".csv" || ending == ".npy" || ending == ".pickle" || ending == ".joblib";
+}
+
 // By the format that is named, else by what is in the file; a pickle that is nobody's is a robot's that is broken.
 bool is_robot_motion(const ImportArguments& arguments) {
   const std::vector<std::string> names = robot_motion_format_names();
   if (!arguments.people.format.empty()) return std::ranges::count(names, arguments.people.format) > 0;
   if (arguments.files.size() != 1) return false;
+  require_data(arguments.files[0]);
   const auto people = std::ranges::find_if(
       people_formats(), [&](const PeopleFormat& format) { return format.recognises(arguments.files); });
   if (people != people_formats().end() && people->name != "positions") return false;
@@ -142,7 +150,7 @@ bool is_robot_motion(const ImportArguments& arguments) {
     return std::ranges::any_of(robot_motion_formats(),
                                [&](const RobotMotionFormat& format) { return format.recognises(source); });
   } catch (const InputError&) {
-    return false;
+    return people == people_formats().end() && ends_like_robot_motion(arguments.files[0]);
   }
 }
 

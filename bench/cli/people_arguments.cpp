@@ -64,8 +64,11 @@ void add_people_options(CLI::App& command, PeopleArguments& arguments) {
   command.add_flag("--no-level", arguments.no_level, "leave it as it is");
   command.add_flag("--drop-t-pose", arguments.drop_t_pose, "frame 0 is an added T pose: drop it (default: detected)");
   command.add_flag("--keep-t-pose", arguments.keep_t_pose, "keep frame 0 whatever it is");
-  command.add_option("--skeleton", options.skeleton,
-                     "which joint each column is: `duet list joint-layouts`, or a file with one name a line");
+  command.add_option(
+      "--skeleton", options.skeleton,
+      "which joint each column is: `duet list joint-layouts`, a file with one name a line, or one of lines "
+      "'left_hip: NAME' (of BVH files, too)");
+  command.add_flag("--as-is", options.as_is, "take clips however implausible their people are");
   command.add_option("--body-model", options.body_model, "your SMPL, SMPL-H or SMPL-X file (NPZ or PKL)");
   command.add_option("--object", options.object,
                      "shape of the object that they carry: a mesh (.obj) or a box or points (.json), in metres");

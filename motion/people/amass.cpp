@@ -35,8 +35,11 @@ bool is_amass_name(const std::string& name) {
 bool is_amass_archive(const std::string& path) {
   const std::vector<std::string> entries = zip_entry_names(path);
   const auto has = [&](const char* name) { return std::find(entries.begin(), entries.end(), name) != entries.end(); };
-  const bool rate = has("mocap_framerate.npy") || has("mocap_frame_rate.npy");
-  return is_stage_i(path) || (rate && (has("poses.npy") || (has("root_orient.npy") && has("pose_body.npy"))));
+  if (is_stage_i(path)) return true;
+  if (has("mocap_framerate.npy") || has("mocap_frame_rate.npy"))
+    return has("poses.npy") || (has("root_orient.npy") && has("pose_body.npy"));
+  // Without a rate, what no other format has: Inter-X's bodies have hands of their own.
+  return has("trans.npy") && (has("poses.npy") || has("pose_hand.npy"));
 }
 
 // A stage-i file too, so that it is refused by name.
@@ -63,25 +66,34 @@ BodyMotion amass_motion(const Npz& npz, const std::string& path) {
 
 struct AmassPerson {
   BodyMotion motion;
-  double rate_hz = 0.0;
+  double rate_hz = 0.0;  // 0: the file does not say
 };
 
 AmassPerson read_amass_person(const std::string& path) {
-  const Npz npz =
-      Npz::load(path, {"poses", "root_orient", "pose_body", "trans", "betas", "mocap_framerate", "mocap_frame_rate"});
+  const Npz npz = Npz::load(
+      path, {"poses", "root_orient", "pose_body", "trans", "betas", "mocap_framerate", "mocap_frame_rate", "fps"});
   if (is_stage_i(path) || (!npz.contains("trans") && !npz.contains("poses"))) refuse_stage_i(path);
   AmassPerson person{.motion = amass_motion(npz, path)};
   if (npz.contains("betas")) person.motion.betas = mean_betas(table_of(npz, "betas"));
-  const std::string key = npz.contains("mocap_framerate") ? "mocap_framerate" : "mocap_frame_rate";
-  person.rate_hz = npz.number(key);
-  if (!(person.rate_hz > 0.0 && person.rate_hz <= 10'000.0))
-    throw InputError(fmt::format("'{}': array '{}': expected a rate of at most 10000 Hz, found {}", shown(path), key,
-                                 person.rate_hz));
+  for (const char* key : {"mocap_framerate", "mocap_frame_rate", "fps"}) {
+    if (!npz.contains(key)) continue;
+    person.rate_hz = npz.number(key);
+    if (!(person.rate_hz > 0.0 && person.rate_hz <= 10'000.0))
+      throw InputError(fmt::format("'{}': array '{}': expected a rate of at most 10000 Hz, found {}", shown(path), key,
+                                   person.rate_hz));
+    break;
+  }
   return person;
 }
 
 RawPeople read_amass(const ClipPlace& place, const PeopleOptions& options) {
   AmassPerson a = read_amass_person(place.files[0]), b = read_amass_person(place.files[1]);
+  if (a.rate_hz == 0.0 || b.rate_hz == 0.0) {
+    if (!options.rate_hz)
+      throw InputError(fmt::format("'{}': it states no rate (no array 'mocap_framerate'); state the rate",
+                                   shown(place.files[a.rate_hz == 0.0 ? 0 : 1])));
+    a.rate_hz = b.rate_hz = *options.rate_hz;
+  }
   if (a.rate_hz != b.rate_hz)
     throw InputError(fmt::format("'{}' is at {:g} Hz and '{}' at {:g} Hz: expected two people at the same rate",
                                  shown(place.files[0]), a.rate_hz, shown(place.files[1]), b.rate_hz));

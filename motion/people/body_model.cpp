@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/npz.h"
 #include "duet/core/pickle_machine.h"
@@ -242,7 +243,7 @@ BodyModel load_body_model(const std::string& path) {
     model->note = fmt::format("body model: {} of '{}' (joints kept beside it)", model->kind, name);
     return *std::move(model);
   }
-  const std::string bytes = read_file(path);
+  const std::string bytes = read_data(path);
   const bool is_archive = bytes.starts_with("PK");
   if (std::optional<BodyModel> model = is_archive ? with_joints(path, bytes) : std::nullopt) {
     model->note = fmt::format("body model: {} of '{}' (its joints)", model->kind, name);

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/json.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -87,7 +87,7 @@ PointTracks chi3d_person(const nlohmann::json& frames, const std::string& file, 
 RawPeople read_chi3d(const ClipPlace& place, const PeopleOptions& /*options*/) {
   const std::string& file = place.files.at(0);
   RawPeople people{.id = place.id, .name = file, .layout = &joint_layout("imar-25"), .joints = {}};
-  const nlohmann::json root = parse_json(read_file(file, kMostChi3dBytes), fmt::format("'{}'", file));
+  const nlohmann::json root = parse_json(read_plain_text(file, kMostChi3dBytes), fmt::format("'{}'", file));
   const auto joints = root.is_object() ? root.find("joints3d_25") : root.end();
   if (!root.is_object() || joints == root.end())
     throw InputError(fmt::format("'{}': expected a JSON object with 'joints3d_25', found none", file));

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <system_error>
 
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
@@ -68,11 +68,11 @@ std::string first_file_at(const std::string& path, const std::function<bool(cons
 std::string leading_bytes(const std::string& path, std::size_t count) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return "";
-  std::ifstream file(path, std::ios::binary);
-  std::string bytes(count, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(count));
-  bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return bytes;
+  try {
+    return read_head(path, count);
+  } catch (const InputError&) {
+    return "";
+  }
 }
 
 std::string file_stem(const std::string& path) { return fs::path(path).stem().string(); }

@@ -3,7 +3,7 @@
 // images. Source: file_definitions.md of CORE4D-Instructions.
 #include <fmt/format.h>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/npy_header.h"
 #include "duet/core/npy_objects.h"
 #include "duet/core/pickle_machine.h"
@@ -44,7 +44,7 @@ NpyArray joints_of(const std::string& path) {
   std::string content;
   const ZipLimits limits{.entry_bytes = kMaxEntryBytes, .total_bytes = kMaxEntryBytes};
   read_zip(
-      read_file(path), path, limits, [](const std::string& entry) { return entry == "arr_0.npy"; },
+      read_data(path), path, limits, [](const std::string& entry) { return entry == "arr_0.npy"; },
       [&](const std::string&, const std::string& bytes) { content = bytes; });
   if (content.empty()) throw InputError(fmt::format("'{}': no array 'arr_0', which holds the dict of a person", path));
   const Pickle pickle = parse_object_npy(content, path);

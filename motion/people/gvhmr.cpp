@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/core/zip.h"
@@ -34,7 +34,7 @@ std::vector<ClipPlace> find_gvhmr(std::span<const std::string> paths, const Peop
 }
 
 BodyMotion read_gvhmr_person(const std::string& path) {
-  const TorchFile file = parse_torch(read_file(path), path);
+  const TorchFile file = parse_torch(read_data(path), path);
   const Pickle& pickle = file.pickle;
   const PickleNode* parameters = pickle.find(pickle[pickle.root], kGvhmrKey);
   if (parameters == nullptr || parameters->kind != PickleKind::kDict)

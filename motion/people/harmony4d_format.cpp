@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/npy_objects.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
@@ -51,7 +51,7 @@ struct HarmonyFrame {
 };
 
 HarmonyFrame read_harmony_frame(const std::string& path) {
-  const std::string bytes = read_file(path);
+  const std::string bytes = read_data(path);
   const Pickle pickle = parse_object_npy(bytes, path);
   const PickleNode& dict = pickle[pickle.root];
   if (dict.kind != PickleKind::kDict || dict.items.size() != 4)

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -94,7 +94,7 @@ void find_reactor(const std::string& clip, const std::string& file, RawPeople& r
     raw.evidence.emplace_back("reactor: P2 (no annots/interaction_order.pkl above the clip)");
     return;
   }
-  const std::string bytes = read_file(path);
+  const std::string bytes = read_data(path);
   const Pickle pickle = parse_pickle(bytes, path);
   const PickleNode* order = pickle.find(pickle[pickle.root], clip);
   if (order == nullptr) {

@@ -7,6 +7,7 @@
 #include <map>
 #include <sstream>
 
+#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/plain_name.h"
@@ -40,7 +41,7 @@ std::string beside_clips(const std::string& clip, const std::string& name) {
 std::map<std::string, int> read_order(const std::string& path) {
   std::map<std::string, int> order;
   if (path.empty()) return order;
-  const std::string bytes = read_file(path);
+  const std::string bytes = read_data(path);
   const Pickle pickle = parse_pickle(bytes, path);
   const PickleNode& root = pickle[pickle.root];
   if (root.kind != PickleKind::kDict)
@@ -61,7 +62,7 @@ std::map<std::string, std::string> read_splits(const std::string& folder) {
   std::map<std::string, std::string> split_of;
   for (const std::string& name : names_in(folder)) {
     if (!name.ends_with(".txt") || name == "all.txt") continue;
-    std::istringstream lines(read_text(folder + "/" + name));
+    std::istringstream lines(read_plain_text(folder + "/" + name));
     for (std::string line; std::getline(lines, line);) {
       line.erase(line.find_last_not_of(" \r\t") + 1);
       if (line.empty()) continue;

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -74,7 +74,7 @@ double interhuman_rate(const Pickle& pickle, std::vector<std::string>& evidence)
 }
 
 RawPeople read_interhuman_raw(const ClipPlace& place, const PeopleOptions& options) {
-  const std::string bytes = read_file(place.files[0]);
+  const std::string bytes = read_data(place.files[0]);
   const Pickle pickle = parse_pickle(bytes, place.files[0]);
   RawPeople raw{.id = place.id, .name = place.files[0], .joints = {}};
   raw.up = Axis::kPlusZ;

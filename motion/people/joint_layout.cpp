@@ -5,12 +5,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <sstream>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/split.h"
 #include "duet/core/text.h"
+#include "duet/motion/joint_names.h"
 #include "duet/motion/people/joint_recipes.h"
 
 namespace duet {
@@ -135,6 +136,13 @@ Eigen::Vector3d sum(const std::vector<JointRecipe::Part>& parts, const PointTrac
   return p;
 }
 
+// The level direction that hips and shoulders face.
+Eigen::Vector3d ahead_of(const Eigen::Ref<const Eigen::Matrix3Xd>& smpl) {
+  const Eigen::Vector3d left =
+      smpl.col(kLeftHip) - smpl.col(kRightHip) + smpl.col(kLeftShoulder) - smpl.col(kRightShoulder);
+  return Eigen::Vector3d(left.y(), -left.x(), 0.0).normalized();
+}
+
 Eigen::Vector3d offset(const JointRecipe& recipe, const PointTracks::ConstFrame& columns,
                        const Eigen::Ref<Eigen::Matrix3Xd>& smpl) {
   Eigen::Vector3d moved = Eigen::Vector3d::Zero();
@@ -144,9 +152,7 @@ Eigen::Vector3d offset(const JointRecipe& recipe, const PointTracks::ConstFrame&
     if (length > 0.0) moved += std::min(recipe.reach, kMostOfTheWay * length) / length * way;
   }
   if (recipe.ahead == 0.0 && recipe.down == 0.0) return moved;
-  const Eigen::Vector3d left =
-      smpl.col(kLeftHip) - smpl.col(kRightHip) + smpl.col(kLeftShoulder) - smpl.col(kRightShoulder);
-  moved += recipe.ahead * Eigen::Vector3d(left.y(), -left.x(), 0.0).normalized();
+  moved += recipe.ahead * ahead_of(smpl);
   moved.z() -= recipe.down;
   return moved;
 }
@@ -173,22 +179,34 @@ JointLayout layout_of_names(std::string name, std::vector<std::string> names) {
   return layout;
 }
 
-JointLayout read_joint_layout(const std::string& name_or_path) {
+JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names) {
   const std::vector<std::string> known = joint_layout_names();
   if (std::find(known.begin(), known.end(), name_or_path) != known.end()) return joint_layout(name_or_path);
   if (!std::filesystem::is_regular_file(name_or_path))
     throw std::invalid_argument(unknown_name_message("skeleton", name_or_path, known) +
                                 "; or the path of a file of names, one a line");
+  const std::string text = read_plain_text(name_or_path);
   std::vector<std::string> names;
-  std::istringstream lines(read_text(name_or_path));
-  for (std::string line; std::getline(lines, line);) {
-    line = line.substr(0, line.find('#'));
-    const std::size_t first = line.find_first_not_of(" \t\r,"), last = line.find_last_not_of(" \t\r,");
-    if (first != std::string::npos) names.push_back(line.substr(first, last - first + 1));
+  if (const auto map = parse_joint_name_map(text, name_or_path)) {
+    if (own_names.empty())
+      throw InputError(
+          fmt::format("'{}': it says which name stands for which joint, and "
+                      "the motion's file has no names; "
+                      "expected one name a line, in the order of the columns",
+                      name_or_path));
+    names = mapped(*map, own_names, name_or_path);
+  } else {
+    for (std::string_view line : split(text, '\n'))
+      if (line = trimmed(line.substr(0, line.find('#')), " \t\r,;\""); !line.empty()) names.emplace_back(line);
   }
   JointLayout layout = layout_of_names(name_or_path, std::move(names));
   layout.has_gaps = true;  // a user's own tracker may lose joints
   return layout;
+}
+
+void put_toe(Eigen::Ref<Eigen::Matrix3Xd> smpl, int side) {
+  const Eigen::Vector3d way = kToeAhead * ahead_of(smpl) - kToeBelow * Eigen::Vector3d::UnitZ();
+  smpl.col(side == 0 ? kLeftToe : kRightToe) = smpl.col(side == 0 ? kLeftAnkle : kRightAnkle) + way;
 }
 
 void make_smpl(const JointLayout& layout, const PointTracks::ConstFrame& columns, bool offsets,

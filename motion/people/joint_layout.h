@@ -33,14 +33,20 @@ std::vector<std::string> joint_layout_names();
 // person, with the parts that are missing, or where one part is there twice.
 JointLayout layout_of_names(std::string name, std::vector<std::string> names);
 
-// A layout's name, or the path of a text file of names, one a line ('#' begins a comment). Throws InputError naming the
-// file, or std::invalid_argument for neither.
-JointLayout read_joint_layout(const std::string& name_or_path);
+// A layout's name, or the path of a text file: of names in the order of the
+// columns, one a line ('#' begins a comment), or of lines "left_hip: NAME"
+// (motion/joint_names.h) for columns that have `own_names`. Throws InputError
+// naming the file, or std::invalid_argument for neither.
+JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names = {});
 
 // The 24 joints of one frame whose columns are in metres in W (z up). `offsets` false: without reach, ahead and down,
 // in any unit and axes.
 using SmplFrame = Eigen::Matrix<double, 3, kSmplJoints>;
 void make_smpl(const JointLayout& layout, const PointTracks::ConstFrame& columns, bool offsets,
                Eigen::Ref<Eigen::Matrix3Xd> smpl);
+
+// Puts the toe of a foot (0 left, 1 right) ahead of its ankle, in the way that
+// people without toes get them.
+void put_toe(Eigen::Ref<Eigen::Matrix3Xd> smpl, int side);
 
 }  // namespace duet

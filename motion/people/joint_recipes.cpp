@@ -10,16 +10,16 @@
 
 #include "duet/core/require.h"
 #include "duet/core/text.h"
+#include "duet/motion/joint_names.h"
 
 namespace duet {
 namespace {
 
-// Places of SMPL's joints that others lack, as parts of the way from pelvis to neck, and lengths in metres: those of
-// the table in docs/file-formats.md ("People of fewer joints"), taken from SMPL's mean shape.
-constexpr std::array<double, 3> kSpineAt = {0.21, 0.48, 0.60};
-constexpr double kCollarAt = 0.81, kCollarOut = 0.38;
+// Places of SMPL's joints that others lack, as parts of the way from pelvis to
+// neck, and lengths in metres: those of the table in docs/file-formats.md
+// ("People of fewer joints"), taken from SMPL's mean shape.
+constexpr double kCollarAt = 0.81;
 constexpr double kPelvisOverHips = 0.05, kNeckOverShoulders = 0.04, kHandBeyondWrist = 0.08;
-constexpr double kToeAhead = 0.12, kToeBelow = 0.05;
 constexpr double kHeadToTop = 0.4;   // head joint on the way from neck to the top of the head
 constexpr double kHeadToEars = 0.8;  // and to the middle of the ears
 
@@ -37,12 +37,16 @@ const Words& words_by_joint() {
 
 const Words& words_by_bone() {
   static const Words words = {
-      {"upleg", kHipPart},         {"thigh", kHipPart},       {"upperleg", kHipPart},   {"leg", kKneePart},
-      {"lowerleg", kKneePart},     {"shin", kKneePart},       {"calf", kKneePart},      {"foot", kAnklePart},
-      {"toebase", kToePart},       {"toe", kToePart},         {"ball", kToePart},       {"shoulder", kCollarPart},
-      {"collar", kCollarPart},     {"clavicle", kCollarPart}, {"arm", kShoulderPart},   {"uparm", kShoulderPart},
-      {"upperarm", kShoulderPart}, {"forearm", kElbowPart},   {"lowerarm", kElbowPart}, {"hand", kWristPart},
-      {"handmiddle1", kHandPart},  {"ear", kEarPart}};
+      {"upleg", kHipPart},          {"thigh", kHipPart},         {"upperleg", kHipPart},   {"leg", kKneePart},
+      {"lowerleg", kKneePart},      {"shin", kKneePart},         {"calf", kKneePart},      {"foot", kAnklePart},
+      {"toebase", kToePart},        {"toe", kToePart},           {"ball", kToePart},       {"shoulder", kCollarPart},
+      {"collar", kCollarPart},      {"clavicle", kCollarPart},   {"arm", kShoulderPart},   {"uparm", kShoulderPart},
+      {"upperarm", kShoulderPart},  {"forearm", kElbowPart},     {"lowerarm", kElbowPart}, {"hand", kWristPart},
+      {"handmiddle1", kHandPart},   {"ear", kEarPart},           {"toes", kToePart},       {"toe0", kToePart},
+      {"shldr", kShoulderPart},     {"femur", kHipPart},         {"tibia", kKneePart},     {"humerus", kShoulderPart},
+      {"radius", kElbowPart},       {"wrist", kWristPart},       {"palm", kHandPart},      {"thighbend", kHipPart},
+      {"shldrbend", kShoulderPart}, {"forearmbend", kElbowPart}, {"hip", kHipPart},        {"knee", kKneePart},
+      {"ankle", kAnklePart},        {"elbow", kElbowPart}};
   return words;
 }
 
@@ -51,9 +55,8 @@ struct SidedName {
   std::string part;
 };
 
-// Letters and digits in lower case, without a prefix up to ':'.
+// Letters and digits in lower case.
 std::string plain(std::string_view name) {
-  if (const std::size_t colon = name.rfind(':'); colon != std::string_view::npos) name = name.substr(colon + 1);
   std::string text;
   for (const char c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) != 0)
@@ -80,11 +83,12 @@ class ColumnFinder {
  public:
   ColumnFinder(const std::string& skeleton, const std::vector<std::string>& names)
       : skeleton_(skeleton), given_(names) {
-    for (const std::string& name : names) names_.push_back(plain(name));
+    for (const std::string& name : without_prefix(names)) names_.push_back(plain(name));
     for (auto& side : found_.side) side.fill(-1);
-    by_bone_ = has("leftforearm") || has("lforearm") || has("leftlowerarm") || has("lowerarml") || has("forearml");
-    has_shin_ = has("leftshin") || has("lshin");
-    has_ankle_ = has("leftankle") || has("lankle") || has("ankleleft") || has("anklel");
+    by_bone_ = has_sided({"forearm", "lowerarm", "radius", "forearmbend"});
+    has_shin_ = has_sided({"shin"});
+    has_ankle_ = has_sided({"ankle"});
+    has_wrist_ = has_sided({"wrist"});
   }
 
   BodyColumns find() {
@@ -103,8 +107,13 @@ class ColumnFinder {
   }
 
  private:
-  [[nodiscard]] bool has(const char* name) const {
-    return std::find(names_.begin(), names_.end(), name) != names_.end();
+  // "leftshin", "lshin", "shinleft", "shinl".
+  [[nodiscard]] bool has_sided(std::initializer_list<std::string> parts) const {
+    return std::any_of(parts.begin(), parts.end(), [&](const std::string& part) {
+      return std::any_of(names_.begin(), names_.end(), [&](const std::string& name) {
+        return name == "left" + part || name == "l" + part || name == part + "left" || name == part + "l";
+      });
+    });
   }
 
   void put(int& place, int column, const std::string& what) const {
@@ -118,7 +127,13 @@ class ColumnFinder {
     int part = (by_bone_ ? words_by_bone() : words_by_joint()).find(name.part)->second;
     if (by_bone_ && has_shin_ && name.part == "leg") part = kHipPart;  // SOMA's Leg, Shin, Foot
     if (!by_bone_ && name.part == "foot" && has_ankle_) part = kToePart;
+    if (by_bone_ && name.part == "hand" && has_wrist_) part = kHandPart;  // Wrist, Hand
     int& place = found_.side[name.side][part];
+    // A joint's name among bones' stands for the part only where no bone does.
+    const bool loose = by_bone_ && is_one_of(name.part, {"hip", "knee", "ankle", "elbow"});
+    if (loose && place >= 0) return;
+    if (!loose && is_loose_[name.side][part]) place = -1;
+    is_loose_[name.side][part] = loose;
     // A knuckle stands for the hand only where there is no hand.
     const bool knuckle = name.part.ends_with('1') || name.part.ends_with('0');
     if (part == kHandPart && place >= 0 && knuckle) return;
@@ -134,7 +149,7 @@ class ColumnFinder {
     if (is_one_of(name, {"head"})) return put(found_.head, column, "head");
     if (is_one_of(name, {"headtop", "headend", "vertex", "headnub"})) return put(found_.head_top, column, "head top");
     if (name == "nose") return put(found_.nose, column, "nose");
-    if (name == "neck") return put(found_.neck, column, "neck");
+    if (name == "neck" || name == "lowerneck") return put(found_.neck, column, "neck");
     if (is_one_of(name, {"neck1", "shouldercenter", "spineshoulder", "thorax", "c7"})) {
       if (second_neck_ < 0) second_neck_ = column;  // the lowest of several
       return;
@@ -142,14 +157,19 @@ class ColumnFinder {
     if (const auto level = trunk_level(name)) trunk_.emplace_back(*level, column);
   }
 
-  // From below; "spine", "spine1", ... and "chest", "chest2", ... are chains of their own, the chest above.
+  // From below; "spine", "spine1", ... and "chest", "chest2", ... are chains of
+  // their own, the chest above; vertebrae by what Xsens calls them.
   static std::optional<int> trunk_level(const std::string& name) {
-    if (name == "spinemid" || name == "abdomen" || name == "lowerback") return 0;
-    for (const auto& [word, base] : {std::pair<std::string, int>{"spine", 1}, {"chest", 20}}) {
+    static const std::map<std::string, int> kLevels = {{"spinemid", 0}, {"abdomen", 0},    {"lowerback", 0},
+                                                       {"l5", 1},       {"l3", 2},         {"t12", 3},
+                                                       {"t8", 20},      {"upperback", 19}, {"upperchest", 2000}};
+    if (const auto found = kLevels.find(name); found != kLevels.end()) return found->second;
+    for (const auto& [word, base] : {std::pair<std::string, int>{"spine", 1}, {"chest", 1000}}) {
       if (!name.starts_with(word)) continue;
       const std::string number = name.substr(word.size());
       if (number.empty()) return base;
-      if (number.size() == 1 && number[0] >= '0' && number[0] <= '9') return base + 1 + (number[0] - '0');
+      if (number.size() <= 3 && std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; }))
+        return base + 1 + std::stoi(number);
     }
     return std::nullopt;
   }
@@ -158,7 +178,8 @@ class ColumnFinder {
   const std::vector<std::string>& given_;
   std::vector<std::string> names_;  // in plain letters
   BodyColumns found_;
-  bool by_bone_ = false, has_shin_ = false, has_ankle_ = false;
+  bool by_bone_ = false, has_shin_ = false, has_ankle_ = false, has_wrist_ = false;
+  std::array<std::array<bool, kBodyPartCount>, 2> is_loose_ = {};
   std::array<bool, 2> is_knuckle_ = {false, false};
   int second_neck_ = -1, second_hips_ = -1;
   std::vector<std::pair<int, int>> trunk_;
@@ -275,7 +296,9 @@ class RecipeMaker {
   std::array<JointRecipe, kSmplJoints> recipes_;
 };
 
-void check_parts(const BodyColumns& columns, const std::string& skeleton) {
+}  // namespace
+
+void require_parts(const BodyColumns& columns, const std::string& skeleton) {
   std::vector<std::string> missing;
   for (const int side : {0, 1}) {
     const auto need = [&](bool there, const char* part) {
@@ -297,14 +320,12 @@ void check_parts(const BodyColumns& columns, const std::string& skeleton) {
         fmt::format("skeleton '{}': no column is the {}", shown(skeleton), fmt::join(missing, "; none the ")));
 }
 
-}  // namespace
-
 BodyColumns body_columns(const std::string& skeleton, const std::vector<std::string>& names) {
   return ColumnFinder(skeleton, names).find();
 }
 
 std::array<JointRecipe, kSmplJoints> recipes_of(const BodyColumns& columns, int size, const std::string& skeleton) {
-  check_parts(columns, skeleton);
+  require_parts(columns, skeleton);
   return RecipeMaker(columns, size).make();
 }
 

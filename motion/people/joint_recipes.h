@@ -24,6 +24,13 @@ struct JointRecipe {
   double down = 0.0;              // [m]
 };
 
+// Places of SMPL's spine joints on the way from pelvis to neck, of a collar on
+// the way from the neck to the shoulder, and of toes from the ankle [m]:
+// docs/file-formats.md, "People of fewer joints".
+inline constexpr std::array<double, 3> kSpineAt = {0.21, 0.48, 0.60};
+inline constexpr double kCollarOut = 0.38;
+inline constexpr double kToeAhead = 0.12, kToeBelow = 0.05;
+
 // The order in which the SMPL joints are made.
 inline constexpr std::array<SmplJoint, kSmplJoints> kRecipeOrder = {
     kLeftHip,    kRightHip,    kLeftKnee,  kRightKnee,  kLeftAnkle, kRightAnkle, kLeftShoulder, kRightShoulder,
@@ -52,12 +59,18 @@ struct BodyColumns {
   std::vector<int> trunk;  // between pelvis and neck, from below
 };
 
-// Two ways of naming are in use: by joints (shoulder, elbow, wrist, hip, knee, ankle), and by the bone that begins
-// there (captures: Shoulder = collar, Arm, ForeArm, Hand = wrist, UpLeg, Leg, Foot = ankle). Throws InputError where a
-// part is there twice; `skeleton` stands in messages.
+// A prefix that all names share is ignored (motion/joint_names.h). Two ways of
+// naming are in use: by joints (shoulder, elbow, wrist, hip, knee, ankle), and
+// by the bone that begins there (captures: Shoulder = collar, Arm, ForeArm,
+// Hand = wrist, UpLeg, Leg, Foot = ankle). Throws InputError where a part is
+// there twice; `skeleton` stands in messages.
 BodyColumns body_columns(const std::string& skeleton, const std::vector<std::string>& names);
 
-// `size`: how many columns. Throws InputError listing the parts that are missing.
+// Throws InputError listing the parts without which nobody can be made.
+void require_parts(const BodyColumns& columns, const std::string& skeleton);
+
+// `size`: how many columns. Throws InputError listing the parts that are
+// missing.
 std::array<JointRecipe, kSmplJoints> recipes_of(const BodyColumns& columns, int size, const std::string& skeleton);
 
 std::vector<JointRecipe::Part> face_of(const BodyColumns& columns);

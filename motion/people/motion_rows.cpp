@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/npy_header.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -74,7 +74,7 @@ std::vector<ClipPlace> find_rows(std::span<const std::string> paths, const Peopl
 }
 
 BodyMotion read_row_person(const std::string& path, const RowLayout& layout) {
-  const NumberTable table = npy_table(read_file(path), path);
+  const NumberTable table = npy_table(read_data(path), path);
   checked_rows(table, {layout.width}, fmt::format("(T, {})", layout.width));
   BodyMotion motion = body_motion(path, columns_of(table, layout.root, 3), columns_of(table, layout.body, 63),
                                   columns_of(table, layout.translation, 3));

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/json.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -120,7 +120,7 @@ Eigen::Matrix3Xd read_object_keypoints(const std::string& path) {
   const bool is_mesh = path.ends_with(".obj") || path.ends_with(".OBJ");
   if (!is_mesh && !path.ends_with(".json"))
     throw InputError(fmt::format("'{}': expected the shape of an object as .obj or .json", shown(path)));
-  const std::string text = read_file(path, kMostShapeBytes);
+  const std::string text = read_plain_text(path, kMostShapeBytes);
   const std::vector<Eigen::Vector3d> points = is_mesh ? vertices_of_obj(text, path) : points_of_json(text, path);
   if (points.empty()) throw InputError(fmt::format("'{}': expected points of an object, found none", path));
   Eigen::Matrix3Xd all(3, static_cast<long>(points.size()));

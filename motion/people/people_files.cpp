@@ -8,10 +8,9 @@
 #include <cctype>
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <utility>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/npy.h"
 #include "duet/core/npy_header.h"
@@ -32,7 +31,7 @@ std::string letters(std::string_view label) {
   return text;
 }
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kLabels = {{{"hugging", "hug"},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 24> kLabels = {{{"hugging", "hug"},
                                                                                     {"hugs", "hug"},
                                                                                     {"shakinghands", "handshake"},
                                                                                     {"shakehands", "handshake"},
@@ -47,6 +46,14 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 16> kLabels 
                                                                                     {"bow", "bend"},
                                                                                     {"bowing", "bend"},
                                                                                     {"bending", "bend"},
+                                                                                    {"shaking", "handshake"},
+                                                                                    {"shake", "handshake"},
+                                                                                    {"waves", "wave"},
+                                                                                    {"wavegoodbye", "wave"},
+                                                                                    {"bows", "bend"},
+                                                                                    {"blowingkiss", "fly_kiss"},
+                                                                                    {"blowakiss", "fly_kiss"},
+                                                                                    {"fistbumping", "fist_bump"},
                                                                                     {"blowkiss", "fly_kiss"}}};
 
 bool is_plain_folder(const fs::path& path) {
@@ -131,15 +138,6 @@ std::string id_of(const std::string& path, int parts) {
   return id;
 }
 
-std::string first_bytes(const std::string& path, std::size_t most) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(fmt::format("cannot read '{}'", shown(path)));
-  std::string bytes(most, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(most));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  return bytes;
-}
-
 std::vector<std::string> numbered_files(const std::string& folder, std::string_view ending) {
   std::vector<std::pair<int, std::string>> numbered;
   for (const std::string& name : names_in(folder)) {
@@ -164,7 +162,7 @@ std::vector<std::string> numbered_files(const std::string& folder, std::string_v
 }
 
 NpyArray read_npy(const std::string& path) {
-  return naming_file(path, [&] { return parse_npy(read_file(path)); });
+  return naming_file(path, [&] { return parse_npy(read_data(path)); });
 }
 
 std::vector<double> numbers_of(NpyArray array, const std::string& what) {

@@ -33,9 +33,6 @@ std::string file_name_of(const std::string& path);
 // "/data/train/01_hugging/001" of 2 parts: "01_hugging-001".
 std::string id_of(const std::string& path, int parts);
 
-// At most `most` bytes from the beginning of a file. Throws InputError naming it.
-std::string first_bytes(const std::string& path, std::size_t most);
-
 // Files of a folder named by the number of a frame ("00001.npy"), in order. Throws InputError naming the folder:
 // another name with that ending, or a number left out between the first and the last.
 std::vector<std::string> numbered_files(const std::string& folder, std::string_view ending);

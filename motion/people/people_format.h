@@ -36,6 +36,7 @@ struct PeopleFormat {
   // Where a format has a way of its own from file to clip (BVH: rotations are resampled, so that bones keep their
   // lengths); null: clip_of(read(...)).
   SourceClip (*clip)(const ClipPlace& place, const PeopleOptions& options) = nullptr;
+  bool states_task = false;  // each of its clips says which task it is
 };
 
 }  // namespace duet

@@ -30,6 +30,7 @@ struct PeopleOptions {
   Alignment align = Alignment::kNone;
   std::optional<Task> task = {};       // empty: from the file's or folder's label, else refused
   std::optional<Person> reactor = {};  // empty: from the data set's annotation, else B
+  bool as_is = false;                  // take people who cannot be (size, upright, floor, sides), and say so
   double output_rate_hz = 50.0;
 };
 

@@ -13,6 +13,8 @@ PeopleFormat harmony4d_format();
 PeopleFormat hi4d_format();
 PeopleFormat chi3d_format();
 PeopleFormat bvh_format();
+PeopleFormat ntu_format();
+PeopleFormat clip_format();
 PeopleFormat positions_format();
 
 }  // namespace duet

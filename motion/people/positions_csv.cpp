@@ -4,44 +4,23 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <optional>
 
+#include "duet/core/csv.h"
 #include "duet/core/order_statistics.h"
 #include "duet/core/require.h"
-#include "duet/core/split.h"
 #include "duet/core/text.h"
 
 namespace duet {
 namespace {
 
-constexpr std::size_t kMostCsvColumns = 4096;
-constexpr std::string_view kBlanksAndQuotes = " \t\r\"";
 constexpr double kEvenTimes = 0.1;  // of a period
 
 [[noreturn]] void refuse_csv(const std::string& name, const std::string& fault) {
   throw InputError(fmt::format("'{}': {}", shown(name, kShownSentence), fault));
-}
-
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> fields = split(line, ',');
-  for (std::string_view& field : fields) field = trimmed(field, kBlanksAndQuotes);
-  return fields;
-}
-
-// The next line with something on it that is no comment; nothing at the end.
-std::optional<std::string_view> next_line(std::string_view text, std::size_t& at, int& number) {
-  while (at < text.size()) {
-    const std::size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = trimmed(text.substr(at, end - at), kBlanksAndQuotes);
-    at = end + 1;
-    ++number;
-    if (!line.empty() && line[0] != '#') return line;
-  }
-  return std::nullopt;
 }
 
 struct Column {
@@ -90,26 +69,27 @@ struct CsvHeader {
   bool two_people = false;
 };
 
-CsvHeader header_of(std::string_view line, const std::string& name) {
-  CsvHeader header;
-  const std::vector<std::string_view> fields = fields_of(line);
-  if (fields.size() > kMostCsvColumns)
-    refuse_csv(name, fmt::format("expected at most {} columns, found {}", kMostCsvColumns, fields.size()));
-  bool any = false, all_have_person = true;
-  for (const std::string_view field : fields) {
-    Column column;
-    column.is_time = field == "time" || field == "t" || field == "Time" || field == "time_s";
-    if (const auto found = column.is_time ? std::nullopt : joint_and_axis(field)) {
-      any = true;
-      column.joint = found->first;
-      column.axis = found->second;
-      all_have_person = all_have_person && person_of(column.joint).has_value();
-    }
-    header.columns.push_back(std::move(column));
+Column column_of(const std::string& field) {
+  Column column;
+  column.is_time = field == "time" || field == "t" || field == "Time" || field == "time_s";
+  if (const auto found = column.is_time ? std::nullopt : joint_and_axis(field)) {
+    column.joint = found->first;
+    column.axis = found->second;
   }
-  if (!any)
-    refuse_csv(name, fmt::format("line 1: expected names like 'left_wrist_x', found '{}'", shown(line.substr(0, 200))));
-  header.two_people = all_have_person;
+  return column;
+}
+
+// Of the row that the reader stands on.
+CsvHeader header_of(const CsvReader& row) {
+  CsvHeader header;
+  for (const std::string& field : row.fields()) header.columns.push_back(column_of(field));
+  const auto has_axis = [](const Column& column) { return column.axis >= 0; };
+  if (std::none_of(header.columns.begin(), header.columns.end(), has_axis))
+    row.fail(fmt::format("expected names like 'left_wrist_x', found '{}'",
+                         shown(fmt::format("{}", fmt::join(row.fields(), ",")))));
+  header.two_people = std::all_of(header.columns.begin(), header.columns.end(), [&](const Column& column) {
+    return !has_axis(column) || person_of(column.joint).has_value();
+  });
   if (!header.two_people) return header;
   for (Column& column : header.columns) {
     if (column.axis < 0) continue;
@@ -163,13 +143,13 @@ class CsvPlaces {
   std::map<std::array<int, 3>, int> columns_;
 };
 
-double number_of(std::string_view field, const std::string& name, int line, std::size_t column) {
-  if (field.empty() || field == "nan" || field == "NaN") return std::numeric_limits<double>::quiet_NaN();
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
-  if (error != std::errc() || end != field.data() + field.size())
-    refuse_csv(name, fmt::format("line {}, column {}: expected a number, found '{}'", line, column + 1, shown(field)));
-  return value;
+double number_of(const CsvReader& row, std::size_t column) {
+  const std::string& field = row.fields()[column];
+  if (field.empty() || field == "nan" || field == "NaN" || field == "NAN")
+    return std::numeric_limits<double>::quiet_NaN();
+  const std::optional<double> value = row.number(field);
+  if (!value) row.fail(fmt::format("column {}: expected a number, found '{}'", column + 1, shown(field)));
+  return *value;
 }
 
 double rate_of_times(const std::vector<double>& times, const std::string& name) {
@@ -189,28 +169,39 @@ double rate_of_times(const std::vector<double>& times, const std::string& name) 
 
 }  // namespace
 
-bool csv_has_two_people(std::string_view first_line, const std::string& name) {
-  return header_of(first_line, name).two_people;
+bool names_positions(std::string_view text) {
+  CsvReader rows(text, "");
+  try {
+    if (!rows.next()) return false;
+  } catch (const InputError&) {
+    return false;
+  }
+  // A robot's table has a root with axes, too, beside columns of its joints.
+  const auto has_axis = [](const std::string& field) { return column_of(field).axis >= 0; };
+  return 2 * std::count_if(rows.fields().begin(), rows.fields().end(), has_axis) >= std::ssize(rows.fields());
+}
+
+bool csv_has_two_people(std::string_view text, const std::string& name) {
+  CsvReader rows(text, name);
+  if (!rows.next()) refuse_csv(name, "expected a line of names, found none");
+  return header_of(rows).two_people;
 }
 
 PositionsCsv parse_positions_csv(std::string_view text, const std::string& name) {
-  std::size_t at = 0;
-  int line_number = 0;
-  const auto first = next_line(text, at, line_number);
-  if (!first) refuse_csv(name, "the file is empty, expected a line of names");
-  const CsvHeader header = header_of(*first, name);
+  CsvReader rows(text, name);
+  if (!rows.next()) refuse_csv(name, "expected a line of names, found none");
+  const CsvHeader header = header_of(rows);
   const CsvPlaces places(header, name);
   std::vector<double> values, times;
   const std::size_t width = header.columns.size();
   std::size_t frames = 0;
-  while (const auto line = next_line(text, at, line_number)) {
-    const std::vector<std::string_view> fields = fields_of(*line);
-    if (fields.size() != width)
-      refuse_csv(name, fmt::format("line {}: expected {} fields, found {}", line_number, width, fields.size()));
+  while (rows.next()) {
+    if (rows.fields().size() != width)
+      rows.fail(fmt::format("expected {} fields, found {}", width, rows.fields().size()));
     for (std::size_t c = 0; c < width; ++c) {
       const Column& column = header.columns[c];
       const bool wanted = column.axis >= 0 || column.is_time;
-      values.push_back(wanted ? number_of(fields[c], name, line_number, c) : 0.0);
+      values.push_back(wanted ? number_of(rows, c) : 0.0);
       if (column.is_time) times.push_back(values.back());
     }
     ++frames;

@@ -23,7 +23,11 @@ struct PositionsCsv {
 // do not go on evenly (to a tenth of a period).
 PositionsCsv parse_positions_csv(std::string_view text, const std::string& name);
 
+// Whether the table begins with names of which half or more are joints' axes: it is of people, whatever is wrong with
+// it further down. `text`: the file or its beginning. Throws nothing.
+bool names_positions(std::string_view text);
+
 // Whether the first line names joints of two people (true), of one (false); throws InputError for neither.
-bool csv_has_two_people(std::string_view first_line, const std::string& name);
+bool csv_has_two_people(std::string_view text, const std::string& name);
 
 }  // namespace duet

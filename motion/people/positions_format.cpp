@@ -7,13 +7,15 @@
 #include <cctype>
 #include <filesystem>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/naming_file.h"
+#include "duet/core/no_data.h"
 #include "duet/core/npy_header.h"
 #include "duet/core/npz.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/core/zip.h"
+#include "duet/motion/people/clip_files.h"
 #include "duet/motion/people/people_detection.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/people/people_readers.h"
@@ -23,6 +25,8 @@ namespace duet {
 namespace {
 
 using Keys = std::vector<std::string>;
+
+constexpr std::size_t kHeadBytes = std::size_t{1} << 16;  // holds the names of any table's columns
 
 const Keys& both_keys() {  // (T, 2, J, 3)
   static const Keys keys = {"positions",       "joints3d", "joints_3d", "keypoints3d", "keypoints_3d",
@@ -61,10 +65,21 @@ bool is_positions_npz(const std::string& path) {
                      [&](const auto& pair) { return has(pair.first) && has(pair.second); });
 }
 
+bool is_table(const std::string& extension) {
+  return extension == ".csv" || extension == ".tsv" || extension == ".txt";
+}
+
+// By the names of its columns; one that is no data at all is said by its reader.
+bool may_hold_positions(const std::string& path) {
+  const std::string head = leading_bytes(path, kHeadBytes);
+  return names_positions(head) || (extension_of(path) == ".csv" && (head.empty() || !no_data_fault(head).empty()));
+}
+
 bool is_positions_file(const std::string& path) {
   const std::string extension = extension_of(path);
   if (!is_file(path)) return false;
-  return extension == ".csv" || extension == ".npy" || (extension == ".npz" && is_positions_npz(path));
+  if (is_table(extension)) return may_hold_positions(path);
+  return extension == ".npy" || (extension == ".npz" && is_positions_npz(path));
 }
 
 bool recognises_positions(std::span<const std::string> paths) {
@@ -82,15 +97,10 @@ bool recognises_positions(std::span<const std::string> paths) {
 bool holds_both(const std::string& path) {
   const std::string extension = extension_of(path);
   if (extension == ".npz") return true;
-  const std::string head = first_bytes(path, std::size_t{1} << 16);
-  if (extension == ".csv") {
-    std::size_t at = 0;
-    while (at < head.size() && (head[at] == '#' || head[at] == '\n' || head[at] == '\r'))
-      at = std::min(head.find('\n', at), head.size() - 1) + 1;
-    return csv_has_two_people(std::string_view(head).substr(at, head.find('\n', at) - at), path);
-  }
+  const std::string head = leading_bytes(path, kHeadBytes);
   try {
-    return parse_npy_header(head).shape.size() != 3;
+    if (!no_data_fault(head).empty()) return true;
+    return is_table(extension) ? csv_has_two_people(head, path) : parse_npy_header(head).shape.size() != 3;
   } catch (const InputError&) {
     return true;
   }
@@ -220,7 +230,7 @@ Keys take_npz(const std::string& path, RawPeople& people) {
 }
 
 Keys take_csv(const ClipPlace& place, RawPeople& people) {
-  PositionsCsv first = parse_positions_csv(read_text(place.files[0]), place.files[0]);
+  PositionsCsv first = parse_positions_csv(read_plain_text(place.files[0]), place.files[0]);
   people.rate_hz = first.rate_hz;
   if (place.files.size() == 1) {
     if (!first.two_people)
@@ -229,7 +239,7 @@ Keys take_csv(const ClipPlace& place, RawPeople& people) {
     people.joints = std::move(first.tracks);
     return first.joints;
   }
-  PositionsCsv second = parse_positions_csv(read_text(place.files[1]), place.files[1]);
+  PositionsCsv second = parse_positions_csv(read_plain_text(place.files[1]), place.files[1]);
   if (second.joints != first.joints)
     throw InputError(
         fmt::format("'{}': expected the joints of '{}', found others", shown(place.files[1]), shown(place.files[0])));
@@ -255,7 +265,7 @@ JointLayout layout_for(const Keys& names, int columns, const std::string& file, 
                        std::string& sentence) {
   if (!options.skeleton.empty()) {
     sentence = fmt::format("skeleton: {} (as told)", options.skeleton);
-    return read_joint_layout(options.skeleton);
+    return read_joint_layout(options.skeleton, names);
   }
   const std::vector<std::string> known = joint_layout_names();
   if (!names.empty()) {
@@ -291,7 +301,7 @@ RawPeople read_positions(const ClipPlace& place, const PeopleOptions& options) {
   Keys names;
   if (extension == ".npz")
     names = take_npz(file, people);
-  else if (extension == ".csv")
+  else if (is_table(extension))
     names = take_csv(place, people);
   else
     take_npy(place, people);

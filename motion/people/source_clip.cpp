@@ -83,12 +83,11 @@ PeopleFinding<bool> find_t_pose_of(const RawPeople& people, const WorldOfFile& w
   if (options.drop_t_pose)
     return {*options.drop_t_pose, *options.drop_t_pose ? "frame 0 dropped (as told)" : "frame 0 kept (as told)"};
   const bool in_a = has_t_pose(people, 0, world), in_b = has_t_pose(people, 1, world);
-  if (in_a != in_b)
-    refuse(people,
-           fmt::format("frame 0 of person {} is an added T pose, that of person {} is not: state whether to drop it",
-                       in_a ? "A" : "B", in_a ? "B" : "A"));
-  return {in_a, in_a ? "frame 0 dropped: an added T pose (straight horizontal arms, then a jump)"
-                     : "frame 0 kept: not an added T pose"};
+  if (!in_a && !in_b) return {false, "frame 0 kept: not an added T pose"};
+  return {true, fmt::format("frame 0 dropped: an added T pose{} (straight horizontal arms, then a jump)",
+                            in_a && in_b ? ""
+                            : in_a       ? " of person A"
+                                         : " of person B")};
 }
 
 // The way from the file to the clip.
@@ -247,10 +246,13 @@ std::map<std::string, std::string> provenance(const RawPeople& people, const Pla
   return source;
 }
 
-void judge(const RawPeople& people, const InteractionClip& clip, std::vector<std::string>& evidence) {
+void judge(const RawPeople& people, const InteractionClip& clip, const PeopleOptions& options,
+           std::vector<std::string>& evidence) {
   const Plausibility found = judge_people(clip);
-  if (!found.faults.empty()) refuse(people, found.faults.front());
-  for (const std::string& sentence : found.oddities) evidence.push_back("not as expected: " + sentence);
+  if (!found.faults.empty() && !options.as_is)
+    refuse(people, found.faults.front() + " (--as-is takes it nevertheless)");
+  for (const auto* sentences : {&found.faults, &found.oddities})
+    for (const std::string& sentence : *sentences) evidence.push_back("not as expected: " + sentence);
 }
 
 }  // namespace
@@ -260,6 +262,10 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
   SourceClip result;
   result.evidence = given.evidence;
   const Task task = task_for(given, options);
+  if (const auto label = given.source.find("label");
+      label != given.source.end() && task_of_label(label->second) != task)
+    result.evidence.push_back(
+        fmt::format("task: {} (as told; its label is '{}')", to_string(task), shown(label->second)));
   std::optional<RawPeople> filled;
   if (const std::string sentence = fill_gaps(given, options.rate_hz.value_or(given.rate_hz), filled); !sentence.empty())
     result.evidence.push_back(sentence);
@@ -281,7 +287,7 @@ SourceClip clip_of(const RawPeople& given, const PeopleOptions& options) {
     clip.source = provenance(people, plan);
     if (filled) clip.source["interpolated"] = "true";
     clip.object = object_of(people, options, plan, result.evidence);
-    judge(people, clip, result.evidence);
+    judge(people, clip, options, result.evidence);
     set_reactor(clip, options.reactor.value_or(people.reactor.value_or(Person::kB)));
   } catch (const std::invalid_argument& error) {
     refuse(people, error.what());

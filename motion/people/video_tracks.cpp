@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "duet/core/file.h"
+#include "duet/core/data_file.h"
 #include "duet/core/joblib.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
@@ -156,7 +156,7 @@ BodyMotion wham_motion(const Pickle& pickle, const PickleNode& person, const Tra
 }
 
 RawPeople read_wham(const ClipPlace& place, const PeopleOptions& options) {
-  const std::string bytes = read_file(place.files[0]);
+  const std::string bytes = read_data(place.files[0]);
   const Pickle pickle = parse_joblib(bytes, place.files[0]);
   const PickleNode& root = pickle[pickle.root];
   if (root.kind != PickleKind::kDict)
@@ -262,7 +262,7 @@ BodyMotion phalp_motion(const Pickle& pickle, const std::vector<PhalpFrame>& fra
 }
 
 RawPeople read_phalp(const ClipPlace& place, const PeopleOptions& options) {
-  const std::string bytes = read_file(place.files[0]);
+  const std::string bytes = read_data(place.files[0]);
   const Pickle pickle = parse_joblib(bytes, place.files[0]);
   const PickleNode& root = pickle[pickle.root];
   if (root.kind != PickleKind::kDict)

@@ -338,7 +338,7 @@ TEST(CommandLine, BadInputIsOneSentenceAndTwo) {
   };
   for (const Case& bad : std::vector<Case>{
            {"import " + (folder / "empty.bvh") + " " + (folder / "empty.bvh") + " --task hug -o x.npz", "empty.bvh"},
-           {"import " + (folder / "empty.bvh") + " --task hug -o x.npz", "pair of BVH files"},
+           {"import " + (folder / "empty.bvh") + " --task hug -o x.npz", "the file is empty"},
            {"import " + (folder / "empty.pkl") + " -o x.npz", "empty.pkl"},
            {"retarget " + (folder / "broken.npz") + " -o x", "broken.npz"},
            {"score " + (folder / "nowhere.npz"), "nowhere.npz"},

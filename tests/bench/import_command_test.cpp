@@ -97,6 +97,27 @@ TEST(ImportCommand, OptionsThatAreWrongAreOneSentence) {
   }
 }
 
+// The reader that fits best speaks: a table of a robot's numbers with a nan in it is no table of people without names.
+TEST(ImportCommand, WhatIsWrongInATableIsSaidByTheReaderThatFits) {
+  const test::ScratchFolder folder;
+  std::string table;
+  for (int row = 1; row <= 50; ++row) {
+    table += row == 41 ? "nan" : "0";
+    table += ",0,0.79,0,0,0,1";
+    for (int joint = 0; joint < 29; ++joint) table += ",0";
+    table += "\n";
+  }
+  write_file(folder / "robot.csv", table);
+  EXPECT_THAT(duet_program("import -q " + (folder / "robot.csv") + " -o /dev/null/x.npz").err,
+              HasSubstr("robot.csv': line 41: column 1: expected a finite number, found 'nan'"));
+  write_file(folder / "people.csv", "time,a_head_x,a_head_y,b_head_x,b_head_y\n0,1,2,3,word\n");
+  EXPECT_THAT(duet_program("import -q " + (folder / "people.csv") + " -o /dev/null/x.npz").err,
+              HasSubstr("joint 'head' of person A has no column for z"));
+  write_file(folder / "pointer.onnx", "version https://git-lfs.github.com/spec/v1\n");
+  EXPECT_THAT(duet_program("import -q " + (folder / "pointer.onnx") + " -o /dev/null/x.npz").err,
+              HasSubstr("pointer.onnx': this is a Git LFS pointer"));
+}
+
 TEST(ImportCommand, FormatsAndSkeletonsAreListed) {
   const auto formats = nlohmann::json::parse(duet_program("list people-formats --json").out);
   EXPECT_THAT(formats.dump(), HasSubstr("inter-x-skeleton"));

@@ -272,6 +272,11 @@ TEST(BodyFormats, MissingKeysAndWrongShapesAreNamed) {
   EXPECT_THAT(refusal(inter_x, npz), HasSubstr("array 'trans': expected numbers, found texts"));
   npz = test::amass_poses_npz(body, 100.0);
   EXPECT_THAT(refusal(amass, npz), HasSubstr("is at 100 Hz and '"));
+  const Npz with_rate = test::amass_poses_npz(body, 120.0);
+  npz = Npz();
+  for (const std::string& key : with_rate.keys())
+    if (!key.starts_with("mocap_")) npz.set(key, with_rate.array(key));
+  EXPECT_THAT(refusal(amass, npz), HasSubstr("it states no rate (no array 'mocap_framerate'); state the rate"));
   npz = test::amass_poses_npz(body, -1.0);
   EXPECT_THAT(refusal(amass, npz), HasSubstr("array 'mocap_framerate': expected a rate of at most 10000 Hz, found -1"));
 }

@@ -116,11 +116,69 @@ TEST(Bvh, RefusalsNameFileLineExpectedAndFound) {
       {two_joints(kThree, kOneFrame + "0 0 0 0 0 0x1 0 0 0\n"), "x.bvh:19: frame 0: expected a number, found '0x1'"},
       {two_joints(kThree, "Frames: 3\nFrame Time: 1\n0 0 0 0 0 0 0 0 0\n"),
        "x.bvh:20: expected 3 frames as announced, found 1"},
-      {two_joints(kThree, good + "0 0 0 0 0 0 0 0 0\n"),
-       "x.bvh:20: expected nothing after the 1 announced frames, found '0'"},
+      {two_joints(kThree, good + "0 0 0 0\n"), "x.bvh:20: expected nothing after the 1 announced frames, found '0'"},
+      {two_joints(kThree, good + "and more\n"), "x.bvh:20: expected nothing after the 1 announced frames, found 'and'"},
   };
   for (const BadText& bad : cases)
     EXPECT_THAT(thrown_message<InputError>([&] { (void)parse_bvh(bad.text, "x.bvh"); }), StartsWith(bad.expected));
+}
+
+TEST(Bvh, WhatMakersWriteInTheirOwnWayIsTaken) {
+  const std::string frames = "Frames: 1\nFrame Time: 0.01\n1 2 3 4 5 6 7 8 9\n";
+  const Bvh plain = parse_bvh(two_joints(kThree, frames), "x.bvh");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = two_joints(kThree, frames);
+    text.replace(text.find(from), from.size(), to);
+    return parse_bvh(text, "x.bvh");
+  };
+  for (const auto& [from, to] : {std::pair{"End Site", "End site"},
+                                 {"End Site", "END SITE"},
+                                 {"End Site", "EndSite"},
+                                 {"End Site", "End Site Arm_end"},
+                                 {"Frames: 1", "Frames : 1"},
+                                 {"Frames: 1", "FRAMES:1"},
+                                 {"Frame Time: 0.01", "Frame time :  0.01"},
+                                 {"Xposition Yposition", "XPOSITION yposition"},
+                                 {"JOINT Arm\n  {", "Joint Arm {"}}) {
+    const Bvh read = with(from, to);
+    EXPECT_EQ(read.values, plain.values) << to;
+    EXPECT_EQ(read.joints.back().name, "Arm/end") << to;
+    EXPECT_EQ(read.joints[0].channels, plain.joints[0].channels) << to;
+  }
+  EXPECT_EQ(with("JOINT Arm", "JOINT Bip01 L UpperArm \t").joints[1].name, "Bip01 L UpperArm");
+}
+
+TEST(Bvh, FramesBeyondTheAnnouncedOnesAreLeftOutWithANote) {
+  const std::string one = kOneFrame + "1 2 3 4 5 6 7 8 9\n";
+  EXPECT_TRUE(parse_bvh(two_joints(kThree, one), "x.bvh").notes.empty());
+  const Bvh bvh = parse_bvh(two_joints(kThree, one + "9 8 7 6 5 4 3 2 1\n"), "x.bvh");
+  EXPECT_EQ(bvh.frames, 1);
+  EXPECT_EQ(bvh.values.size(), 9U);
+  EXPECT_THAT(bvh.notes, testing::ElementsAre(HasSubstr("has 2 frames and announces 1")));
+}
+
+TEST(Bvh, PositionChannelsThatNobodyFilledAreNoPositions) {
+  const std::string channels = "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation";
+  const std::string frames = "Frames: 2\nFrame Time: 0.01\n0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 0 0 0 90\n";
+  const Bvh bvh = parse_bvh(two_joints(channels, frames), "x.bvh");
+  EXPECT_EQ(local_poses(bvh, 0)[1].p, Eigen::Vector3d(1, 0, 0));
+  EXPECT_THAT(bvh.notes, testing::ElementsAre(HasSubstr("position channels of 1 joints are 0 in all frames")));
+  const Bvh filled = parse_bvh(
+      two_joints(channels, "Frames: 2\nFrame Time: 0.01\n0 0 0 0 0 0 0 0 0 0 0 0\n0 0 0 0 0 0 0 0 1 0 0 0\n"), "x.bvh");
+  EXPECT_EQ(local_poses(filled, 0)[1].p, Eigen::Vector3d(0, 0, 0));
+  EXPECT_TRUE(filled.notes.empty());
+}
+
+TEST(Bvh, SeveralRootsAreReadEachWithNamesOfItsOwn) {
+  const std::string one = two_joints(kThree, "");
+  const std::string root = one.substr(one.find("ROOT"), one.find("MOTION") - one.find("ROOT"));
+  const std::string values = "1 2 3 4 5 6 7 8 9";
+  const Bvh bvh =
+      parse_bvh("HIERARCHY\n" + root + root + "MOTION\n" + kOneFrame + values + " " + values + "\n", "x.bvh");
+  ASSERT_EQ(bvh.joints.size(), 6U);
+  EXPECT_EQ(bvh.joints[3].parent, -1);
+  EXPECT_EQ(bvh.joints[4].parent, 3);
+  EXPECT_EQ(global_poses(bvh, local_poses(bvh, 0))[5].p, global_poses(bvh, local_poses(bvh, 0))[2].p);
 }
 
 // Only a cut inside the last number can leave a file that is whole.

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace duet::test {
@@ -124,14 +126,89 @@ inline std::vector<BvhBone> soma_bones() {
   return bones;
 }
 
-// As LAFAN1 has it: the common names, feet that end in Toe, three vertebrae, no fingers.
+// As LAFAN1 has it: the common names, feet that end in Toe, three vertebrae, no fingers, and End Sites of no length: a
+// hand and a toe end where they begin.
 inline std::vector<BvhBone> lafan_bones() {
   std::vector<BvhBone> bones = common_bones();
   for (BvhBone& bone : bones) {
     bone.name = bone.name.substr(std::string("mixamorig:").size());
     if (bone.name.ends_with("ToeBase")) bone.name = bone.name.substr(0, bone.name.size() - 4);
+    if (bone.name.ends_with("/end")) bone.offset.setZero();
   }
+  for (const char* toe : {"LeftToe", "RightToe"})
+    for (int j = static_cast<int>(bones.size()); j-- > 0;)
+      if (bones[j].name == toe) bones.push_back({std::string(toe) + "/end", j, {0, 0, 0}});
   return bones;
+}
+
+// What others call the joints of lafan_bones(), "@" for the side.
+struct BvhNames {
+  std::string maker, left, right;
+  std::string hips, spine, spine1, spine2, neck, head, collar, shoulder, elbow, wrist, hip, knee, ankle, toe;
+
+  [[nodiscard]] std::map<std::string, std::string> map() const {
+    std::map<std::string, std::string> names = {{"Hips", hips},     {"Spine", spine}, {"Spine1", spine1},
+                                                {"Spine2", spine2}, {"Neck", neck},   {"Head", head}};
+    for (const bool is_left : {true, false})
+      for (const auto& [common, name] : {std::pair{"Shoulder", &collar},
+                                         {"Arm", &shoulder},
+                                         {"ForeArm", &elbow},
+                                         {"Hand", &wrist},
+                                         {"UpLeg", &hip},
+                                         {"Leg", &knee},
+                                         {"Foot", &ankle},
+                                         {"Toe", &toe}}) {
+        std::string sided = *name;
+        sided.replace(sided.find('@'), 1, is_left ? left : right);
+        names[(is_left ? "Left" : "Right") + std::string(common)] = sided;
+      }
+    return names;
+  }
+};
+
+inline std::vector<BvhNames> bvh_names_of_others() {
+  return {
+      {"Biped", "L", "R", "Bip01 Pelvis", "Bip01 Spine", "Bip01 Spine1", "Bip01 Spine2", "Bip01 Neck", "Bip01 Head",
+       "Bip01 @ Clavicle", "Bip01 @ UpperArm", "Bip01 @ Forearm", "Bip01 @ Hand", "Bip01 @ Thigh", "Bip01 @ Calf",
+       "Bip01 @ Foot", "Bip01 @ Toe0"},
+      {"Bandai-Namco", "L", "R", "Hips", "Spine", "Spine1", "Chest", "Neck", "Head", "Shoulder_@", "UpperArm_@",
+       "LowerArm_@", "Hand_@", "UpperLeg_@", "LowerLeg_@", "Foot_@", "Toes_@"},
+      {"Rokoko", "Left", "Right", "Hips", "Spine1", "Spine2", "Spine3", "Neck", "Head", "@Shoulder", "@Arm", "@ForeArm",
+       "@Hand", "@Thigh", "@Shin", "@Foot", "@Toe"},
+      {"SMPL", "L", "R", "Pelvis", "Spine1", "Spine2", "Spine3", "Neck", "Head", "@_Collar", "@_Shoulder", "@_Elbow",
+       "@_Wrist", "@_Hip", "@_Knee", "@_Ankle", "@_Foot"},
+      {"Unity", "Left", "Right", "Hips", "Spine", "Chest", "UpperChest", "Neck", "Head", "@Shoulder", "@UpperArm",
+       "@LowerArm", "@Hand", "@UpperLeg", "@LowerLeg", "@Foot", "@Toes"},
+      {"lower case", "left", "right", "hips", "spine", "spine1", "spine2", "neck", "head", "@shoulder", "@arm",
+       "@forearm", "@hand", "@upleg", "@leg", "@foot", "@toebase"},
+      {"Vicon", "Left", "Right", "Actor1.Hips", "Actor1.Spine", "Actor1.Spine1", "Actor1.Spine2", "Actor1.Neck",
+       "Actor1.Head", "Actor1.@Shoulder", "Actor1.@Arm", "Actor1.@ForeArm", "Actor1.@Hand", "Actor1.@UpLeg",
+       "Actor1.@Leg", "Actor1.@Foot", "Actor1.@Toe"},
+      {"MotionBuilder", "Left", "Right", "Character1_Hips", "Character1_Spine", "Character1_Spine1",
+       "Character1_Spine2", "Character1_Neck", "Character1_Head", "Character1_@Shoulder", "Character1_@Arm",
+       "Character1_@ForeArm", "Character1_@Hand", "Character1_@UpLeg", "Character1_@Leg", "Character1_@Foot",
+       "Character1_@Toe"},
+      {"Mixamo without a colon", "Left", "Right", "mixamorig_Hips", "mixamorig_Spine", "mixamorig_Spine1",
+       "mixamorig_Spine2", "mixamorig_Neck", "mixamorig_Head", "mixamorig_@Shoulder", "mixamorig_@Arm",
+       "mixamorig_@ForeArm", "mixamorig_@Hand", "mixamorig_@UpLeg", "mixamorig_@Leg", "mixamorig_@Foot",
+       "mixamorig_@ToeBase"},
+      {"Mixamo with a number", "Left", "Right", "mixamorig1:Hips", "mixamorig1:Spine", "mixamorig1:Spine1",
+       "mixamorig1:Spine2", "mixamorig1:Neck", "mixamorig1:Head", "mixamorig1:@Shoulder", "mixamorig1:@Arm",
+       "mixamorig1:@ForeArm", "mixamorig1:@Hand", "mixamorig1:@UpLeg", "mixamorig1:@Leg", "mixamorig1:@Foot",
+       "mixamorig1:@ToeBase"},
+      {"video", "left", "right", "character_A_hips", "character_A_spine", "character_A_spine1", "character_A_spine2",
+       "character_A_neck", "character_A_head", "character_A_@_collar", "character_A_@_shoulder", "character_A_@_elbow",
+       "character_A_@_wrist", "character_A_@_hip", "character_A_@_knee", "character_A_@_ankle", "character_A_@_foot"},
+      {"Xsens by segments", "Left", "Right", "Pelvis", "L5", "L3", "T8", "Neck", "Head", "@Shoulder", "@UpperArm",
+       "@ForeArm", "@Hand", "@UpperLeg", "@LowerLeg", "@Foot", "@Toe"},
+      {"Rigify", "L", "R", "DEF-hips", "DEF-spine", "DEF-spine.001", "DEF-spine.002", "DEF-neck", "DEF-head",
+       "DEF-shoulder.@", "DEF-upper_arm.@", "DEF-forearm.@", "DEF-hand.@", "DEF-thigh.@", "DEF-shin.@", "DEF-foot.@",
+       "DEF-toe.@"},
+      {"DAZ", "l", "r", "hip", "abdomen", "chest", "chest2", "neck", "head", "@Collar", "@Shldr", "@ForeArm", "@Hand",
+       "@Thigh", "@Shin", "@Foot", "@Toe"},
+      {"ASF", "l", "r", "root", "lowerback", "upperback", "chest", "lowerneck", "head", "@clavicle", "@humerus",
+       "@radius", "@wrist", "@femur", "@tibia", "@foot", "@toes"},
+  };
 }
 
 struct BvhWriter {
@@ -146,6 +223,7 @@ struct BvhWriter {
   bool t_pose = false;                       // frame 0 has the arms out
   double swing = 3.0;                        // of the left thigh, per frame [deg]
   int frames = 6;
+  std::map<std::string, std::string> names = {};  // what other makers call the bones
 
   // Axes of a file that is z up: (x, y, z) -> (x, -z, y).
   [[nodiscard]] Eigen::Vector3d turned(const Eigen::Vector3d& v) const {
@@ -181,6 +259,11 @@ struct BvhWriter {
   }
 
  private:
+  [[nodiscard]] std::string name_of(const BvhBone& bone) const {
+    const auto found = names.find(bone.name);
+    return found == names.end() ? bone.name : found->second;
+  }
+
   // Angles about the file's Z, Y, X that turn as the given ones about Z, Y, X of a y-up file; one at a time is enough.
   [[nodiscard]] std::string angles(const Eigen::Vector3d& zyx) const {
     if (!z_up) return fmt::format("{:.12g} {:.12g} {:.12g} ", zyx[0], zyx[1], zyx[2]);
@@ -191,7 +274,7 @@ struct BvhWriter {
     const BvhBone& bone = bones[index];
     const Eigen::Vector3d offset = turned(bone.offset) / metres_per_unit;
     const bool end = bone.name.ends_with("/end");
-    out += end ? "End Site" : (bone.parent < 0 ? "ROOT " : "JOINT ") + bone.name;
+    out += end ? "End Site" : (bone.parent < 0 ? "ROOT " : "JOINT ") + name_of(bone);
     out += fmt::format("\n{{\nOFFSET {:.12g} {:.12g} {:.12g}\n", offset.x(), offset.y(), offset.z());
     if (!end)
       out += bone.parent < 0 ? "CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n"

@@ -29,6 +29,32 @@ TEST(JointLayout, WeightsOfEachJointAddUpToOneAndDirectionsToZero) {
   }
 }
 
+TEST(JointLayout, APrefixThatAllNamesShareSaysNothing) {
+  const JointLayout& plain = joint_layout("smpl-22");
+  for (const char* prefix : {"Actor1.", "Actor1:", "character_A_", "ns:Skeleton_", "jnt_", "DEF-"}) {
+    std::vector<std::string> names = plain.names;
+    for (std::string& name : names) name.insert(0, prefix);
+    const JointLayout found = layout_of_names("prefixed", names);
+    for (int j = 0; j < kSmplJoints; ++j)
+      EXPECT_EQ(found.smpl[j].parts[0].column, plain.smpl[j].parts[0].column) << prefix << kSmplNames[j];
+  }
+}
+
+TEST(JointLayout, AFileOfNamesMapsTheColumnsOfAFile) {
+  const test::ScratchFolder folder;
+  std::vector<std::string> own;
+  std::string map;
+  for (int j = 0; j < 22; ++j) {
+    own.push_back(fmt::format("marker {}", 21 - j));
+    map += fmt::format("{}: marker {}\n", kSmplNames[j], 21 - j);
+  }
+  write_file(folder / "map.yaml", "\xef\xbb\xbf" + map);
+  const JointLayout found = read_joint_layout(folder / "map.yaml", own);
+  EXPECT_EQ(found.smpl[kLeftWrist].parts[0].column, static_cast<int>(kLeftWrist));
+  EXPECT_THAT(thrown_message<InputError>([&] { (void)read_joint_layout(folder / "map.yaml"); }),
+              HasSubstr("the motion's file has no names"));
+}
+
 // A recipe uses columns of the file, and SMPL joints that stand before it in the order of making.
 TEST(JointLayout, RecipesUseOnlyWhatIsMadeBefore) {
   for (const std::string& name : joint_layout_names()) {

@@ -257,7 +257,7 @@ TEST(PeopleBadInput, CsvIsJudgedByLineAndColumn) {
   EXPECT_THAT(edited("head_x", "head_q"), HasSubstr("joint 'head' of person A has no column for x"));
   EXPECT_THAT(edited("head_x", "head_y"), HasSubstr("joint 'head' has this axis twice"));
   EXPECT_THAT(edited("0.00000,", "0.00000,zero"),
-              HasSubstr("a.csv': line 2, column 2: expected a number, found 'zero"));
+              HasSubstr("a.csv': line 2: column 2: expected a number, found 'zero"));
   EXPECT_THAT(edited("0.03333,", "0.03333,1,"), HasSubstr("line 3: expected 67 fields, found 68"));
   EXPECT_THAT(edited("0.06667,", "0.09667,"), HasSubstr("column 'time': frame"));
   EXPECT_THAT(refusal(standin, 0, "time,wrist\n1,2\n"), HasSubstr("expected names like 'left_wrist_x'"));
@@ -268,6 +268,39 @@ TEST(PeopleBadInput, CsvIsJudgedByLineAndColumn) {
                         text.replace(text.find("b_nose_x"), 8, "b_chin_x");
                       }),
               HasSubstr("joint 'chin' stands there for person B only"));
+}
+
+TEST(PeopleBadInput, WhatIsNoDataIsSaidByNameWhateverItsEnding) {
+  const ScratchFolder folder;
+  const std::string pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 1\n";
+  for (const char* name : {"x.npz", "x.npy", "x.csv", "x.bvh", "x.pkl", "x.pt", "x.h5", "x.skeleton", "x.json"}) {
+    for (const auto& [bytes, what] : {std::pair<std::string, const char*>{pointer, "this is a Git LFS pointer"},
+                                      {"<!DOCTYPE html><html>", "this is an HTML page"},
+                                      {std::string("\xff\xfe"
+                                                   "a\0_\0x\0,\0",
+                                                   10),
+                                       "this is text in UTF-16"},
+                                      {"", "the file is empty"}}) {
+      write_file(folder / name, bytes);
+      const std::vector<std::string> paths = {folder / name};
+      EXPECT_THAT(thrown_message<InputError>([&] { (void)find_people_format(paths); }),
+                  HasSubstr(std::string(name) + "': " + what));
+    }
+  }
+}
+
+TEST(PeopleBadInput, APathWithoutPeopleIsSaidShortlyWithWhatItHolds) {
+  const ScratchFolder folder;
+  write_file(folder / "data/a.dat", "x");
+  write_file(folder / "data/b.dat", "x");
+  write_file(folder / "notes.md", "# Notes\nmore");
+  const auto message = [&](const std::string& name) {
+    const std::vector<std::string> paths = {folder / name};
+    return thrown_message<InputError>([&] { (void)find_people_format(paths); });
+  };
+  EXPECT_THAT(message("data"), HasSubstr("no motion of two people that is known: the folder holds 2 .dat"));
+  EXPECT_THAT(message("notes.md"), HasSubstr("the file begins with '# Notes'"));
+  for (const char* name : {"data", "notes.md"}) EXPECT_LT(message(name).size(), 300U) << message(name);
 }
 
 TEST(PeopleBadInput, OptionsThatBvhFilesHaveNoUseForAreRefused) {

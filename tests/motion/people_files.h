@@ -300,8 +300,10 @@ inline std::vector<StandinFile> example_files() {
   for (const auto& [name, bones] : {std::pair<std::string, std::vector<BvhBone>>{"bvh_cmu", cmu_bones()},
                                     {"bvh_lafan1", lafan_bones()},
                                     {"bvh_xsens", xsens_bones()},
+                                    {"bvh_biped", lafan_bones()},
                                     {"bvh_soma", soma_bones()}}) {
     BvhWriter writer{.bones = bones};
+    if (name == "bvh_biped") writer.names = bvh_names_of_others().front().map();
     files.push_back({name + "/a.bvh", writer.text()});
     writer.root.z() = 1.5;
     writer.first_angles = {0, 180, 0};  // turned to face the other
