@@ -29,6 +29,9 @@ std::span<const CriterionInfo> curation_criteria();
 // What each criterion allows, by name; those that are not named have the table's.
 struct CurationOptions {
   std::map<std::string, double> limits = {};
+  // How much limbs' bones change in the usual recording of this source (median of bone_change); 0: not known. A tracker
+  // whose bones change more than others' is allowed kOfSource of what is usual for it, where `limits` does not name it.
+  double source_bone_change = 0.0;
   std::vector<Gate> gates = {all_gates().begin(), all_gates().end()};
 };
 // "joint_speed=8". Throws std::invalid_argument for an unknown criterion (with the known ones) or a value that is no
@@ -54,6 +57,9 @@ struct CurationVerdict {
   // Where the criterion that fails by the largest factor is worst; 0 where none fails.
   [[nodiscard]] int worst_frame() const;
 };
+
+// The figure of the criterion "bone_change".
+double limb_bone_change(const InteractionClip& clip);
 
 CurationVerdict curate(const InteractionClip& clip, const CurationOptions& options = {});
 

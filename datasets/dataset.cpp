@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <mutex>
@@ -17,10 +18,12 @@
 #include "duet/datasets/dataset_files.h"
 #include "duet/datasets/dataset_folder.h"
 #include "duet/datasets/people_clip.h"
+#include "duet/datasets/source_facts.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
+#include "duet/motion/people/people_files.h"
 #include "duet/motion/people/people_formats.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/retarget/pair.h"
@@ -43,6 +46,7 @@ json settings_of(const DatasetPlan& plan, const PeopleFormat& format) {
                         {"level", or_null(people.level)},
                         {"floor", or_null(people.floor)},
                         {"drop_t_pose", or_null(people.drop_t_pose)},
+                        {"as_is", people.as_is},
                         {"skeleton", people.skeleton},
                         {"body_model", people.body_model.empty() ? "" : sha256_file(people.body_model)},
                         {"object", people.object.empty() ? "" : sha256_file(people.object)},
@@ -123,11 +127,12 @@ class StageClock {
   std::chrono::steady_clock::time_point begin_;
 };
 
-std::string key_of(const std::string& settings, const std::vector<NamedDigest>& sources, const ClipPlace& place,
-                   const Annotations& annotations) {
+std::string key_of(const std::string& settings, const std::vector<NamedDigest>& files, const ClipPlace& place,
+                   const Annotations& annotations, const SourceFacts& source) {
   Sha256 digest;
   digest.update(settings);
-  for (const NamedDigest& source : sources) digest.update(source.file + "\n" + source.sha256 + "\n");
+  digest.update(fmt::format("{} {}\n", source.bone_change, source.is_mixed()));
+  for (const NamedDigest& file : files) digest.update(file.file + "\n" + file.sha256 + "\n");
   digest.update(place.entry);
   const auto annotation = annotations.find(place.id);
   if (annotation != annotations.end()) digest.update(annotations_csv({annotation->second}));
@@ -148,9 +153,15 @@ std::map<std::string, double> figures_of(const PairedMotion& paired, const Robot
 // The work of one thread on one clip.
 class ClipWork {
  public:
-  ClipWork(const DatasetPlan& plan, const PeopleFormat& format, const std::string& folder, const ClipPlace& place,
-           std::map<std::string, double>& seconds)
-      : plan_(plan), format_(format), folder_(folder), place_(place), inputs_(plan.inputs), clock_(seconds) {}
+  ClipWork(const DatasetPlan& plan, const PeopleFormat& format, const SourceFacts& source, const std::string& folder,
+           const ClipPlace& place, std::map<std::string, double>& seconds)
+      : plan_(plan),
+        format_(format),
+        source_(source),
+        folder_(folder),
+        place_(place),
+        inputs_(plan.inputs),
+        clock_(seconds) {}
 
   DatasetEntry run(DatasetEntry entry) {
     entry.format = format_.name;
@@ -174,15 +185,20 @@ class ClipWork {
     PeopleOptions options = plan_.people;
     const auto annotation = plan_.annotations.find(place_.id);
     if (annotation != plan_.annotations.end() && annotation->second.task) options.task = annotation->second.task;
+    const bool told_for_all = plan_.people.task && !(annotation != plan_.annotations.end() && annotation->second.task);
+    if (told_for_all && source_.is_mixed() && is_other(entry)) return;
     PeopleClip read = read_people_clip(format_, place_, options);
-    entry.label = read.label;
+    if (entry.label.empty()) entry.label = read.label;
     if (!read.source) {
       entry.status = ClipStatus::kOther;
-      entry.reasons = {fmt::format("its label '{}' is none of duet's tasks", read.label)};
+      entry.reasons = {
+          fmt::format("its label '{}' is none of duet's tasks (annotations.csv can give it one)", read.label)};
       return;
     }
     InteractionClip& clip = read.source->clip;
     clip.id = place_.id;
+    if (const auto label = clip.source.find("label"); entry.label.empty() && label != clip.source.end())
+      entry.label = label->second;
     if (annotation != plan_.annotations.end()) annotate(clip, annotation->second);
     entry.evidence = std::move(read.source->evidence);
     inputs_.strip(entry.evidence);
@@ -202,6 +218,18 @@ class ClipWork {
     for (const DatasetRobot& robot : plan_.robots) retarget_for(robot, clip, entry);
   }
 
+  // Whether, among recordings of several labels, this one's is another than the task that was told for all.
+  bool is_other(DatasetEntry& entry) const {
+    entry.label = label_of(format_, place_, plan_.people);
+    if (entry.label.empty() || task_of_label(entry.label) == plan_.people.task) return false;
+    entry.status = ClipStatus::kOther;
+    entry.reasons = {
+        fmt::format("its label '{}' is not --task {}, and the recordings have several labels "
+                    "(annotations.csv can give it a task)",
+                    entry.label, to_string(*plan_.people.task))};
+    return true;
+  }
+
   static void describe(DatasetEntry& entry, const InteractionClip& clip) {
     entry.provenance = clip.source;
     entry.task = to_string(clip.task);
@@ -213,7 +241,9 @@ class ClipWork {
   }
 
   CurationVerdict judge(DatasetEntry& entry, const InteractionClip& clip) const {
-    CurationVerdict verdict = curate(clip, plan_.curation);
+    CurationOptions options = plan_.curation;
+    options.source_bone_change = source_.bone_change;
+    CurationVerdict verdict = curate(clip, options);
     for (const CriterionFinding& finding : verdict.findings)
       entry.criteria[std::string(finding.criterion->name)] = finding.value;
     entry.status = verdict.passed() ? ClipStatus::kKept : ClipStatus::kRejected;
@@ -245,6 +275,7 @@ class ClipWork {
 
   const DatasetPlan& plan_;
   const PeopleFormat& format_;
+  const SourceFacts& source_;
   const std::string& folder_;
   const ClipPlace& place_;
   InputFolders inputs_;
@@ -287,6 +318,7 @@ class DatasetWork {
     summary_.clips = static_cast<int>(places_.size());
     if (events_.found) events_.found(summary_.clips);
     check_annotations();
+    find_facts();
   }
 
   DatasetSummary run() {
@@ -308,6 +340,13 @@ class DatasetWork {
             fmt::format("the annotations name clip '{}', which is not among the {} clips", clip, places_.size()));
   }
 
+  void find_facts() {
+    if (plan_.people.task) source_.labels = count_labels(format_, places_, plan_.people, plan_.threads);
+    const bool judges_bones = std::ranges::count(plan_.curation.gates, Gate::kMotionFidelity) > 0 &&
+                              !plan_.curation.limits.contains("bone_change");
+    if (judges_bones) source_.bone_change = usual_bone_change(format_, places_, plan_.people, plan_.threads);
+  }
+
   bool stopped() {
     const std::lock_guard hold(mutex_);
     summary_.stopped = summary_.stopped || (events_.stop && events_.stop());
@@ -324,10 +363,10 @@ class DatasetWork {
     } catch (const InputError&) {
       entry.sources.clear();  // the reader says what is wrong with it
     }
-    entry.key = key_of(settings_.dump(), entry.sources, place, plan_.annotations);
+    entry.key = key_of(settings_.dump(), entry.sources, place, plan_.annotations, source_);
     if (const std::optional<DatasetEntry> before = folder_.find(place.id, entry.key))
       return finish(*before, true, seconds);
-    entry = ClipWork(plan_, format_, folder_.path(), place, seconds).run(std::move(entry));
+    entry = ClipWork(plan_, format_, source_, folder_.path(), place, seconds).run(std::move(entry));
     folder_.append(entry);
     finish(entry, false, seconds);
   }
@@ -343,6 +382,7 @@ class DatasetWork {
   const PeopleFormat& format_;
   json settings_;
   std::vector<ClipPlace> places_;
+  SourceFacts source_;
   DatasetFolder folder_;
   const DatasetEvents& events_;
   SourceDigests digests_;

@@ -1,5 +1,7 @@
 #include "duet/datasets/dataset_files.h"
 
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 
 #include "duet/core/file.h"
@@ -21,6 +23,10 @@ std::string manifest_of(const std::vector<DatasetEntry>& entries) {
 std::string annotations_of(const std::vector<DatasetEntry>& entries) {
   std::vector<Annotation> annotations;
   for (const DatasetEntry& entry : entries) {
+    if (entry.status == ClipStatus::kOther) {  // a person gives it a task here
+      annotations.push_back({.clip = entry.clip, .note = fmt::format("label '{}'", entry.label)});
+      continue;
+    }
     if (entry.task.empty()) continue;
     const auto phases = entry.provenance.find("phases");
     annotations.push_back({.clip = entry.clip,

@@ -46,9 +46,16 @@ SourceClip recognised(const std::string& name, ClipOfTask&& clip) {
 
 }  // namespace
 
+std::string label_of(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& options) {
+  if (format.clip != nullptr) return "";
+  const RawPeople people = format.read(place, options);
+  const auto label = people.source.find("label");
+  return label == people.source.end() ? "" : label->second;
+}
+
 PeopleClip read_people_clip(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& options) {
   if (options.task || format.clip != nullptr) {
-    if (options.task) return {.source = read_source_clip(format, place, options), .label = ""};
+    if (options.task || format.states_task) return {.source = read_source_clip(format, place, options), .label = ""};
     return {.source = recognised(place.files.front(),
                                  [&](Task task) {
                                    PeopleOptions with_task = options;

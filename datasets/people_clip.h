@@ -19,4 +19,7 @@ struct PeopleClip {
 // (names the option that settles it).
 PeopleClip read_people_clip(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& options);
 
+// The data set's label of a recording; "" where it has none. Throws InputError: what the format's reader refuses.
+std::string label_of(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& options);
+
 }  // namespace duet

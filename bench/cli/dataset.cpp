@@ -5,6 +5,8 @@
 #include <fmt/ranges.h>
 
 #include <filesystem>
+#include <map>
+#include <optional>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/dataset_stats.h"
@@ -17,6 +19,8 @@
 #include "duet/datasets/dataset_tables.h"
 #include "duet/datasets/people_clip.h"
 #include "duet/datasets/phase_errors.h"
+#include "duet/datasets/source_facts.h"
+#include "duet/motion/people/people_files.h"
 #include "duet/motion/people/people_formats.h"
 #include "duet/motion/plausibility.h"
 
@@ -172,6 +176,20 @@ Inspected inspect_clip(const PeopleFormat& format, const ClipPlace& place, const
   return {text, json};
 }
 
+// "labels: shaking 22 (handshake), kicking 51 (none of duet's tasks)".
+void add_labels(const std::map<std::string, int>& labels, std::string& text, nlohmann::json& json) {
+  std::string list;
+  json["labels"] = nlohmann::json::array();
+  for (const auto& [label, clips] : labels) {
+    const std::optional<Task> task = label.empty() ? std::nullopt : task_of_label(label);
+    const std::string ours = task ? std::string(to_string(*task)) : "none of duet's tasks";
+    list += fmt::format("{}{} {}{}", list.empty() ? "" : ", ", label.empty() ? "without" : label, clips,
+                        label.empty() || (task && label == ours) ? "" : fmt::format(" ({})", ours));
+    json["labels"].push_back({{"label", label}, {"clips", clips}, {"task", task ? ours : ""}});
+  }
+  text += fmt::format("labels: {}\n", list.empty() ? "none can be read" : list);
+}
+
 void run_inspect(const Session& session, const DatasetArguments& arguments, int most) {
   const PeopleOptions options = people_options(arguments.people);
   const PeopleFormat& format = find_people_format(arguments.inputs, arguments.people.format);
@@ -182,6 +200,7 @@ void run_inspect(const Session& session, const DatasetArguments& arguments, int 
                          {"licence", format.licence},
                          {"count", places.size()},
                          {"clips", nlohmann::json::array()}};
+  add_labels(count_labels(format, places, options, arguments.threads), text, json);
   const std::size_t count = most > 0 ? std::min(places.size(), static_cast<std::size_t>(most)) : places.size();
   for (std::size_t i = 0; i < count; ++i) {
     Inspected inspected = inspect_clip(format, places[i], options);

@@ -48,13 +48,52 @@ TEST(Curation, ASingleFrameOfNoiseIsNone) {
   EXPECT_THAT(failing(clip), IsEmpty());
 }
 
-TEST(Curation, BonesThatGrowAreATrackingError) {
+// The right forearm of B is longer by `share` in 45 of 100 frames.
+InteractionClip with_growing_forearm(double share) {
   InteractionClip clip = good();
-  for (int t = 0; t < clip.frames(); ++t)
-    for (const int j : {kRightWrist, kRightHand})
-      clip.b.joints.frame(t).col(j) +=
-          0.5 * (t % 100 < 50) * (clip.b.joints.at(t, kRightElbow) - clip.b.joints.at(t, kRightShoulder));
-  EXPECT_FALSE(finding(curate(clip), "bone_change").passed);
+  for (int t = 0; t < clip.frames(); ++t) {
+    const Eigen::Vector3d forearm = clip.b.joints.at(t, kRightWrist) - clip.b.joints.at(t, kRightElbow);
+    for (const int j : {kRightWrist, kRightHand}) clip.b.joints.frame(t).col(j) += share * (t % 100 < 45) * forearm;
+  }
+  return clip;
+}
+
+TEST(Curation, BonesThatGrowAreATrackingError) {
+  EXPECT_FALSE(finding(curate(with_growing_forearm(0.6)), "bone_change").passed);
+  EXPECT_NEAR(limb_bone_change(with_growing_forearm(0.6)), 0.6, 0.01);
+  EXPECT_TRUE(finding(curate(with_growing_forearm(0.4)), "bone_change").passed);
+}
+
+// A tracker whose bones change in every recording is not broken in each.
+TEST(Curation, BonesAreHeldAgainstWhatIsUsualInTheirSource) {
+  const InteractionClip clip = with_growing_forearm(0.6);
+  EXPECT_TRUE(finding(curate(clip, {.source_bone_change = 0.45}), "bone_change").passed);
+  EXPECT_FALSE(finding(curate(clip, {.source_bone_change = 0.35}), "bone_change").passed);
+  EXPECT_FALSE(
+      finding(curate(clip, {.limits = {{"bone_change", 0.25}}, .source_bone_change = 1.0}), "bone_change").passed)
+      << "what is told holds for every source";
+}
+
+TEST(Curation, AWaveAtTheChestIsSeenUnlessThePrintedHeightIsAskedFor) {
+  InteractionClip clip = synthesize(Task::kWave, {.seed = 11});
+  const auto lowered = [&](double down) {
+    InteractionClip low = clip;
+    for (HumanMotion* person : {&low.a, &low.b})
+      for (int t = 0; t < low.frames(); ++t)
+        for (const int hand : {kLeftHand, kRightHand}) person->joints.frame(t)(2, hand) -= down;
+    return low;
+  };
+  double highest = 0.0;
+  for (const HumanMotion* person : {&clip.a, &clip.b})
+    for (int t = 0; t < clip.frames(); ++t)
+      for (const int hand : {kLeftHand, kRightHand})
+        highest = std::max(highest, person->joints.at(t, hand).z() - person->joints.at(t, kPelvis).z());
+  const InteractionClip at_chest = lowered(highest - 0.4), below = lowered(highest - 0.3);
+  EXPECT_EQ(finding(curate(at_chest), "task_seen").value, 0.5);
+  EXPECT_TRUE(finding(curate(at_chest), "task_seen").passed);
+  EXPECT_FALSE(finding(curate(at_chest, {.limits = {{"task_seen", 1.0}}}), "task_seen").passed);
+  EXPECT_EQ(finding(curate(below), "task_seen").value, 0.0);
+  EXPECT_EQ(finding(curate(clip), "task_seen").value, 1.0);
 }
 
 // What a depth camera does where two who hug hide each other: left and right are exchanged from one frame on.
@@ -80,7 +119,8 @@ TEST(Curation, ATurnBeforeTheActIsNone) {
   InteractionClip clip = good();
   EXPECT_LT(finding(curate(clip), "act_turn").value, 0.3);
   clip.phases = {0, clip.frames()};
-  EXPECT_FALSE(finding(curate(clip), "act_turn").passed);
+  EXPECT_GT(finding(curate(clip), "act_turn").value, 1.7);
+  EXPECT_FALSE(finding(curate(clip, {.limits = {{"act_turn", 1.7}}}), "act_turn").passed);
 }
 
 TEST(Curation, PeopleOfTheWrongSizeAreNone) {
