@@ -121,6 +121,9 @@ Json limiter_setup_json(const LimiterSetup& setup) {
 LimiterSetup parse_limiter_setup(const Json& json, const std::string& name) {
   try {
     return setup_of(json, name);
+  } catch (const Json::out_of_range& error) {  // "[json.exception.out_of_range.403] key 'forward' not found"
+    const std::string_view what = error.what();
+    throw InputError(fmt::format("{}: the setup of a limiter: {}", name, what.substr(what.find("] ") + 2)));
   } catch (const Json::exception& error) {
     throw InputError(fmt::format("{}: expected the setup of a limiter, found {}", name, error.what()));
   }

@@ -21,6 +21,7 @@ static_assert(std::endian::native == std::endian::little, "MCAP is little-endian
 
 constexpr std::string_view kMcapMagic("\x89MCAP0\r\n", 8);
 constexpr std::size_t kRecordHead = 9;                     // kind, length
+constexpr std::size_t kChunkHead = kRecordHead + 40;       // times, size, checksum, no packing, size
 constexpr std::size_t kChunkBytes = std::size_t{4} << 20;  // of records, before they are packed
 constexpr std::size_t kMostChunk = std::size_t{64} << 20;  // that is unpacked
 constexpr int kZstdLevel = 9;
@@ -140,7 +141,11 @@ struct McapScan {
     const auto checksum = fields.number<std::uint32_t>();
     const std::string packing = fields.text();
     const std::span<const std::byte> packed = fields.take(fields.number<std::uint64_t>());
-    if (packing.empty()) return records(packed, 0, true);
+    if (packing.empty()) {
+      if (checksum != 0 && checksum != more_checksum(0, packed))
+        throw InputError(fmt::format("{}: the checksum of a chunk does not agree", name));
+      return records(packed, 0, true);
+    }
     if (packing != "zstd" || size > kMostChunk)
       throw InputError(fmt::format("{}: expected chunks of at most {} bytes packed by zstd, found {} bytes by '{}'",
                                    name, kMostChunk, size, shown(packing)));
@@ -203,7 +208,7 @@ void McapWriter::put_record(std::uint8_t kind, std::string_view content) {
 }
 
 void McapWriter::gather(std::span<const std::byte> bytes) {
-  if (chunks_ == McapChunks::kNone) return put(bytes);
+  if (chunks_ != McapChunks::kZstd) return put(bytes);
   chunk_.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
@@ -232,6 +237,21 @@ void McapWriter::add(const McapChannel& channel) {
                                         sized(channel.message_encoding) + sized(""));
 }
 
+// Of one message, not packed. Allocates nothing: logs are written while a robot moves.
+void McapWriter::put_chunk_head(std::uint64_t time, std::span<const std::byte> head, std::span<const std::byte> data) {
+  const std::uint64_t size = head.size() + data.size(), length = kChunkHead - kRecordHead + size;
+  const std::uint32_t checksum = more_checksum(more_checksum(0, head), data);
+  std::array<std::byte, kChunkHead> chunk{};  // zeros at 37: the empty name of the packing
+  chunk[0] = std::byte{kMcapChunk};
+  std::memcpy(&chunk[1], &length, 8);
+  std::memcpy(&chunk[9], &time, 8);
+  std::memcpy(&chunk[17], &time, 8);
+  std::memcpy(&chunk[25], &size, 8);
+  std::memcpy(&chunk[33], &checksum, 4);
+  std::memcpy(&chunk[41], &size, 8);
+  put(chunk);
+}
+
 bool McapWriter::write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time,
                        std::span<const std::byte> data) {
   std::array<std::byte, kRecordHead + 22> head;
@@ -242,9 +262,10 @@ bool McapWriter::write(std::uint16_t channel, std::uint32_t sequence, std::uint6
   std::memcpy(&head[11], &sequence, 4);
   std::memcpy(&head[15], &time, 8);
   std::memcpy(&head[23], &time, 8);
+  if (chunks_ == McapChunks::kOneMessage) put_chunk_head(time, head, data);
   gather(head);
   gather(data);
-  if (chunks_ == McapChunks::kNone) return good_;
+  if (chunks_ != McapChunks::kZstd) return good_;
   chunk_begin_ = chunk_end_ == 0 ? time : std::min(chunk_begin_, time);
   chunk_end_ = std::max(chunk_end_, time);
   if (chunk_.size() >= kChunkBytes) end_chunk();

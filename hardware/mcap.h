@@ -1,6 +1,6 @@
 // MCAP files, the container of robot logs that Foxglove's tools read: append-only, so that a file whose writer was
-// killed can be read up to the last whole record; of logs that is a message, of compressed files a chunk of some
-// megabytes. Source: the MCAP specification, version 0.
+// killed can be read up to the last whole record; of logs that is a message, with a checksum of its own, of compressed
+// files a chunk of some megabytes. Source: the MCAP specification, version 0.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,9 @@ struct McapChannel {
   std::string schema_name, schema_encoding, schema;
 };
 
-enum class McapChunks { kNone, kZstd };
+// None; each message as a chunk of its own, not packed, whose checksum holds where the file is cut; some megabytes by
+// zstd.
+enum class McapChunks { kNone, kOneMessage, kZstd };
 
 // One owner, one thread.
 class McapWriter {
@@ -49,6 +51,7 @@ class McapWriter {
   void gather(std::span<const std::byte> bytes);
   void gather_record(std::uint8_t kind, std::string_view content);
   void end_chunk();
+  void put_chunk_head(std::uint64_t time, std::span<const std::byte> head, std::span<const std::byte> data);
 
   std::FILE* file_ = nullptr;
   McapChunks chunks_ = McapChunks::kNone;

@@ -155,7 +155,8 @@ void read_record(const TickRecord& r, LimiterInput& input, HumanJoints& person, 
   get(r.asked_q, command.q);
 }
 
-RunLog::RunLog(const std::string& path, const GuardSetup& setup) : writer_(path), ring_(kSlots) {
+RunLog::RunLog(const std::string& path, const GuardSetup& setup)
+    : writer_(path, McapChunks::kOneMessage), ring_(kSlots) {
   for (const McapChannel& channel : kChannels) writer_.add(channel);
   const LimiterSetup& limiter = setup.limiter;
   const nlohmann::json json = {
