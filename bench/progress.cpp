@@ -50,6 +50,7 @@ void Progress::start(const std::string& title, int total, const std::string& uni
   unit_ = unit;
   total_ = total;
   done_ = 0;
+  share_.reset();
   active_ = true;
   begin_ = drawn_ = Clock::now();
   if (style_ == Style::kLines) print_error(fmt::format("{}: {} {}\n", title_, total_, unit_));
@@ -59,6 +60,11 @@ void Progress::advance(int items) {
   const std::lock_guard lock(mutex_);
   done_ += items;
   draw(false);
+}
+
+void Progress::set_share(double share) {
+  const std::lock_guard lock(mutex_);
+  share_ = share;
 }
 
 void Progress::finish() {
@@ -77,7 +83,9 @@ std::string Progress::line(double elapsed) const {
   const double rate = elapsed > 0.0 ? done_ / elapsed : 0.0;
   std::string text = fmt::format("{}: {}/{} {}", title_, done_, total_, unit_);
   if (done_ > 0) text += fmt::format(", {:.3g}/s", rate);
-  if (done_ > 0 && done_ < total_) text += fmt::format(", {} left", format_duration((total_ - done_) / rate));
+  if (done_ == 0 || done_ >= total_) return text;
+  const double share = share_.value_or(static_cast<double>(done_) / total_);
+  if (share > 0.0) text += fmt::format(", {} left", format_duration(elapsed * (1.0 - share) / share));
   return text;
 }
 

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <mutex>
+#include <optional>
 #include <string>
 
 namespace duet {
@@ -16,6 +17,9 @@ class Progress {
   // Starts a stage of `total` items ("retargeting", 30, "clips"); ends the stage before.
   void start(const std::string& title, int total, const std::string& unit);
   void advance(int items = 1);
+  // How much of the stage's work is done, 0 to 1, where items differ: the time left follows from it and no more from
+  // the number of items. NaN: nobody knows yet.
+  void set_share(double share);
   // A line of its own, between stages.
   void note(const std::string& sentence);
   // Prints the stage's last line: items, seconds, rate.
@@ -30,6 +34,7 @@ class Progress {
   std::mutex mutex_;
   std::string title_, unit_;
   int total_ = 0, done_ = 0;
+  std::optional<double> share_;
   bool active_ = false;
   Clock::time_point begin_, drawn_;
 };

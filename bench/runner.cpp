@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "duet/backends/factory.h"
 #include "duet/bench/clips.h"
+#include "duet/bench/episode_costs.h"
 #include "duet/bench/prepared_clips.h"
 #include "duet/bench/run_inputs.h"
 #include "duet/bench/run_work.h"
@@ -188,6 +190,7 @@ struct Rollouts {
   const Bodies& bodies;
   const EpisodePlan& plan;
   const StopSign& stop;
+  EpisodeCosts& costs;
   int threads = 1;
 
   [[nodiscard]] std::string key_of(const EpisodeSpec& spec) const {
@@ -202,7 +205,11 @@ struct Rollouts {
     SharedWork work(folder, stop);
     const auto key_at = [&](int i) { return key_of(plan.at(places[i])); };
     const auto run_at = [&](int i) {
-      return run_or_refuse(plan.at(places[i]), suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+      const EpisodeSpec spec = plan.at(places[i]);
+      EpisodeRow row = run_or_refuse(spec, suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+      costs.ended(spec, row.wall_s);
+      progress.set_share(costs.share_done());
+      return row;
     };
     work.run(static_cast<int>(places.size()), threads, key_at, run_at, progress);
     summary.run += work.done();
@@ -238,19 +245,35 @@ void run_until_decided(const Rollouts& rollouts, const RunOptions& options, cons
   progress.finish();
 }
 
+// The first episode of each engine, controller and arm before all others: the time that is left is known when they end.
+std::vector<std::uint32_t> pilots_first(const EpisodePlan& plan, const std::vector<std::uint32_t>& places) {
+  std::set<std::string> seen;
+  std::vector<std::uint32_t> first, rest;
+  for (const std::uint32_t place : places) {
+    const EpisodeSpec spec = plan.at(place);
+    const bool is_first = seen.insert(fmt::format("{}/{}/{}", cost_name(spec), spec.arm, spec.policy)).second;
+    (is_first ? first : rest).push_back(place);
+  }
+  first.insert(first.end(), rest.begin(), rest.end());
+  return first;
+}
+
 // Plans and runs what is missing.
 void run_missing(const Suite& suite, const RunIdentity& identity, const Bodies& bodies, const RunOptions& options,
                  const StopSign& stop, Progress& progress, RunDirectory& run, RunSummary& summary) {
   const EpisodePlan plan(suite, bodies);
-  const Rollouts rollouts{suite, identity, bodies, plan, stop, options.threads};
+  EpisodeCosts costs(suite);
+  const Rollouts rollouts{suite, identity, bodies, plan, stop, costs, options.threads};
   const auto key_of = [&](const EpisodeSpec& spec) { return rollouts.key_of(spec); };
   const std::vector<std::uint32_t> missing = missing_episodes(plan, part_of(options), run, key_of, stop, summary);
+  for (const std::uint32_t place : missing) costs.expect(plan.at(place));
   if (options.decide.asked()) {
     run_until_decided(rollouts, options, missing, progress, run, summary);
     return;
   }
   progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
-  rollouts.run(missing, run, progress, summary);
+  progress.set_share(costs.share_done());
+  rollouts.run(pilots_first(plan, missing), run, progress, summary);
   progress.finish();
 }
 

@@ -11,6 +11,7 @@
 #include "duet/bench/clips.h"
 #include "duet/bench/cluster/attempt.h"
 #include "duet/bench/cluster/planned_run.h"
+#include "duet/bench/episode_costs.h"
 #include "duet/bench/prepared_clips.h"
 #include "duet/bench/run_work.h"
 #include "duet/bench/runner.h"
@@ -23,8 +24,6 @@ namespace duet {
 namespace {
 
 constexpr double kLeastCost = 1.0e-3;  // [s/s]: what an absent engine's rows cost
-
-std::string cost_name(const EpisodeSpec& spec) { return fmt::format("{}/{}", spec.engine, spec.controller); }
 
 void refuse_planned(const std::string& directory) {
   if (has_shard_plan(directory))
@@ -41,12 +40,6 @@ std::vector<PlannedClip> keep_clips(const std::vector<PairedMotion>& clips, cons
     planned.push_back({std::string(to_string(clip.task)), clip.clip_id, name, sha256_file(file)});
   }
   return planned;
-}
-
-// Of the motion that an episode follows, its start included. [s]
-double motion_seconds(const EpisodeSpec& spec, const Suite& suite) {
-  if (!suite.references.empty()) return reference_of(suite.references, spec.clip->clip_id).seconds;
-  return static_cast<double>(spec.clip->robot.frames()) / spec.clip->robot.rate_hz;
 }
 
 // What a run needs while it is planned.

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace duet {
 namespace {
 
@@ -38,6 +40,21 @@ TEST(Progress, BarReturnsToTheStartOfTheLine) {
   progress.finish();
   const std::string text = testing::internal::GetCapturedStderr();
   EXPECT_NE(text.find("\r[############............]"), std::string::npos) << text;
+}
+
+TEST(Progress, TheTimeLeftFollowsTheWorkAndNotTheItems) {
+  const auto shown_at = [](double share) {
+    Progress progress(Progress::Style::kBar);
+    testing::internal::CaptureStderr();
+    progress.start("rolling out", 2, "episodes");
+    progress.advance(1);
+    progress.set_share(share);
+    progress.finish();
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(shown_at(std::nan("")).find(" left"), std::string::npos);  // nobody knows yet
+  EXPECT_NE(shown_at(0.5).find(", 0 s left"), std::string::npos);
+  EXPECT_NE(shown_at(1e-13).find(" h "), std::string::npos);
 }
 
 TEST(Progress, QuietIsSilent) {
