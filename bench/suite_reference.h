@@ -12,7 +12,7 @@
 
 namespace duet {
 
-// In rows the policy's name; their task is kWalkRows (results/analyses/walk_table.h).
+// In rows the policy's name; their task is kWalkRows (results/statistics/row_groups.h).
 inline constexpr const char* kVelocityPolicy = "velocity";
 
 // In the neutral pose; in one that is drawn for the episode; between poses that are drawn for it.

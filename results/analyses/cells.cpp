@@ -27,6 +27,8 @@ std::string task_title(const std::string& task) {
 
 std::string count_cell(long count) { return fmt::format("{}", count); }
 
+std::string counted(long count, const char* noun) { return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s"); }
+
 // Adding 0.0 turns -0.0 into 0.0, so that no table prints "-0.0".
 std::string decimals(double value, int digits) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value + 0.0, digits) : "-";
@@ -53,6 +55,8 @@ std::string p_cell(double p) {
   if (std::isnan(p)) return "-";
   return p < 0.001 ? "<0.001" : fmt::format("{:.3f}", p);
 }
+
+std::string p_text(double p) { return p < 0.001 ? "p < 0.001" : "p = " + p_cell(p); }
 
 std::string significant(double value) { return std::isfinite(value) ? fmt::format("{:.4g}", value) : "-"; }
 

@@ -136,7 +136,7 @@ Family gather(const std::map<PairKey, const EpisodeRow*>& a, const std::map<Pair
   for (const auto& [key, row] : a) {
     const auto partner = b.find(key);
     both_levels(key, [&, of_a = row](PairedRows& gathered) {
-      partner == b.end() ? void(++gathered.unpaired_a) : gathered.add(*of_a, *partner->second);
+      partner == b.end() ? void(++gathered.unpaired_a) : gathered.pairs.add(*of_a, *partner->second);
     });
   }
   for (const auto& [key, row] : b) {
@@ -153,16 +153,8 @@ std::string group_name(const Group& group, const std::string& task) {
 
 }  // namespace
 
-void PairedRows::add(const EpisodeRow& a, const EpisodeRow& b) {
-  const bool of_a = headline_success(a);
-  const bool of_b = headline_success(b);
-  table.add(of_a, of_b);
-  differences.push_back(static_cast<double>(of_a) - static_cast<double>(of_b));
-  clusters.push_back(clips.of(a.task, a.clip));
-}
-
 Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options) {
-  const PairedTable& table = gathered.table;
+  const PairedTable& table = gathered.pairs.table();
   Comparison result;
   result.pairs = table.pairs();
   result.both = table.both;
@@ -171,8 +163,7 @@ Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options) 
   result.neither = table.neither;
   result.difference = table.difference();
   result.interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, options.level);
-  result.cluster_interval =
-      cluster_bootstrap(gathered.differences, gathered.clusters, options.resamples, options.seed, options.level);
+  result.cluster_interval = gathered.pairs.bootstrap(options);
   result.p = mcnemar_exact(table.only_a, table.only_b);
   const double discordance = static_cast<double>(table.only_a + table.only_b) / static_cast<double>(result.pairs);
   result.minimum_detectable = minimum_detectable_difference_paired(discordance, result.pairs, 1.0 - options.level);
@@ -198,7 +189,7 @@ std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std
   const Pairing pairing = pairing_of(of_a, of_b);
   std::vector<Comparison> comparisons;
   for (const auto& [key, gathered] : gather(indexed(of_a, pairing), indexed(of_b, pairing))) {
-    if (gathered.table.pairs() == 0) continue;
+    if (gathered.pairs.table().pairs() == 0) continue;
     const auto& [group, rank, task] = key;
     Comparison& comparison = comparisons.emplace_back(evaluate(gathered, options));
     comparison.group = group_name(group, task);

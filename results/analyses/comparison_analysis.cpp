@@ -5,6 +5,7 @@
 
 #include "duet/results/analyses/cells.h"
 #include "duet/results/analyses/comparison_parts.h"
+#include "duet/results/statistics/by_clip.h"
 #include "duet/results/statistics/resolution.h"
 
 namespace duet {
@@ -43,17 +44,18 @@ std::vector<std::string> comparison_notes(const std::vector<Comparison>& compari
   const double level = 100.0 * comparisons.front().level;
   std::vector<std::string> notes = {fmt::format(
       "Same episodes in both runs. A, B: success in %. A - B: points with Newcombe's paired {:g} % interval; by clip: "
-      "bootstrap over clips. p: exact McNemar, p (Holm): corrected for the {} comparisons here. MDE: the smallest "
+      "bootstrap over clips, nowhere narrower than Newcombe's over so many clips. p: exact McNemar, p (Holm): "
+      "corrected for the {} comparisons here. MDE: the smallest "
       "difference, in points, that so many pairs with so much disagreement show in 80 % of runs. Verdict: of A; the "
       "same within the margin where the paired "
       "interval lies within {:g} points, else better or worse where p (Holm) is at most {:.2g}.",
       level, comparisons.size(), 100.0 * margin, 1.0 - comparisons.front().level)};
   std::string small;
   for (const Comparison& comparison : comparisons)
-    if (comparison.pairs < 30) small.append(small.empty() ? "" : "; ").append(comparison.group);
+    if (comparison.pairs < kFewestClips) small.append(small.empty() ? "" : "; ").append(comparison.group);
   if (!small.empty())
-    notes.push_back(
-        fmt::format("Warning: fewer than 30 pairs in {}. A difference there is no finding by itself.", small));
+    notes.push_back(fmt::format("Warning: fewer than {} pairs in {}. A difference there is no finding by itself.",
+                                kFewestClips, small));
   const long only_a = largest(comparisons, &Comparison::unpaired_a);
   const long only_b = largest(comparisons, &Comparison::unpaired_b);
   if (only_a > 0 || only_b > 0)

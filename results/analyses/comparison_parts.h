@@ -13,13 +13,8 @@ namespace duet {
 
 // What is gathered of one comparison before its statistics are computed.
 struct PairedRows {
-  PairedTable table;
-  std::vector<double> differences;  // success of A minus success of B, per pair
-  std::vector<int> clusters;
-  ClipNumbers clips;
+  EpisodePairs pairs;
   long unpaired_a = 0, unpaired_b = 0;
-
-  void add(const EpisodeRow& a, const EpisodeRow& b);  // by their headline success
 };
 
 // Needs a pair; p_holm is left at 1, and so are the names.

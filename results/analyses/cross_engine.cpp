@@ -23,32 +23,28 @@ std::set<std::string> engines_of(const EpisodesOfEngines& episodes) {
   return engines;
 }
 
-void finish(EngineRate& rate, double level) {
-  rate.rate = rate.n > 0 ? static_cast<double>(rate.k) / static_cast<double>(rate.n) : kUndefined;
-  rate.interval = wilson(rate.k, rate.n, level);
+// Of no episode the rate is not defined, and any may be.
+EngineRate engine_rate(const std::string& engine, const SuccessByClip& success, double level) {
+  if (success.episodes() == 0) return {engine, 0, 0, kUndefined, wilson(0, 0, level)};
+  return {engine, success.episodes(), success.successes(), success.mean(), success.of_episodes(level)};
 }
 
 // What is gathered of one combination before its statistics are computed.
 struct Gathered {
-  std::map<std::string, EngineRate> engines;
-  EngineRate playback;
-  std::vector<double> means;  // over engines, per episode
-  std::vector<int> clips;
+  std::map<std::string, SuccessByClip> engines;
+  SuccessByClip playback;
+  SuccessByClip means;  // over engines, per episode
 };
 
-void gather_episode(const RowPerEngine& row_of, const EpisodeRow* playback, Gathered& gathered) {
+void gather_episode(const EpisodeId& id, const RowPerEngine& row_of, const EpisodeRow* playback, Gathered& gathered) {
+  const auto success_of = [](const EpisodeRow& row) { return headline_success(row) ? 1.0 : 0.0; };
   std::vector<double> successes;
   for (const auto& [engine, row] : row_of) {
-    EngineRate& rate = gathered.engines.at(engine);
-    const bool success = headline_success(*row);
-    ++rate.n;
-    rate.k += success ? 1 : 0;
-    successes.push_back(success ? 1.0 : 0.0);
+    successes.push_back(success_of(*row));
+    gathered.engines.at(engine).add(id, successes.back());
   }
-  gathered.means.push_back(mean_of(successes));
-  if (playback == nullptr) return;
-  ++gathered.playback.n;
-  gathered.playback.k += headline_success(*playback) ? 1 : 0;
+  gathered.means.add(id, mean_of(successes));
+  if (playback != nullptr) gathered.playback.add(id, success_of(*playback));
 }
 
 void add_spread(EngineSuccess& success) {
@@ -69,37 +65,26 @@ void add_spread(EngineSuccess& success) {
 }
 
 EngineSuccess success_of(const Combination& combination, const EpisodesOfEngines& episodes, const EngineRows& rows,
-                         ClusterBootstrap& bootstrap, double level) {
+                         double level) {
   EngineSuccess success;
   success.controller = combination.controller;
   success.policy = combination.policy;
   success.perturbation = combination.perturbation;
   Gathered gathered;
-  ClipNumbers clips;
-  for (const std::string& engine : engines_of(episodes)) gathered.engines[engine].engine = engine;
+  for (const std::string& engine : engines_of(episodes)) gathered.engines[engine];
   for (const auto& [id, row_of] : episodes) {
     if (row_of.size() < gathered.engines.size()) {
       ++success.left_out;
       continue;
     }
-    gather_episode(row_of, rows.playback(combination, id), gathered);
-    gathered.clips.push_back(clips.of(id));
+    gather_episode(id, row_of, rows.playback(combination, id), gathered);
     ++success.n;
   }
-  for (auto& [engine, rate] : gathered.engines) {
-    finish(rate, level);
-    success.engines.push_back(rate);
-  }
-  if (gathered.playback.n > 0) {
-    gathered.playback.engine = kPlaybackEngine;
-    finish(gathered.playback, level);
-    success.playback = gathered.playback;
-  }
+  for (const auto& [engine, of] : gathered.engines) success.engines.push_back(engine_rate(engine, of, level));
+  if (gathered.playback.episodes() > 0)
+    success.playback = engine_rate(std::string(kPlaybackEngine), gathered.playback, level);
   add_spread(success);
-  success.mean_interval = {.low = kUndefined, .high = kUndefined};
-  if (success.n > 0) {
-    success.mean_interval = bootstrap.mean(gathered.means, gathered.clips, level);
-  }
+  success.mean_interval = success.n > 0 ? gathered.means.by_clip(level) : kNoInterval;
   return success;
 }
 
@@ -233,11 +218,9 @@ const EpisodeRow* EngineRows::playback(const Combination& combination, const Epi
 }
 
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options) {
-  ClusterBootstrap bootstrap(options.intervals.resamples, options.intervals.seed);
   std::vector<EngineSuccess> success;
-  for (const auto& [combination, episodes] : rows.physics()) {
-    success.push_back(success_of(combination, episodes, rows, bootstrap, options.intervals.level));
-  }
+  for (const auto& [combination, episodes] : rows.physics())
+    success.push_back(success_of(combination, episodes, rows, options.intervals.level));
   return success;
 }
 

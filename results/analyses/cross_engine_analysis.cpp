@@ -62,9 +62,9 @@ TitledTable spread_table(const CrossEngine& result, const RowLabels& labels) {
   add("Noise SD", [](const EngineSuccess& of) { return percent(of.noise_sd); });
   add("Beyond noise", [](const EngineSuccess& of) { return percent(of.excess_sd); });
   titled.notes = {
-      fmt::format("Mean over engines in %, each engine counting the same. Its {:g} % interval draws clips again, the "
-                  "same clips in all engines: it covers which clips were taken, not which engines; those are the ones "
-                  "at hand.",
+      fmt::format("Mean over engines in %, each engine counting the same. Its {:g} % interval is Wilson's over clips, "
+                  "however many engines run them: it covers which clips were taken, not which engines; those are the "
+                  "ones at hand.",
                   100.0 * result.level),
       "In points: SD, the sample standard deviation of the engines' rates; range, the highest minus the lowest; noise "
       "SD, what chance in so many episodes gives if engines do not differ; beyond noise, the SD that is left when "
@@ -91,8 +91,8 @@ std::string reliability_sentence(const RankStability& ranks) {
   };
   return fmt::format(
       "Of {}, with intervals that draw clips again: mean tau-b {} {}; mean maximum rank violation {:.1f} points {}; "
-      "the "
-      "winner changes between two engines with probability {:.2f} {}.",
+      "{:.2f} of the "
+      "pairs of engines have no winner in common {}.",
       ranks.of, tau_cell(ranks.mean_tau_b), limits(ranks.tau_interval, 1.0, 2), 100.0 * ranks.rank_violation,
       limits(ranks.violation_interval, 100.0, 1), ranks.winner_changes, limits(ranks.winner_interval, 1.0, 2));
 }

@@ -48,7 +48,7 @@ void add_rank_reliability(const EngineRows& rows, const CrossEngineOptions& opti
 // For each item the largest difference of its rate in the reference to that of an item that `other` puts on another
 // side of it; the mean over items. Rates of the same items, one or more. Source: SIMPLER, arXiv 2405.05941, section IV.
 double mean_maximum_rank_violation(std::span<const double> reference, std::span<const double> other);
-// Probability that the best item in `a` is not that in `b`; of items tied for the best one is drawn in each.
+// 1 where no item that is best in `a` is best in `b`, else 0: items that are tied for the best all win.
 double winner_change(std::span<const double> a, std::span<const double> b);
 std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
                                       const CrossEngineOptions& options);

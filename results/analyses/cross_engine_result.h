@@ -28,7 +28,7 @@ struct EngineRate {
   std::string engine;
   long n = 0, k = 0;
   double rate = 0.0;  // NaN where n is 0
-  Interval interval;  // Wilson
+  Interval interval;  // Wilson; by clip where a clip has several draws
 };
 
 // Success of one (controller, policy, perturbation), over the episodes that all its engines ran.
@@ -39,7 +39,7 @@ struct EngineSuccess {
   std::vector<EngineRate> engines;     // physics engines that ran it, by name
   std::optional<EngineRate> playback;  // of the same episodes, under the same controller or else the first by name
   double mean = 0.0;                   // over engines, each counts the same
-  Interval mean_interval;              // bootstrap over clips, the same in all engines: says nothing of other engines
+  Interval mean_interval;              // by clip (wilson_by_clip): says nothing of other engines
   double sd = 0.0;                     // sample standard deviation of the rates; NaN for fewer than 2 engines
   double range = 0.0;                  // highest minus lowest rate
   double noise_sd = 0.0;   // that independent binomial episodes would give: sqrt of the mean of p (1 - p) / (n - 1)
@@ -68,7 +68,7 @@ struct RankStability {
   Interval tau_interval = {};   // of mean_tau_b, over the draws in which it is defined
   double rank_violation = 0.0;  // mean_maximum_rank_violation, each engine of a pair as the reference in turn
   Interval violation_interval = {};
-  double winner_changes = 0.0;  // probability that the best item in one engine is not that in the other
+  double winner_changes = 0.0;  // share of pairs of engines without a best item in common
   Interval winner_interval = {};
 };
 

@@ -54,19 +54,15 @@ void count_outcome(const EpisodeRow& row, LeaderboardEntry& entry) {
   if (row.outcome == Outcome::kTimedOut) ++entry.timed_out;
   if (row.outcome == Outcome::kError) ++entry.errors;
   if (row.outcome == Outcome::kUnsupported) ++entry.unsupported;
-  const bool ended = row.outcome == Outcome::kOk || row.outcome == Outcome::kFell;
-  if (ended && !row.success.has_value()) ++entry.unjudged;
+  if (row.outcome == Outcome::kOk && !row.success.has_value()) ++entry.unjudged;
   count_policy_faults(row.policy_faults, entry);
 }
 
 // Rates over all episodes of the entry: one without the verdict has failed, as in the headline.
 void add_verdicts(const RowList& rows, LeaderboardEntry& entry) {
   for (const EpisodeRow* row : rows) {
-    const bool ended = row->outcome == Outcome::kOk || row->outcome == Outcome::kFell;
-    for (const Verdict& verdict : row->verdicts) {
-      double& count = entry.other_success[verdict.version + "/" + verdict.thresholds];
-      if (ended && verdict.success) count += 1.0;
-    }
+    for (const Verdict& verdict : row->verdicts)
+      entry.other_success[verdict.version + "/" + verdict.thresholds] += verdict_success(*row, verdict) ? 1.0 : 0.0;
   }
   for (auto& [name, count] : entry.other_success) count /= static_cast<double>(entry.n);
 }
@@ -83,20 +79,26 @@ void add_metrics(const RowList& rows, LeaderboardEntry& entry) {
 }
 
 void add_lift(const RowList& rows, const std::map<Counterpart, const EpisodeRow*>& null_rows, LeaderboardEntry& entry) {
-  PairedTable table;
+  EpisodePairs pairs;
   for (const EpisodeRow* row : rows) {
     const auto found = row->arm == "null" ? null_rows.end() : null_rows.find(counterpart(*row));
-    if (found != null_rows.end()) table.add(headline_success(*row), headline_success(*found->second));
+    if (found != null_rows.end()) pairs.add(*row, *found->second);
   }
-  constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
-  entry.pairs = table.pairs();
-  if (entry.pairs == 0) {
-    entry.null_success = entry.lift = entry.lift_interval.low = entry.lift_interval.high = kUndefined;
-    return;
-  }
-  entry.null_success = table.rate_b();
-  entry.lift = table.difference();
-  entry.lift_interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, entry.level);
+  entry.pairs = pairs.table().pairs();
+  entry.null_success = entry.lift = std::numeric_limits<double>::quiet_NaN();
+  entry.lift_interval = kNoInterval;
+  if (entry.pairs == 0) return;
+  entry.null_success = pairs.table().rate_b();
+  entry.lift = pairs.table().difference();
+  entry.lift_interval = pairs.of_episodes(entry.level);
+}
+
+void set_success(const RowList& rows, LeaderboardEntry& entry) {
+  SuccessByClip success;
+  for (const EpisodeRow* row : rows) success.add(episode_id(*row), headline_success(*row) ? 1.0 : 0.0);
+  entry.success = static_cast<double>(entry.k) / static_cast<double>(entry.n);
+  entry.interval = success.of_episodes(entry.level);
+  entry.by_clip = success.has_several_draws();
 }
 
 LeaderboardEntry summarise(const EntryKey& group, const std::string& task, const RowList& rows,
@@ -110,8 +112,7 @@ LeaderboardEntry summarise(const EntryKey& group, const std::string& task, const
   entry.arm = group.arm;
   entry.level = level;
   for (const EpisodeRow* row : rows) count_outcome(*row, entry);
-  entry.success = static_cast<double>(entry.k) / static_cast<double>(entry.n);
-  entry.interval = wilson(entry.k, entry.n, level);
+  set_success(rows, entry);
   add_lift(rows, null_rows, entry);
   add_verdicts(rows, entry);
   add_metrics(rows, entry);

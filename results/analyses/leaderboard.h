@@ -17,10 +17,10 @@ struct LeaderboardEntry {
   std::string engine, controller, policy, perturbation, task;
   long n = 0, k = 0;  // headline: main detector
   double success = 0.0;
-  Interval interval;                            // Wilson
+  Interval interval;                            // Wilson; by clip where a clip has several draws
   double null_success = 0.0;                    // same episodes under the null arm; NaN where not run
   double lift = 0.0;                            // success - null_success
-  Interval lift_interval;                       // paired Newcombe
+  Interval lift_interval;                       // paired Newcombe, likewise
   std::map<std::string, double> other_success;  // "paper/paper", "robot/strict", ... -> rate
   long fell = 0, diverged = 0, timed_out = 0, errors = 0;
   std::map<std::string, double> metrics;  // mean over episodes that have it
@@ -31,11 +31,12 @@ struct LeaderboardEntry {
   long unjudged = 0;                       // ended well but no detector ruled on it; counted as a failure
   long plans_late = 0, plans_invalid = 0;  // plans of the policy that were left out, over all its episodes
   long policy_dead = 0;                    // episodes in which the policy gave no plan any more
+  bool by_clip = false;                    // how the intervals are: a clip has several draws
   std::string policy_fault = {};           // message of the first of those, by episode; it is another program's text
 };
 
 // Sorted by engine, controller, policy, perturbation, task (order of all_tasks(), "all" last); arms of one policy in
-// turn. An episode succeeds where its headline verdict does and its outcome is ok or fell. Throws InputError: rows of
+// turn. An episode succeeds where its headline verdict does and its outcome is ok. Throws InputError: rows of
 // two suites or suite versions, an episode that is there twice.
 std::vector<LeaderboardEntry> leaderboard(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
@@ -50,7 +51,7 @@ struct Comparison {
   long pairs = 0, both = 0, only_a = 0, only_b = 0, neither = 0;
   double difference = 0.0;       // success of A minus success of B
   Interval interval;             // paired Newcombe
-  Interval cluster_interval;     // bootstrap over clips
+  Interval cluster_interval;     // bootstrap over clips, nowhere narrower than newcombe_by_clip
   double p = 1.0, p_holm = 1.0;  // exact McNemar
   double minimum_detectable = 0.0;
   double level = 0.95;                  // of both intervals

@@ -37,14 +37,14 @@ std::string joined(const std::vector<std::string>& words, const char* separator)
 std::string small_sample_note(const std::vector<LeaderboardEntry>& entries) {
   std::set<std::pair<int, std::string>> small;
   for (const LeaderboardEntry& entry : entries) {
-    if (entry.n < 30) small.emplace(task_rank(entry.task), task_title(entry.task));
+    if (entry.n < kFewestClips) small.emplace(task_rank(entry.task), task_title(entry.task));
   }
   if (small.empty()) return "";
   std::vector<std::string> titles;
   titles.reserve(small.size());
   for (const auto& [rank, title] : small) titles.push_back(title);
-  return fmt::format("Fewer than 30 episodes: {}. Read those figures with their intervals; do not rank by them.",
-                     joined(titles, ", "));
+  return fmt::format("Fewer than {} episodes: {}. Read those figures with their intervals; do not rank by them.",
+                     kFewestClips, joined(titles, ", "));
 }
 
 // Sum over the entries that cover all tasks.
@@ -150,8 +150,13 @@ std::vector<std::string> leaderboard_notes(const std::vector<LeaderboardEntry>& 
                   "success minus that "
                   "of the same episodes under the null arm (a robot that stands still), in points, with Newcombe's "
                   "paired interval. "
-                  "Episodes that diverged, timed out or ended in an error count as failures.",
+                  "Episodes that fell, diverged, timed out or ended in an error count as failures, under every "
+                  "detector.",
                   100.0 * entries.front().level)};
+  if (std::ranges::any_of(entries, &LeaderboardEntry::by_clip))
+    notes.emplace_back(
+        "Clips have several draws, which are no independent episodes: intervals are by clip, and where a clip has "
+        "several draws none is narrower than one episode a clip would give.");
   for (std::string note : {small_sample_note(entries), null_arm_note(entries)}) {
     if (!note.empty()) notes.push_back(std::move(note));
   }

@@ -11,10 +11,7 @@
 namespace duet {
 namespace {
 
-struct LevelCounts {
-  long n = 0, k = 0;
-};
-using CountsByLevel = std::map<int, LevelCounts>;
+using CountsByLevel = std::map<int, SuccessByClip>;
 
 // The headline; whom a commanded velocity leads has to follow it by half, so that standing is no walking.
 bool passes(const EpisodeRow& row) {
@@ -47,7 +44,7 @@ LevelEntry level_entry(const PolicyKey& key, const CountsByLevel& counts, const 
   int run = 0;
   for (const LevelName& name : table.levels) {
     const auto found = counts.find(name.level);
-    const Rate rate = found == counts.end() ? Rate{} : make_rate(found->second.k, found->second.n, table.level);
+    const Rate rate = found == counts.end() ? Rate{} : make_rate(found->second, table.level);
     entry.levels.push_back(rate);
     passed = passed && rate.n > 0 && rate.rate >= table.ladder.pass;
     if (passed) entry.reached = name.level;
@@ -69,9 +66,7 @@ LevelTable ladder_table(const Ladder& ladder, const std::map<PolicyKey, Perturbe
         const std::optional<LevelName> found = level_of_row(ladder.word, *row);
         if (!found) continue;
         add_level_name(ladder, *found, names);
-        LevelCounts& of_level = counts[key][found->level];
-        ++of_level.n;
-        of_level.k += passes(*row) ? 1 : 0;
+        counts[key][found->level].add(id, passes(*row) ? 1.0 : 0.0);
       }
     }
   }
@@ -98,9 +93,9 @@ TitledTable titled_ladder(const LevelTable& table) {
     cells.push_back(entry.reached ? count_cell(*entry.reached) : "none");
   }
   titled.notes = {
-      fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals. Mean: over the {0}s, "
-                  "each counting the "
-                  "same. Reached: the last {0} up to which success is {2:g} % or more at each.",
+      fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals, by clip where a clip has "
+                  "several draws. Mean: over the {0}s, each counting the same. Reached: the last {0} up to which "
+                  "success is {2:g} % or more at each.",
                   table.ladder.word, 100.0 * table.level, 100.0 * table.ladder.pass)};
   return titled;
 }

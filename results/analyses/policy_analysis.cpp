@@ -125,7 +125,7 @@ std::vector<TitledTable> headline_tables(const PolicyTable& table) {
   add_notes(table, tables.front());
   tables.front().notes.emplace_back(
       "Mean, spread (highest minus lowest) and worst are over the physics engines, each counting the same; playback "
-      "is none. The interval of the mean success is over clips and says nothing of other engines.");
+      "is none. The interval of the mean success is Wilson's over clips and says nothing of other engines.");
   return tables;
 }
 
@@ -192,7 +192,8 @@ TitledTable pairs_table(const PolicyTable& table) {
   titled.title = "Policies against each other";
   titled.notes = {fmt::format(
       "The same episodes of one engine and controller under two policies, headline detector. A - B: points "
-      "with Newcombe's paired {:g} % interval; by clip: bootstrap over clips. p: exact McNemar; p (Holm): "
+      "with Newcombe's paired {:g} % interval; by clip: bootstrap over clips, nowhere narrower than Newcombe's over "
+      "so many clips. p: exact McNemar; p (Holm): "
       "corrected for the {} comparisons here. MDE: the smallest difference, in points, that so many pairs with "
       "so much disagreement show in 80 % of runs.",
       100.0 * table.level, table.pairs.size())};

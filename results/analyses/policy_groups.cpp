@@ -10,8 +10,6 @@
 namespace duet {
 namespace {
 
-bool ended(const EpisodeRow& row) { return row.outcome == Outcome::kOk || row.outcome == Outcome::kFell; }
-
 const Verdict* verdict_of(const EpisodeRow& row, std::string_view version, std::string_view thresholds) {
   for (const Verdict& verdict : row.verdicts)
     if (verdict.version == version && verdict.thresholds == thresholds) return &verdict;
@@ -31,34 +29,40 @@ std::map<PolicyKey, PerturbedRows> rows_of_policies(const std::vector<EpisodeRow
   return policies;
 }
 
+Rate make_rate(const SuccessByClip& success, double level) {
+  if (success.episodes() == 0) return {};
+  return {.n = success.episodes(),
+          .k = success.successes(),
+          .rate = success.mean(),
+          .interval = success.of_episodes(level)};
+}
+
 Rate headline_rate(const EpisodeRows& rows, double level) {
-  long k = 0;
-  for (const auto& [id, row] : rows) k += headline_success(*row) ? 1 : 0;
-  return make_rate(k, static_cast<long>(rows.size()), level);
+  SuccessByClip success;
+  for (const auto& [id, row] : rows) success.add(id, headline_success(*row) ? 1.0 : 0.0);
+  return make_rate(success, level);
 }
 
 Rate verdict_rate(const EpisodeRows& rows, std::string_view version, std::string_view thresholds, double level) {
-  long k = 0;
+  SuccessByClip success;
   bool known = false;
   for (const auto& [id, row] : rows) {
     const Verdict* verdict = verdict_of(*row, version, thresholds);
-    if (verdict == nullptr) continue;
-    known = true;
-    if (ended(*row) && verdict->success) ++k;
+    known = known || verdict != nullptr;
+    success.add(id, verdict != nullptr && verdict_success(*row, *verdict) ? 1.0 : 0.0);
   }
-  return known ? make_rate(k, static_cast<long>(rows.size()), level) : Rate{};
+  return known ? make_rate(success, level) : Rate{};
 }
 
 PairedDifference paired_difference(const EpisodeRows& a, const EpisodeRows& b, double level) {
-  PairedTable table;
+  EpisodePairs pairs;
   for (const auto& [id, row] : a) {
     const auto found = b.find(id);
-    if (found != b.end()) table.add(headline_success(*row), headline_success(*found->second));
+    if (found != b.end()) pairs.add(*row, *found->second);
   }
-  if (table.pairs() == 0) return {};
-  return {.pairs = table.pairs(),
-          .difference = table.difference(),
-          .interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, level)};
+  if (pairs.table().pairs() == 0) return {};
+  return {
+      .pairs = pairs.table().pairs(), .difference = pairs.table().difference(), .interval = pairs.of_episodes(level)};
 }
 
 RowLabels policy_labels(const std::vector<PolicyKey>& keys) {

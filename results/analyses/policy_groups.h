@@ -29,6 +29,7 @@ using PerturbedRows = std::map<std::string, EpisodeRows, std::less<>>;
 // Keeps pointers into `rows`. Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 std::map<PolicyKey, PerturbedRows> rows_of_policies(const std::vector<EpisodeRow>& rows);
 
+Rate make_rate(const SuccessByClip& success, double level);  // n = 0 without episodes
 // Over episodes: the headline; a detector by name ("paper", "paper"), n = 0 where no episode has its verdict. As in the
 // leaderboard an episode without the verdict has failed where others have it.
 Rate headline_rate(const EpisodeRows& rows, double level);
@@ -38,7 +39,7 @@ Rate verdict_rate(const EpisodeRows& rows, std::string_view version, std::string
 struct PairedDifference {
   long pairs = 0;
   double difference = std::numeric_limits<double>::quiet_NaN();
-  Interval interval = kNoInterval;  // Newcombe
+  Interval interval = kNoInterval;  // Newcombe; by clip where a clip has several draws
 };
 PairedDifference paired_difference(const EpisodeRows& a, const EpisodeRows& b, double level);
 

@@ -47,8 +47,12 @@ Rate paper_rate(const LeaderboardEntry& entry) {
   return make_rate(std::lround(found->second * static_cast<double>(entry.n)), entry.n, entry.level);
 }
 
+Rate rate_of(const LeaderboardEntry& entry) {
+  return {.n = entry.n, .k = entry.k, .rate = entry.success, .interval = entry.interval};
+}
+
 void take_overall(const LeaderboardEntry& entry, PolicyFigures& figures) {
-  figures.success = make_rate(entry.k, entry.n, entry.level);
+  figures.success = rate_of(entry);
   figures.paper = paper_rate(entry);
   figures.lift = {.pairs = entry.pairs, .difference = entry.lift, .interval = entry.lift_interval};
   figures.falls = make_rate(entry.fell, entry.n, entry.level);
@@ -70,16 +74,13 @@ Rate violation_rate(const EpisodeRows& rows, double level) {
 bool is_playback(const PolicyFigures& figures) { return figures.key.engine == kPlaybackEngine; }
 
 // Sets the mean over physics engines of the episodes that all of them ran.
-void add_mean(const std::map<PolicyKey, PerturbedRows>& policies, ClusterBootstrap& bootstrap, double level,
-              PolicyLine& line) {
+void add_mean(const std::map<PolicyKey, PerturbedRows>& policies, double level, PolicyLine& line) {
   std::vector<const EpisodeRows*> engines;
   for (const PolicyFigures& figures : line.engines)
     if (!is_playback(figures)) engines.push_back(&policies.at(figures.key).find(kClean)->second);
   line.mean_success = line.mean_interval.low = line.mean_interval.high = kNone;
   if (engines.empty()) return;
-  std::vector<double> means;
-  std::vector<int> clips;
-  ClipNumbers numbers;
+  SuccessByClip means;
   for (const auto& [id, row] : *engines.front()) {
     double successes = 0.0;
     bool in_all = true;
@@ -88,14 +89,11 @@ void add_mean(const std::map<PolicyKey, PerturbedRows>& policies, ClusterBootstr
       in_all = in_all && found != episodes->end();
       if (in_all) successes += headline_success(*found->second) ? 1.0 : 0.0;
     }
-    if (!in_all) continue;
-    means.push_back(successes / static_cast<double>(engines.size()));
-    clips.push_back(numbers.of(id));
+    if (in_all) means.add(id, successes / static_cast<double>(engines.size()));
   }
-  if (means.empty()) return;
-  line.mean_success = 0.0;
-  for (const double mean : means) line.mean_success += mean / static_cast<double>(means.size());
-  line.mean_interval = bootstrap.mean(means, clips, level);
+  if (means.clips() == 0) return;
+  line.mean_success = means.mean();
+  line.mean_interval = means.by_clip(level);
 }
 
 using LineKey = std::tuple<std::string, std::string, std::string>;
@@ -109,7 +107,7 @@ std::map<LineKey, PolicyLine> lines_of(const std::vector<LeaderboardEntry>& entr
     if (entry.perturbation != kClean || rows == policies.end() || !rows->second.contains(kClean)) continue;
     PolicyFigures& of = figures[key];
     of.key = key;
-    of.by_task[entry.task] = make_rate(entry.k, entry.n, level);
+    of.by_task[entry.task] = rate_of(entry);
     of.by_task_paper[entry.task] = paper_rate(entry);
     if (entry.task != "all") continue;
     take_overall(entry, of);
@@ -132,10 +130,10 @@ std::optional<Comparison> compared(const PolicyKey& a, const EpisodeRows& of_a, 
   PairedRows gathered;
   for (const auto& [id, row] : of_a) {
     const auto found = of_b.find(id);
-    found == of_b.end() ? void(++gathered.unpaired_a) : gathered.add(*row, *found->second);
+    found == of_b.end() ? void(++gathered.unpaired_a) : gathered.pairs.add(*row, *found->second);
   }
-  if (gathered.table.pairs() == 0) return std::nullopt;
-  gathered.unpaired_b = static_cast<long>(of_b.size()) - gathered.table.pairs();
+  if (gathered.pairs.table().pairs() == 0) return std::nullopt;
+  gathered.unpaired_b = static_cast<long>(of_b.size()) - gathered.pairs.table().pairs();
   Comparison pair = evaluate(gathered, options);
   pair.group = fmt::format("{}/{}: {} vs {}", a.engine, a.controller, a.policy, b.policy);
   std::tie(pair.engine, pair.controller, pair.perturbation, pair.task) =
@@ -204,9 +202,8 @@ PolicyTable policy_table(const std::vector<EpisodeRow>& rows, const IntervalOpti
   if (std::all_of(policies.begin(), policies.end(), [](const auto& of) { return of.first.policy == kReplay; }))
     return table;
   const std::vector<LeaderboardEntry> entries = leaderboard(rows, options);
-  ClusterBootstrap bootstrap(options.resamples, options.seed);
   for (auto& [key, line] : lines_of(entries, policies, options.level)) {
-    add_mean(policies, bootstrap, options.level, line);
+    add_mean(policies, options.level, line);
     table.lines.push_back(std::move(line));
   }
   table.pairs = all_pairs(policies, options);

@@ -52,7 +52,7 @@ struct PolicyLine {
   std::vector<PolicyFigures> engines;  // physics engines by name, then playback
   // Success over the episodes that all its physics engines ran, each engine counting the same.
   double mean_success = 0.0;
-  Interval mean_interval;  // bootstrap over clips, the same in all engines: says nothing of other engines
+  Interval mean_interval;  // by clip (wilson_by_clip): says nothing of other engines
 };
 
 // A figure over the physics engines of a line.

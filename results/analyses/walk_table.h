@@ -9,11 +9,10 @@
 
 #include "duet/results/analyses/analysis.h"
 #include "duet/results/rows/episode_row.h"
+#include "duet/results/statistics/row_groups.h"
 #include "duet/results/statistics/statistics.h"
 
 namespace duet {
-
-inline constexpr std::string_view kWalkRows = "walk";  // the task of such rows
 
 // A metric of rows and how tables call it.
 struct WalkFigure {

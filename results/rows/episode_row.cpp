@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "duet/core/arm_role.h"
 #include "duet/core/digest.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
@@ -18,7 +19,8 @@ void check_key(const EpisodeRow& row) {
 }
 
 void check_arm(const EpisodeRow& row) {
-  const std::array<std::string, 3> known = {"main", "null", "shuffled"};
+  std::vector<std::string> known;
+  for (const EpisodeArmInfo& arm : kEpisodeArms) known.emplace_back(arm.name);
   if (std::ranges::find(known, row.arm) == known.end())
     throw InputError(fmt::format("episode row: key 'arm': {}", unknown_name_message("arm", row.arm, known)));
 }
@@ -60,7 +62,7 @@ constexpr auto kRowFields = std::to_array<RowField>({
     {{"message", &Row::message, "why, where the outcome is not `ok`; else empty"}},
     {{"detectors", &Row::detectors, "version of the detectors' code"}, {.scanned = true}},
     {{"success", &Row::success,
-      "headline verdict; `null`: no detector ruled. Counted as success only where the outcome is `ok` or `fell`"}},
+      "headline verdict; `null`: no detector ruled. Counted as success only where the outcome is `ok`"}},
     {{"verdicts", &Row::verdicts, "of every detector"}},
     {{"metrics", &Row::metrics,
       "names, units and directions: `duet list metrics`. `onset_s`: the first time from 1 s on at which a hand of the "

@@ -33,11 +33,11 @@ struct EpisodeRow {
   std::string controller, policy;                // as the suite names them
   std::string controller_digest, policy_digest;  // SHA-256 of what they are; "" where their files were absent
   std::string perturbation = "clean", robot_digest;
-  std::string arm = "main";  // "main", "null", "shuffled"
+  std::string arm = "main";  // core/arm_role.h: kEpisodeArms
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
   std::string detectors;        // version of the detectors' code (metrics/detector.h)
-  std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok and fell
+  std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok
   std::vector<Verdict> verdicts;
   NamedNumbers metrics;  // finite values only; undefined ones are absent
   bool fell = false;

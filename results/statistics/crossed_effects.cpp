@@ -7,9 +7,12 @@
 #include <map>
 
 #include "duet/core/require.h"
+#include "duet/results/statistics/by_clip.h"
 
 namespace duet {
 namespace {
+
+constexpr double kRounding = 1e-20;  // squared errors below are no spread
 
 // Continued fraction of the regularised incomplete beta function by Lentz's method; converges for x < (a + 1) / (a + b
 // + 2).
@@ -115,10 +118,11 @@ CrossedDifference crossed_difference(const TrainingOutcomes& a, const TrainingOu
   const double from_a = squared_error(means_of(a)), from_b = squared_error(means_of(b));
   const double all = from_a + from_b + from_clips;
   result.error = std::sqrt(all);
-  if (!(all > 0.0)) {
+  if (!(all > kRounding)) {
     result.degrees = std::numeric_limits<double>::infinity();
-    result.interval = {result.difference, result.difference};
-    result.p = result.difference == 0.0 ? 1.0 : 0.0;
+    // Without any spread the clips alone say how sure it is.
+    result.interval = newcombe_by_clip(of_a, of_b, clip, level);
+    result.p = sign_flip_exact(std::vector<long>(result.difference == 0.0 ? 0 : clips, 1));
     return result;
   }
   const auto freedom = [](std::size_t n) { return static_cast<double>(n) - 1.0; };

@@ -200,10 +200,9 @@ double mean_maximum_rank_violation(std::span<const double> reference, std::span<
 double winner_change(std::span<const double> a, std::span<const double> b) {
   require(a.size() == b.size() && !a.empty(), "winner: expected as many rates in both engines, and one or more");
   const std::vector<std::size_t> of_a = best_of(a), of_b = best_of(b);
-  const auto shared = std::count_if(of_a.begin(), of_a.end(), [&](std::size_t winner) {
-    return std::find(of_b.begin(), of_b.end(), winner) != of_b.end();
-  });
-  return 1.0 - static_cast<double>(shared) / static_cast<double>(of_a.size() * of_b.size());
+  const bool shared =
+      std::ranges::any_of(of_a, [&](std::size_t winner) { return std::ranges::count(of_b, winner) > 0; });
+  return shared ? 0.0 : 1.0;
 }
 
 void add_rank_reliability(const EngineRows& rows, const CrossEngineOptions& options,

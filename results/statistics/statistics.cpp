@@ -108,35 +108,43 @@ double sample_deviation(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size() - 1));
 }
 
+Interval wilson_of(double k, double n, double level) {
+  const double z = two_sided_z(level);
+  if (n == 0.0) return {.low = 0.0, .high = 1.0};
+  const double p = k / n;
+  const double scale = 1.0 / (1.0 + z * z / n);
+  const double centre = scale * (p + z * z / (2.0 * n));
+  const double half = scale * z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n));
+  return {.low = k == 0.0 ? 0.0 : std::max(centre - half, 0.0), .high = k == n ? 1.0 : std::min(centre + half, 1.0)};
+}
+
 Interval wilson(long k, long n, double level) {
   require(n >= 0 && k >= 0 && k <= n, fmt::format("Wilson interval: expected 0 <= k <= n, found k = {}, n = {}", k, n));
-  const double z = two_sided_z(level);
-  if (n == 0) return {.low = 0.0, .high = 1.0};
-  const double size = static_cast<double>(n);
-  const double p = static_cast<double>(k) / size;
-  const double scale = 1.0 / (1.0 + z * z / size);
-  const double centre = scale * (p + z * z / (2.0 * size));
-  const double half = scale * z * std::sqrt(p * (1.0 - p) / size + z * z / (4.0 * size * size));
-  return {.low = k == 0 ? 0.0 : std::max(centre - half, 0.0), .high = k == n ? 1.0 : std::min(centre + half, 1.0)};
+  return wilson_of(static_cast<double>(k), static_cast<double>(n), level);
+}
+
+Interval newcombe_of(const PairCounts& pairs, double level) {
+  const auto& [both, only_a, only_b, neither] = pairs;
+  const double size = both + only_a + only_b + neither;
+  require_level(level);
+  if (size == 0.0) return {.low = -1.0, .high = 1.0};
+  const double p_a = (both + only_a) / size;
+  const double p_b = (both + only_b) / size;
+  const Interval a = wilson_of(both + only_a, size, level);
+  const Interval b = wilson_of(both + only_b, size, level);
+  const double correlation = paired_correlation(both, only_a, only_b, neither);
+  const double difference = (only_a - only_b) / size;
+  return {.low = difference - square_and_add(p_a - a.low, b.high - p_b, correlation),
+          .high = difference + square_and_add(a.high - p_a, p_b - b.low, correlation)};
 }
 
 Interval newcombe_paired(long both, long only_a, long only_b, long neither, double level) {
   require(
       both >= 0 && only_a >= 0 && only_b >= 0 && neither >= 0,
       fmt::format("paired table: expected counts of at least 0, found {}, {}, {}, {}", both, only_a, only_b, neither));
-  const long n = both + only_a + only_b + neither;
-  require_level(level);
-  if (n == 0) return {.low = -1.0, .high = 1.0};
-  const double size = static_cast<double>(n);
-  const double p_a = static_cast<double>(both + only_a) / size;
-  const double p_b = static_cast<double>(both + only_b) / size;
-  const Interval a = wilson(both + only_a, n, level);
-  const Interval b = wilson(both + only_b, n, level);
-  const double correlation = paired_correlation(static_cast<double>(both), static_cast<double>(only_a),
-                                                static_cast<double>(only_b), static_cast<double>(neither));
-  const double difference = static_cast<double>(only_a - only_b) / size;
-  return {.low = difference - square_and_add(p_a - a.low, b.high - p_b, correlation),
-          .high = difference + square_and_add(a.high - p_a, p_b - b.low, correlation)};
+  return newcombe_of({static_cast<double>(both), static_cast<double>(only_a), static_cast<double>(only_b),
+                      static_cast<double>(neither)},
+                     level);
 }
 
 Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level) {

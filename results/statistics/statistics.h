@@ -29,9 +29,14 @@ struct IntervalOptions {
 
 // Wilson score interval of k successes in n. n = 0: [0, 1]. Throws std::invalid_argument for k not in [0, n].
 Interval wilson(long k, long n, double level = 0.95);
+Interval wilson_of(double k, double n, double level = 0.95);  // of numbers that need not be whole
 
 // Newcombe's interval (method 10, paired) of p_a - p_b from the paired table: both, only a, only b, neither.
 Interval newcombe_paired(long both, long only_a, long only_b, long neither, double level = 0.95);
+struct PairCounts {
+  double both = 0.0, only_a = 0.0, only_b = 0.0, neither = 0.0;
+};
+Interval newcombe_of(const PairCounts& pairs, double level = 0.95);  // of numbers that need not be whole
 
 // Newcombe's interval (method 10, independent) of k_a / n_a - k_b / n_b. Throws as wilson does.
 Interval newcombe_independent(long k_a, long n_a, long k_b, long n_b, double level = 0.95);

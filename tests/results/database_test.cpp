@@ -47,7 +47,7 @@ TEST(Database, HoldsEpisodesMetricsAndVerdicts) {
   EXPECT_THAT(query(path,
                     "SELECT task, clip, episode, seed, outcome, success, headline, fell, contact_peak_n, message "
                     "FROM episodes WHERE suite = 'hhoi-core'"),
-              testing::ElementsAre("hug|hug-003|7|18364758544493064720|fell|1|1|1|NULL|" + row.message));
+              testing::ElementsAre("hug|hug-003|7|18364758544493064720|fell|1|0|1|NULL|" + row.message));
   EXPECT_THAT(query(path, "SELECT name FROM metrics ORDER BY name"), testing::ElementsAre("hf_ratio", "jpe"));
   EXPECT_THAT(query(path, "SELECT value = 0.1 + 0.2 FROM metrics WHERE name = 'jpe'"), testing::ElementsAre("1"));
   EXPECT_THAT(
@@ -114,7 +114,7 @@ TEST(Database, ViewAgreesWithTheLeaderboard) {
   write_database(rows, scratch / "r.sqlite");
   EXPECT_THAT(query(scratch / "r.sqlite", "SELECT n, k, fell, diverged FROM leaderboard"),
               testing::ElementsAre(std::to_string(entry.n) + "|" + std::to_string(entry.k) + "|1|1"));
-  EXPECT_EQ(entry.k, 5);
+  EXPECT_EQ(entry.k, 4);
 }
 
 TEST(Database, ReplacesTheFileAndLeavesNothingElse) {

@@ -69,7 +69,7 @@ TEST(Degradation, LossIsPairedWithTheCleanEpisodes) {
   EXPECT_EQ(two.paper.k, 2);
   EXPECT_EQ(two.difference.pairs, 4);
   EXPECT_DOUBLE_EQ(two.difference.difference, -0.5);
-  EXPECT_DOUBLE_EQ(two.difference.interval.low, newcombe_paired(2, 0, 2, 0).low);
+  EXPECT_LT(two.difference.interval.low, newcombe_paired(2, 0, 2, 0).low);  // four draws of two clips
 }
 
 TEST(Degradation, OnlyEpisodesOfBothPair) {

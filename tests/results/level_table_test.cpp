@@ -121,7 +121,7 @@ TEST(LevelTable, TwoNamesOfOneLevelAreRefused) {
 TEST(LevelTable, SaysWhatWasReached) {
   const Analysis analysis = level_analysis(level_tables(ladder()));
   EXPECT_THAT(analysis_markdown(analysis),
-              AllOf(HasSubstr("### Levels"), HasSubstr(" 1 waits |"), HasSubstr("25.0 [4.6, 69.9]"),
+              AllOf(HasSubstr("### Levels"), HasSubstr(" 1 waits |"), HasSubstr("25.0 [2.7, 80.2]"),
                     HasSubstr("up to which success is 50 % or more"), HasSubstr("|    none |")));
   const auto reached = figures_like(analysis, {.of = "level", .name = "reached"});
   ASSERT_EQ(reached.size(), 1U);  // the other policy reaches none

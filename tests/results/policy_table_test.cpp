@@ -41,10 +41,10 @@ TEST(PolicyTable, CountsSuccessUnderBothDetectorsAndTheLift) {
   ASSERT_EQ(table.lines.size(), 2U);  // the null arm is no policy
   const PolicyFigures& dstar = line_of(table, "dstar").engines.at(0);
   EXPECT_EQ(dstar.success.k, 3);
-  EXPECT_DOUBLE_EQ(dstar.success.interval.low, wilson(3, 4).low);
+  EXPECT_LE(dstar.success.interval.low, wilson_of(1.5, 2).low);  // four draws of two clips
   EXPECT_EQ(dstar.paper.k, 1);
   EXPECT_DOUBLE_EQ(dstar.lift.difference, 0.5);
-  EXPECT_DOUBLE_EQ(dstar.lift.interval.high, newcombe_paired(1, 2, 0, 1).high);
+  EXPECT_GE(dstar.lift.interval.high, newcombe_paired(1, 2, 0, 1).high);
   EXPECT_TRUE(std::isnan(dstar.dof_jerk));
   EXPECT_EQ(dstar.violations.n, 0);
 }
