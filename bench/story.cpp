@@ -3,17 +3,22 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <utility>
 
 #include "duet/bench/clips.h"
 #include "duet/bench/progress.h"
+#include "duet/bench/run_identity.h"
 #include "duet/bench/run_inputs.h"
 #include "duet/bench/scoring.h"
+#include "duet/bench/shipped_suites.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/metrics/catalogue.h"
+#include "duet/policies/registry.h"
 #include "duet/robots/kinematics.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {
@@ -106,13 +111,57 @@ ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const R
   return story;
 }
 
+namespace {
+
+// What the suite's text says that each of its policies uses; nothing of a text that is none.
+std::map<std::string, std::string> used_policies(const std::string& suite_yaml) {
+  std::map<std::string, std::string> uses;
+  try {
+    for (const YAML::Node& node : parse_yaml(suite_yaml, "suite.yaml")["policies"]) {
+      const YAML::Node name = node.IsMap() ? node["name"] : node;
+      if (!name.IsDefined() || !name.IsScalar()) continue;
+      const bool says = node.IsMap() && node["use"].IsDefined() && node["use"].IsScalar();
+      uses[name.Scalar()] = says ? node["use"].Scalar() : name.Scalar();
+    }
+  } catch (const std::exception&) {  // what this program does not read names no policy of its own
+    return {};
+  }
+  return uses;
+}
+
+}  // namespace
+
+PolicyRoles roles_of(const RunInfo& info) {
+  const std::map<std::string, std::string> uses = used_policies(info.suite_yaml);
+  PolicyRoles roles;
+  for (const std::string& shipped : policy_names()) {
+    const PolicyRole role = policy_role(shipped);
+    if (role.role == ArmRole::kCompetitor) continue;
+    const std::string digest = identity_of(SuitePolicy{.name = shipped}).digest;
+    for (const auto& [name, own] : info.policies) {
+      const auto use = uses.find(name);
+      if (use != uses.end() ? use->second == shipped : own == digest) roles[name] = role;
+    }
+  }
+  return roles;
+}
+
+BoardSuite board_suite(const RunInfo& info) {
+  const std::string name = fmt::format("{} {}", info.suite, info.suite_version);
+  const std::string note = shipped_suite_note(info);
+  BoardSuite suite{.label = note.empty() ? suite_label(info) : fmt::format("{}, {}", name, note),
+                   .roles = roles_of(info)};
+  if (note.starts_with("NOT")) suite.warning = fmt::format("{} is {}.", name, note);
+  return suite;
+}
+
 RunTables tables_of(std::vector<EpisodeRow> rows, const Run& run) {
   RunMetrics metrics;
   for (const MetricInfo& metric : metric_catalogue()) {
     metrics.all.push_back(column_of(metric));
     if (metric.group == MetricGroup::kRetargeting) metrics.drifting.push_back(column_of(metric));
   }
-  return run_tables(std::move(rows), std::move(metrics), run.info.certificate, run.file);
+  return run_tables(std::move(rows), std::move(metrics), run.info.certificate, run.file, board_suite(run.info));
 }
 
 std::vector<TrainingCurves> training_curves(const std::vector<std::string>& files) {
@@ -128,7 +177,7 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   ReportContent content;
   const Suite suite = suite_of_head(run);
   content.curves = training_curves(curve_files);
-  content.title = fmt::format("{} {}", suite.name, suite.version);
+  content.title = tables.board.suite.label;
   content.environment = run.info.environment;
   content.notes = notes_of(suite);
   content.entries = tables.leaderboard;

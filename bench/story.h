@@ -19,6 +19,12 @@ class Progress;
 // People as in the clip, the adapted partner and the robot at the start, in mid-act and at the end.
 ClipStory clip_story(const PairedMotion& motion, const ClipScore& score, const RobotModel& robot);
 
+// Which of a run's policies are references: what its suite says that they use, and, for those of other runs that were
+// united with it, the digest of what made their rows.
+PolicyRoles roles_of(const RunInfo& info);
+// How its tables call the suite, with a warning where it only bears the name of one that ships.
+BoardSuite board_suite(const RunInfo& info);
+
 // What the analyses of a run are made of; the metrics are the catalogue's, and the 18 of retargeting those that drift.
 // The rows are the run's, which may be lean.
 RunTables tables_of(std::vector<EpisodeRow> rows, const Run& run);

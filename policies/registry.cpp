@@ -24,6 +24,7 @@ struct Entry {
   PolicyInfo (*info)(const std::string& name);
   PolicyMaker (*maker)(const std::string& name, Robot robot, const PolicyOptions& options);
   LoadedFiles (*files)(const std::string& name, const PolicyOptions& options);
+  PolicyRole role = {};
 };
 
 template <typename T>
@@ -39,9 +40,12 @@ LoadedFiles no_files(const std::string&, const PolicyOptions&) { return {}; }
 PolicyInfo dense_info(const std::string& name) { return {name, "The same at 50 Hz, past the anchors", {}}; }
 PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral pose where it stands", {}}; }
 
-constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files},
-                               {"replay_dense", dense_info, of<DenseReplayPolicy>, no_files},
-                               {"null", null_info, of<NullPolicy>, no_files},
+constexpr PolicyRole kKnowsTheMotion = {ArmRole::kOracle, "knows the motion"};
+constexpr PolicyRole kStandsStill = {ArmRole::kControl, "stands still"};
+
+constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files, kKnowsTheMotion},
+                               {"replay_dense", dense_info, of<DenseReplayPolicy>, no_files, kKnowsTheMotion},
+                               {"null", null_info, of<NullPolicy>, no_files, kStandsStill},
                                {"dstar", dstar_info, dstar_maker, dstar_files},
                                {"dp", dstar_info, dstar_maker, dstar_files},
                                {"retrieval", retrieval_info, retrieval_maker, retrieval_files}};
@@ -106,6 +110,12 @@ void register_policy(const PolicyInfo& info, PolicyLoader load) {
 }
 
 PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }
+
+PolicyRole policy_role(const std::string& name) {
+  for (const Entry& entry : kPolicies)
+    if (name == entry.name) return entry.role;
+  return {};
+}
 
 LoadedFiles policy_files(const std::string& name, const PolicyOptions& options) {
   return find_entry(name).files(name, options);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/core/arm_role.h"
 #include "duet/core/loaded_file.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
@@ -18,6 +19,8 @@ namespace duet {
 std::vector<PolicyInfo> policies();
 std::vector<std::string> policy_names();
 PolicyInfo policy_info(const std::string& name);
+// What it is in tables, whatever a suite calls it; a descriptor, and what a program adds, competes.
+PolicyRole policy_role(const std::string& name);
 // Every file that such a policy loads, in a fixed order. Throws as policy_maker for a name that is unknown and a
 // descriptor that is broken, MissingError for a file that is not on this machine; the files are not read.
 LoadedFiles policy_files(const std::string& name, const PolicyOptions& options = {});

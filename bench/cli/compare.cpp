@@ -3,6 +3,7 @@
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/run_notes.h"
+#include "duet/bench/story.h"
 #include "duet/core/naming_file.h"
 #include "duet/results/analyses/leaderboard.h"
 #include "duet/results/rows/distinct_episodes.h"
@@ -30,7 +31,8 @@ void add_other_digests(const char* kind, const Digests& a, const Digests& b, std
 }
 
 std::vector<std::string> comparison_notes(const CompareArguments& arguments, const Run& a, const Run& b) {
-  std::vector<std::string> notes = completeness_notes({arguments.a, arguments.b}, {a, b});
+  std::vector<std::string> notes =
+      with_suite(board_suite(a.info), completeness_notes({arguments.a, arguments.b}, {a, b}));
   if (a.info.suite_hash != b.info.suite_hash)
     notes.push_back(fmt::format("the suite's hash is {} in A and {} in B: other settings, clips or detectors",
                                 short_digest(a.info.suite_hash), short_digest(b.info.suite_hash)));

@@ -113,6 +113,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   const RunTables tables = tables_of(replays ? run.rows : std::exchange(run.rows, {}), run);
   const std::vector<Analysis> analyses = run_analyses(tables);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
+  notes = with_suite(tables.board.suite, std::move(notes));
   if (arguments.min_effect > 0.0)
     for (std::string& caution : resolution_notes(tables.leaderboard, arguments.min_effect / 100.0))
       notes.push_back(std::move(caution));
@@ -141,7 +142,7 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     for (const auto& [file, text] : analysis_files(analyses, format)) write(file, text, format);
   }
   add_analyses(analyses, json);
-  print(session, with_notes("md", run_text(tables, analyses), notes), json);
+  print(session, with_notes("md", run_text(analyses), notes), json);
   if (arguments.replays.scenes == 0)
     suggest_next(session, fmt::format("duet replay {} -o {}", shell_word(arguments.runs.front()),
                                       shell_word(folder + "/replay.html")));

@@ -118,6 +118,7 @@ void run_suite_command(Session& session, RunArguments arguments) {
   if (std::string partial = completeness(run); !partial.empty()) notes.push_back(std::move(partial));
   add_row_notes(run.rows, notes);
   const RunTables tables = tables_of(std::exchange(run.rows, {}), run);
+  const std::vector<std::string> file_notes = with_suite(tables.board.suite, notes);
   const std::vector<Analysis> analyses = run_analyses(tables, Extent::kRun);
   for (const std::string& fault : policy_fault_notes(tables.leaderboard)) warn(fault);
   nlohmann::json json = {{"run", arguments.output},
@@ -130,10 +131,11 @@ void run_suite_command(Session& session, RunArguments arguments) {
                          {"absent_policies", summary.absent_policies},
                          {"policy_faults", policy_fault_notes(tables.leaderboard)},
                          {"complete", summary.end == RunEnd::kComplete},
-                         {"notes", notes}};
+                         {"notes", file_notes}};
   if (summary.decided.has_value()) json["decision"] = decided_run_json(*summary.decided);
   add_analyses(analyses, json);
-  print_result(session, summary.end, with_notes("md", run_text(tables, analyses), notes), json);
+  const std::string text = arguments.tables ? with_notes("md", run_text(analyses), file_notes) + "\n" : "";
+  print_result(session, summary.end, text + run_screen(tables, analyses, notes), json);
   suggest_next(session, summary.end == RunEnd::kComplete
                             ? fmt::format("duet report {} --replays 3", shell_word(arguments.output))
                             : shell_words(session.argv));
@@ -200,6 +202,7 @@ void add_run(CLI::App& app, Session& session) {
       ->check(time_limit_check());
   command->add_flag("--retry-errors", options.retry_errors,
                     "run episodes again that ended with an error; those that timed out always run again");
+  command->add_flag("--tables", arguments->tables, "print every table before the verdict and the board");
   command->add_flag("--dry-run", arguments->dry_run,
                     "print the resolved suite, its hash and the programs that it would start; run nothing");
   command->callback([&session, arguments] { run_suite_command(session, *arguments); });

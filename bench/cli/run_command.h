@@ -12,7 +12,7 @@ namespace duet::cli {
 struct RunArguments {
   SuiteArguments suite;
   std::string output, certificate;
-  bool dry_run = false;
+  bool dry_run = false, tables = false;
   double min_effect = 5.0;  // [points]
   RunOptions options;
 };

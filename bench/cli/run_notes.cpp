@@ -83,6 +83,11 @@ void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>
   notes.push_back(repeats);
 }
 
+std::vector<std::string> with_suite(const BoardSuite& suite, std::vector<std::string> notes) {
+  if (!suite.warning.empty()) notes.insert(notes.begin(), suite.warning);
+  return notes;
+}
+
 std::string with_notes(const std::string& format, const std::string& text, const std::vector<std::string>& notes) {
   if (notes.empty()) return text;
   if (format == "json") {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/bench/cli/command.h"
+#include "duet/results/analyses/board.h"
 #include "duet/results/rows/run_directory.h"
 
 namespace duet::cli {
@@ -18,6 +19,9 @@ Run open_run(const std::string& path, RowExtent extent = RowExtent::kWhole);
 std::vector<std::string> completeness_notes(const std::vector<std::string>& paths, const std::vector<Run>& runs);
 // Which policies were slow, and which of the rows repeat others and count once; of that is warned, too.
 void add_row_notes(const std::vector<EpisodeRow>& rows, std::vector<std::string>& notes);
+
+// The same after the warning that the suite only bears the name of one that ships, where it does.
+std::vector<std::string> with_suite(const BoardSuite& suite, std::vector<std::string> notes);
 
 // A file's text with the notes, as its format has them (md, csv, tex, svg; json: before its own in the key "notes");
 // unchanged without any.

@@ -79,7 +79,7 @@ class Run:
         return pandas.DataFrame(self.columns(*names))
 
     def table(self, name: str = "leaderboard") -> Table:
-        """leaderboard, engines, controllers, policies, degradation, reactivity, contacts, people, levels or walking; metrics: the
+        """board, leaderboard, engines, controllers, policies, degradation, reactivity, contacts, people, levels or walking; metrics: the
         leaderboard with the means of metrics. Without a figure where the run has not what the table asks for."""
         return Table(self._folder.table(name))
 

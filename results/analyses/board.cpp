@@ -5,82 +5,105 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <tuple>
 
-#include "duet/results/analyses/leaderboard_rows.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/results/analyses/policy_groups.h"
+#include "duet/results/rows/distinct_episodes.h"
 #include "duet/results/statistics/row_groups.h"
 
 namespace duet {
 namespace {
 
-constexpr int kLeadResamples = 10000;
-constexpr std::uint64_t kLeadSeed = 1;
-constexpr const char* kCleanPerturbation = "clean";
+constexpr double kLevel = 1e-9;  // rates of equal counts differ by rounding alone
 
-bool is_of(const BoardRow& row, const std::string& controller, const std::string& policy,
-           const std::string& perturbation) {
-  return row.controller == controller && row.policy == policy && row.perturbation == perturbation;
-}
+struct BoardKey {
+  std::string arm, controller, policy, perturbation;
+  auto operator<=>(const BoardKey&) const = default;
+};
+using EpisodeEngines = std::map<EpisodeId, std::map<std::string, const EpisodeRow*>>;
 
-BoardRow row_of(const EngineSuccess& success) {
-  BoardRow row;
-  std::tie(row.controller, row.policy, row.perturbation) =
-      std::tie(success.controller, success.policy, success.perturbation);
-  row.n = success.n;
-  row.mean = success.mean;
-  row.interval = success.mean_interval;
-  row.rates = success.engines;
-  row.playback = success.playback;
-  row.sd = success.sd;
-  row.noise_sd = success.noise_sd;
-  return row;
-}
+BoardKey key_of(const BoardRow& row) { return {row.arm, row.controller, row.policy, row.perturbation}; }
 
-// One physics engine, or none.
-BoardRow row_of(const LeaderboardEntry& entry) {
-  BoardRow row;
-  std::tie(row.controller, row.policy, row.perturbation) = std::tie(entry.controller, entry.policy, entry.perturbation);
-  row.n = entry.n;
-  row.mean = entry.success;
-  row.interval = entry.interval;
-  row.rates = {{entry.engine, entry.n, entry.k, entry.success, entry.interval}};
-  row.sd = row.noise_sd = std::nan("");
-  return row;
-}
-
-std::vector<BoardRow> bare_rows(const std::vector<LeaderboardEntry>& entries, const CrossEngine& engines) {
-  std::vector<BoardRow> rows;
-  if (engines.engines.size() > 1) {
-    for (const EngineSuccess& success : engines.success)
-      if (success.n > 0) rows.push_back(row_of(success));
-    return rows;
+// Rows of physics engines, or of playback where there is nothing else.
+std::map<BoardKey, EpisodeEngines> board_groups(const std::vector<EpisodeRow>& rows) {
+  const std::vector<const EpisodeRow*> distinct = distinct_episodes(rows);
+  const auto is_physics = [](const EpisodeRow* row) { return row->engine != kPlaybackEngine; };
+  const auto is_clean = [](const EpisodeRow* row) { return row->perturbation == kClean; };
+  const bool physics = std::ranges::any_of(distinct, is_physics);
+  const bool clean =
+      std::ranges::any_of(distinct, [&](const EpisodeRow* row) { return is_physics(row) == physics && is_clean(row); });
+  std::map<BoardKey, EpisodeEngines> groups;
+  for (const EpisodeRow* row : distinct) {
+    if (is_physics(row) != physics || is_clean(row) != clean) continue;
+    const EpisodeRow*& place =
+        groups[{row->arm, row->controller, row->policy, row->perturbation}][episode_id(*row)][row->engine];
+    if (place != nullptr) require_distinct(*place, *row);
+    place = row;
   }
-  const auto is_physics = [](const LeaderboardEntry& entry) { return entry.engine != kPlaybackEngine; };
-  const bool physics = std::ranges::any_of(entries, is_physics);
-  for (const LeaderboardEntry& entry : entries)
-    if (entry.task == "all" && entry.arm == "main" && is_physics(entry) == physics) rows.push_back(row_of(entry));
-  return rows;
+  return groups;
 }
 
-// From the leaderboard, over the physics engines of the row.
-void add_outcomes(const std::vector<LeaderboardEntry>& entries, BoardRow& row) {
-  double null_sum = 0.0;
-  long nulls = 0;
-  for (const LeaderboardEntry& entry : entries) {
-    if (entry.task != "all" || entry.arm != "main" || !is_of(row, entry.controller, entry.policy, entry.perturbation))
-      continue;
-    if (std::ranges::find(row.rates, entry.engine, &EngineRate::engine) == row.rates.end()) continue;
-    row.fell += entry.fell;
-    row.unfinished += entry.diverged + entry.timed_out + entry.errors + entry.unsupported;
-    if (!std::isfinite(entry.null_success)) continue;
-    null_sum += entry.null_success;
-    ++nulls;
+void count_ends(const EpisodeEngines& episodes, BoardRow& row) {
+  for (const auto& [id, engines] : episodes) {
+    for (const auto& [engine, of] : engines) {
+      row.fell += of->fell || of->outcome == Outcome::kFell ? 1 : 0;
+      row.unfinished += of->outcome != Outcome::kOk && of->outcome != Outcome::kFell ? 1 : 0;
+    }
   }
-  row.null_rate = nulls == 0 ? std::nan("") : null_sum / static_cast<double>(nulls);
+}
+
+// Over the episodes that all engines of the group ran; n is 0 where there are none.
+void add_rates(const EpisodeEngines& episodes, double level, BoardRow& row) {
+  std::set<std::string> names;
+  for (const auto& [id, engines] : episodes)
+    for (const auto& [engine, of] : engines) names.insert(engine);
+  std::map<std::string, SuccessByClip> rates;
+  SuccessByClip means;
+  for (const auto& [id, engines] : episodes) {
+    if (engines.size() < names.size()) continue;
+    double sum = 0.0;
+    for (const auto& [engine, of] : engines) {
+      const double success = headline_success(*of) ? 1.0 : 0.0;
+      rates[engine].add(id, success);
+      sum += success;
+    }
+    means.add(id, sum / static_cast<double>(engines.size()));
+  }
+  row.n = means.episodes();
+  if (row.n == 0) return;
+  row.mean = means.mean();
+  row.interval = names.size() > 1 ? means.by_clip(level) : means.of_episodes(level);
+  for (const auto& [engine, success] : rates)
+    row.rates.push_back({engine, success.episodes(), success.successes(), success.mean(), success.of_episodes(level)});
+}
+
+// Success of the null arm over the episodes of both; NaN without any.
+double null_rate(const EpisodeEngines& episodes, const EpisodeEngines* null) {
+  long n = 0, k = 0;
+  if (null == nullptr) return std::nan("");
+  for (const auto& [id, engines] : episodes) {
+    const auto same = null->find(id);
+    if (same == null->end()) continue;
+    for (const auto& [engine, of] : engines) {
+      const auto found = same->second.find(engine);
+      if (found == same->second.end()) continue;
+      ++n;
+      k += headline_success(*found->second) ? 1 : 0;
+    }
+  }
+  return n == 0 ? std::nan("") : static_cast<double>(k) / static_cast<double>(n);
+}
+
+// Of several null policies the first by name.
+const EpisodeEngines* null_group(const std::map<BoardKey, EpisodeEngines>& groups, const BoardKey& of) {
+  for (const auto& [key, episodes] : groups)
+    if (key.arm == "null" && key.controller == of.controller && key.perturbation == of.perturbation) return &episodes;
+  return nullptr;
 }
 
 void add_contact(const ContactTable& contacts, BoardRow& row) {
+  if (row.arm != "main") return;
   for (const ContactGroup& group : contacts.groups) {
     if (group.controller != row.controller || group.policy != row.policy) continue;
     BoardContact contact;
@@ -96,142 +119,114 @@ void add_contact(const ContactTable& contacts, BoardRow& row) {
   }
 }
 
-bool has_rate(const BoardRow& row, const std::string& engine) {
-  return std::ranges::find(row.rates, engine, &EngineRate::engine) != row.rates.end();
-}
-
-// Pairs by engine, task, clip and episode.
-std::optional<BoardLead> lead_of(const std::vector<EpisodeRow>& rows, const BoardRow& first, const BoardRow& second) {
-  std::map<std::tuple<std::string, EpisodeId>, std::pair<int, int>> pairs;  // -1: not run
-  for (const EpisodeRow& row : rows) {
-    if (row.arm != "main" || !has_rate(first, row.engine) || !has_rate(second, row.engine)) continue;
-    const bool of_first = is_of(first, row.controller, row.policy, row.perturbation);
-    if (!of_first && !is_of(second, row.controller, row.policy, row.perturbation)) continue;
-    auto& pair = pairs.try_emplace({row.engine, episode_id(row)}, -1, -1).first->second;
-    (of_first ? pair.first : pair.second) = headline_success(row) ? 1 : 0;
+BoardDifference difference_of(const std::map<BoardKey, EpisodeEngines>& groups, const BoardRow& a, const BoardRow& b,
+                              double level) {
+  const EpisodeEngines &of_a = groups.at(key_of(a)), &of_b = groups.at(key_of(b));
+  EpisodePairs pairs;
+  for (const auto& [id, engines] : of_a) {
+    const auto same = of_b.find(id);
+    if (same == of_b.end()) continue;
+    for (const auto& [engine, row] : engines)
+      if (const auto found = same->second.find(engine); found != same->second.end()) pairs.add(*row, *found->second);
   }
-  std::vector<double> differences;
-  std::vector<int> clips;
-  ClipNumbers numbers;
-  for (const auto& [id, pair] : pairs) {
-    if (pair.first < 0 || pair.second < 0) continue;
-    differences.push_back(pair.first - pair.second);
-    clips.push_back(numbers.of(std::get<1>(id)));
+  BoardDifference result{.other = b.name(), .interval = kNoInterval};
+  if (pairs.clips() == 0) return result;
+  result.difference = pairs.table().difference();
+  result.interval = pairs.by_clip(level);
+  result.clips = pairs.clips();
+  result.p = pairs.p();
+  return result;
+}
+
+BoardSpread spread_of(const BoardRow& row, const EpisodeEngines& episodes) {
+  const auto [low, high] = std::ranges::minmax_element(row.rates, {}, &EngineRate::rate);
+  BoardSpread spread{.lowest = *low, .highest = *high};
+  EpisodePairs pairs;
+  for (const auto& [id, engines] : episodes)
+    if (engines.size() == row.rates.size()) pairs.add(*engines.at(high->engine), *engines.at(low->engine));
+  const auto count = static_cast<double>(row.rates.size());
+  if (pairs.clips() > 0) spread.p = std::min(1.0, pairs.p() * count * (count - 1.0) / 2.0);
+  return spread;
+}
+
+std::vector<std::string> engines_won_by_another(const std::vector<BoardRow>& rows) {
+  std::vector<std::string> engines;
+  for (const EngineRate& first : rows.front().rates) {
+    const bool another = std::ranges::any_of(rows, [&](const BoardRow& row) {
+      return std::ranges::any_of(row.rates, [&](const EngineRate& rate) {
+        return rate.engine == first.engine && rate.rate > first.rate + kLevel;
+      });
+    });
+    if (another) engines.push_back(first.engine);
   }
-  if (differences.empty()) return std::nullopt;
-  BoardLead lead;
-  for (const double difference : differences) lead.difference += difference / static_cast<double>(differences.size());
-  lead.interval = cluster_bootstrap(differences, clips, kLeadResamples, kLeadSeed);
-  lead.clips = static_cast<long>(numbers.size());
-  return lead;
+  return engines;
 }
 
-std::string best_sentence(const Board& board) {
-  const BoardRow& best = board.rows.front();
-  const std::string where = board.engines > 1
-                                ? fmt::format("mean over {} engines, {} episodes each", board.engines, best.n)
-                                : fmt::format("{}, {} episodes", best.rates.front().engine, best.n);
-  if (board.rows.size() == 1)
-    return fmt::format("{}: {} % success ({}).", best.name(), percent(best.mean, best.interval), where);
-  return fmt::format("{} is best of {}: {} % success ({}).", best.name(), board.rows.size(),
-                     percent(best.mean, best.interval), where);
+bool is_better(const BoardRow& a, const BoardRow& b) {
+  return std::abs(a.mean - b.mean) > kLevel ? a.mean > b.mean : a.name() < b.name();
 }
 
-std::string lead_sentence(const Board& board) {
-  const BoardLead& lead = *board.lead;
-  const std::string next = board.rows[1].name();
-  const std::string size = fmt::format("{} points over {} clips", points(lead.difference, lead.interval), lead.clips);
-  if (lead.interval.low > 0.0) return fmt::format("It is ahead of {} by {}: more than chance gives.", next, size);
-  return fmt::format("Its lead over {} is {}: these clips do not decide between the two.", next, size);
+void rank(std::vector<BoardRow>& rows) {
+  std::ranges::stable_sort(rows, is_better);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const bool level = i > 0 && std::abs(rows[i].mean - rows[i - 1].mean) <= kLevel;
+    rows[i].rank = level ? rows[i - 1].rank : i + 1;
+  }
 }
 
-std::string engines_sentence(const Board& board) {
-  const BoardRow& best = board.rows.front();
-  const auto [low, high] = std::ranges::minmax_element(best.rates, {}, &EngineRate::rate);
-  std::string text =
-      fmt::format("The engine {}: from {} % in {} to {} % in {} for it, {} chance alone would give",
-                  best.sd > best.noise_sd ? "matters" : "hardly matters", percent(low->rate), low->engine,
-                  percent(high->rate), high->engine, best.sd > best.noise_sd ? "more than" : "no more than");
-  if (std::isfinite(board.winner_changes))
-    text += fmt::format("; another engine names another winner with probability {:.2f}", board.winner_changes);
-  return text + ".";
-}
-
-std::string null_sentence(const Board& board) {
-  double most = 0.0;
-  for (const BoardRow& row : board.rows)
-    if (std::isfinite(row.null_rate)) most = std::max(most, row.null_rate);
-  if (most <= 0.0) return "";
-  return fmt::format("A robot that stands still passes up to {} % by the same detector.", percent(most));
-}
-
-std::string rates_text(const BoardRow& row) {
-  std::string text;
-  for (const EngineRate& rate : row.rates)
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", rate.engine, percent(rate.rate));
-  return text;
-}
-
-std::string contact_text(const BoardRow& row) {
-  if (!row.contact) return "-";
-  return fmt::format(
-      "{} of {}{}", row.contact->over, row.contact->touched,
-      std::isfinite(row.contact->worst_ratio) ? fmt::format(" ({:.2f}x)", row.contact->worst_ratio) : "");
+// Where no policy competes, the controllers do, under what knows the motion.
+void part_by_role(std::vector<BoardRow> all, Board& board) {
+  const auto is = [](ArmRole role) { return [role](const BoardRow& row) { return row.role.role == role; }; };
+  board.of_oracles = std::ranges::none_of(all, is(ArmRole::kCompetitor));
+  const ArmRole ranked = board.of_oracles ? ArmRole::kOracle : ArmRole::kCompetitor;
+  for (BoardRow& row : all) (row.role.role == ranked ? board.rows : board.references).push_back(std::move(row));
+  rank(board.rows);
+  std::ranges::stable_sort(board.references, [](const BoardRow& a, const BoardRow& b) {
+    return a.role.role != b.role.role ? a.role.role > b.role.role : is_better(a, b);
+  });
 }
 
 }  // namespace
 
 std::string BoardRow::name() const {
-  const std::string pair = fmt::format("{} with {}", controller, policy);
-  return perturbation == kCleanPerturbation ? pair : fmt::format("{} under {}", pair, perturbation);
+  std::string text = fmt::format("{} with {}", controller, policy);
+  if (perturbation != kClean) text += " under " + perturbation;
+  return role.word.empty() ? text : fmt::format("{} ({})", text, role.word);
 }
 
-Board board(const std::vector<EpisodeRow>& rows, const std::vector<LeaderboardEntry>& entries,
-            const CrossEngine& engines, const ContactTable& contacts) {
-  Board made;
-  made.rows = bare_rows(entries, engines);
-  made.engines = static_cast<long>(engines.engines.size());
-  made.winner_changes = std::nan("");
-  for (const RankStability& ranks : engines.ranks)
-    if (ranks.of == "combinations") made.winner_changes = ranks.winner_changes;
-  const auto is_clean = [](const BoardRow& row) { return row.perturbation == kCleanPerturbation; };
-  if (std::ranges::any_of(made.rows, is_clean))
-    std::erase_if(made.rows, [&](const BoardRow& row) { return !is_clean(row); });
-  for (BoardRow& row : made.rows) {
-    add_outcomes(entries, row);
+Told told(const BoardDifference& difference, double level) {
+  if (difference.clips < kFewestClips) return Told::kTooFewClips;
+  return difference.p <= 1.0 - level && difference.interval.low > 0.0 ? Told::kAhead : Told::kApart;
+}
+
+Board board(const std::vector<EpisodeRow>& rows, const ContactTable& contacts, const BoardSuite& suite, double level) {
+  const std::map<BoardKey, EpisodeEngines> groups = board_groups(rows);
+  std::vector<BoardRow> all;
+  for (const auto& [key, episodes] : groups) {
+    BoardRow row{.controller = key.controller, .policy = key.policy, .perturbation = key.perturbation, .arm = key.arm};
+    row.role = role_of(key.arm, key.policy, suite.roles);
+    add_rates(episodes, level, row);
+    if (row.n == 0) continue;
+    row.null_rate = null_rate(episodes, null_group(groups, key));
+    count_ends(episodes, row);
     add_contact(contacts, row);
+    all.push_back(std::move(row));
   }
-  std::ranges::stable_sort(made.rows, [](const BoardRow& a, const BoardRow& b) {
-    return a.mean != b.mean ? a.mean > b.mean : a.name() < b.name();
+  Board made{.suite = suite, .level = level};
+  part_by_role(std::move(all), made);
+  if (made.rows.empty()) return made;
+  const BoardRow& first = made.rows.front();
+  if (made.rows.size() > 1) {
+    made.lead = difference_of(groups, first, made.rows[1], level);
+    made.won_by_another = engines_won_by_another(made.rows);
+  }
+  const auto control = std::ranges::find_if(made.references, [&](const BoardRow& row) {
+    return row.role.role == ArmRole::kControl && row.controller == first.controller &&
+           row.perturbation == first.perturbation;
   });
-  if (made.rows.size() > 1) made.lead = lead_of(rows, made.rows[0], made.rows[1]);
+  if (control != made.references.end()) made.lift = difference_of(groups, first, *control, level);
+  if (first.rates.size() > 1) made.spread = spread_of(first, groups.at(key_of(first)));
   return made;
-}
-
-std::vector<std::string> board_verdict(const Board& board) {
-  std::vector<std::string> sentences;
-  if (board.rows.empty()) return sentences;
-  sentences.push_back(best_sentence(board));
-  if (board.lead) sentences.push_back(lead_sentence(board));
-  if (board.engines > 1) sentences.push_back(engines_sentence(board));
-  if (const std::string still = null_sentence(board); !still.empty()) sentences.push_back(still);
-  return sentences;
-}
-
-std::string board_markdown(const Board& board) {
-  if (board.rows.empty()) return "";
-  std::string text;
-  for (const std::string& sentence : board_verdict(board)) text += escape_markdown(sentence) + "\n";
-  TextTable table{
-      {"#", "Controller", "Policy", "Success [%]", "Null", "Fell", "Unfinished", "Over limit", "By engine"}, {}, 3};
-  for (std::size_t i = 0; i < board.rows.size(); ++i) {
-    const BoardRow& row = board.rows[i];
-    table.rows.push_back({std::to_string(i + 1), row.controller,
-                          row.perturbation == kCleanPerturbation ? row.policy : row.policy + ", " + row.perturbation,
-                          percent(row.mean, row.interval), percent(row.null_rate), std::to_string(row.fell),
-                          std::to_string(row.unfinished), contact_text(row), rates_text(row)});
-  }
-  return text + "\n" + markdown_table(table);
 }
 
 }  // namespace duet

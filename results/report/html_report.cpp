@@ -118,7 +118,7 @@ std::vector<Section> sections_of(const ReportContent& content) {
   };
   const auto add_analyses = [&](bool opens) {
     for (const Analysis& analysis : content.analyses)
-      if (analysis.opens == opens && analysis.name != kLeaderboardName)
+      if (analysis.opens == opens && analysis.name != kLeaderboardName && analysis.name != kBoardName)
         add(analysis.name, analysis.title, analysis_html(analysis), opens);
   };
   add("board", "Board", board_html(content.board), true);

@@ -45,10 +45,18 @@ std::string axis_svg(const BoardRow& row, const std::vector<std::string>& engine
   return svg + "</svg>";
 }
 
+// The ranked ones, then the references.
+std::vector<const BoardRow*> shown_rows(const Board& board) {
+  std::vector<const BoardRow*> rows;
+  for (const std::vector<BoardRow>* of : {&board.rows, &board.references})
+    for (const BoardRow& row : *of) rows.push_back(&row);
+  return rows;
+}
+
 std::vector<std::string> engines_of(const Board& board) {
   std::vector<std::string> engines;
-  for (const BoardRow& row : board.rows)
-    for (const EngineRate& rate : row.rates)
+  for (const BoardRow* row : shown_rows(board))
+    for (const EngineRate& rate : row->rates)
       if (std::ranges::find(engines, rate.engine) == engines.end()) engines.push_back(rate.engine);
   std::ranges::sort(engines);
   return engines;
@@ -57,7 +65,8 @@ std::vector<std::string> engines_of(const Board& board) {
 std::string episodes_link(const BoardRow& row, const std::string& task, const std::string& text) {
   return fmt::format(
       R"(<a href="#episodes" data-controller="{}" data-policy="{}" data-perturbation="{}" data-task="{}">{}</a>)",
-      escape_html(row.controller), escape_html(row.policy), escape_html(row.perturbation), escape_html(task), text);
+      escape_html(row.controller), escape_html(policy_of_episode(row.arm, row.policy)), escape_html(row.perturbation),
+      escape_html(task), text);
 }
 
 std::string contact_cell(const BoardRow& row) {
@@ -69,12 +78,18 @@ std::string contact_cell(const BoardRow& row) {
                      row.contact->over > 0 ? R"( class="over")" : "", row.contact->touched, worst);
 }
 
-std::string board_row_html(const BoardRow& row, std::size_t rank, const std::vector<std::string>& engines,
-                           bool with_contact) {
+// "replay (knows the motion)", "dstar, push_60n"
+std::string policy_html(const BoardRow& row) {
+  return escape_html(row.policy + (row.perturbation == "clean" ? "" : ", " + row.perturbation) +
+                     (row.role.word.empty() ? "" : fmt::format(" ({})", row.role.word)));
+}
+
+// A reference has no rank and sorts below all that have one.
+std::string board_row_html(const BoardRow& row, const std::vector<std::string>& engines, bool with_contact) {
   std::string html = fmt::format(
-      R"(<tr><td class="l rank" data-v="{0}">{0}</td><th scope="row" class="l">{1}<span class="ci">{2}</span></th>)",
-      rank, escape_html(row.policy + (row.perturbation == "clean" ? "" : ", " + row.perturbation)),
-      escape_html(row.controller));
+      R"(<tr{}><td class="l rank" data-v="{}">{}</td><th scope="row" class="l">{}<span class="ci">{}</span></th>)",
+      row.rank == 0 ? R"( class="control")" : "", row.rank == 0 ? "" : std::to_string(row.rank),
+      row.rank == 0 ? "–" : std::to_string(row.rank), policy_html(row), escape_html(row.controller));
   html += fmt::format(
       R"(<td data-v="{:.6f}"><span class="rate big">{}</span><span class="ci">[{}, {}]</span></td><td class="l plotcell">{}</td>)",
       row.mean, percent(row.mean), percent(row.interval.low), percent(row.interval.high), axis_svg(row, engines));
@@ -105,8 +120,8 @@ double task_rate(const std::vector<LeaderboardEntry>& entries, const BoardRow& r
   double sum = 0.0;
   int count = 0;
   for (const LeaderboardEntry& entry : entries) {
-    if (entry.task != task || entry.arm != "main" || entry.controller != row.controller || entry.policy != row.policy ||
-        entry.perturbation != row.perturbation ||
+    if (entry.task != task || entry.arm != row.arm || entry.controller != row.controller ||
+        entry.policy != row.policy || entry.perturbation != row.perturbation ||
         std::ranges::find(row.rates, entry.engine, &EngineRate::engine) == row.rates.end())
       continue;
     sum += entry.success;
@@ -126,10 +141,10 @@ std::string verdict_html(const Board& board) {
 }
 
 std::string board_html(const Board& board) {
-  if (board.rows.empty()) return "";
+  const std::vector<const BoardRow*> rows = shown_rows(board);
+  if (rows.empty()) return "";
   const std::vector<std::string> engines = engines_of(board);
-  const bool with_contact =
-      std::ranges::any_of(board.rows, [](const BoardRow& row) { return row.contact.has_value(); });
+  const bool with_contact = std::ranges::any_of(rows, [](const BoardRow* row) { return row->contact.has_value(); });
   std::string html =
       R"(<div class="scroll" tabindex="0" role="region" aria-label="Ranked board"><table class="sortable ranked"><thead><tr>)";
   std::vector<const char*> titles = {
@@ -139,26 +154,26 @@ std::string board_html(const Board& board) {
   for (const char* title : titles)
     html += fmt::format(R"(<th scope="col"><button type="button">{}</button></th>)", title);
   html += "</tr></thead><tbody>\n";
-  for (std::size_t i = 0; i < board.rows.size(); ++i)
-    html += board_row_html(board.rows[i], i + 1, engines, with_contact);
+  for (const BoardRow* row : rows) html += board_row_html(*row, engines, with_contact);
   return html + "</tbody></table></div>" + axis_legend(engines, board.level);
 }
 
 std::string task_map_html(const Board& board, const std::vector<LeaderboardEntry>& entries) {
   const std::vector<std::string> tasks = leaderboard_tasks(entries);
-  if (board.rows.empty() || tasks.empty()) return "";
+  const std::vector<const BoardRow*> rows = shown_rows(board);
+  if (rows.empty() || tasks.empty()) return "";
   std::string html =
       R"(<div class="scroll" tabindex="0" role="region" aria-label="Success by task"><table class="map"><caption>Success in %, mean over engines; a number leads to its episodes</caption><thead><tr><th scope="col" class="l">Policy, controller</th>)";
   for (const std::string& task : tasks)
     html += fmt::format(R"(<th scope="col">{}</th>)", escape_html(task_title(task)));
   html += "</tr></thead><tbody>\n";
-  for (const BoardRow& row : board.rows) {
-    html += fmt::format(R"(<tr><th scope="row" class="l">{} <span class="unit">{}</span></th>)",
-                        escape_html(row.policy), escape_html(row.controller));
+  for (const BoardRow* row : rows) {
+    html += fmt::format(R"(<tr{}><th scope="row" class="l">{} <span class="unit">{}</span></th>)",
+                        row->rank == 0 ? R"( class="control")" : "", policy_html(*row), escape_html(row->controller));
     for (const std::string& task : tasks) {
-      const double rate = task_rate(entries, row, task);
+      const double rate = task_rate(entries, *row, task);
       html += std::isfinite(rate) ? fmt::format(R"(<td class="h{:.0f}">{}</td>)", std::floor(rate * 9.999),
-                                                episodes_link(row, task, percent(rate)))
+                                                episodes_link(*row, task, percent(rate)))
                                   : R"(<td class="zero">-</td>)";
     }
     html += "</tr>\n";

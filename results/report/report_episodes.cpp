@@ -40,6 +40,10 @@ bool failed(const EpisodeRow& row) { return !headline_success(row) && row.arm ==
 
 }  // namespace
 
+std::string policy_of_episode(const std::string& arm, const std::string& policy) {
+  return arm == "main" ? policy : arm == "null" ? "null arm" : policy + " (" + arm + ")";
+}
+
 std::string replays_html(const std::vector<ReportReplay>& replays) {
   if (replays.empty()) return "";
   std::string html = R"(<p>In 3-D, where engines and policies agree least:</p><ul class="replays">)";
@@ -86,9 +90,7 @@ std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector
     html += fmt::format(R"(<th scope="col"><button type="button">{}</button></th>)", title);
   html += "</tr></thead><tbody>\n";
   for (const EpisodeRow* row : order) {
-    const std::string policy = row->arm == "main"   ? row->policy
-                               : row->arm == "null" ? "null arm"
-                                                    : row->policy + " (" + row->arm + ")";
+    const std::string policy = policy_of_episode(row->arm, row->policy);
     html += "<tr>";
     for (const std::string& cell :
          {row->task, row->episode == 0 ? row->clip : fmt::format("{} {}", row->clip, row->episode), policy,

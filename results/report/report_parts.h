@@ -21,6 +21,7 @@ std::string task_map_html(const Board& board, const std::vector<LeaderboardEntry
 
 // "" where there are none.
 std::string replays_html(const std::vector<ReportReplay>& replays);
+std::string policy_of_episode(const std::string& arm, const std::string& policy);  // as the list calls it
 // `all`: how many there are where `rows` are some of them.
 std::string episodes_html(const std::vector<EpisodeRow>& rows, const std::vector<ReportReplay>& replays,
                           std::size_t all = 0);

@@ -49,6 +49,7 @@ struct ListedAnalysis {
 };
 
 constexpr ListedAnalysis kAnalyses[] = {
+    {kBoardName, [](const RunTables& run) { return board_analysis(run.board); }, Walking::kLeftOut, true},
     {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
      Walking::kWritten, true},
     {"engines", engines_with_plot, Walking::kWritten, true},
@@ -74,7 +75,7 @@ bool has_walking(const RunTables& tables) {
 }  // namespace
 
 RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
-                     RowFile file) {
+                     RowFile file, const BoardSuite& suite) {
   RunTables tables{.rows = std::move(rows),
                    .file = std::move(file),
                    .metrics = std::move(metrics),
@@ -86,19 +87,19 @@ RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlo
   tables.leaderboard = leaderboard(tables.rows);
   tables.engines = cross_engine(tables.rows, tables.metrics.drifting, {.file = tables.file});
   tables.contacts = contact_table(tables.rows);
-  tables.board = board(tables.rows, tables.leaderboard, tables.engines, tables.contacts);
+  tables.board = board(tables.rows, tables.contacts, suite);
   return tables;
 }
 
 std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent) {
   const bool walking = has_walking(tables);
+  if (tables.rows.empty()) return {run_analysis(tables, kLeaderboardName)};
   std::vector<Analysis> analyses;
   for (const ListedAnalysis& listed : kAnalyses) {
     if ((extent == Extent::kRun && !listed.after_run) || (walking && listed.walking == Walking::kLeftOut)) continue;
     Analysis analysis = listed.make(tables);
     analysis.in_terminal = !walking || listed.walking == Walking::kPrinted;
-    if (!analysis.empty() || tables.rows.empty()) analyses.push_back(std::move(analysis));
-    if (tables.rows.empty()) break;
+    if (!analysis.empty()) analyses.push_back(std::move(analysis));
   }
   return analyses;
 }
@@ -112,12 +113,19 @@ Analysis run_analysis(const RunTables& tables, std::string_view name) {
   throw std::invalid_argument(unknown_name_message("table", std::string(name), known));
 }
 
-std::string run_text(const RunTables& tables, const std::vector<Analysis>& analyses) {
+std::string run_text(const std::vector<Analysis>& analyses) {
   std::vector<std::string> parts;
-  if (!tables.board.rows.empty() && !has_walking(tables)) parts.push_back(board_markdown(tables.board));
   for (const Analysis& analysis : analyses)
     if (analysis.in_terminal) parts.push_back(terminal_text(analysis));
   return fmt::format("{}", fmt::join(parts, "\n"));
+}
+
+std::string run_screen(const RunTables& tables, const std::vector<Analysis>& analyses,
+                       const std::vector<std::string>& notes) {
+  if (!tables.rows.empty() && !has_walking(tables)) return board_screen(tables.board, notes);
+  std::string text;
+  for (const std::string& note : notes) text += "> " + note + "\n\n";
+  return text + run_text(analyses);
 }
 
 }  // namespace duet

@@ -34,7 +34,7 @@ struct RunTables {
 };
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
-                     RowFile file = {});
+                     RowFile file = {}, const BoardSuite& suite = {});
 
 // What ends a run, or all that `duet report` writes.
 enum class Extent { kRun, kReport };
@@ -46,8 +46,11 @@ std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent = Exte
 // The one of that name, whether or not it has a figure. Throws std::invalid_argument for an unknown name.
 Analysis run_analysis(const RunTables& tables, std::string_view name);
 
-// Markdown for a terminal: the verdict and the board first, then the analyses. Of robots that walk by command how they
-// do, and no board.
-std::string run_text(const RunTables& tables, const std::vector<Analysis>& analyses);
+// Markdown for a terminal: the analyses, the board first. Of robots that walk by command how they do, and no board.
+std::string run_text(const std::vector<Analysis>& analyses);
+
+// What ends a run: verdict and board on one screen with the notes above them; of robots that walk run_text.
+std::string run_screen(const RunTables& tables, const std::vector<Analysis>& analyses,
+                       const std::vector<std::string>& notes);
 
 }  // namespace duet

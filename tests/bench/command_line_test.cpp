@@ -373,6 +373,30 @@ TEST(CommandLine, FullDiskLosesNothingThatWasThere) {
   EXPECT_EQ(files, 1);
 }
 
+// A suite under the name of one that ships, its oracle under a name of its own.
+TEST(CommandLine, ARunEndsOnOneScreenThatSaysWhatIsNoCompetitorAndNotTheSuite) {
+  const test::ScratchFolder folder;
+  write_file(folder / "suite.yaml",
+             "schema: duet.suite/1\nname: hhoi-spatial\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+             "engines: [playback]\ncontrollers: [pd]\nstart: clip\n"
+             "policies: [{name: hindsight, use: replay}, retrieval]\n");
+  const Answer run = duet_program("run " + (folder / "suite.yaml") + " -o " + (folder / "run"));
+  ASSERT_EQ(run.code, 0) << run.err;
+  const char* warning = "hhoi-spatial 1.0.0 is NOT the suite of that name that ships";
+  EXPECT_THAT(run.out, AllOf(::testing::StartsWith("pd with retrieval: "), HasSubstr(warning),
+                             HasSubstr("(playback, 1 episode)"), HasSubstr("\n  -  hindsight (knows the motion) "),
+                             HasSubstr("\n  -  null (stands still) ")));
+  std::istringstream lines(run.out);
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) EXPECT_LE(line.size(), 100U) << line;
+  EXPECT_LE(count, 20);
+  ASSERT_EQ(duet_program("report -q --no-clips " + (folder / "run") + " -f md,csv,json,tex,html").code, 0);
+  for (const char* name : {"board.md", "board.csv", "board.json", "board.tex", "leaderboard.md", "leaderboard.csv",
+                           "leaderboard.json", "leaderboard.tex", "report.html"})
+    EXPECT_THAT(read_file(folder / ("run/" + std::string(name))), HasSubstr(warning)) << name;
+  EXPECT_THAT(read_file(folder / "run/report.html"), HasSubstr("<title>hhoi-spatial 1.0.0, NOT the suite"));
+}
+
 TEST(CommandLine, RepeatsOfAnEpisodeCountOnceAndAreSaid) {
   const test::ScratchFolder folder;
   write_file(folder / "suite.yaml",

@@ -179,7 +179,7 @@ TEST_F(GivenClips, OneCommandPrintsRecordedBesideSynthetic) {
   EXPECT_EQ(without.code, 2);
   EXPECT_THAT(without.err, HasSubstr("expected --clips PATH"));
   const test::Answer answer =
-      test::duet_program("run " + suite + " --clips " + recording("one") + " -o " + (folder_ / "run"));
+      test::duet_program("run --tables " + suite + " --clips " + recording("one") + " -o " + (folder_ / "run"));
   ASSERT_EQ(answer.code, 0) << answer.err;
   EXPECT_THAT(answer.out, AllOf(HasSubstr("### Recorded and synthetic people"), HasSubstr("| replay ")));
   const test::Answer report = test::duet_program("report " + (folder_ / "run") + " -f md,csv,json,tex,html");

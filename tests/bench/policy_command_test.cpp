@@ -77,7 +77,7 @@ class P:
 };
 
 TEST_F(PolicyCommand, AProgramThatDoesNotPlayIsAnErrorWithItsNameEverywhere) {
-  const Answer ran = run(suite("replay, " + descriptor("dead", "command: [/bin/false]")), "--allow-programs");
+  const Answer ran = run(suite("replay, " + descriptor("dead", "command: [/bin/false]")), "--allow-programs --tables");
   EXPECT_EQ(ran.code, 3) << ran.err;
   EXPECT_THAT(ran.err,
               HasSubstr("duet: warning: Policy 'dead' lost plans (in 1 episodes: dead in 1, which are errors and "

@@ -34,22 +34,23 @@ std::vector<EpisodeRow> two_engines() {
 
 TEST(RunAnalyses, AreThoseThatTheRowsHaveFiguresOf) {
   EXPECT_THAT(names_of(run_analyses(tables_of(two_engines()))),
-              ElementsAre("leaderboard", "engines", "controllers", "policies", "degradation"));
+              ElementsAre("board", "leaderboard", "engines", "controllers", "policies", "degradation"));
   EXPECT_THAT(names_of(run_analyses(tables_of(two_engines()), Extent::kRun)),
-              ElementsAre("leaderboard", "engines", "controllers"));
+              ElementsAre("board", "leaderboard", "engines", "controllers"));
 }
 
 TEST(RunAnalyses, ARunWithoutEpisodesSaysSo) {
   const RunTables nothing = tables_of({});
   const std::vector<Analysis> analyses = run_analyses(nothing);
   EXPECT_THAT(names_of(analyses), ElementsAre("leaderboard"));
-  EXPECT_EQ(run_text(nothing, analyses), "No episodes.\n");
+  EXPECT_EQ(run_text(analyses), "No episodes.\n");
+  EXPECT_EQ(run_screen(nothing, analyses, {"a note"}), "> a note\n\nNo episodes.\n");
 }
 
 TEST(RunAnalyses, ATerminalBeginsWithTheBoard) {
   const RunTables tables = tables_of(two_engines());
-  const std::string text = run_text(tables, run_analyses(tables));
-  EXPECT_THAT(text, testing::StartsWith("vmc with dstar"));
+  const std::string text = run_text(run_analyses(tables));
+  EXPECT_THAT(text, testing::StartsWith("### Board\n\nvmc with dstar"));
   EXPECT_LT(text.find("By engine"), text.find("### Success per engine"));
   EXPECT_LT(text.find("### Success per engine"), text.find("### Controllers"));
   EXPECT_THAT(text, Not(HasSubstr("Mean over the episodes that have the metric")));  // of several engines
@@ -61,7 +62,8 @@ TEST(RunAnalyses, RobotsThatWalkByCommandAreJudgedByNoAct) {
   const RunTables tables = tables_of(rows);
   const std::vector<Analysis> analyses = run_analyses(tables);
   EXPECT_THAT(names_of(analyses), ElementsAre("leaderboard", "engines", "controllers", "walking"));
-  const std::string text = run_text(tables, analyses);
+  const std::string text = run_text(analyses);
+  EXPECT_EQ(run_screen(tables, analyses, {}), text);
   EXPECT_THAT(text, AllOf(testing::StartsWith("### Walking by command"), Not(HasSubstr("### Success per engine"))));
 }
 
