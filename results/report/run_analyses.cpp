@@ -74,8 +74,8 @@ bool has_walking(const RunTables& tables) {
 
 }  // namespace
 
-RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate,
-                     RowFile file, const BoardSuite& suite) {
+RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate, RowFile file,
+                     const BoardSuite& suite) {
   RunTables tables{.rows = std::move(rows),
                    .file = std::move(file),
                    .metrics = std::move(metrics),
