@@ -13,13 +13,13 @@
 namespace duet {
 namespace {
 
-constexpr double kWholeRate = 5e-4;                       // relative; 29.97 Hz is 1e-3 from 30 Hz
-constexpr double kSameRate = 1e-6;                        // relative; of digits that differ in the last place
-constexpr double kLowestRate = 0.01, kHighestRate = 1e5;  // [Hz]
-constexpr double kHorizontalSine = 0.34;                  // arms within 20 degrees of horizontal
-constexpr double kStraightArm = 0.95;                     // shoulder to wrist, of the arm's length
-constexpr double kJump = 5.0;                             // first step of the motion, in steps that follow
-constexpr double kJumpOfStature = 0.05;                   // and never less than this
+constexpr double kWholeRate = 5e-4;                                 // relative; 29.97 Hz is 1e-3 from 30 Hz
+constexpr double kSameRate = 1e-6;                                  // relative; of digits that differ in the last place
+constexpr double kLowestFrameRate = 0.01, kHighestFrameRate = 1e5;  // [Hz]
+constexpr double kHorizontalSine = 0.34;                            // arms within 20 degrees of horizontal
+constexpr double kStraightArm = 0.95;                               // shoulder to wrist, of the arm's length
+constexpr double kJump = 5.0;                                       // first step of the motion, in steps that follow
+constexpr double kJumpOfStature = 0.05;                             // and never less than this
 
 SmplPositions positions_at(const BvhPerson& person, int frame) {
   return smpl_positions(person.skeleton, global_poses(person.bvh, local_poses(person.bvh, frame)));
@@ -60,11 +60,11 @@ bool has_t_pose(const BvhPerson& person, UpAxis up) {
 
 double rate_of(const Bvh& bvh) {
   const double rate_hz = 1.0 / bvh.frame_time;
-  if (!(rate_hz >= kLowestRate && rate_hz <= kHighestRate))
+  if (!(rate_hz >= kLowestFrameRate && rate_hz <= kHighestFrameRate))
     throw InputError(
         fmt::format("'{}': a frame time of {} s is out of range "
                     "({:g} to {:g} Hz); state the rate",
-                    bvh.name, bvh.frame_time, kLowestRate, kHighestRate));
+                    bvh.name, bvh.frame_time, kLowestFrameRate, kHighestFrameRate));
   const double whole = std::round(rate_hz);
   return whole > 0.0 && std::abs(rate_hz - whole) <= kWholeRate * whole ? whole : rate_hz;
 }
