@@ -10,6 +10,7 @@
 #include <map>
 #include <mutex>
 
+#include "duet/core/build_tree.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -42,7 +43,9 @@ std::vector<fs::path> module_folders() {
   for (const std::string& prefix : installed_prefixes()) places.push_back(fs::path(prefix) / DUET_INSTALLED_ENGINES);
   for (const fs::path& place : places)
     if (fs::is_directory(place, error)) return {place};
-  return {DUET_BUILD_ENGINES};
+  static const std::optional<BuildTree> built_in = build_tree_of(program_file());
+  if (built_in) return {fs::path(built_in->build) / "engines"};
+  return {};
 }
 
 struct Loaded {

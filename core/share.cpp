@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "duet/core/build_tree.h"
 #include "duet/core/require.h"
 
 // Defined by a program that was linked against an installed duet (cmake/duet_location.cpp.in), absent elsewhere.
@@ -32,9 +33,15 @@ std::string program_file() { return duet_module_file != nullptr ? duet_module_fi
 std::vector<std::string> share_folders() {
   std::vector<std::string> folders;
   if (const char* share = std::getenv("DUET_SHARE"); share != nullptr && *share != '\0') folders.emplace_back(share);
-  for (const std::string& prefix : installed_prefixes())
-    folders.push_back((fs::path(prefix) / "share" / "duet").string());
-  folders.emplace_back(DUET_SOURCE_DIR);
+  bool is_installed = false;
+  std::error_code error;
+  for (const std::string& prefix : installed_prefixes()) {
+    const fs::path folder = fs::path(prefix) / "share" / "duet";
+    is_installed = is_installed || (fs::is_directory(folder, error) && !fs::is_empty(folder, error));
+    folders.push_back(folder.string());
+  }
+  static const std::optional<BuildTree> built_in = build_tree_of(program_file());
+  if (!is_installed && built_in) folders.push_back(built_in->sources);
   return folders;
 }
 

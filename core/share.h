@@ -7,9 +7,9 @@
 
 namespace duet {
 
-// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in share/duet of one of `installed_prefixes`, else
-// in the source tree of the machine that built it. Throws MissingError naming `what` ("robot card") and the places
-// looked at.
+// The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in share/duet of one of `installed_prefixes`, else,
+// where none of them is there, in the sources of a program that lies where it was built (core/build_tree.h). Throws
+// MissingError naming `what` ("robot card") and the places looked at.
 std::string share_file(std::string_view what, std::string_view relative);
 
 // The folders that may be the one into which duet was installed, in the order in which they are to be asked: that of a

@@ -1,7 +1,11 @@
 #include "duet/core/share.h"
 
+#include <fmt/format.h>
+
+#include <cstdio>
 #include <filesystem>
 
+#include "duet/core/build_tree.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
@@ -11,16 +15,61 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A program that is installed must not read the sources of the machine that built it.
-TEST(ShareFile, BesideTheProgramComesBeforeTheSourceTree) {
-  const fs::path installed = fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share" / "duet";
-  ASSERT_FALSE(fs::exists(installed / "LICENSE"));
+// Printed by a copy of this program.
+TEST(ShareFile, DISABLED_PrintsItsFolders) {
+  for (const std::string& folder : share_folders()) std::printf("folder %s\n", folder.c_str());
+}
+
+std::string folders_of(const std::string& program) {
+  const std::string command =
+      fmt::format("env -u DUET_SHARE '{}' --gtest_also_run_disabled_tests --gtest_filter='*PrintsItsFolders'", program);
+  std::string text;
+  FILE* pipe = ::popen(command.c_str(), "r");
+  for (char line[4096]; std::fgets(line, sizeof line, pipe) != nullptr;)
+    if (std::string_view(line).starts_with("folder ")) text += line;
+  ::pclose(pipe);
+  return text;
+}
+
+TEST(ShareFile, AProgramWhereItWasBuiltReadsTheSources) {
   EXPECT_EQ(share_file("licence", "LICENSE"), (fs::path(DUET_SOURCE_DIR) / "LICENSE").string());
-  fs::create_directories(installed);
-  write_file((installed / "LICENSE").string(), "installed");
-  const std::string found = share_file("licence", "LICENSE");
-  fs::remove(installed / "LICENSE");
-  EXPECT_EQ(found, (installed / "LICENSE").string());
+  const std::optional<BuildTree> tree = build_tree_of(program_file());
+  ASSERT_TRUE(tree.has_value());
+  EXPECT_TRUE(fs::equivalent(tree->sources, DUET_SOURCE_DIR));
+}
+
+// Whoever can write where it was built could give robots and engines to all users of the machine.
+TEST(ShareFile, AProgramThatIsInstalledReadsNothingOfTheTreeItWasBuiltIn) {
+  const test::ScratchFolder scratch;
+  fs::create_directories(scratch / "bin");
+  fs::copy_file("/proc/self/exe", scratch / "bin/program");
+  const std::string share = "folder " + fs::canonical(scratch / "").string() + "/share/duet\n";
+  EXPECT_EQ(folders_of(scratch / "bin/program"), share);
+  write_file(scratch / "share/duet/LICENSE", "installed");
+  EXPECT_EQ(folders_of(scratch / "bin/program"), share);
+  // The same below a folder where another duet was built.
+  write_file(scratch / "CMakeCache.txt",
+             "duet_SOURCE_DIR:STATIC=/elsewhere\nduet_BINARY_DIR:STATIC=/elsewhere/build\n");
+  EXPECT_EQ(folders_of(scratch / "bin/program"), share);
+  fs::remove(scratch / "share/duet/LICENSE");
+  EXPECT_EQ(folders_of(scratch / "bin/program"), share + "folder /elsewhere\n");
+}
+
+TEST(BuildTree, IsThatOfTheNearestCacheWhichNamesDuet) {
+  const test::ScratchFolder scratch;
+  write_file(scratch / "build/bench/program", "");
+  EXPECT_FALSE(build_tree_of(scratch / "build/bench/program").has_value());
+  write_file(scratch / "CMakeCache.txt", "duet_SOURCE_DIR:STATIC=/far\nduet_BINARY_DIR:STATIC=/far/build\n");
+  EXPECT_EQ(build_tree_of(scratch / "build/bench/program")->sources, "/far");
+  write_file(scratch / "build/CMakeCache.txt", "# of a stranger's project\nduet_DIR:PATH=/usr/lib/cmake/duet\n");
+  EXPECT_FALSE(build_tree_of(scratch / "build/bench/program").has_value());
+  write_file(scratch / "build/CMakeCache.txt",
+             "CMAKE_HOME_DIRECTORY:INTERNAL=/mine\nduet_BINARY_DIR:STATIC=/mine/build/duet\n"
+             "duet_SOURCE_DIR:STATIC=/mine/duet\n");
+  const std::optional<BuildTree> tree = build_tree_of(scratch / "build/bench/program");
+  ASSERT_TRUE(tree.has_value());
+  EXPECT_EQ(tree->sources, "/mine/duet");
+  EXPECT_EQ(tree->build, "/mine/build/duet");
 }
 
 TEST(ShareFile, MissingFilesAreRefusedWithThePlaces) {

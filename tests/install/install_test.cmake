@@ -53,6 +53,12 @@ if(NOT EXISTS ${prefix}/share/man/man1/duet.1)
   message(FATAL_ERROR "expected the manual page share/man/man1/duet.1, found none")
 endif()
 
+# Nor does anything else that is installed.
+execute_process(COMMAND grep -rlF -e ${SOURCE}/ -e ${BUILD}/ ${prefix} OUTPUT_VARIABLE named)
+if(named)
+  message(FATAL_ERROR "expected no path of ${SOURCE} in what is installed, found it in:\n${named}")
+endif()
+
 # The program finds its own files and no others: a suite that is in no other place is listed.
 set(duet ${prefix}/bin/duet)
 file(READ ${prefix}/share/duet/suites/demo.yaml suite)
