@@ -86,6 +86,7 @@ void judge_first(const RobotModel& robot, const RobotState& now, PolicyCheck& ch
   if (check.plan.empty()) return;
   const Reference& first = check.plan.front();
   check.root_distance = (first.X_WB.p - now.X_WB.p).norm();
+  check.root_turn = first.X_WB.R.angularDistance(now.X_WB.R);
   for (int i = 0; i < robot.dof(); ++i) {
     const RobotJoint& joint = robot.joints[static_cast<std::size_t>(i)];
     const bool at_limit = first.q[i] <= joint.lower + kAtLimit || first.q[i] >= joint.upper - kAtLimit;
@@ -111,11 +112,18 @@ std::string anchor_line(const Reference& anchor, int tick) {
 
 // What is no fault but looks like a mistake.
 std::string doubts(const PolicyCheck& check) {
-  constexpr double kFar = 1.0;  // a plan begins now: the robot is not a metre away from itself [m]
+  // A plan begins now: the robot is not that far away from itself, and not turned away from itself.
+  constexpr double kFar = 0.5, kTurned = 0.5 * std::numbers::pi;  // [m], [rad]
   std::string text;
   if (check.root_distance > kFar)
     text += fmt::format("note: the plan's first root is {:.2f} m from the robot; is the frame of 'output' right?\n",
                         check.root_distance);
+  if (check.root_turn > kTurned)
+    text += fmt::format(
+        "note: the plan's first root is turned by {:.0f} degrees from the robot's; are its quaternions w, x, y, z, and "
+        "is "
+        "the frame of 'output' right?\n",
+        check.root_turn * 180.0 / std::numbers::pi);
   if (check.joints_at_limits > 0)
     text += fmt::format("note: {} joints of the plan's first reference are at their limits; is their order right?\n",
                         check.joints_at_limits);

@@ -32,6 +32,7 @@ struct PolicyCheck {
   std::vector<ShownInput> inputs;  // in the order of the descriptor
   std::vector<Reference> plan;     // what the scheduler would get, from now on at 50 Hz; empty where it gave none
   double root_distance = 0.0;      // of the plan's first root from the robot's [m]
+  double root_turn = 0.0;          // and between their orientations [rad]
   int joints_at_limits = 0;        // of the plan's first reference
   double make_ms = 0.0, reset_ms = 0.0, plan_ms = 0.0;
   PolicyFaults faults;

@@ -209,6 +209,10 @@ TEST_F(PolicyCommand, CheckNamesWhatIsWrongInOneSentence) {
   EXPECT_EQ(far.code, 0) << far.err;
   EXPECT_THAT(far.out, AllOf(HasSubstr("m from the robot; is the frame of 'output' right?"),
                              HasSubstr("note: 29 joints of the plan's first reference are at their limits")));
+  // As the robot faces, but in the order x, y, z, w.
+  const Answer turned = check(python("turned", "[[0, 0, 0.75, 0, 0, 1, 0] + [0] * 29] * 5"));
+  EXPECT_EQ(turned.code, 0) << turned.err;
+  EXPECT_THAT(turned.out, HasSubstr("are its quaternions w, x, y, z"));
 }
 
 TEST_F(PolicyCommand, TheExampleOfANetworkRunsAsItIsWritten) {
