@@ -12,6 +12,8 @@
 #include "duet/bench/run_work.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/policies/language.h"
+#include "duet/rollout/act_episode.h"
 
 namespace duet {
 namespace {
@@ -69,7 +71,33 @@ EpisodeRow LedSuite::run(int episode, const EpisodeLead& lead) const {
   return run_episode(plan_->at(episode), suite_, identity_, robot(), "", lead);
 }
 
+std::string LedSuite::prompt(int episode) const { return std::string(task_prompt(plan_->at(episode).clip->task)); }
+
+int LedSuite::questions(int episode) const {
+  const int ticks = episode_ticks(episode_setup(plan_->at(episode), suite_, *robot()));
+  return (ticks + kTicksPerPlan - 1) / kTicksPerPlan;
+}
+
+// In a forked child the thread is not there to be waited for, and its queue may be locked for ever: they are left.
+LedEpisode::~LedEpisode() {
+  if (process_ == ::getpid()) {
+    stop();
+    return;
+  }
+  if (thread_.joinable()) thread_.detach();
+  static_cast<void>(new std::shared_ptr<PlanQueue>(std::move(queue_)));
+}
+
+void LedEpisode::require_same_process() const {
+  if (process_ == ::getpid()) return;
+  throw std::runtime_error(
+      fmt::format("the episode runs in process {}, and this is process {}, forked from it: expected episodes that this "
+                  "process has made",
+                  process_, ::getpid()));
+}
+
 void LedEpisode::start(int episode) {
+  require_same_process();
   require(episode >= 0 && episode < suite_->size(),
           fmt::format("episode: expected a number from 0 to {}, found {}", suite_->size() - 1, episode));
   stop();
@@ -112,11 +140,13 @@ void LedEpisode::lead_partner(const PointTracks& ahead) {
 }
 
 void LedEpisode::answer(std::span<const double> numbers, int rows) {
+  require_same_process();
   require(question_ != nullptr, "the episode is over: begin another one");
   queue_->answer(*question_, numbers, rows);
 }
 
 std::shared_ptr<const PlanRequest> LedEpisode::next() {
+  require_same_process();
   question_.reset();
   std::vector<std::shared_ptr<const PlanRequest>> taken;
   while (taken.empty() && !queue_->closed()) taken = queue_->take(kWhile);
@@ -126,6 +156,7 @@ std::shared_ptr<const PlanRequest> LedEpisode::next() {
 }
 
 void LedEpisode::stop() {
+  if (process_ != ::getpid()) return;  // nothing of it runs here
   stop_ = true;
   if (queue_) queue_->close("the episode was stopped");
   if (thread_.joinable()) thread_.join();

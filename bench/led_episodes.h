@@ -2,6 +2,8 @@
 // Loop, scoring and row are those of `duet run`.
 #pragma once
 
+#include <unistd.h>
+
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -38,6 +40,10 @@ class LedSuite {
   [[nodiscard]] int size() const { return static_cast<int>(plan_->size()); }
   [[nodiscard]] EpisodeSpec at(int episode) const { return plan_->at(episode); }
   [[nodiscard]] const std::shared_ptr<const RobotModel>& robot() const;
+  // The language command of an episode.
+  [[nodiscard]] std::string prompt(int episode) const;
+  // How many questions an episode asks at most.
+  [[nodiscard]] int questions(int episode) const;
   // As run_episode: an exception is a row, but StorageError and EpisodeInterrupted.
   [[nodiscard]] EpisodeRow run(int episode, const EpisodeLead& lead) const;
 
@@ -51,12 +57,13 @@ class LedSuite {
 // Who is led: the robot alone, while the partner follows the clip, or both.
 enum class Led { kRobot, kBoth };
 
-// One episode at a time, on a thread of its own. One owner, not thread-safe.
+// One episode at a time, on a thread of its own. One owner, not thread-safe. A forked child has no such thread: there
+// every call throws std::runtime_error, and nothing is waited for.
 class LedEpisode {
  public:
   explicit LedEpisode(std::shared_ptr<const LedSuite> suite, Led led = Led::kRobot)
-      : suite_(std::move(suite)), led_(led) {}
-  ~LedEpisode() { stop(); }
+      : suite_(std::move(suite)), led_(led), process_(::getpid()) {}
+  ~LedEpisode();
   LedEpisode(const LedEpisode&) = delete;
   LedEpisode& operator=(const LedEpisode&) = delete;
 
@@ -88,8 +95,11 @@ class LedEpisode {
   void stop();
 
  private:
+  void require_same_process() const;
+
   std::shared_ptr<const LedSuite> suite_;  // shared by the episodes of a batch
   Led led_;
+  pid_t process_;
   std::shared_ptr<PointTracks> partner_;         // with the episode's thread, which waits while a question is open
   std::shared_ptr<PlanQueue> queue_;             // with the episode's thread
   std::shared_ptr<const PlanRequest> question_;  // that waits for its answer

@@ -1,6 +1,7 @@
 #include "duet/bench/led_episodes.h"
 
 #include <gmock/gmock.h>
+#include <sys/wait.h>
 
 #include <limits>
 
@@ -49,6 +50,38 @@ TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
   EXPECT_EQ(episode.row()->state_hash, expected.state_hash);
   EXPECT_EQ(episode.row()->key, expected.key);
   EXPECT_EQ(episode.row()->seed, expected.seed);
+}
+
+TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  auto episode = std::make_unique<LedEpisode>(suite);
+  const auto request = episode->begin(0);
+  const std::vector<double> plan = holding(*request, *suite->robot());
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(60);
+    const std::string said = thrown_message<std::runtime_error>([&] { episode->go_on(plan, kAnchors); });
+    const std::string begun = thrown_message<std::runtime_error>([&] { episode->begin(1); });
+    episode->stop();
+    episode.reset();
+    ::_exit(said.find("forked from it") != std::string::npos && begun == said ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_NE(episode->go_on(plan, kAnchors), nullptr);
+}
+
+TEST(LedSuite, SaysHowManyQuestionsAnEpisodeAsksAtMost) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  for (int number = 0; number < suite->size(); ++number) {
+    LedEpisode episode(suite);
+    int questions = 0;
+    for (auto request = episode.begin(number); request != nullptr; ++questions)
+      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+    EXPECT_EQ(questions, suite->questions(number));
+    EXPECT_FALSE(suite->prompt(number).empty());
+  }
 }
 
 // The partner's joints in the newest frame that a question shows.
