@@ -10,7 +10,6 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/policies/on_other_body.h"
-#include "duet/policies/registry.h"
 #include "duet/robots/joint_map.h"
 
 namespace duet {
@@ -18,6 +17,13 @@ namespace {
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// A policy that ships or was registered.
+PolicyLoader by_name(const std::string& use) {
+  return [use](std::shared_ptr<const RobotModel> robot, const PolicyOptions& options) {
+    return policy_maker(use, std::move(robot), options);
+  };
 }
 
 // Clips and policies are of the nominal robot: one without any of its joints would be told nothing.
@@ -40,7 +46,7 @@ std::string card_of(const Suite& suite, const SuiteController& controller) {
 }
 
 Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
-               const std::vector<std::string>& skipped_policies) {
+               const std::vector<std::string>& skipped_policies, const std::map<std::string, PolicyLoader>& called) {
   require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
   add(suite.robot.empty() ? default_card_path() : suite.robot);
   for (const SuiteController& controller : suite.controllers) {
@@ -56,9 +62,12 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
       absent_[controller.name] = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
     }
   }
-  for (const SuitePolicy& policy : suite.policies)
-    if (policy.name != kNullPolicy && !contains(skipped_policies, policy.name)) add_policy(policy);
-  add_policy(SuitePolicy{kNullPolicy});
+  for (const SuitePolicy& policy : suite.policies) {
+    if (policy.name == kNullPolicy || contains(skipped_policies, policy.name)) continue;
+    const auto own = called.find(policy.name);
+    add_policy(policy, own == called.end() ? by_name(policy.use) : own->second);
+  }
+  add_policy(SuitePolicy{kNullPolicy}, by_name(kNullPolicy));
 }
 
 // What was made for the nominal body goes by the joints' names on one that it does not fit. Its files were read for the
@@ -71,11 +80,11 @@ void Bodies::map_policy(const std::string& name, std::size_t place) {
   };
 }
 
-void Bodies::add_policy(const SuitePolicy& policy) {
+void Bodies::add_policy(const SuitePolicy& policy, const PolicyLoader& load) {
   for (std::size_t place = 0; place < bodies_.size(); ++place) {
     PolicyOnBody& entry = policies_[{policy.name, place}];
     try {
-      entry.make = policy_maker(policy.use, bodies_[place].robot, policy.options);
+      entry.make = load(bodies_[place].robot, policy.options);
     } catch (const MissingError& error) {
       entry.refusal = fmt::format("policy '{}' is absent: {}", policy.name, error.what());
       absent_policies_[policy.name] = entry.refusal;

@@ -11,7 +11,7 @@
 
 #include "duet/bench/suite.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/policies/policy.h"
+#include "duet/policies/registry.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
@@ -29,9 +29,11 @@ class Bodies {
  public:
   // Throws as load_robot for the suite's own card and for a card that is broken, and as policy_maker where a policy
   // does not fit nominal() or its files are broken. InputError too for programs that are not allowed. A controller or
-  // policy whose files are not on this machine is absent, not an error; those in `skipped` are not looked at.
+  // policy whose files are not on this machine is absent, not an error; those in `skipped` are not looked at. `called`:
+  // how policies are made that the caller brings, by their names in the suite.
   explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
-                  const std::vector<std::string>& skipped_policies = {});
+                  const std::vector<std::string>& skipped_policies = {},
+                  const std::map<std::string, PolicyLoader>& called = {});
 
   // Puts the clips, retargeted to nominal(), on every body. Once.
   void take_clips(std::vector<PairedMotion> clips);
@@ -55,7 +57,7 @@ class Bodies {
     std::vector<PairedMotion> clips;
   };
   std::size_t add(const std::string& card);
-  void add_policy(const SuitePolicy& policy);
+  void add_policy(const SuitePolicy& policy, const PolicyLoader& load);
   // Called while an exception is handled; throws it again where there is nothing to map.
   void map_policy(const std::string& name, std::size_t place);
   [[nodiscard]] std::size_t place(const std::string& controller) const;

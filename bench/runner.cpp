@@ -161,6 +161,7 @@ std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPa
     if (!belongs(spec, spec.clip->task, part)) continue;
     if (run.size() > 0 && run.has(key_of(spec))) {
       ++summary.already_there;
+      ++summary.there_of[spec.policy];
     } else {
       missing.push_back(static_cast<std::uint32_t>(i));
     }
@@ -299,6 +300,26 @@ void require_names_of(const std::string& directory, const Suite& suite) {
   require_all("engines", there.engines, suite.engines);
 }
 
+// In suite.yaml, where policies have taken the place of others of their names: their options.
+void say_replaced(const std::string& directory, const Suite& suite, const std::vector<std::string>& replaced) {
+  if (replaced.empty()) return;
+  const std::string path = inside(directory, "suite.yaml");
+  const std::string before = read_text(path);
+  const Suite there = parse_suite(before, path);
+  std::string text = before;
+  for (const SuitePolicy& old : there.policies)
+    for (const SuitePolicy& now : suite.policies) {
+      if (now.name != old.name || std::ranges::find(replaced, now.name) == replaced.end()) continue;
+      for (const auto& [option, value] : now.options) {
+        const auto found = old.options.find(option);
+        if (found == old.options.end() || found->second.empty() || found->second == value) continue;
+        const std::size_t place = text.find(found->second);
+        if (place != std::string::npos) text.replace(place, found->second.size(), value);
+      }
+    }
+  if (text != before) write_file(path, text);
+}
+
 }  // namespace
 
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
@@ -309,14 +330,15 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   summary.absent_engines = absent_engines(suite, options);
   const RunIdentity identity = identity_of(suite);
   Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
-                left_out(part_of(options).policies, policy_names_of(suite)));
+                left_out(part_of(options).policies, policy_names_of(suite)), options.called);
   check_actors(bodies, suite, options);
   summary.absent_controllers = bodies.absent();
   summary.absent_policies = bodies.absent_policies();
   const KeptSuite kept = kept_suite(suite, directory);
   const RunInfo info = new_run_info(suite, kept, identity, options.argv, options.certificate);
   require_names_of(directory, suite);
-  RunDirectory run = RunDirectory::open(directory, info, options.retry_errors);
+  RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
+  say_replaced(directory, suite, options.replaced);
   keep_inputs(kept, directory);
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
   const StopSign stop(options.time_limit, options.begin, options.stop_asked);

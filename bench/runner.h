@@ -17,6 +17,7 @@
 #include "duet/bench/run_work.h"
 #include "duet/bench/stop_sign.h"
 #include "duet/bench/suite.h"
+#include "duet/policies/registry.h"
 #include "duet/results/rows/run_directory.h"
 
 namespace duet {
@@ -33,12 +34,15 @@ struct RunOptions {
   std::size_t episodes_per_look = kEpisodesPerLook;  // of a decision
   nlohmann::json certificate;                        // parity certificate that the run keeps; null: none
   std::function<bool()> stop_asked = {};             // the run then ends resumable, as after an interrupt
+  std::map<std::string, PolicyLoader> called = {};   // how policies are made that the caller brings, by name
+  std::vector<std::string> replaced = {};            // policies whose rows go where they were another policy then
 };
 
 struct RunSummary {
   // Of the part that was asked for; planned is 0 where the run was stopped before its clips were ready.
   std::int64_t planned = 0, already_there = 0, run = 0;
-  std::map<std::string, int> outcomes;  // of those run now
+  std::map<std::string, std::int64_t> there_of;  // already_there by policy
+  std::map<std::string, int> outcomes;           // of those run now
   // Name -> reason; their episodes are rows with `unsupported`.
   std::map<std::string, std::string> absent_engines, absent_controllers, absent_policies;
   std::vector<std::string> warnings;  // sentences

@@ -53,6 +53,18 @@ constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_file
 // A name that is the path of a policy descriptor.
 constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};
 
+// A function of Python (python/plans_binding.cpp), which no list has: runs of it are read and compared wherever they
+// are.
+PolicyInfo function_info(const std::string& name) {
+  return {name,
+          "A function of Python that is called for all waiting episodes at once (duet.evaluate)",
+          {{"source", "", "SHA-256 of what the function is"}}};
+}
+PolicyMaker function_maker(const std::string&, Robot, const PolicyOptions&) {
+  throw MissingError("policy 'python' is a function: only the program that has it can run its episodes");
+}
+constexpr Entry kFunction = {"python", function_info, function_maker, no_files};
+
 // One that a program has added.
 struct Registered {
   std::string name;
@@ -85,6 +97,7 @@ const Entry& find_entry(const std::string& name) {
   if (name.ends_with(".yaml")) return kDescriptor;
   for (const Entry& entry : kPolicies)
     if (name == entry.name) return entry;
+  if (name == kFunction.name) return kFunction;
   if (registered().find(name) != nullptr) return kRegistered;
   throw std::invalid_argument(unknown_name_message("policy", name, policy_names()));
 }
@@ -106,7 +119,9 @@ std::vector<std::string> policy_names() {
 
 void register_policy(const PolicyInfo& info, PolicyLoader load) {
   require(load != nullptr, fmt::format("policy '{}': expected a function that loads it, found none", info.name));
-  registered().add("policy", {info.name, info, std::move(load)}, shipped_names());
+  std::vector<std::string> taken = shipped_names();
+  taken.emplace_back(kFunction.name);
+  registered().add("policy", {info.name, info, std::move(load)}, taken);
 }
 
 PolicyInfo policy_info(const std::string& name) { return find_entry(name).info(name); }

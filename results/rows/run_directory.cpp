@@ -105,7 +105,8 @@ void record_resumption(const std::string& folder, const RunInfo& info) {
 
 }  // namespace
 
-RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info, bool retry_errors) {
+RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info, bool retry_errors,
+                                const std::vector<std::string>& replaced) {
   if (is_published(path))
     throw InputError(fmt::format("'{}' is published: its rows stay as they are; choose another folder", path));
   // In this order: another process may begin the run in between, and its run.json is there before anything else.
@@ -120,15 +121,52 @@ RunDirectory RunDirectory::open(const std::string& path, const RunInfo& info, bo
   const ScopedLock writing(*run.lock_, kWriting);
   const bool resumed = is_run(path);
   if (!resumed) write_file(inside(path, "run.json"), run_json(info));
-  const RunInfo found = read_run_json(beside(path, "run.json"));
+  RunInfo found = read_run_json(beside(path, "run.json"));
   require_same_suite(path, found, info);
+  const bool alone = run.lock_->try_lock(kPresent);
+  run.replace(found, info, replaced, alone);
   require_same_actors(path, found, info);
-  if (run.lock_->try_lock(kPresent)) remove_litter(path);
+  if (alone) remove_litter(path);
   run.lock_->lock(kPresent, FolderLock::Kind::kShared);
   write_missing(path, info);
   run.read_rows(info);
   if (resumed) record_resumption(path, info);
   return run;
+}
+
+// Under the lock. run.json comes last: where the process ends before, the same call begins anew.
+void RunDirectory::replace(RunInfo& found, const RunInfo& wanted, const std::vector<std::string>& policies,
+                           bool alone) {
+  std::vector<std::string> others;
+  for (const std::string& name : policies) {
+    const auto there = found.policies.find(name);
+    const auto now = wanted.policies.find(name);
+    if (there == found.policies.end() || now == wanted.policies.end() || there->second == now->second) continue;
+    others.push_back(name);
+    there->second = now->second;
+  }
+  if (others.empty()) return;
+  if (!alone)
+    throw InputError(fmt::format("'{}': rows of {} cannot be replaced while another run works in the folder", path_,
+                                 fmt::join(others, ", ")));
+  const std::string file = inside(path_, "episodes.jsonl");
+  std::string kept;
+  std::vector<std::string> keys;
+  const std::string text = std::filesystem::exists(file) ? read_text(file) : "";
+  for (std::size_t begin = 0, end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    const EpisodeRow row = row_from_json(parse_json(text.substr(begin, end - begin), file));
+    if (std::ranges::find(others, row.policy) == others.end())
+      kept.append(text, begin, end + 1 - begin);
+    else
+      keys.push_back(row.key);
+  }
+  write_file(file, kept);
+  for (const std::string& key : keys) {
+    const std::string name = key.substr(0, 16);
+    if (name.find_first_not_of("0123456789abcdef") == std::string::npos)
+      std::filesystem::remove(inside(path_, "trajectories") + "/" + name + ".npz");
+  }
+  write_file(inside(path_, "run.json"), run_json(found));
 }
 
 // Under the lock: what others append later is read from here on.

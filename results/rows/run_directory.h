@@ -26,10 +26,13 @@ enum class Claim { kMine, kDone, kTaken };
 class RunDirectory {
  public:
   // Creates the folder, or opens it to resume. An episode that timed out before counts as not there; with
-  // `retry_errors` one that ended with an error does too. Throws InputError: the folder holds a run of another suite
-  // (names both) or with another policy or controller under one name (names it and both digests), is not a run and not
-  // empty, is published, has two rows of one episode that differ; StorageError: it cannot be written, a link in it.
-  static RunDirectory open(const std::string& path, const RunInfo& info, bool retry_errors = false);
+  // `retry_errors` one that ended with an error does too. `replaced`: policies that may be others than those of the
+  // folder; the rows and recordings of the old ones are removed then, while nobody else works in the folder. Throws
+  // InputError: the folder holds a run of another suite (names both) or with another policy or controller under one
+  // name (names it and both digests), is not a run and not empty, is published, has two rows of one episode that
+  // differ; StorageError: it cannot be written, a link in it.
+  static RunDirectory open(const std::string& path, const RunInfo& info, bool retry_errors = false,
+                           const std::vector<std::string>& replaced = {});
 
   [[nodiscard]] const std::string& path() const { return path_; }
   // Whether the folder has the episode, as far as this process has looked.
@@ -60,6 +63,7 @@ class RunDirectory {
   };
   RunDirectory() = default;
   void read_rows(const RunInfo& info);
+  void replace(RunInfo& found, const RunInfo& wanted, const std::vector<std::string>& policies, bool alone);
   void read_appended(bool cut);
   [[nodiscard]] bool may_run_again(const Known& known) const {
     if (!known.from_before) return false;

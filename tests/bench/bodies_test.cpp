@@ -47,6 +47,23 @@ TEST(OnBody, JointsGoByNameOthersStayAtNeutral) {
   EXPECT_EQ(moved.root.size(), motion.root.size());
 }
 
+TEST(Bodies, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
+  Suite suite = test::playback_suite();
+  suite.policies = {{.name = "a", .use = "null"}, {.name = "b", .use = "null"}};
+  std::vector<std::string> made;
+  const auto loader = [&](const std::string& name) -> PolicyLoader {
+    return [&made, name](const std::shared_ptr<const RobotModel>& robot, const PolicyOptions&) -> PolicyMaker {
+      return [&made, name, robot] {
+        made.push_back(name);
+        return make_policy("null", robot);
+      };
+    };
+  };
+  const Bodies bodies(suite, {}, {}, {{"a", loader("first")}, {"b", loader("second")}});
+  for (const char* name : {"b", "a", "null"}) static_cast<void>(bodies.policy("pd", name).make());
+  EXPECT_EQ(made, (std::vector<std::string>{"second", "first"}));
+}
+
 TEST(Bodies, ControllersOfOneBodyShareItAndItsClips) {
   Suite suite = test::playback_suite();
   suite.controllers = {SuiteController{"pd"}, SuiteController{"vmc"}};

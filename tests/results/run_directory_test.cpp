@@ -282,6 +282,39 @@ TEST(LoadRun, NamesTheRunsInAFolderThatIsNone) {
               testing::EndsWith("(no run.json); '" + (scratch / "demo/run") + "' is one"));
 }
 
+TEST(RunDirectory, ReplacesRowsOfAPolicyThatIsAnotherAndNothingElse) {
+  const ScratchFolder scratch;
+  const auto row = [](const std::string& policy, char digest, int number) {
+    EpisodeRow row = episode(policy, "hug", number, true);
+    row.policy_digest = std::string(64, digest);
+    row.key = episode_key(row);
+    return row;
+  };
+  RunInfo info = tiny_run();
+  info.policies = {{"mine", std::string(64, 'a')}, {"other", std::string(64, 'b')}};
+  const EpisodeRow gone = row("mine", 'a', 0), stays = row("other", 'b', 0);
+  {
+    RunDirectory run = RunDirectory::open(scratch / "run", info);
+    run.append(gone);
+    run.append(stays);
+    for (const EpisodeRow& of : {gone, stays})
+      write_file(scratch / ("run/trajectories/" + of.key.substr(0, 16) + ".npz"), "");
+    info.policies["mine"] = std::string(64, 'c');
+    EXPECT_THAT(thrown_message<InputError>([&] { RunDirectory::open(scratch / "run", info, false, {"mine"}); }),
+                HasSubstr("rows of mine cannot be replaced while another run works in the folder"));
+  }
+  EXPECT_EQ(load_run(scratch / "run").rows.size(), 2U);
+  RunDirectory run = RunDirectory::open(scratch / "run", info, false, {"mine", "other", "nobody"});
+  EXPECT_FALSE(run.has(gone.key));
+  EXPECT_TRUE(run.has(stays.key));
+  EXPECT_FALSE(std::filesystem::exists(scratch / ("run/trajectories/" + gone.key.substr(0, 16) + ".npz")));
+  EXPECT_TRUE(std::filesystem::exists(scratch / ("run/trajectories/" + stays.key.substr(0, 16) + ".npz")));
+  run.append(row("mine", 'c', 0));
+  const duet::Run loaded = load_run(scratch / "run");
+  EXPECT_EQ(loaded.rows.size(), 2U);
+  EXPECT_EQ(loaded.info.policies, info.policies);
+}
+
 TEST(LoadRun, RefusesWhatIsNoRun) {
   const ScratchFolder scratch;
   EXPECT_THAT(thrown_message<InputError>([&] { load_run(scratch / "nowhere"); }), HasSubstr("is not a run directory"));
