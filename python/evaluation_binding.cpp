@@ -6,6 +6,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <exception>
+#include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -14,13 +15,16 @@
 
 #include "duet/backends/factory.h"
 #include "duet/bench/clips.h"
+#include "duet/bench/run_identity.h"
 #include "duet/bench/runner.h"
 #include "duet/bench/shipped_suites.h"
 #include "duet/bench/story.h"
 #include "duet/bench/suite_actors.h"
+#include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
+#include "duet/policies/plan_queue.h"
 #include "duet/policies/registry.h"
 #include "duet/python/bindings.h"
 #include "duet/results/analyses/leaderboard_rows.h"
@@ -31,14 +35,30 @@
 namespace duet::python {
 namespace {
 
-// A policy as evaluate() names it.
+// A policy as evaluate() names it; with a queue, it is a function that is called.
 struct AskedPolicy {
   std::string name, use;
   std::map<std::string, std::string> options;
+  std::shared_ptr<PlanQueue> queue;  // with the thread that answers
 };
 
+// A function goes on with rows of its own alone.
+void require_same_function(const SuitePolicy& policy, const std::string& directory) {
+  const std::string path = (std::filesystem::path(directory) / "run.json").string();
+  if (!std::filesystem::exists(path)) return;
+  const std::map<std::string, std::string> there = read_run_json(path).policies;
+  const auto found = there.find(policy.name);
+  if (found == there.end() || found->second == identity_of(policy).digest) return;
+  throw InputError(
+      fmt::format("'{}' holds a run of another policy '{}': its code or its data were other ones. Give another folder "
+                  "(output=...), or replace=True to put new rows in the place of the old ones; a policy that changes "
+                  "its own data while it is called stays one policy with version='...' from its first run on",
+                  directory, policy.name));
+}
+
 // Those that the suite does not have are added to it; the filter is the run's choice, as `duet run --policies`.
-void add_policies(const std::vector<AskedPolicy>& asked, Suite& suite, RunOptions& options) {
+void add_policies(const std::vector<AskedPolicy>& asked, const std::string& directory, bool replace, Suite& suite,
+                  RunOptions& options) {
   for (const AskedPolicy& policy : asked) {
     const std::vector<std::string> known = policy_names_of(suite);
     const bool there = std::ranges::find(known, policy.name) != known.end() || policy.name == kNullPolicy;
@@ -48,6 +68,12 @@ void add_policies(const std::vector<AskedPolicy>& asked, Suite& suite, RunOption
       require(is_plain_name(policy.name), plain_name_message(policy.name));
       SuitePolicy added{.name = policy.name, .use = policy.use, .options = policy.options};
       check_options_of(added);
+      if (policy.queue) {
+        if (!replace) require_same_function(added, directory);
+        if (replace) options.replaced.push_back(policy.name);
+        options.called[policy.name] = [queue = policy.queue](const std::shared_ptr<const RobotModel>& robot,
+                                                             const PolicyOptions&) { return queue->maker(robot); };
+      }
       suite.policies.push_back(std::move(added));
     }
     options.policies.push_back(policy.name);
@@ -73,13 +99,10 @@ nlohmann::json summary_json(const RunSummary& summary) {
   nlohmann::json absent = nlohmann::json::object();
   for (const auto* names : {&summary.absent_engines, &summary.absent_controllers, &summary.absent_policies})
     for (const auto& [name, reason] : *names) absent[name] = reason;
-  return {{"planned", summary.planned},
-          {"already_there", summary.already_there},
-          {"run_now", summary.run},
-          {"outcomes", summary.outcomes},
-          {"absent", absent},
-          {"warnings", summary.warnings},
-          {"complete", summary.end == RunEnd::kComplete}};
+  return {{"planned", summary.planned},   {"already_there", summary.already_there},
+          {"there_of", summary.there_of}, {"run_now", summary.run},
+          {"outcomes", summary.outcomes}, {"absent", absent},
+          {"warnings", summary.warnings}, {"complete", summary.end == RunEnd::kComplete}};
 }
 
 // A run under way, on a thread of its own.
@@ -134,11 +157,12 @@ class Evaluation {
   std::thread thread_;
 };
 
-using PolicyTuple = std::tuple<std::string, std::string, std::map<std::string, std::string>>;
+using PolicyTuple =
+    std::tuple<std::string, std::string, std::map<std::string, std::string>, std::shared_ptr<PlanQueue>>;
 
 std::unique_ptr<Evaluation> start(const SuiteQuestion& question, const std::vector<PolicyTuple>& policies,
                                   const std::map<std::string, std::vector<std::string>>& only,
-                                  const std::string& output, int jobs, bool retry_errors, bool quiet,
+                                  const std::string& output, int jobs, bool retry_errors, bool replace, bool quiet,
                                   const std::vector<std::string>& argv) {
   require(jobs >= 1 && jobs <= 1024, fmt::format("jobs: expected 1 to 1024, found {}", jobs));
   Suite suite = suite_of(question);
@@ -154,8 +178,8 @@ std::unique_ptr<Evaluation> start(const SuiteQuestion& question, const std::vect
   options.tasks = chosen_of("tasks");
   options.perturbations = chosen_of("perturbations");
   std::vector<AskedPolicy> asked;
-  for (const auto& [name, use, settings] : policies) asked.push_back({name, use, settings});
-  add_policies(asked, suite, options);
+  for (const auto& [name, use, settings, queue] : policies) asked.push_back({name, use, settings, queue});
+  add_policies(asked, output, replace, suite, options);
   return std::make_unique<Evaluation>(std::move(suite), output, std::move(options), quiet);
 }
 
@@ -166,6 +190,10 @@ TablePair pair_of(const Analysis& analysis) { return {analysis_markdown(analysis
 
 TablePair table_of(const Run& run, const std::string& name) {
   const RunTables tables = tables_of(run.rows, run);
+  std::vector<std::string> known = run_analysis_names();
+  known.emplace_back("metrics");
+  if (std::ranges::find(known, name) == known.end())
+    throw std::invalid_argument(unknown_name_message("table", name, known));
   if (name == kLeaderboardName) return pair_of(leaderboard_analysis(tables.leaderboard, tables.metrics.all, false));
   return pair_of(run_analysis(tables, name == "metrics" ? kLeaderboardName : name));
 }
@@ -248,13 +276,13 @@ void add_evaluation(py::module_& module) {
       .def(py::init([](const std::string& suite, const Overrides& overrides, const std::vector<std::string>& clips,
                        bool allow_programs, const std::vector<PolicyTuple>& policies,
                        const std::map<std::string, std::vector<std::string>>& only, const std::string& output, int jobs,
-                       bool retry_errors, bool quiet, const std::vector<std::string>& argv) {
-             return start({suite, overrides, clips, allow_programs}, policies, only, output, jobs, retry_errors, quiet,
-                          argv);
+                       bool retry_errors, bool replace, bool quiet, const std::vector<std::string>& argv) {
+             return start({suite, overrides, clips, allow_programs}, policies, only, output, jobs, retry_errors,
+                          replace, quiet, argv);
            }),
            py::arg("suite"), py::arg("overrides"), py::arg("clips"), py::arg("allow_programs"), py::arg("policies"),
-           py::arg("only"), py::arg("output"), py::arg("jobs"), py::arg("retry_errors"), py::arg("quiet"),
-           py::arg("argv"))
+           py::arg("only"), py::arg("output"), py::arg("jobs"), py::arg("retry_errors"), py::arg("replace"),
+           py::arg("quiet"), py::arg("argv"))
       .def("wait", &Evaluation::wait, py::arg("seconds"), "Whether it is over.")
       .def("stop", &Evaluation::stop, "It ends at its next step, resumable.")
       .def("result", &Evaluation::result, "JSON of its summary; raises what it ended with.");

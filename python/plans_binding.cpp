@@ -2,14 +2,11 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
-#include <map>
-#include <mutex>
 #include <string>
 #include <utility>
 
 #include "duet/core/require.h"
 #include "duet/policies/plan_queue.h"
-#include "duet/policies/registry.h"
 #include "duet/python/bindings.h"
 
 namespace duet::python {
@@ -129,38 +126,6 @@ void add_observations(py::module_& module) {
            "(B, 5, 36): plans that stand in the neutral pose where the episode began: the null policy.");
 }
 
-// The policy `python` of a suite: the function whose digest is its option `source`. Evaluations that are under way.
-class CalledPolicies {
- public:
-  void set(const std::string& source, const std::shared_ptr<PlanQueue>& queue) {
-    const std::lock_guard lock(mutex_);
-    queues_[source] = queue;
-  }
-  std::shared_ptr<PlanQueue> find(const std::string& source) {
-    const std::lock_guard lock(mutex_);
-    const auto found = queues_.find(source);
-    return found == queues_.end() ? nullptr : found->second.lock();
-  }
-
- private:
-  std::mutex mutex_;
-  std::map<std::string, std::weak_ptr<PlanQueue>> queues_;  // whose end is the end of their evaluation
-};
-
-std::shared_ptr<CalledPolicies> register_python() {
-  auto called = std::make_shared<CalledPolicies>();
-  const PolicyInfo info{.name = "python",
-                        .about = "A function of Python that is called for all waiting episodes at once (duet.evaluate)",
-                        .options = {{"source", "", "SHA-256 of what the function is"}}};
-  register_policy(info, [called](const std::shared_ptr<const RobotModel>& robot, const PolicyOptions& options) {
-    const auto source = options.find("source");
-    const std::shared_ptr<PlanQueue> queue = source == options.end() ? nullptr : called->find(source->second);
-    if (!queue) throw MissingError("policy 'python' is a function: only the program that has it can run its episodes");
-    return queue->maker(robot);
-  });
-  return called;
-}
-
 // Takes (B, 5 or 100, 7 + n) numbers, B plans.
 void answer(PlanQueue& queue, const Observations& batch, const Numbers& plans) {
   const int width = 7 + batch.robot->dof();
@@ -184,14 +149,11 @@ void answer(PlanQueue& queue, const Observations& batch, const Numbers& plans) {
 
 void add_plans(py::module_& module) {
   add_observations(module);
-  const std::shared_ptr<CalledPolicies> called = register_python();
   py::class_<PlanQueue, std::shared_ptr<PlanQueue>>(module, "PlanQueue", "Episodes that wait for plans of a function.")
-      .def(py::init([called](const std::string& name, const std::string& source, double patience, double share) {
-             auto queue = PlanQueue::make({.name = name, .patience = patience, .share = share});
-             called->set(source, queue);
-             return queue;
+      .def(py::init([](const std::string& name, double patience, double share) {
+             return PlanQueue::make({.name = name, .patience = patience, .share = share});
            }),
-           py::arg("name"), py::arg("source"), py::arg("patience"), py::arg("share"))
+           py::arg("name"), py::arg("patience"), py::arg("share"))
       .def(
           "take",
           [](PlanQueue& queue, double seconds) -> std::optional<Observations> {

@@ -10,11 +10,13 @@ import warnings
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple, Union
 
 from duet import _duet
+from duet._identity import forget_packages, identity_of
 from duet._run import Run
-from duet._tools import Names, array_of, names_of, overrides_of, path_of
+from duet._tools import Names, array_of, names_of, overrides_of, path_of, whole_number
 
 Policy = Callable[[_duet.Observations], Any]
 AskedPolicy = Union[None, str, Policy, Iterable[Union[str, Policy]], Mapping[str, Union[str, Policy]]]
+Version = Union[None, str, Mapping[str, str]]
 
 _GLANCE = 0.05  # [s] between two looks at signals
 _ended: List[threading.Thread] = []  # whose function had not come back when its evaluation ended
@@ -24,7 +26,7 @@ def evaluate(policy: AskedPolicy, suite: Union[str, "os.PathLike[str]"] = "demo"
              output: Union[str, "os.PathLike[str]"], engines: Names = None, controllers: Names = None,
              tasks: Names = None, perturbations: Names = None, jobs: Optional[int] = None,
              settings: Optional[Mapping[str, Any]] = None, clips: Names = None, name: Optional[str] = None,
-             version: Optional[str] = None, patience: float = 60.0, retry_errors: bool = False,
+             version: Version = None, patience: float = 60.0, retry_errors: bool = False, replace: bool = False,
              allow_programs: bool = False, progress: bool = False) -> Run:
     """Runs a suite into the folder `output` and returns what is in it; a run that is there is resumed.
 
@@ -33,9 +35,14 @@ def evaluate(policy: AskedPolicy, suite: Union[str, "os.PathLike[str]"] = "demo"
     B of them, and returns plans of shape (B, 5, 36) or (B, 100, 36). It is called from one thread of its own.
 
     `suite` is the name of one that ships or a path; `settings` override its keys ({"clips.synth.per_task": 1}).
-    `jobs` is how many episodes are under way at once; more than cores make larger batches. `version` says what the
-    function is where its source does not (weights that it closes over); rows of another version have other keys.
-    `patience` [s] is how long it may take for one batch. A function that raises, answers in another shape or does not
+    `jobs` is how many episodes are under way at once; more than cores make larger batches.
+
+    A function's rows are its own: its code and all data that it holds (attributes, closures, globals, arrays, weights)
+    are in their keys. Where that cannot be known (an open file, a connection), or where a policy changes its own data
+    while it is called, `version` stands for the data: one text, or one for each name ({"a": "7", "b": "8"}). Two
+    policies of one call that are one by that are refused. A folder that has rows of the function before it was changed
+    is refused, and with `replace` they make room for new ones. Rows that were there already are told by a
+    RuntimeWarning. `patience` [s] is how long it may take for one batch. A function that raises, answers in another shape or does not
     come back ends the episodes that wait for it with a row whose outcome is `error` and whose message is the last line
     of the traceback; an answer that is not finite costs that plan.
 
@@ -43,24 +50,25 @@ def evaluate(policy: AskedPolicy, suite: Union[str, "os.PathLike[str]"] = "demo"
     """
     suite_text = path_of(suite)
     overrides = overrides_of(settings)
+    threads = whole_number("jobs", _duet.default_jobs() if jobs is None else jobs)
     asked = _asked_policies(policy, name)
+    sources = _sources(asked, version)
     called: List[_Called] = []
-    listed: List[Tuple[str, str, Dict[str, str]]] = []
+    listed: List[Tuple[str, str, Dict[str, str], Optional[_duet.PlanQueue]]] = []
     for policy_name, what in asked:
         if callable(what):
-            source = _identity(what, version)
-            called.append(_Called(_duet.PlanQueue(policy_name, source, patience, 0.5), what))
-            listed.append((policy_name, "python", {"source": source}))
+            called.append(_Called(policy_name, _duet.PlanQueue(policy_name, patience, 0.5), what))
+            listed.append((policy_name, "python", {"source": sources[policy_name]}, called[-1].queue))
         else:
-            listed.append((policy_name, what, {}))
+            listed.append((policy_name, what, {}, None))
     only = {"engines": names_of(engines), "controllers": names_of(controllers), "tasks": names_of(tasks),
             "perturbations": names_of(perturbations)}
     folder = path_of(output)
     try:
         evaluation = _duet.Evaluation(
             suite=suite_text, overrides=overrides, clips=names_of(clips), allow_programs=allow_programs,
-            policies=listed, only=only, output=folder, jobs=_duet.default_jobs() if jobs is None else jobs,
-            retry_errors=retry_errors, quiet=not progress, argv=["python", "duet.evaluate", suite_text])
+            policies=listed, only=only, output=folder, jobs=threads, retry_errors=retry_errors, replace=replace,
+            quiet=not progress, argv=["python", "duet.evaluate", suite_text])
         for function in called:
             function.thread.start()
         summary = _finish(evaluation)
@@ -69,8 +77,10 @@ def evaluate(policy: AskedPolicy, suite: Union[str, "os.PathLike[str]"] = "demo"
             function.end()
     run = Run(folder)
     run.summary = summary
-    for sentence in summary["warnings"] + list(summary["absent"].values()) + run.info["policy_faults"]:
-        warnings.warn(sentence, RuntimeWarning, stacklevel=2)
+    reused = [function.reused(summary["there_of"].get(function.name, 0)) for function in called]
+    for sentence in reused + summary["warnings"] + list(summary["absent"].values()) + run.info["policy_faults"]:
+        if sentence:
+            warnings.warn(sentence, RuntimeWarning, stacklevel=2)
     return run
 
 
@@ -90,11 +100,43 @@ def _asked_policies(policy: AskedPolicy, name: Optional[str]) -> List[Tuple[str,
     if policy is None:
         return []
     if isinstance(policy, Mapping):
-        return list(policy.items())
-    several = [policy] if isinstance(policy, str) or callable(policy) else list(policy)
-    if name is not None and len(several) != 1:
-        raise ValueError(f"name: expected one policy, found {len(several)}; a mapping gives each its name")
-    return [(name or _name_of(one), one) for one in several]
+        named = [(str(key), one) for key, one in policy.items()]
+    else:
+        if not (isinstance(policy, (str, Iterable)) or callable(policy)):
+            raise ValueError(f"policy: expected a function, a name, or several of them, found {type(policy).__name__}")
+        several = [policy] if isinstance(policy, str) or callable(policy) else list(policy)
+        if name is not None and len(several) != 1:
+            raise ValueError(f"name: expected one policy, found {len(several)}; a mapping gives each its name")
+        named = [(name or _name_of(one), one) for one in several]
+    if not named:
+        raise ValueError("policy: expected at least one, found none; None stands for the suite's own")
+    for place, (one_name, one) in enumerate(named):
+        if not (isinstance(one, str) or callable(one)):
+            raise ValueError(f"policy '{one_name}': expected a function or a name, found {type(one).__name__}")
+        if one_name in [other for other, _ in named[:place]]:
+            raise ValueError(f"policy: two are named '{one_name}'; a mapping gives each its name: {{'a': ..., 'b': ...}}")
+    return named
+
+
+def _sources(asked: List[Tuple[str, Union[str, Policy]]], version: Version) -> Dict[str, str]:
+    """What each function is. Raises ValueError for two that are one, and where it cannot be known."""
+    functions = {name: what for name, what in asked if callable(what)}
+    versions = {name: version for name in functions} if version is None or isinstance(version, str) else version
+    if not isinstance(versions, Mapping) or not all(isinstance(text, (str, type(None))) for text in versions.values()):
+        raise ValueError(f"version: expected a text, or one for each policy by name, found {version!r}")
+    strangers = [name for name in versions if name not in functions]
+    if strangers:
+        raise ValueError(f"version: expected names of functions ({', '.join(functions)}), found '{strangers[0]}'")
+    sources: Dict[str, str] = {}
+    forget_packages()
+    for name, function in functions.items():
+        source = identity_of(name, function, versions.get(name))
+        twin = next((other for other, known in sources.items() if known == source), None)
+        if twin is not None:
+            raise ValueError(f"policies '{twin}' and '{name}' are one policy: the same code and the same data. Leave one "
+                             f"out, or tell them apart: version={{'{twin}': '0', '{name}': '1'}}")
+        sources[name] = source
+    return sources
 
 
 def _name_of(policy: Union[str, Policy]) -> str:
@@ -102,28 +144,6 @@ def _name_of(policy: Union[str, Policy]) -> str:
         return os.path.splitext(os.path.basename(policy))[0] if policy.endswith(".yaml") else policy
     own = getattr(policy, "__name__", None) or type(policy).__name__
     return "python" if own == "<lambda>" else own
-
-
-def _identity(policy: Policy, version: Optional[str]) -> str:
-    """SHA-256 of what a function is: its version where one is given, else its source and the weights of a torch module."""
-    import hashlib
-    import inspect
-
-    kind: Any = policy if hasattr(policy, "__qualname__") else type(policy)
-    digest = hashlib.sha256(f"{getattr(kind, '__qualname__', '')}\n".encode())
-    if version is not None:
-        digest.update(f"version {version}".encode())
-        return digest.hexdigest()
-    try:
-        digest.update(inspect.getsource(kind).encode())
-    except (OSError, TypeError):
-        code = getattr(policy, "__code__", None) or getattr(getattr(kind, "__call__", None), "__code__", None)
-        digest.update(code.co_code if code is not None else b"")
-    if callable(getattr(policy, "state_dict", None)):
-        for key, tensor in sorted(policy.state_dict().items()):  # type: ignore[attr-defined]
-            digest.update(key.encode())
-            digest.update(tensor.detach().cpu().numpy().tobytes())
-    return digest.hexdigest()
 
 
 def last_line(error: BaseException) -> str:
@@ -137,9 +157,11 @@ def last_line(error: BaseException) -> str:
 class _Called:
     """A function and the thread that it is called from."""
 
-    def __init__(self, queue: "_duet.PlanQueue", function: Policy):
+    def __init__(self, name: str, queue: "_duet.PlanQueue", function: Policy):
+        self.name = name
         self.queue = queue
         self.function = function
+        self.calls = 0
         self.thread = threading.Thread(target=self._serve, name="duet-policy", daemon=True)
 
     def _serve(self) -> None:
@@ -149,6 +171,7 @@ class _Called:
                 self._answer_each(observations)
 
     def _answered(self, observations: "_duet.Observations") -> bool:
+        self.calls += 1
         try:
             self.queue.answer(observations, array_of(self.function(observations)))
             return True
@@ -163,6 +186,13 @@ class _Called:
         for i in range(len(observations)):
             self._answered(observations.part(i))
 
+    def reused(self, rows: int) -> str:
+        """A sentence where `rows` of it were in the folder before; else nothing."""
+        if rows == 0:
+            return ""
+        how = "the function was not called" if self.calls == 0 else "the function was called for the others alone"
+        return f"policy '{self.name}': {rows} {'row was' if rows == 1 else 'rows were'} there; {how}"
+
     def end(self) -> None:
         self.queue.close("the evaluation is over")
         if self.thread.ident is None:
@@ -170,5 +200,5 @@ class _Called:
         self.thread.join(1.0)
         if self.thread.is_alive():
             _ended.append(self.thread)
-            print(f"duet: the policy has not come back from its last call; its thread is left to itself",
+            print("duet: the policy has not come back from its last call; its thread is left to itself",
                   file=sys.stderr)

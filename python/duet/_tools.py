@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import operator
 import os
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Tuple, Union
 
@@ -64,4 +65,15 @@ def array_of(numbers: Any) -> Any:
         raise TypeError("expected an array of numbers, found None")
     if hasattr(numbers, "detach"):
         numbers = numbers.detach().cpu().numpy()
-    return numpy.ascontiguousarray(numbers, dtype=numpy.float64)
+    array = numpy.asarray(numbers)
+    if array.dtype.kind not in "iufO":
+        raise TypeError(f"expected an array of numbers, found one of {array.dtype}")
+    return numpy.ascontiguousarray(array, dtype=numpy.float64)
+
+
+def whole_number(name: str, value: Any) -> int:
+    """An int, or what is one exactly (NumPy's). Raises ValueError for others."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name}: expected a whole number, found {value!r}") from None

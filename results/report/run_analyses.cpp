@@ -105,12 +105,15 @@ std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent) {
 }
 
 Analysis run_analysis(const RunTables& tables, std::string_view name) {
-  std::vector<std::string> known;
-  for (const ListedAnalysis& listed : kAnalyses) {
+  for (const ListedAnalysis& listed : kAnalyses)
     if (listed.name == name) return listed.make(tables);
-    known.emplace_back(listed.name);
-  }
-  throw std::invalid_argument(unknown_name_message("table", std::string(name), known));
+  throw std::invalid_argument(unknown_name_message("table", std::string(name), run_analysis_names()));
+}
+
+std::vector<std::string> run_analysis_names() {
+  std::vector<std::string> names;
+  for (const ListedAnalysis& listed : kAnalyses) names.emplace_back(listed.name);
+  return names;
 }
 
 std::string run_text(const std::vector<Analysis>& analyses) {

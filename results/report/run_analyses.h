@@ -46,6 +46,9 @@ std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent = Exte
 // The one of that name, whether or not it has a figure. Throws std::invalid_argument for an unknown name.
 Analysis run_analysis(const RunTables& tables, std::string_view name);
 
+// Names of all of them.
+std::vector<std::string> run_analysis_names();
+
 // Markdown for a terminal: the analyses, the board first. Of robots that walk by command how they do, and no board.
 std::string run_text(const std::vector<Analysis>& analyses);
 

@@ -104,6 +104,8 @@ class Rows(ScratchTest):
         for name in ("leaderboard", "metrics", "engines", "controllers", "contacts"):
             self.assertIsInstance(run.table(name).rows, list)
             self.assertEqual(run.table(name).values["schema"], "duet.analysis/1")
+        with self.assertRaisesRegex(ValueError, "unknown table 'nonsense'.*leaderboard.*metrics"):
+            run.table("nonsense")
         self.assertEqual(len(run.columns("clip", "success")["success"]), len(run.episodes))
         self.assertIn("12 episodes", repr(run))
 
@@ -158,6 +160,9 @@ class Faults(ScratchTest):
                  "no batch": (lambda o: o.hold()[0], r"found \(5, 36\)"),
                  "nothing": (lambda o: None, "Error"),
                  "text": (lambda o: "stand", "Error"),
+                 "text in an array": (lambda o: o.hold().astype(str), "TypeError: expected an array of numbers, found one of <U"),
+                 "complex": (lambda o: o.hold() * 1j, "TypeError: expected an array of numbers, found one of complex128"),
+                 "truth": (lambda o: o.hold() > 0.0, "TypeError: expected an array of numbers, found one of bool"),
                  "ragged": (lambda o: [[1.0], [2.0, 3.0]], "Error")}
         for number, (name, (policy, pattern)) in enumerate(cases.items()):
             with self.subTest(name):
@@ -195,6 +200,12 @@ class Faults(ScratchTest):
                 ((hold, suite), {"name": "a/b"}, ValueError, "a/b"),
                 ((hold, suite), {"name": "replay"}, ValueError, "the suite's own"),
                 ((hold, suite), {"jobs": 0}, ValueError, "jobs: expected 1 to 1024, found 0"),
+                ((hold, suite), {"jobs": 2.5}, ValueError, "jobs: expected a whole number, found 2.5"),
+                ((5, suite), {}, ValueError, "policy: expected a function, a name, or several of them, found int"),
+                (([], suite), {}, ValueError, "policy: expected at least one, found none"),
+                (({}, suite), {}, ValueError, "policy: expected at least one, found none"),
+                (({"a": 5}, suite), {}, ValueError, "policy 'a': expected a function or a name, found int"),
+                (([lambda o: o.hold(), lambda o: None], suite), {}, ValueError, "two are named 'python'; a mapping gives each"),
                 ((hold, suite), {"patience": -1.0}, ValueError, "patience"),
                 (([hold, "replay"], suite), {"name": "two"}, ValueError, "expected one policy, found 2")):
             with self.subTest(pattern), self.assertRaisesRegex(error, pattern):
