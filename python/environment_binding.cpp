@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "duet/bench/led_episodes.h"
@@ -203,6 +204,19 @@ std::shared_ptr<LedSuite> led_suite(const std::string& suite, const Overrides& o
   return std::make_shared<LedSuite>(load_suite(suite_file(suite), overrides), part, threads, quiet);
 }
 
+std::tuple<std::string, std::string, std::string> about_episode(const LedSuite& suite, int episode) {
+  require(episode >= 0 && episode < suite.size(),
+          fmt::format("episode: expected a number below {}, found {}", suite.size(), episode));
+  const PairedMotion& clip = *suite.at(episode).clip;
+  return {clip.clip_id, std::string(to_string(clip.task)), suite.prompt(episode)};
+}
+
+int most_steps(const LedSuite& suite) {
+  int most = 0;
+  for (int episode = 0; episode < suite.size(); ++episode) most = std::max(most, suite.questions(episode));
+  return most;
+}
+
 }  // namespace
 
 void add_environment(py::module_& module) {
@@ -216,14 +230,8 @@ void add_environment(py::module_& module) {
            py::arg("suite"), py::arg("overrides"), py::arg("engine"), py::arg("controller"), py::arg("task"),
            py::arg("perturbation"), py::arg("threads"), released)
       .def("__len__", &LedSuite::size)
-      .def(
-          "clip",
-          [](const LedSuite& suite, int episode) {
-            require(episode >= 0 && episode < suite.size(),
-                    fmt::format("episode: expected a number below {}, found {}", suite.size(), episode));
-            return suite.at(episode).clip->clip_id;
-          },
-          py::arg("episode"))
+      .def("about", &about_episode, py::arg("episode"), "Its clip, task and prompt.")
+      .def_property_readonly("most_steps", &most_steps, "That an episode of it has; looks at each.")
       .def_property_readonly("joints", [](const LedSuite& suite) { return suite.robot()->joint_names(); })
       .def_property_readonly("lower",
                              [](const LedSuite& suite) {
