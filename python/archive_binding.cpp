@@ -19,8 +19,10 @@
 #include "duet/formats/robot_motion_format.h"
 #include "duet/metrics/detector.h"
 #include "duet/motion/paired_motion.h"
+#include "duet/motion/people/people_detection.h"
 #include "duet/motion/people/people_formats.h"
 #include "duet/motion/phase_proposal.h"
+#include "duet/motion/plausibility.h"
 #include "duet/motion/synthesis.h"
 #include "duet/python/bindings.h"
 #include "duet/results/rows/json_fields.h"
@@ -79,6 +81,20 @@ PointTracks tracks_of(const Numbers& joints, const char* who) {
 
 using Texts = std::map<std::string, std::string>;
 
+// People of others are judged where they come in, as the command line judges them.
+void require_plausible(const InteractionClip& clip, const std::string& what, bool as_is) {
+  if (as_is) return;
+  const std::vector<std::string> faults = judge_people(clip).faults;
+  if (!faults.empty())
+    throw InputError(fmt::format("{}: {} (as_is=True takes the clip nevertheless)", what, faults.front()));
+}
+
+Archive loaded(const std::string& path, bool as_is) {
+  Archive archive = checked(Npz::load(path));
+  if (archive.kind == "clip") require_plausible(read_clip(archive.npz), fmt::format("'{}'", path), as_is);
+  return archive;
+}
+
 PairOptions pair_options_from(const Texts& options) { return make_pair_options({options.begin(), options.end()}); }
 
 Archive clip_archive(const InteractionClip& clip) {
@@ -88,18 +104,24 @@ Archive paired_archive(const PairedMotion& motion) {
   return {Npz::parse(paired_motion_bytes(motion, ZipMethod::kStored), motion.clip_id), "paired"};
 }
 
+Person person_of(const std::string& name) {
+  require(name == "A" || name == "B", fmt::format("reactor: expected A or B, found '{}'", name));
+  return name == "A" ? Person::kA : Person::kB;
+}
+
 // Two people as arrays of joints.
 Archive make_clip(const Numbers& a, const Numbers& b, double rate_hz, const std::string& task,
-                  const std::string& reactor, const std::optional<std::pair<int, int>>& act, const std::string& id) {
-  require(reactor == "A" || reactor == "B", fmt::format("reactor: expected A or B, found '{}'", reactor));
+                  const std::string& reactor, const std::optional<std::pair<int, int>>& act, const std::string& id,
+                  bool as_is) {
   InteractionClip clip;
   clip.id = id;
   clip.task = parse_task(task);
   clip.a = {.rate_hz = rate_hz, .joints = tracks_of(a, "a"), .rotations = {}};
   clip.b = {.rate_hz = rate_hz, .joints = tracks_of(b, "b"), .rotations = {}};
-  clip.reactor = reactor == "A" ? Person::kA : Person::kB;
+  clip.reactor = person_of(reactor);
   validate(clip.a, "a");
   validate(clip.b, "b");
+  require_plausible(clip, "the two people", as_is);
   clip.phases = act ? Phases{act->first, act->second} : propose_phases(clip.a, clip.b, clip.task);
   validate(clip);
   return clip_archive(clip);
@@ -109,7 +131,7 @@ Archive retarget_clip(const Archive& archive, const Texts& options, const std::s
                       const std::string& reactor) {
   require(archive.kind == "clip", fmt::format("retarget: expected a clip of two people, found a {}", archive.kind));
   InteractionClip clip = read_clip(archive.npz);
-  if (!reactor.empty()) set_reactor(clip, reactor == "A" ? Person::kA : Person::kB);
+  if (!reactor.empty()) set_reactor(clip, person_of(reactor));
   return paired_archive(retarget(clip, *load_shared_robot(card), pair_options_from(options)));
 }
 
@@ -129,7 +151,8 @@ std::string score(const Archive& archive, const Texts& readings, const std::stri
     return dumped(recordings_json({score_recording_file(archive.npz.name(), archive.npz, robot, options)}).at(0));
   }
   const auto robot = load_shared_robot(card);
-  const ClipScore scored = score_clip(load_or_retarget(archive.npz, *robot, {}).motion, robot, options);
+  const ClipScore scored =
+      score_clip(load_or_retarget(archive.npz, *robot, {}, Implausible::kTaken).motion, robot, options);
   return dumped(score_json({scored}, summarize_scores({scored}, options.readings.metrics)).at("clips").at(0));
 }
 
@@ -171,8 +194,14 @@ std::string detect_in(const Archive& archive, const std::string& task, const std
 // Clips of others below some paths, one read at a time.
 class PeopleReader {
  public:
-  PeopleReader(const std::vector<std::string>& paths, const std::string& format, const std::string& task) {
+  PeopleReader(const std::vector<std::string>& paths, const std::string& format, const std::string& task,
+               const std::string& reactor, std::optional<double> rate_hz, const std::string& up,
+               std::optional<double> metres_per_unit) {
     if (!task.empty()) options_.task = parse_task(task);
+    if (!reactor.empty()) options_.reactor = person_of(reactor);
+    if (!up.empty()) options_.up = parse_axis(up);
+    options_.rate_hz = rate_hz;
+    options_.metres_per_unit = metres_per_unit;
     format_ = &find_people_format(paths, format);
     places_ = format_->find(paths, options_);
   }
@@ -238,8 +267,10 @@ std::string dataset_entries(const std::string& folder) {
 void add_readers(py::module_& module) {
   const auto released = py::call_guard<py::gil_scoped_release>();
   py::class_<PeopleReader>(module, "PeopleReader", "Recordings of two people, in a format of others.")
-      .def(py::init<const std::vector<std::string>&, const std::string&, const std::string&>(), py::arg("paths"),
-           py::arg("format"), py::arg("task"), released)
+      .def(py::init<const std::vector<std::string>&, const std::string&, const std::string&, const std::string&,
+                    std::optional<double>, const std::string&, std::optional<double>>(),
+           py::arg("paths"), py::arg("format"), py::arg("task"), py::arg("reactor"), py::arg("rate_hz"), py::arg("up"),
+           py::arg("metres_per_unit"), released)
       .def("__len__", &PeopleReader::size)
       .def_property_readonly("format", &PeopleReader::format)
       .def("at", &PeopleReader::at, py::arg("i"), released, "A clip, and what was found of its units and axes.");
@@ -272,11 +303,18 @@ void add_archive(py::module_& module) {
       .def("__getitem__", &item, py::arg("key"), "A view, read-only; texts as a list.")
       .def(
           "save", [](const Archive& archive, const std::string& path) { archive.npz.save(path); }, py::arg("path"),
-          released);
-  module.def(
-      "load", [](const std::string& path) { return checked(Npz::load(path)); }, py::arg("path"), released);
+          released)
+      .def(py::pickle(
+          [](const Archive& archive) {
+            return py::make_tuple(py::bytes(archive.npz.bytes(ZipMethod::kStored)), archive.npz.name(), archive.kind);
+          },
+          [](const py::tuple& state) {
+            return Archive{Npz::parse(state[0].cast<std::string>(), state[1].cast<std::string>()),
+                           state[2].cast<std::string>()};
+          }));
+  module.def("load", &loaded, py::arg("path"), py::arg("as_is"), released);
   module.def("make_clip", &make_clip, py::arg("a"), py::arg("b"), py::arg("rate_hz"), py::arg("task"),
-             py::arg("reactor"), py::arg("act"), py::arg("id"));
+             py::arg("reactor"), py::arg("act"), py::arg("id"), py::arg("as_is"));
   module.def(
       "synthesize",
       [](const std::string& task, std::uint64_t seed, int index) {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any, Dict, Iterator, List, Optional, Union
+from typing import Any, Dict, Iterator, List, Optional, Tuple, Union
 
 from duet import _duet
 from duet._motion import Recording, load
@@ -55,6 +55,9 @@ class Run:
         self.summary: Optional[Dict[str, Any]] = None  # of the call of evaluate() that returned it
         self._episodes: Optional[List[Dict[str, Any]]] = None
 
+    def __reduce__(self) -> Tuple[Any, Tuple[Any, ...]]:
+        return _read_again, (os.path.abspath(self.path), self.summary)
+
     def __repr__(self) -> str:
         return f"<duet.Run {self.path!r}: {len(self.episodes)} episodes of {self.info['suite']}>"
 
@@ -73,7 +76,7 @@ class Run:
         return {column: [value(row, column) for row in self.episodes] for column in chosen}
 
     def dataframe(self, *names: str) -> Any:
-        """The same for pandas, where that is installed."""
+        """The same for pandas, where that is installed: `dataframe("task", "jpe")`; without names no metric."""
         import pandas  # type: ignore[import]
 
         return pandas.DataFrame(self.columns(*names))
@@ -103,6 +106,13 @@ class Run:
         if not isinstance(recording, Recording):
             raise _duet.InputError(f"{path}: expected a recording, found a {recording.kind}")
         return recording
+
+
+def _read_again(path: str, summary: Optional[Dict[str, Any]]) -> Run:
+    """What another process unpickles: the folder is read there."""
+    run = Run(path)
+    run.summary = summary
+    return run
 
 
 def load_run(path: Union[str, "os.PathLike[str]"]) -> Run:

@@ -1,5 +1,8 @@
+import copy
 import gc
+import multiprocessing
 import os
+import pickle
 import sys
 import tracemalloc
 import unittest
@@ -159,6 +162,81 @@ class Scores(ScratchTest):
             duet.retarget(people, robot="no_such_robot")
         with self.assertRaisesRegex(ValueError, "version: expected robot or paper, found 'mine'"):
             duet.detect(people, "wave", version="mine")
+        for seed, pattern in ((-1, "seed: expected a number from 0 to 18446744073709551615, found -1"),
+                              (0.5, "seed: expected a whole number, found 0.5")):
+            with self.assertRaisesRegex(ValueError, pattern):
+                duet.synthesize("wave", seed=seed)
+
+
+class Doors(ScratchTest):
+    """People of others are judged where they come in, as the command line judges them."""
+
+    def test_people_who_cannot_be_are_refused_at_every_door_unless_taken_as_they_are(self):
+        people = duet.synthesize("hug", seed=7)
+        a, b = people.a, people.b
+        turned = lambda x: x[..., [0, 2, 1]] * [1.0, 1.0, 1.0]  # y up
+        for name, change, pattern in (
+                ("millimetres", lambda x: 1000.0 * x, "millimetre"), ("centimetres", lambda x: 100.0 * x, "centimetre"),
+                ("inches", lambda x: x / 0.0254, "inch"), ("y up", turned, "up"), ("upside down", lambda x: -x, "up"),
+                ("below the floor", lambda x: x - [0.0, 0.0, 3.0], "floor")):
+            with self.subTest(name):
+                for door in (lambda **o: duet.clip(change(a), change(b), rate_hz=50, task="hug", **o),
+                             lambda **o: duet.retarget(change(a), change(b), rate_hz=50, task="hug", **o)):
+                    with self.assertRaisesRegex(duet.InputError, f"{pattern}.*as_is=True"):
+                        door()
+                taken = duet.clip(change(a), change(b), rate_hz=50, task="hug", as_is=True)
+                taken.save(self.path("taken.npz"))
+                for door in (duet.load, duet.score):
+                    with self.assertRaisesRegex(duet.InputError, f"taken.npz.*{pattern}.*as_is=True"):
+                        door(self.path("taken.npz"))
+                self.assertTrue((duet.load(self.path("taken.npz"), as_is=True).a == taken.a).all())
+        duet.score(self.path("taken.npz"), as_is=True)
+        duet.retarget(taken)
+        for task in duet.tasks():
+            people = duet.synthesize(task, seed=3)
+            duet.clip(people.a, people.b, rate_hz=50, task=task)
+
+    def test_what_a_file_does_not_say_is_said_beside_it(self):
+        people = duet.synthesize("hug", seed=3)
+        joints = numpy.stack([people.a, people.b], axis=1)
+        names = numpy.array(list(people["human_joint_names"]))
+        numpy.savez(self.path("bare.npz"), positions=joints, joints=names)
+        with self.assertRaisesRegex(duet.InputError, "rate"):
+            duet.read_people(self.path("bare.npz"), task="hug")[0]
+        (clip,) = duet.read_people(self.path("bare.npz"), task="hug", rate=50)
+        self.assertLess(numpy.abs(clip.a - people.a).max(), 0.05)
+        numpy.savez(self.path("other.npz"), positions=1000.0 * joints[..., [0, 2, 1]] * [1, 1, -1], joints=names, rate_hz=50.0)
+        (clip,) = duet.read_people(self.path("other.npz"), task="hug", up="y", unit=0.001, reactor="A")
+        self.assertEqual(clip.reactor, "A")
+        self.assertAlmostEqual(numpy.abs(clip.a[0, 0] - clip.a[0, 15]).max(), numpy.abs(people.a[0, 0] - people.a[0, 15]).max(), 1)
+        with self.assertRaisesRegex(ValueError, "up axis: expected x, y, z, -x, -y or -z, found 'w'"):
+            duet.read_people(self.path("bare.npz"), up="w")
+
+
+class Pickles(ScratchTest):
+    def test_motions_come_back_from_another_process_to_the_bit(self):
+        clip = duet.synthesize("wave", seed=2)
+        paired = duet.retarget(clip)
+        duet.write_robot_motion(paired, self.path("motion.pkl"), format="gmr")
+        run = duet.evaluate(None, self.suite(more=KEPT), output=self.path("run"))
+        recording = run.recording(main_arm(run)[0]["key"])
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            for motion in (clip, paired, recording, duet.read_robot_motion(self.path("motion.pkl"))):
+                there = pool.apply(copy.copy, (motion,))
+                self.assertIs(type(there), type(motion))
+                self.assertEqual((there.keys(), there.kind, repr(there)), (motion.keys(), motion.kind, repr(motion)))
+                for key in motion.keys():
+                    self.assertTrue(numpy.array_equal(there[key], motion[key]), key)
+
+    def test_runs_and_readers_come_back_by_their_path(self):
+        run = duet.evaluate(None, self.suite(), output=self.path("run"))
+        there = pickle.loads(pickle.dumps(run))
+        self.assertEqual((there.episodes, there.summary), (run.episodes, run.summary))
+        people = duet.synthesize("hug", seed=3)
+        numpy.savez(self.path("take.npz"), positions=numpy.stack([people.a, people.b], axis=1),
+                    joints=numpy.array(list(people["human_joint_names"])))
+        takes = duet.read_people(self.path("take.npz"), task="hug", rate=50)
+        self.assertTrue((pickle.loads(pickle.dumps(takes))[0].a == takes[0].a).all())
 
 
 class DataSets(ScratchTest):

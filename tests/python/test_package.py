@@ -27,9 +27,34 @@ class Package(unittest.TestCase):
         for name in ("evaluate", "retarget", "score", "detect", "make_env", "make_vec_env", "Batch", "Run", "load"):
             self.assertTrue(getattr(duet, name).__doc__, name)
 
+    def test_nothing_of_it_names_the_folder_of_its_build(self):
+        module = duet._duet.__file__
+        engines = [engine["name"] for engine in duet.engines() if engine["available"]]
+        self.assertTrue(engines)  # those of the build folder are found all the same
+        with open(module, "rb") as file:
+            self.assertNotIn(SOURCE.encode() + b"/", file.read())
+
     def test_interpreters_end_while_a_policy_is_stuck(self):
-        self.python("import threading, duet\nqueue = duet._duet.PlanQueue('x', 'y', 0.0, 1.0)\n"
+        self.python("import threading, duet\nqueue = duet._duet.PlanQueue('x', 0.0, 1.0)\n"
                     "threading.Thread(target=queue.take, args=(3600.0,), daemon=True).start()\n")
+
+
+# A user's own code, which mypy judges strictly: arrays have their types.
+STRICT = """import numpy
+import duet
+
+Numbers = numpy.ndarray[object, numpy.dtype[numpy.float64]]
+
+
+def policy(observations: duet.Observations) -> Numbers:
+    plans = observations.hold()
+    plans[:, :, 2] -= observations.frames[:, -1, :1] * 0.0
+    return plans
+
+
+def longest(people: duet.Clip, motion: duet.Paired, recording: duet.Recording) -> Numbers:
+    return max(people.a, motion.q, recording.v, key=len)
+"""
 
 
 class Stubs(ScratchTest):
@@ -65,6 +90,11 @@ class Stubs(ScratchTest):
         source = os.path.join(SOURCE, "python")
         ended = subprocess.run([mypy, "--cache-dir", self.path("cache"), "--ignore-missing-imports", "-p", "duet"], cwd=source,
                                capture_output=True, text=True, check=False)
+        self.assertEqual(ended.returncode, 0, ended.stdout + ended.stderr)
+        with open(self.path("mine.py"), "w", encoding="utf-8") as file:
+            file.write(STRICT)
+        ended = subprocess.run([mypy, "--strict", "--follow-imports", "silent", "--cache-dir", self.path("cache"), self.path("mine.py")], cwd=source,
+                               env={**os.environ, "MYPYPATH": source}, capture_output=True, text=True, check=False)
         self.assertEqual(ended.returncode, 0, ended.stdout + ended.stderr)
 
 
