@@ -84,9 +84,9 @@ Phases get_phases(const Npz& npz) {
 double get_rate(const Npz& npz) {
   const double rate_hz = npz.number("rate_hz");
   if (!(rate_hz > 0.0)) refuse(npz, "rate_hz", fmt::format("expected a positive rate, found {}", rate_hz));
-  if (rate_hz < kLowestRate)
+  if (rate_hz < kLowestPeopleRate)
     refuse(npz, "rate_hz",
-           fmt::format("expected {} Hz or more, as people's motions have, found {}", kLowestRate, rate_hz));
+           fmt::format("expected {} Hz or more, as people's motions have, found {}", kLowestPeopleRate, rate_hz));
   return rate_hz;
 }
 

@@ -37,7 +37,7 @@ std::string get_id(const Npz& npz, const std::string& key);
 Task get_task(const Npz& npz);
 Person get_reactor(const Npz& npz);
 Phases get_phases(const Npz& npz);
-inline constexpr double kLowestRate = 5.0;  // of motions of people [Hz]
+inline constexpr double kLowestPeopleRate = 5.0;  // of motions of people [Hz]
 double get_rate(const Npz& npz);
 
 // "human_joint_names": the 24 names, in the order of the columns of every human motion in the archive.
