@@ -1,12 +1,15 @@
 // The detectors' tracks of a human and of a robot.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <vector>
 
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
 #include "duet/metrics/detector.h"
 #include "duet/robots/kinematics.h"
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {
@@ -24,6 +27,27 @@ Agent empty_agent(Eigen::Index frames) {
   return agent;
 }
 
+// Median over the frames of the mean of both arms. [m]
+double arm_of(const PointTracks& smpl24) {
+  std::vector<double> arms;
+  for (int t = 0; t < smpl24.frames(); ++t) {
+    const PointTracks::ConstFrame joints = smpl24.frame(t);
+    double both = 0.0;
+    for (const auto& [from, to] : {std::pair{kLeftShoulder, kLeftElbow},
+                                  {kLeftElbow, kLeftWrist},
+                                  {kLeftWrist, kLeftHand},
+                                  {kRightShoulder, kRightElbow},
+                                  {kRightElbow, kRightWrist},
+                                  {kRightWrist, kRightHand}})
+      both += (joints.col(to) - joints.col(from)).norm();
+    arms.push_back(0.5 * both);
+  }
+  if (arms.empty()) return kAdultArm;
+  const auto middle = arms.begin() + static_cast<std::ptrdiff_t>(arms.size() / 2);
+  std::nth_element(arms.begin(), middle, arms.end());
+  return *middle > 0.0 ? *middle : kAdultArm;
+}
+
 // `pose(t)` and `joints(t)` are the base's pose and the joint angles at frame t.
 template <typename PoseAt, typename JointsAt>
 Agent follow(const RobotModel& robot, int frames, PoseAt pose, JointsAt joints) {
@@ -32,6 +56,7 @@ Agent follow(const RobotModel& robot, int frames, PoseAt pose, JointsAt joints) 
       {robot.track_frame("lhand"), &agent.lhand},         {robot.track_frame("rhand"), &agent.rhand},
       {robot.track_frame("head"), &agent.head},           {robot.track_frame("torso"), &agent.torso},
       {robot.track_frame("lshoulder"), &agent.lshoulder}, {robot.track_frame("rshoulder"), &agent.rshoulder}};
+  agent.arm = 0.5 * (arm_length(robot, 0) + arm_length(robot, 1));
   Kinematics kinematics(robot);
   for (int t = 0; t < frames; ++t) {
     if (joints(t).size() != robot.dof())
@@ -60,6 +85,7 @@ Agent human_agent(const PointTracks& smpl24) {
     agent.lshoulder.col(t) = joints.col(kLeftShoulder);
     agent.rshoulder.col(t) = joints.col(kRightShoulder);
   }
+  agent.arm = arm_of(smpl24);
   return agent;
 }
 

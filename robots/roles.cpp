@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "duet/core/skeleton.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet {
 namespace {
@@ -41,6 +42,24 @@ std::vector<int> tilting_waist(const RobotModel& robot) {
   for (const int joint : robot.roles.waist)
     if (std::abs(hinge_axis(robot, joint).z()) < kUpright) tilting.push_back(joint);
   return tilting;
+}
+
+double arm_length(const RobotModel& robot, int side) {
+  const RobotFrame& shoulder = robot.frames[robot.track_frame(side == 0 ? "lshoulder" : "rshoulder")];
+  const RobotFrame& hand = robot.frames[robot.track_frame(side == 0 ? "lhand" : "rhand")];
+  Eigen::Vector3d end = hand.X_LF.p;  // of the last piece, in the link that it begins in
+  double length = 0.0;
+  for (int link = hand.link; link > 0 && link != shoulder.link; link = robot.links[link].parent) {
+    length += end.norm();
+    end = robot.links[link].X_PL.p;
+    if (robot.links[link].parent == shoulder.link) return length + (end - shoulder.X_LF.p).norm();
+  }
+  if (hand.link == shoulder.link) return (end - shoulder.X_LF.p).norm();
+  Kinematics kinematics(robot);  // a shoulder's track on the trunk
+  kinematics.update({}, robot.neutral);
+  return (kinematics.frame_position(robot.track_frame(side == 0 ? "lhand" : "rhand")) -
+          kinematics.frame_position(robot.track_frame(side == 0 ? "lshoulder" : "rshoulder")))
+      .norm();
 }
 
 std::vector<int> leg_joints(const RobotModel& robot) {

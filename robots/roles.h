@@ -31,6 +31,11 @@ std::vector<int> leg_joints(const RobotModel& robot);
 // The soles' shapes by the link that carries them, in the card's order: the left foot's first.
 std::vector<std::vector<int>> soles_of_feet(const RobotModel& robot);
 
+// Length of an arm from the shoulder's track along the links to the hand's, 0 left, 1 right: as far as it reaches
+// stretched out; in the neutral pose where the shoulder's track lies on the trunk. [m] Throws std::invalid_argument
+// where the card lacks one of the two tracks.
+double arm_length(const RobotModel& robot, int side);
+
 // The frame that stands for the person's pelvis (the first retarget pair's; the base's origin where there is none), in
 // the base. A robot whose base is its trunk has its pelvis below a waist, which turns it. q: dof.
 Pose pelvis_in_base(const RobotModel& robot, const Eigen::VectorXd& q);

@@ -8,9 +8,13 @@
 
 namespace duet {
 
+inline constexpr double kAdultArm = 0.58;  // median of SBU's, K3HI's and Kinder's people [m]
+
 // Named tracks of one agent, each (3, T) [m], frame W; those that a detector does not need may stay empty.
 struct Agent {
   Eigen::Matrix3Xd lhand, rhand, head, root, torso, lshoulder, rshoulder;
+  // Length of an arm from shoulder to hand: bounds that would be a person's size are shares of it. [m]
+  double arm = kAdultArm;
 };
 
 // A track that a detector needs, as messages name it: "performer.lhand".

@@ -220,7 +220,9 @@ const TaskDefinition& bend() {
                    .figures = kBendFigures,
                    .tracks = bend_tracks,
                    .detect = detect_bend,
-                   .read_strictly = read_bend_strictly}};
+                   .read_strictly = read_bend_strictly},
+      .rule = &rules::kBend,
+      .interaction = {.onset = ActOnset::kTrunkLeans}};
   return kDefinition;
 }
 

@@ -232,7 +232,8 @@ const TaskDefinition& fist_bump() {
                    .figures = kFistBumpFigures,
                    .tracks = fist_bump_tracks,
                    .detect = detect_fist_bump},
-      .rule = &rules::kFistBump};
+      .rule = &rules::kFistBump,
+      .interaction = {.touch = Touch::kHands, .touch_s = 0.002, .ghost_hands = 0.10, .onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

@@ -233,7 +233,9 @@ const TaskDefinition& fly_kiss() {
                    .figures = kFlyKissFigures,
                    .tracks = fly_kiss_tracks,
                    .detect = detect_fly_kiss,
-                   .read_strictly = read_fly_kiss_strictly}};
+                   .read_strictly = read_fly_kiss_strictly},
+      .rule = &rules::kFlyKiss,
+      .interaction = {.onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

@@ -262,6 +262,9 @@ constexpr auto kHandshakeParaphrases = std::to_array<std::string_view>({
 
 namespace tasks {
 
+// Hands that clasp touch before they do.
+constexpr auto kHandshakeIncludes = std::to_array<std::string_view>({"fist_bump"});
+
 const TaskDefinition& handshake() {
   static constexpr TaskDefinition kDefinition = {
       .name = "handshake",
@@ -284,7 +287,12 @@ const TaskDefinition& handshake() {
                    .figures = kHandshakeFigures,
                    .tracks = handshake_tracks,
                    .detect = detect_handshake},
-      .rule = &rules::kHandshake};
+      .rule = &rules::kHandshake,
+      .interaction = {.touch = Touch::kHands,
+                      .touch_s = 0.3,
+                      .ghost_hands = 0.12,
+                      .onset = ActOnset::kHandRises,
+                      .includes = kHandshakeIncludes}};
   return kDefinition;
 }
 

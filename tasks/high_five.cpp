@@ -226,7 +226,8 @@ const TaskDefinition& high_five() {
                    .figures = kHighFiveFigures,
                    .tracks = high_five_tracks,
                    .detect = detect_high_five},
-      .rule = &rules::kHighFive};
+      .rule = &rules::kHighFive,
+      .interaction = {.touch = Touch::kHands, .touch_s = 0.002, .ghost_hands = 0.10, .onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

@@ -364,6 +364,9 @@ constexpr auto kHugParaphrases = std::to_array<std::string_view>({
 
 namespace tasks {
 
+// People lean into a hug, and hands that go round one another pass.
+constexpr auto kHugIncludes = std::to_array<std::string_view>({"bend", "high_five"});
+
 const TaskDefinition& hug() {
   static constexpr TaskDefinition kDefinition = {
       .name = "hug",
@@ -383,7 +386,8 @@ const TaskDefinition& hug() {
               .perform = synthesis::perform_hug,
               .recorded = synthesis::kRecordedHug},
       .detector = {.thresholds = kHugThresholds, .figures = kHugFigures, .tracks = hug_tracks, .detect = detect_hug},
-      .rule = &rules::kHug};
+      .rule = &rules::kHug,
+      .interaction = {.touch = Touch::kArmsRoundTrunk, .touch_s = 0.5, .includes = kHugIncludes}};
   return kDefinition;
 }
 

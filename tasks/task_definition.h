@@ -57,6 +57,20 @@ struct TaskDetector {
   void (*read_strictly)(DetectorReadings& readings) = nullptr;
 };
 
+// What has to touch what for an act to be an interaction.
+enum class Touch { kNone, kHands, kArmsRoundTrunk };
+// What tells that an act begins: a hand that rises, a trunk that leans; nothing where arms open on the way up.
+enum class ActOnset { kNone, kHandRises, kTrunkLeans };
+
+// What makes an act of the task an interaction with the partner, beside the act itself (metrics/interaction.h).
+struct InteractionRule {
+  Touch touch = Touch::kNone;
+  double touch_s = 0.0;      // a solid partner is touched for so long in all [s]
+  double ghost_hands = 0.0;  // of a ghost: the nearest hands come so near [m]
+  ActOnset onset = ActOnset::kNone;
+  std::span<const std::string_view> includes = {};  // tasks whose acts belong to this one and are no others
+};
+
 struct TaskDefinition {
   std::string_view name;                          // as in tasks/list.cmake
   std::string_view prompt;                        // the command that stands for the task where no other is given
@@ -66,6 +80,7 @@ struct TaskDefinition {
   synthesis::Act act;
   TaskDetector detector;
   const ActRule* rule = nullptr;  // of the set `act`; null: the strict thresholds stand for it
+  InteractionRule interaction = {};
 };
 
 const TaskDefinition& definition_of(Task task);

@@ -335,7 +335,8 @@ const TaskDefinition& wave() {
                    .figures = kWaveFigures,
                    .tracks = wave_tracks,
                    .detect = detect_wave},
-      .rule = &rules::kWave};
+      .rule = &rules::kWave,
+      .interaction = {.onset = ActOnset::kHandRises}};
   return kDefinition;
 }
 

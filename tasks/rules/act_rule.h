@@ -31,7 +31,7 @@ struct ActRule {
 
 namespace rules {
 
-extern const ActRule kHug, kHandshake, kHighFive, kWave, kFistBump;
+extern const ActRule kHug, kHandshake, kHighFive, kWave, kBend, kFlyKiss, kFistBump;
 
 }  // namespace rules
 }  // namespace duet

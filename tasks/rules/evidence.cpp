@@ -8,8 +8,16 @@ namespace {
 constexpr int kBefore = 10;    // frames in which hands close in on one another
 constexpr int kComeAndGo = 2;  // frames at either end of a meeting in which hands still come and already go
 
+Eigen::ArrayXd heights_in(const Eigen::Matrix3Xd& hand, const FrameSpan& span) {
+  return hand.row(2).segment(span.begin, span.frames()).transpose().array();
+}
+
+int turns_in(const Eigen::Matrix3Xd& hand, const FrameSpan& span) {
+  return static_cast<int>(turning_points(heights_in(hand, span), kShakeTurn).size());
+}
+
 double range_of(const Eigen::Matrix3Xd& hand, const FrameSpan& span) {
-  const auto z = hand.row(2).segment(span.begin, span.frames());
+  const Eigen::ArrayXd z = heights_in(hand, span);
   return z.maxCoeff() - z.minCoeff();
 }
 
@@ -53,7 +61,28 @@ Agent smoothed(const Agent& agent) {
           .root = smoothed(agent.root),
           .torso = smoothed(agent.torso),
           .lshoulder = smoothed(agent.lshoulder),
-          .rshoulder = smoothed(agent.rshoulder)};
+          .rshoulder = smoothed(agent.rshoulder),
+          .arm = agent.arm};
+}
+
+std::vector<TurningPoint> turning_points(const Eigen::ArrayXd& place, double least) {
+  std::vector<TurningPoint> points;
+  TurningPoint low{0, place[0]}, high{0, place[0]};
+  int heading = 0;
+  for (int t = 1; t < static_cast<int>(place.size()); ++t) {
+    if (place[t] > high.place) high = {t, place[t]};
+    if (place[t] < low.place) low = {t, place[t]};
+    if (heading >= 0 && high.place - place[t] >= least) {
+      points.push_back(high);
+      heading = -1;
+      low = {t, place[t]};
+    } else if (heading <= 0 && place[t] - low.place >= least) {
+      points.push_back(low);
+      heading = 1;
+      high = {t, place[t]};
+    }
+  }
+  return points;
 }
 
 std::vector<FrameSpan> spans_of(const FrameMask& mask) {
@@ -71,6 +100,18 @@ FrameMask mask_of(const FrameSpan& span, Eigen::Index frames) {
   FrameMask mask(frames);
   std::fill(mask.begin() + span.begin, mask.begin() + span.end, true);
   return mask;
+}
+
+Eigen::Matrix3Xd mouth_of(const Agent& performer, const Agent& partner) {
+  constexpr double kBefore = 0.17, kBelow = 0.1;  // of an arm: 10 and 6 cm of a person
+  Eigen::Matrix3Xd mouth = performer.head;
+  for (Eigen::Index t = 0; t < mouth.cols(); ++t) {
+    Eigen::Vector2d ahead = (partner.root.col(t) - performer.root.col(t)).head<2>();
+    if (ahead.norm() > 0.0) ahead.normalize();
+    mouth.col(t).head<2>() += kBefore * performer.arm * ahead;
+    mouth(2, t) -= kBelow * performer.arm;
+  }
+  return mouth;
 }
 
 Eigen::ArrayXd shoulder_heights(const Agent& agent) {
@@ -108,6 +149,7 @@ std::vector<HandMeeting> hand_meetings(const Agent& performer, const Agent& part
                             .performer_right = own_right,
                             .partner_right = other_right,
                             .nearest = distance.segment(span.begin, span.frames()).minCoeff(),
+                            .turns = std::min(turns_in(own, span), turns_in(other, span)),
                             .shake = std::min(range_of(own, inside), range_of(other, inside)),
                             .travel = std::max(range_of(own, span), range_of(other, span)),
                             .own_height = height_over_shoulders(own, performer, span),

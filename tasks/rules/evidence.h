@@ -26,8 +26,22 @@ struct FrameSpan {
 std::vector<FrameSpan> spans_of(const FrameMask& mask);
 FrameMask mask_of(const FrameSpan& span, Eigen::Index frames);
 
+// Where the mouth is: before the head, towards the partner, and below its middle; both a share of the arm. (3, T) [m]
+Eigen::Matrix3Xd mouth_of(const Agent& performer, const Agent& partner);
+
 // Mean height of both shoulders, (T). [m]
 Eigen::ArrayXd shoulder_heights(const Agent& agent);
+
+// A place at which a motion turns back.
+struct TurningPoint {
+  int frame = 0;
+  double place = 0.0;
+};
+// Where `place`, (T), turns back by `least` or more, in order of time; its ends are none.
+std::vector<TurningPoint> turning_points(const Eigen::ArrayXd& place, double least);
+
+// Least turn of clasped hands that counts: in SBU and K3HI hands that only meet turn less often than three times. [m]
+inline constexpr double kShakeTurn = 0.015;
 
 // How near hands are while they are together: nearer than `contact`, or, where they never come so near (short hands of
 // a skeleton), within `steady` of their least distance, which is below `farthest`. [m]
@@ -40,6 +54,7 @@ struct HandMeeting {
   FrameSpan span;
   bool performer_right = false, partner_right = false;
   double nearest = 0.0;  // least distance of the two [m]
+  int turns = 0;         // times that both hands turn up or down by kShakeTurn or more, the lesser
   double shake = 0.0;    // range of heights that both hands go through, the lesser, but for 0.04 s at either end [m]
   double travel = 0.0;   // the larger [m]
   double own_height = 0.0, other_height = 0.0;  // of each hand over its own shoulders, mean [m]

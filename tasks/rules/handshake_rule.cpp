@@ -1,7 +1,7 @@
 // Handshake: two hands stay together below the shoulders while both stand at arm's length, and go up and down together
 // or hold on. People shake hands of one side. An object that is handed over goes from any hand to any, leaves the giver
-// within a second and hangs still meanwhile; a fist bump is over at once; a high-five is up; rocket and parachute
-// travel.
+// within a second and does not go up and down; a fist bump is over at once; a high-five is up; rocket and parachute
+// travel and turn once.
 #include <algorithm>
 
 #include "duet/tasks/rules/act_rule.h"
@@ -11,13 +11,13 @@ namespace duet::rules {
 namespace {
 
 std::vector<MeetingCondition> handshake_conditions(const HandMeeting& m, const Thresholds& tau) {
-  const double shake = m.shake - tau.at("shake"), held = m.span.seconds() - tau.at("hold");
+  const double turns = m.turns - tau.at("turns"), held = m.span.seconds() - tau.at("hold");
   const bool same_side = m.performer_right == m.partner_right;
   return {{"clasp", m.span.seconds() - tau.at("clasp")},
           {"crossed", same_side ? m.span.seconds() : m.span.seconds() - tau.at("crossed")},
-          {"shake", std::max(shake, held)},
-          {"hold", std::max(shake, held)},
-          {"travel", tau.at("travel") - m.travel},
+          {"turns", std::max(turns, held)},
+          {"hold", std::max(turns, held)},
+          {"travel", turns >= 0.0 ? m.travel : tau.at("travel") - m.travel},
           {"height", tau.at("height") - 0.5 * (m.own_height + m.other_height)},
           {"apart", m.trunks - tau.at("apart")}};
 }
@@ -33,9 +33,9 @@ constexpr auto kHandshakeRule = std::to_array<RuleThreshold>({
     {"farthest", 0.3, "m", "which is below this"},
     {"clasp", 0.6, "s", "they stay together at least so long"},
     {"crossed", 1.1, "s", "a left with a right hand at least so long"},
-    {"shake", 0.035, "m", "both go up and down by at least so much meanwhile, or"},
-    {"hold", 1.5, "s", "they stay together at least so long"},
-    {"travel", 0.35, "m", "neither goes up or down by more meanwhile"},
+    {"turns", 3, "1", "both turn up or down by 1.5 cm so often meanwhile, or"},
+    {"hold", 1.2, "s", "they stay together at least so long"},
+    {"travel", 0.35, "m", "unless they turn so often, neither goes up or down by more meanwhile"},
     {"height", 0.0, "m", "their mean height over the shoulders is at most this"},
     {"apart", 0.5, "m", "the trunks are at least so far apart meanwhile"},
 });

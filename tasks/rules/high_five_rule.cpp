@@ -13,17 +13,21 @@ std::vector<MeetingCondition> high_five_conditions(const HandMeeting& m, const T
           {"apart", m.trunks - tau.at("apart")}};
 }
 
+// Heights are shares of each one's own arm.
 DetectorResult detect_high_five_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   const double contact = tau.at("contact");
-  return judge_meetings(smoothed(performer), smoothed(partner), {contact, 0.0, contact}, tau, high_five_conditions);
+  Thresholds metres = tau;
+  metres.at("height") *= performer.arm;
+  metres.at("height_other") *= partner.arm;
+  return judge_meetings(smoothed(performer), smoothed(partner), {contact, 0.0, contact}, metres, high_five_conditions);
 }
 
 constexpr auto kHighFiveRule = std::to_array<RuleThreshold>({
     {"contact", 0.2, "m", "two hands are together while nearer"},
     {"longest", 1.0, "s", "they stay together at most so long"},
-    {"height", -0.1, "m", "the performer's is at least so high over its shoulders meanwhile"},
-    {"height_other", -0.3, "m", "the partner's is at least so high over its shoulders meanwhile"},
-    {"apart", 0.4, "m", "the trunks are at least so far apart meanwhile"},
+    {"height", -0.28, "arm", "the performer's is at least so high over its shoulders meanwhile"},
+    {"height_other", -0.35, "arm", "the partner's is at least so high over its shoulders meanwhile"},
+    {"apart", 0.5, "m", "the trunks are at least so far apart meanwhile"},
 });
 
 }  // namespace

@@ -1,5 +1,7 @@
-// Wave: a raised hand swings to and fro, several times on end at 0.8 to 5 Hz, about a bent elbow: across the arm, so
-// that its distance from the shoulder changes less than its place. A punch goes out and back along the arm.
+// Wave: one raised hand swings to and fro, several times on end at 0.6 Hz and faster, and comes back to where it began,
+// clear of the partner. The way up and the way down are no swings; who pushes or punches is near the partner or has
+// both hands up. A hand that is held up and waves from the wrist alone is not seen: its track stands still (five of
+// Kinder's nineteen).
 //
 // A swing is the way between two turning points of the hand along its main direction, slow drifts taken off.
 #include <Eigen/Eigenvalues>
@@ -13,25 +15,31 @@
 namespace duet::rules {
 namespace {
 
-constexpr int kDrift = 51;  // frames of the moving mean that is taken off: a second
+constexpr int kDrift = 41;  // frames of the moving mean that is taken off
+constexpr int kComes = 8;   // frames at either end of the time that a hand is up in which it comes and goes
+constexpr int kLeast = 15;  // frames that can be judged
 
-Tracks wave_rule_tracks(const Agent& performer, const Agent&) {
+Tracks wave_rule_tracks(const Agent& performer, const Agent& partner) {
   Tracks tracks = hands_of("performer", performer);
   append(tracks, {{"performer.lshoulder", &performer.lshoulder}, {"performer.rshoulder", &performer.rshoulder}});
+  append(tracks, hands_of("partner", partner));
+  append(tracks, {{"performer.head", &performer.head},
+                  {"performer.root", &performer.root},
+                  {"performer.torso", &performer.torso},
+                  {"partner.root", &partner.root}});
+  append(tracks, {{"partner.torso", &partner.torso}, {"partner.head", &partner.head}});
   return tracks;
 }
 
 // Swings on end of one hand.
 struct SwingChain {
   int swings = 0;
-  FrameSpan span;
+  FrameSpan span = {};
   double across = 0.0;  // least way of a swing [m]
-  double radial = 0.0;  // range of the distance from the shoulder, of the range of the way [1]
-};
-
-struct TurningPoint {
-  int frame = 0;
-  double place = 0.0;
+  double back = 0.0;    // distance of its end from its begin, of an arm's length [1]
+  double clear = 0.0;   // least distance of the hand from the partner's trunk, head and hands [m]
+  double body = 0.0;    // likewise from the own mouth and heart, of an arm's length [1]
+  double other = 0.0;   // mean height of the other hand over the shoulders, of an arm's length [1]
 };
 
 // The hand's place along its main direction. [m]
@@ -41,70 +49,79 @@ Eigen::ArrayXd main_motion(const Eigen::Matrix3Xd& hand) {
   return (solver.eigenvectors().col(2).transpose() * moving).transpose().array();
 }
 
-// Places where the motion turns back by `least` or more; the ends are not.
-std::vector<TurningPoint> turning_points(const Eigen::ArrayXd& place, double least) {
-  std::vector<TurningPoint> points;
-  TurningPoint low{0, place[0]}, high{0, place[0]};
-  int heading = 0;
-  for (int t = 1; t < static_cast<int>(place.size()); ++t) {
-    if (place[t] > high.place) high = {t, place[t]};
-    if (place[t] < low.place) low = {t, place[t]};
-    if (heading >= 0 && high.place - place[t] >= least) {
-      points.push_back(high);
-      heading = -1;
-      low = {t, place[t]};
-    } else if (heading <= 0 && place[t] - low.place >= least) {
-      points.push_back(low);
-      heading = 1;
-      high = {t, place[t]};
-    }
-  }
-  return points;
+// One person's hand beside the partner: what a chain of swings is judged by.
+struct WavingHand {
+  Eigen::Matrix3Xd from_shoulder;               // (3, T) [m]
+  Eigen::ArrayXd height, other, partner, body;  // (T) in arms, but the partner in [m]
+};
+
+WavingHand waving_hand(const Agent& performer, const Agent& partner, bool right) {
+  const Eigen::Matrix3Xd& hand = right ? performer.rhand : performer.lhand;
+  const Eigen::Matrix3Xd& other = right ? performer.lhand : performer.rhand;
+  const Eigen::ArrayXd shoulders = shoulder_heights(performer);
+  WavingHand waving;
+  waving.from_shoulder = hand - (right ? performer.rshoulder : performer.lshoulder);
+  waving.height = (hand.row(2).transpose().array() - shoulders) / performer.arm;
+  waving.other = (other.row(2).transpose().array() - shoulders) / performer.arm;
+  waving.partner = distances(hand, partner.torso)
+                       .min(distances(hand, partner.head))
+                       .min(distances(hand, partner.lhand))
+                       .min(distances(hand, partner.rhand));
+  waving.body = distances(hand, mouth_of(performer, partner)).min(distances(hand, performer.torso)) / performer.arm;
+  return waving;
 }
 
-double range_in(const Eigen::ArrayXd& values, const FrameSpan& span) {
-  const auto part = values.segment(span.begin, span.frames());
-  return part.maxCoeff() - part.minCoeff();
+SwingChain chain_of(const WavingHand& hand, const std::vector<TurningPoint>& points, std::size_t first,
+                    std::size_t last, int begin, double arm) {
+  SwingChain chain{.swings = static_cast<int>(last - first)};
+  chain.span = {begin + points[first].frame, begin + points[last].frame + 1};
+  const auto part = [&](const Eigen::ArrayXd& values) { return values.segment(chain.span.begin, chain.span.frames()); };
+  chain.across = std::numeric_limits<double>::max();
+  for (std::size_t j = first + 1; j <= last; ++j)
+    chain.across = std::min(chain.across, std::abs(points[j].place - points[j - 1].place));
+  chain.back = (hand.from_shoulder.col(chain.span.end - 1) - hand.from_shoulder.col(chain.span.begin)).norm() / arm;
+  chain.clear = part(hand.partner).minCoeff();
+  chain.body = part(hand.body).minCoeff();
+  chain.other = part(hand.other).mean();
+  return chain;
+}
+
+bool is_wave(const SwingChain& chain, const Thresholds& tau) {
+  return chain.swings >= tau.at("swings") && chain.back <= tau.at("back") && chain.clear >= tau.at("clear") &&
+         chain.body >= tau.at("body") && chain.other <= tau.at("other");
+}
+
+// A wave before none, then the longer one.
+bool is_better(const SwingChain& chain, const SwingChain& best, const Thresholds& tau) {
+  return is_wave(chain, tau) != is_wave(best, tau) ? is_wave(chain, tau) : chain.swings > best.swings;
 }
 
 // The longest chain of swings in a span of frames where the hand is up.
-SwingChain longest_chain(const Eigen::Matrix3Xd& hand, const Eigen::Matrix3Xd& shoulder, const FrameSpan& up,
-                         const Thresholds& tau) {
-  const Eigen::ArrayXd place = main_motion((hand - shoulder).middleCols(up.begin, up.frames()));
-  const Eigen::ArrayXd arm = distances(hand, shoulder).segment(up.begin, up.frames());
-  const std::vector<TurningPoint> points = turning_points(place, tau.at("swing"));
+SwingChain longest_chain(const WavingHand& hand, FrameSpan up, double arm, const Thresholds& tau) {
+  const int frames = static_cast<int>(hand.height.size());
+  if (up.begin > 0) up.begin += kComes;
+  if (up.end < frames) up.end -= kComes;
   SwingChain best;
+  if (up.frames() < kLeast) return best;
+  const Eigen::ArrayXd place = main_motion(hand.from_shoulder.middleCols(up.begin, up.frames()));
+  const std::vector<TurningPoint> points = turning_points(place, tau.at("swing"));
   std::size_t first = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
     if ((points[i].frame - points[i - 1].frame) / kRateHz > tau.at("slowest")) first = i;
-    const int swings = static_cast<int>(i - first);
-    if (swings <= best.swings) continue;
-    const FrameSpan inside{points[first].frame, points[i].frame + 1};
-    best.swings = swings;
-    best.span = {up.begin + inside.begin, up.begin + inside.end};
-    best.radial = range_in(arm, inside) / range_in(place, inside);
-    best.across = std::numeric_limits<double>::max();
-    for (std::size_t j = first + 1; j <= i; ++j)
-      best.across = std::min(best.across, std::abs(points[j].place - points[j - 1].place));
+    if (i == first) continue;
+    const SwingChain chain = chain_of(hand, points, first, i, up.begin, arm);
+    if (is_better(chain, best, tau)) best = chain;
   }
   return best;
 }
 
-bool is_wave(const SwingChain& chain, const Thresholds& tau) {
-  return chain.swings >= tau.at("swings") && chain.radial <= tau.at("radial");
-}
-
-// A wave before none, then the longer one.
-SwingChain best_chain(const Agent& performer, const Thresholds& tau) {
+SwingChain best_chain(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   SwingChain best;
   for (const bool right : {false, true}) {
-    const Eigen::Matrix3Xd& hand = right ? performer.rhand : performer.lhand;
-    const Eigen::Matrix3Xd& shoulder = right ? performer.rshoulder : performer.lshoulder;
-    const Eigen::ArrayXd height = hand.row(2).transpose().array() - shoulder_heights(performer);
-    for (const FrameSpan& up : spans_of(at_least(height, tau.at("height")))) {
-      const SwingChain chain = longest_chain(hand, shoulder, up, tau);
-      const bool better = is_wave(chain, tau) != is_wave(best, tau) ? is_wave(chain, tau) : chain.swings > best.swings;
-      if (better) best = chain;
+    const WavingHand hand = waving_hand(performer, partner, right);
+    for (const FrameSpan& up : spans_of(at_least(hand.height, tau.at("height")))) {
+      const SwingChain chain = longest_chain(hand, up, performer.arm, tau);
+      if (is_better(chain, best, tau)) best = chain;
     }
   }
   return best;
@@ -115,36 +132,51 @@ double highest_hand(const Agent& performer) {
       .maxCoeff();
 }
 
-DetectorResult detect_wave_act(const Agent& raw_performer, const Agent&, const Thresholds& tau) {
-  const Agent performer = smoothed(raw_performer);
-  const SwingChain chain = best_chain(performer, tau);
+DetectorResult detect_wave_act(const Agent& raw_performer, const Agent& raw_partner, const Thresholds& tau) {
+  const Agent performer = smoothed(raw_performer), partner = smoothed(raw_partner);
+  const SwingChain chain = best_chain(performer, partner, tau);
   DetectorResult result;
   result.frames = mask_of(chain.span, performer.lhand.cols());
   result.parts = {{"swings", chain.swings >= tau.at("swings")},
-                  {"bent_elbow", chain.swings > 0 && chain.radial <= tau.at("radial")}};
+                  {"returns", chain.swings > 0 && chain.back <= tau.at("back")},
+                  {"clear", chain.clear >= tau.at("clear") && chain.body >= tau.at("body")},
+                  {"one_hand", chain.swings > 0 && chain.other <= tau.at("other")}};
   result.success = is_wave(chain, tau);
   result.values = {{"swings", chain.swings},
                    {"swing_min", chain.across},
-                   {"radial", chain.radial},
                    {"waving_s", chain.span.seconds()},
+                   {"back", chain.back},
+                   {"clear", chain.clear},
+                   {"body", chain.body},
+                   {"other", chain.other},
                    {"height", highest_hand(performer)}};
-  result.margins = {{"swings", chain.swings - tau.at("swings")}, {"radial", tau.at("radial") - chain.radial}};
+  result.margins = {{"swings", chain.swings - tau.at("swings")},
+                    {"back", tau.at("back") - chain.back},
+                    {"clear", chain.clear - tau.at("clear")},
+                    {"body", chain.body - tau.at("body")},
+                    {"other", tau.at("other") - chain.other}};
   return result;
 }
 
 constexpr auto kWaveRule = std::to_array<RuleThreshold>({
-    {"height", -0.2, "m", "the hand is at least so high over the shoulders all the while"},
-    {"swing", 0.06, "m", "a swing is at least so long"},
-    {"slowest", 0.65, "s", "and takes at most so long"},
-    {"swings", 4, "1", "swings on end, at least"},
-    {"radial", 0.6, "1", "the distance from the shoulder changes by at most this share of the way across"},
+    {"height", -0.3, "arm", "the hand is at least so high over the shoulders all the while"},
+    {"swing", 0.03, "m", "a swing is at least so long"},
+    {"slowest", 0.8, "s", "and takes at most so long"},
+    {"swings", 3, "1", "swings on end, at least"},
+    {"back", 0.65, "arm", "the hand ends at most so far from where it began"},
+    {"clear", 0.45, "m", "it stays so far from the partner's trunk, head and hands"},
+    {"body", 0.3, "arm", "and so far from the own mouth and heart"},
+    {"other", -0.3, "arm", "the other hand is at most so high over the shoulders"},
 });
 
 constexpr auto kWaveRuleFigures = std::to_array<DetectorFigure>({
     {"swings", "1", "swings on end of a raised hand"},
     {"swing_min", "m", "the least way of them"},
-    {"radial", "1", "change of the distance from the shoulder, as a share of the way across"},
     {"waving_s", "s", "how long they last"},
+    {"back", "1", "distance of the hand's last place from its first, of an arm's length"},
+    {"clear", "m", "least distance of the hand from the partner's trunk, head and hands"},
+    {"body", "1", "least distance of the hand from the own mouth and heart, of an arm's length"},
+    {"other", "1", "mean height of the other hand over the shoulders, of an arm's length"},
     {"height", "m", "largest height of the higher hand over the shoulders"},
 });
 

@@ -42,9 +42,8 @@ TEST(DetectorCatalogue, RulesOfTheSetActHaveUnitsAndMeanings) {
     for (const auto& [name, value] : thresholds(task, ThresholdSet::kAct))
       EXPECT_FALSE(threshold_unit(task, name, ThresholdSet::kAct).empty()) << to_string(task) << " " << name;
   }
-  EXPECT_TRUE(rule_thresholds(Task::kBend).empty());
   EXPECT_EQ(threshold_unit(Task::kHug, "hold", ThresholdSet::kAct), "s");
-  EXPECT_EQ(threshold_unit(Task::kBend, "min_frames", ThresholdSet::kAct), "frames");
+  EXPECT_EQ(threshold_unit(Task::kBend, "angle", ThresholdSet::kAct), "rad");
 }
 
 TEST(DetectorCatalogue, StrictChoicesAreTheReadingsThatTheSetBrings) {
