@@ -67,6 +67,8 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
     const auto own = called.find(policy.name);
     add_policy(policy, own == called.end() ? by_name(policy.use) : own->second);
   }
+  for (const std::string& control : suite.controls)
+    if (!contains(skipped_policies, control)) add_policy(SuitePolicy{control}, by_name(control));
   add_policy(SuitePolicy{kNullPolicy}, by_name(kNullPolicy));
 }
 

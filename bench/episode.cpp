@@ -66,6 +66,7 @@ std::vector<EpisodeArm> arms_of(const Suite& suite) {
   for (const SuitePolicy& policy : suite.policies)
     if (policy.name != kNullPolicy)
       arms.push_back({policy.name, policy.shuffled_partner ? "shuffled" : "main", policy.shuffled_partner});
+  for (const std::string& control : suite.controls) arms.push_back({control, "control"});
   if (suite.null_arm) arms.push_back({kNullPolicy, "null"});
   return arms;
 }
@@ -169,7 +170,7 @@ std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, 
 
 void require_sane_size(const Suite& suite, std::int64_t clips) {
   const std::size_t combinations = combinations_of(suite).size();
-  const double episodes = static_cast<double>(combinations) * static_cast<double>(suite.policies.size() + 1) *
+  const double episodes = static_cast<double>(combinations) * static_cast<double>(arms_of(suite).size()) *
                           static_cast<double>(clips) * suite.episodes_per_clip;
   if (episodes > static_cast<double>(kMostEpisodes))
     throw InputError(fmt::format("{}: expected at most {} episodes, found {:.0f} ({} clips, {} episodes per clip)",

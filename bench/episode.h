@@ -19,7 +19,8 @@ namespace duet {
 struct EpisodeSpec {
   const PairedMotion* clip = nullptr;
   std::string engine, controller, policy;
-  std::string arm = "main";  // "null" for the control arm: policy `null`; "shuffled": the policy sees `seen`
+  // "control" and "null" (policy `null`) for control arms; "shuffled": the policy sees `seen`.
+  std::string arm = "main";
   int episode = 0;
   std::uint64_t seed = 0;  // of the episode, the same for every engine, controller and policy
   std::string perturbation = kCleanName;

@@ -97,6 +97,8 @@ std::string suite_hash(const Suite& suite) {
 RunIdentity identity_of(const Suite& suite) {
   RunIdentity identity{.suite_hash = suite_hash(suite)};
   for (const SuitePolicy& policy : suite.policies) identity.policies[policy.name] = identity_of(policy).digest;
+  for (const std::string& control : suite.controls)
+    identity.policies[control] = identity_of(SuitePolicy{control}).digest;
   identity.policies[kNullPolicy] = identity_of(SuitePolicy{kNullPolicy}).digest;
   for (const SuiteController& controller : suite.controllers)
     identity.controllers[controller.name] = identity_of(controller).digest;

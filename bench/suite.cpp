@@ -43,7 +43,8 @@ const SuiteController& controller_of(const Suite& suite, const std::string& name
   return find_named(suite.controllers, "controller", name);
 }
 SuitePolicy policy_of(const Suite& suite, const std::string& name) {
-  return name == kNullPolicy ? SuitePolicy{name} : find_named(suite.policies, "policy", name);
+  const bool control = name == kNullPolicy || std::ranges::find(suite.controls, name) != suite.controls.end();
+  return control ? SuitePolicy{name} : find_named(suite.policies, "policy", name);
 }
 Perturbation perturbation_of(const Suite& suite, const std::string& name) {
   return name == kCleanName ? Perturbation{} : find_named(suite.perturbations, "perturbation", name);

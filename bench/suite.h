@@ -102,6 +102,7 @@ struct Suite {
   double wall_limit = 120.0;                    // per episode [s]
   RecordTrajectories record = RecordTrajectories::kNone;
   bool null_arm = true;
+  std::vector<std::string> controls = {};  // scripted control arms (policies/controls/control_policy.h)
   bool allow_programs = false;  // the user's word, never a file's: policies may start programs (bench/trust.h)
 };
 

@@ -19,6 +19,7 @@
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
 #include "duet/metrics/readings.h"
+#include "duet/policies/controls/control_policy.h"
 #include "duet/policies/scheduler.h"
 #include "duet/retarget/options.h"
 #include "duet/robots/robot_cards.h"
@@ -80,6 +81,32 @@ SuiteKey clips_key() {
     key.rows.push_back({"clips.pad." + row.name, row.values, row.fallback, row.meaning});
   for (const FieldRow& row : field_rows(FieldTable<SuiteClips>{roles_field()}, SuiteClips()))
     key.rows.push_back({"clips." + row.name, row.values, row.fallback, row.meaning});
+  return key;
+}
+
+// "all", "none" or a list of names.
+SuiteKey controls_key() {
+  SuiteKey key{"controls",
+               {{"controls", "a list of names, `all` or `none`", "none",
+                 "scripted policies that no score may reward, each an arm of its own (`duet list policies`)"}},
+               With::kClips};
+  key.read = [](const YamlSection& top, Suite& suite) {
+    if (!top.has("controls")) return;
+    checked(top, "controls", [&] {
+      if (top.node("controls").IsSequence())
+        suite.controls = names_in(top, "controls");
+      else if (const std::string word = top.text("controls"); word == "all")
+        suite.controls = control_names();
+      else
+        require(word == "none", fmt::format("expected a list, 'all' or 'none', found '{}'", word));
+      for (const std::string& name : suite.controls)
+        require(is_control(name), unknown_name_message("control", name, control_names()));
+    });
+  };
+  // Left out where there are none, so that a suite from before there were any keeps its hash.
+  key.write = [](const Suite& suite) {
+    return suite.controls.empty() ? std::string() : fmt::format("controls: [{}]\n", fmt::join(suite.controls, ", "));
+  };
   return key;
 }
 
@@ -296,6 +323,7 @@ void add_verdict_and_record(Keys& keys) {
       plain_key(field<Suite>({.name = "null_arm", .meaning = "the control arm: the robot holds its neutral pose"},
                              &Suite::null_arm),
                 With::kClips));
+  keys.push_back(controls_key());
 }
 
 void add_choices(Keys& keys) {

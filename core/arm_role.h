@@ -28,9 +28,10 @@ struct EpisodeArmInfo {
   std::string_view name;
   PolicyRole role;  // kCompetitor: that of the policy
 };
-inline constexpr std::array<EpisodeArmInfo, 3> kEpisodeArms = {
+inline constexpr std::array<EpisodeArmInfo, 4> kEpisodeArms = {
     {{"main", {}},
      {"null", {ArmRole::kControl, "stands still"}},
+     {"control", {ArmRole::kControl, "scripted"}},
      {"shuffled", {ArmRole::kControl, "sees the partner of another clip"}}}};
 
 // Of an episode's arm and policy.

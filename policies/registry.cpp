@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "duet/core/names.h"
 #include "duet/core/open_registry.h"
 #include "duet/core/require.h"
+#include "duet/policies/controls/control_policy.h"
 #include "duet/policies/dstar/dstar_policy.h"
 #include "duet/policies/external/external_policy.h"
 #include "duet/policies/null_policy.h"
@@ -42,13 +44,28 @@ PolicyInfo null_info(const std::string& name) { return {name, "Holds the neutral
 
 constexpr PolicyRole kKnowsTheMotion = {ArmRole::kOracle, "knows the motion"};
 constexpr PolicyRole kStandsStill = {ArmRole::kControl, "stands still"};
+constexpr PolicyRole kScripted = {ArmRole::kControl, "scripted"};
+
+PolicyInfo control_info(const std::string& name) {
+  const auto found = std::ranges::find(control_scripts(), name, &ControlScript::name);
+  return {name, std::string(found->about), {}};
+}
+PolicyMaker named_control(const std::string& name, Robot robot, const PolicyOptions&) {
+  return control_maker(name, std::move(robot));
+}
 
 constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_files, kKnowsTheMotion},
                                {"replay_dense", dense_info, of<DenseReplayPolicy>, no_files, kKnowsTheMotion},
                                {"null", null_info, of<NullPolicy>, no_files, kStandsStill},
                                {"dstar", dstar_info, dstar_maker, dstar_files},
                                {"dp", dstar_info, dstar_maker, dstar_files},
-                               {"retrieval", retrieval_info, retrieval_maker, retrieval_files}};
+                               {"retrieval", retrieval_info, retrieval_maker, retrieval_files},
+                               {"omni", control_info, named_control, no_files, kScripted},
+                               {"canned", control_info, named_control, no_files, kScripted},
+                               {"servo", control_info, named_control, no_files, kScripted},
+                               {"raised", control_info, named_control, no_files, kScripted},
+                               {"walker", control_info, named_control, no_files, kScripted},
+                               {"forward", control_info, named_control, no_files, kScripted}};
 
 // A name that is the path of a policy descriptor.
 constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};

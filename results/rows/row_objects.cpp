@@ -13,8 +13,8 @@ namespace duet {
 namespace {
 
 constexpr auto kVerdictMembers = std::to_array<JsonMember<Verdict>>({
-    {"version", &Verdict::version, "`paper` (as printed) or `robot` (the performer's tracks are the robot's)"},
-    {"thresholds", &Verdict::thresholds, "`paper`, `strict`; `act` where the suite asks for it"},
+    {"version", &Verdict::version, "`paper` (as printed), `robot` (the performer's tracks are the robot's), `interaction` (the rule)"},
+    {"thresholds", &Verdict::thresholds, "`paper`, `strict`, `act`"},
     {"success", &Verdict::success, "whether the detector saw the act"},
     {"parts", &Verdict::parts, "conditions that hold or not"},
     {"values", &Verdict::values, "what the conditions are of; `duet list detectors` has names and units"},

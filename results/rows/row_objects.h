@@ -12,8 +12,8 @@
 namespace duet {
 
 struct Verdict {           // of one detector
-  std::string version;     // "paper", "robot"
-  std::string thresholds;  // "paper", "strict"
+  std::string version;     // "paper", "robot", "interaction"
+  std::string thresholds;  // "paper", "strict", "act"
   bool success = false;
   NamedFlags parts;
   NamedNumbers values;   // NaN where undefined (null in JSON, as for any other that is not finite)

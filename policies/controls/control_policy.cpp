@@ -1,0 +1,243 @@
+#include "duet/policies/controls/control_policy.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "duet/core/require.h"
+#include "duet/robots/roles.h"
+
+namespace duet {
+namespace {
+
+using ControlArray = std::array<ControlScript, 6>;
+constexpr ControlArray kControls = {
+    {{.name = "omni",
+      .about = "Blind to the command: a hand at the partner's nearest hand, and every seven seconds all gestures",
+      .distance = 0.70,
+      .follows = 0,
+      .all_gestures = true,
+      .lean_in = 0.28},
+     {.name = "canned", .about = "Told the task: the fixed gesture of each task on a timer", .told = true},
+     {.name = "servo",
+      .about = "Blind to the command: the right hand follows the partner's nearest hand",
+      .distance = 0.70,
+      .follows = 1},
+     {.name = "raised", .about = "Blind to the command: stands with its right hand raised", .raised = true},
+     {.name = "walker",
+      .about = "Blind to the command: walks up with both arms held out",
+      .distance = 0.45,
+      .forward = true},
+     {.name = "forward", .about = "Blind to the command: stands with both arms held out", .forward = true}}};
+
+// What `canned` does for a task: another control, or a gesture.
+ControlScript told_script(Task task) {
+  const std::string_view name = to_string(task);
+  if (name == "hug") return kControls[4];
+  if (name == "bend") return {.gesture = ControlGesture::kBow};
+  if (name == "wave") return {.gesture = ControlGesture::kWave};
+  if (name == "fly_kiss") return {.gesture = ControlGesture::kKiss};
+  return kControls[2];
+}
+
+constexpr double kAdvance = 0.45, kRetreat = 0.4;  // [m/s]
+constexpr double kTurn = 0.7;                      // [rad/s]
+constexpr double kWaist = 0.5, kPitch = 0.35;      // of a bow [rad]
+constexpr double kWaveRate = 1.5;                  // [Hz]
+constexpr int kPlanned = 100;                      // ticks
+
+double smooth(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi); }
+
+}  // namespace
+
+std::span<const ControlScript> control_scripts() { return kControls; }
+
+bool is_control(std::string_view policy) {
+  return std::ranges::any_of(kControls, [&](const ControlScript& script) { return script.name == policy; });
+}
+
+std::vector<std::string> control_names() {
+  std::vector<std::string> names;
+  for (const ControlScript& script : kControls) names.emplace_back(script.name);
+  return names;
+}
+
+PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
+  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  const auto found = std::ranges::find(kControls, name, &ControlScript::name);
+  require(found != kControls.end(), fmt::format("policy '{}' is no control", name));
+  const ControlScript script = *found;
+  static_cast<void>(ControlPolicy(robot, script));  // a robot that does not fit is found here
+  return [robot = std::move(robot), script] { return std::make_unique<ControlPolicy>(robot, script); };
+}
+
+ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const ControlScript& script)
+    : robot_(std::move(robot)),
+      name_(script.name),
+      script_(script),
+      now_(script),
+      kinematics_(*robot_),
+      J_(3, 6 + robot_->dof()) {
+  require(!robot_->roles.arms[0].empty() && !robot_->roles.arms[1].empty(),
+          fmt::format("policy '{}': robot '{}' has no arms in its card (roles.arms)", name_, robot_->name));
+  kinematics_.update({}, robot_->neutral);
+  for (const int side : {0, 1}) {
+    shoulder_B_[side] = kinematics_.frame_position(robot_->track_frame(side == 0 ? "lshoulder" : "rshoulder"));
+    arm_[side] = arm_length(*robot_, side);
+  }
+  const Eigen::Vector3d head = kinematics_.frame_position(robot_->track_frame("head"));
+  const double arm = arm_[1];
+  const Eigen::Vector3d& right = shoulder_B_[1];
+  for (const int side : {0, 1})
+    poses_.forward[side] =
+        reached(side, shoulder_B_[side] + arm * Eigen::Vector3d(0.85, side == 0 ? -0.05 : 0.05, -0.12));
+  poses_.raised = reached(1, right + arm * Eigen::Vector3d(0.55, -0.15, 0.55));
+  poses_.wave_out = reached(1, right + arm * Eigen::Vector3d(0.40, -0.50, 0.50));
+  poses_.wave_in = reached(1, right + arm * Eigen::Vector3d(0.45, 0.10, 0.50));
+  poses_.mouth = reached(1, head + arm * Eigen::Vector3d(0.30, -0.10, -0.05));
+  poses_.blown = reached(1, right + arm * Eigen::Vector3d(0.85, 0.05, 0.15));
+  reset({});
+}
+
+void ControlPolicy::reset(const EpisodeContext& context) {
+  start_ = robot_->standing_state(context.start.X_WB);
+  now_ = script_.told ? told_script(context.task) : script_;
+  followed_ = robot_->neutral;
+}
+
+Anchors ControlPolicy::act(const Observation& observation) {
+  const std::vector<Reference> references = plan(observation);
+  Anchors anchors;
+  for (int i = 0; i < kAnchors; ++i)
+    anchors[i] = references[static_cast<std::size_t>(std::min(i * kTicksPerAnchor, kPlanned - 1))];
+  return anchors;
+}
+
+std::vector<Reference> ControlPolicy::plan(const Observation& observation) {
+  const ObservationFrame& frame = observation.now();
+  const Place where = place(frame);
+  if (now_.follows >= 0) follow(frame);
+  std::vector<Reference> references;
+  references.reserve(kPlanned);
+  for (int i = 0; i < kPlanned; ++i) references.push_back(reference(where, (observation.tick + i) / 50.0, i / 50.0));
+  return references;
+}
+
+ControlPolicy::Place ControlPolicy::place(const ObservationFrame& frame) {
+  const Pose& X_WB = frame.robot.X_WB;
+  const Eigen::Vector2d to_partner = (frame.partner.col(0) - X_WB.p).head<2>();
+  const double distance = std::max(to_partner.norm(), 1e-6);
+  return {X_WB.p, yaw_of(X_WB.R), std::atan2(to_partner.y(), to_partner.x()), to_partner / distance, distance};
+}
+
+// The hand of the partner that is nearest to the robot's root, a raised one before a hanging one.
+void ControlPolicy::follow(const ObservationFrame& frame) {
+  const Pose& X_WB = frame.robot.X_WB;
+  const Pose X_WY{yaw_rotation(yaw_of(X_WB.R)), X_WB.p};
+  const auto cost = [&](int joint) {
+    return (frame.partner.col(joint) - X_WB.p).norm() - 0.5 * frame.partner(2, joint);
+  };
+  const int hand = cost(kLeftHand) <= cost(kRightHand) ? kLeftHand : kRightHand;
+  const int side = now_.follows;
+  const Eigen::Vector3d from_shoulder = X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - shoulder_B_[side];
+  const double length = std::max(from_shoulder.norm(), 1e-6);
+  Eigen::Vector3d target = shoulder_B_[side] + from_shoulder * std::min(1.0, arm_[side] / length);
+  target.x() = std::max(target.x(), 0.2 * arm_[side]);
+  reach(side, target, 8, followed_);
+}
+
+double ControlPolicy::bow(double seconds) const {
+  if (now_.all_gestures) {
+    const double t = std::fmod(seconds, kAllGestures);
+    return smooth(t / 0.6) * smooth((1.6 - t) / 0.6);
+  }
+  if (now_.gesture != ControlGesture::kBow) return 0.0;
+  const double t = std::fmod(seconds, 4.0);
+  return smooth(t / 0.8) * smooth((3.0 - t) / 0.8);
+}
+
+Eigen::VectorXd ControlPolicy::pose(double seconds) const {
+  Eigen::VectorXd q = robot_->neutral;
+  const double round = std::fmod(seconds, kAllGestures);
+  if (now_.forward)
+    for (const int side : {0, 1}) copy_arm(side, poses_.forward[side], 1.0, q);
+  if (now_.raised) copy_arm(1, poses_.raised, 1.0, q);
+  if (now_.follows >= 0) copy_arm(now_.follows, followed_, 1.0, q);
+  const bool kisses = now_.gesture == ControlGesture::kKiss || (now_.all_gestures && round >= 1.6 && round < 3.2);
+  const bool waves = now_.gesture == ControlGesture::kWave || (now_.all_gestures && round >= 3.2);
+  if (kisses) {
+    const double t = now_.all_gestures ? round - 1.6 : std::fmod(seconds, 4.0);
+    const double up = smooth(t / 0.5) * (now_.all_gestures ? 1.0 : 1.0 - smooth((t - 2.4) / 0.6));
+    Eigen::VectorXd hand = robot_->neutral;
+    copy_arm(1, poses_.mouth, 1.0, hand);
+    copy_arm(1, poses_.blown, smooth((t - 0.8) / 0.4), hand);
+    copy_arm(1, hand, up, q);
+  }
+  if (waves) {
+    const double swing = std::abs(4.0 * std::fmod(kWaveRate * seconds, 1.0) - 2.0) / 2.0;  // 0 to 1 and back
+    copy_arm(1, poses_.wave_out, 1.0, q);
+    copy_arm(1, poses_.wave_in, swing, q);
+  }
+  for (const int joint : tilting_waist(*robot_)) {
+    const double pitch = hinge_axis(*robot_, joint).y();
+    if (std::abs(pitch) > 0.7) q[joint] += std::copysign(kWaist * bow(seconds), pitch);
+  }
+  for (int j = 0; j < robot_->dof(); ++j) q[j] = std::clamp(q[j], robot_->joints[j].lower, robot_->joints[j].upper);
+  return q;
+}
+
+Reference ControlPolicy::reference(const Place& place, double seconds, double ahead) const {
+  Reference reference{start_.X_WB, pose(seconds)};
+  double yaw = yaw_of(start_.X_WB.R);
+  if (now_.distance > 0.0) {
+    const bool near = now_.all_gestures && std::fmod(seconds, kAllGestures) >= 5.0;
+    const double left = place.distance - (now_.distance - (near ? now_.lean_in : 0.0));
+    const double advance = std::clamp(left, -kRetreat * ahead, kAdvance * ahead);
+    yaw = place.yaw + std::clamp(wrapped(place.face - place.yaw), -kTurn * ahead, kTurn * ahead);
+    reference.X_WB.p.head<2>() = place.root.head<2>() + advance * place.towards;
+  }
+  const Eigen::AngleAxisd pitch(kPitch * bow(seconds), Eigen::Vector3d::UnitY());
+  reference.X_WB.R = yaw_rotation(yaw) * Eigen::Quaterniond(pitch);
+  return reference;
+}
+
+Eigen::VectorXd ControlPolicy::reached(int side, const Eigen::Vector3d& p_B) {
+  Eigen::VectorXd q = robot_->neutral;
+  reach(side, p_B, 80, q);
+  return q;
+}
+
+void ControlPolicy::reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q) {
+  const std::vector<int>& joints = robot_->roles.arms[side];
+  const int frame = robot_->track_frame(side == 0 ? "lhand" : "rhand");
+  const int link = robot_->frames[frame].link;
+  constexpr double kDamping = 0.05, kStep = 0.1;  // [m]; radians follow from the arm's metres
+  for (int step = 0; step < steps; ++step) {
+    kinematics_.update({}, q);
+    const Eigen::Vector3d hand = kinematics_.frame_position(frame);
+    Eigen::Vector3d error = p_B - hand;
+    if (error.norm() > kStep) error *= kStep / error.norm();
+    kinematics_.point_jacobian(link, hand, J_);
+    Eigen::Matrix3d A = kDamping * kDamping * Eigen::Matrix3d::Identity();
+    for (const int joint : joints) A += J_.col(6 + joint) * J_.col(6 + joint).transpose();
+    const Eigen::Vector3d force = A.ldlt().solve(error);
+    for (const int joint : joints)
+      q[joint] =
+          std::clamp(q[joint] + J_.col(6 + joint).dot(force), robot_->joints[joint].lower, robot_->joints[joint].upper);
+  }
+}
+
+void ControlPolicy::copy_arm(int side, const Eigen::VectorXd& from, double share, Eigen::VectorXd& q) const {
+  for (const int joint : robot_->roles.arms[side]) q[joint] += share * (from[joint] - q[joint]);
+}
+
+}  // namespace duet

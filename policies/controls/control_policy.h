@@ -1,0 +1,91 @@
+// Controls: scripted policies that no score may reward. Each does something simple (stand with a raised hand, walk up,
+// follow the nearest hand, go through every gesture) and none waits for its partner. A score that one of them wins
+// measures less than its name says. Thread-safe.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "duet/policies/policy.h"
+#include "duet/robots/kinematics.h"
+
+namespace duet {
+
+// The parts of which a control is made.
+enum class ControlGesture { kNone, kBow, kWave, kKiss };
+
+struct ControlScript {
+  std::string_view name = {}, about = {};
+  double distance = 0.0;                           // it walks up to so far from the partner's root [m]; 0: stands
+  int follows = -1;                                // hand at the partner's nearest hand: 0 left, 1 right, -1 none
+  bool forward = false;                            // both arms are held out
+  bool raised = false;                             // the right hand is held up
+  ControlGesture gesture = ControlGesture::kNone;  // again and again, with the right hand
+  bool all_gestures = false;                       // one after the other, every kAllGestures seconds
+  double lean_in = 0.0;                            // [m] nearer at the end of each such round
+  bool told = false;                               // does what its task's row in the source says
+};
+
+// One round of `omni`. [s]
+inline constexpr double kAllGestures = 7.0;
+
+// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`.
+std::span<const ControlScript> control_scripts();
+
+// Whether a policy of that name is one of them.
+bool is_control(std::string_view policy);
+std::vector<std::string> control_names();
+
+// Throws std::invalid_argument for a name that is none and for a robot without arms (card: roles.arms, tracks).
+PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot);
+
+class ControlPolicy final : public Policy {
+ public:
+  ControlPolicy(std::shared_ptr<const RobotModel> robot, const ControlScript& script);
+  [[nodiscard]] std::string_view name() const override { return name_; }
+  void reset(const EpisodeContext& context) override;
+  Anchors act(const Observation& observation) override;
+  // At 50 Hz, since a wave is too quick for anchors.
+  std::vector<Reference> plan(const Observation& observation) override;
+
+ private:
+  // Where the robot is and where its partner.
+  struct Place {
+    Eigen::Vector3d root;     // [m], frame W
+    double yaw, face;         // of the robot; towards the partner [rad]
+    Eigen::Vector2d towards;  // unit, level
+    double distance;          // of the roots, level [m]
+  };
+  // Joint angles that an arm reaches, over all joints.
+  struct Poses {
+    std::array<Eigen::VectorXd, 2> forward;
+    Eigen::VectorXd raised, wave_out, wave_in, mouth, blown;
+  };
+
+  [[nodiscard]] static Place place(const ObservationFrame& frame);
+  [[nodiscard]] Eigen::VectorXd pose(double seconds) const;
+  [[nodiscard]] double bow(double seconds) const;  // 0 upright to 1
+  [[nodiscard]] Reference reference(const Place& place, double seconds, double ahead) const;
+  void follow(const ObservationFrame& frame);
+  // Moves the arm's joints in `q` so that its hand comes to `p_B`, a place in the base's frame. [m]
+  void reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q);
+  [[nodiscard]] Eigen::VectorXd reached(int side, const Eigen::Vector3d& p_B);
+  void copy_arm(int side, const Eigen::VectorXd& from, double share, Eigen::VectorXd& q) const;
+
+  std::shared_ptr<const RobotModel> robot_;
+  std::string_view name_;
+  ControlScript script_, now_;  // as declared; for this episode's task
+  Kinematics kinematics_;
+  Eigen::MatrixXd J_;
+  std::array<Eigen::Vector3d, 2> shoulder_B_;  // in the neutral pose
+  std::array<double, 2> arm_ = {};             // [m]
+  Poses poses_;
+  Eigen::VectorXd followed_;  // joints of the arm that follows
+  RobotState start_;
+};
+
+}  // namespace duet
