@@ -9,6 +9,7 @@
 #include "duet/core/require.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/diagnostics.h"
+#include "duet/metrics/interaction.h"
 #include "duet/metrics/locomotion.h"
 #include "duet/metrics/onset.h"
 #include "duet/metrics/retargeting.h"
@@ -59,8 +60,25 @@ void set_measured(const Rollout& rollout, EpisodeRow& row) {
   row.forces = {{"ground.mean_n", rollout.ground.mean}, {"ground.peak_n", rollout.ground.peak}};
 }
 
+// Names in `row.forces` of what the rule `interaction` asks of a solid partner's contacts.
+constexpr const char* kHandsTouch = "human.hands_touch_s";
+constexpr const char* kTrunkTouch = "human.trunk_touch_s";
+constexpr const char* kSettledRatio = "human.settled_ratio";
+
+std::optional<PartnerTouch> touch_of(const EpisodeRow& row) {
+  const auto hands = row.forces.find(kHandsTouch), trunk = row.forces.find(kTrunkTouch);
+  if (hands == row.forces.end() || trunk == row.forces.end()) return std::nullopt;
+  PartnerTouch touch{hands->second, trunk->second, std::nullopt};
+  if (const auto ratio = row.forces.find(kSettledRatio); ratio != row.forces.end()) touch.settled_ratio = ratio->second;
+  return touch;
+}
+
 void add_contacts(const Rollout& rollout, const PairedMotion& clip, const RobotModel& robot, EpisodeRow& row) {
   if (!rollout.safety) return;
+  const PartnerTouch touch = partner_touch(*rollout.safety, robot, make_human_body(bone_lengths(clip.partner)),
+                                           act_window(rollout.recording), rollout.recording.rate_hz);
+  row.forces[kHandsTouch] = touch.hands_s;
+  row.forces[kTrunkTouch] = touch.trunk_s;
   row.contact_peak_n = rollout.safety->peak_force;
   row.contact_impulse_ns = rollout.safety->impulse;
   add_finite(contact_forces(*rollout.safety), row.forces);
@@ -88,6 +106,29 @@ int sole_height_mm(const Kinematics& kinematics, const std::vector<int>& shapes)
 Task task_of(const Recording& recording) {
   require(recording.task.has_value(), "episode: expected a recording of a task, found one of none");
   return *recording.task;
+}
+
+// Of an episode that the engine ended early, or of a task without a rule, the verdict says no and why.
+Verdict interaction_verdict(const Recording& recording, const ActSource& source, const Agent& human,
+                            const Agent& machine, EpisodeRow& row) {
+  const Task task = task_of(recording);
+  InteractionEvidence evidence{machine,
+                               human,
+                               touch_of(row),
+                               act_window(recording),
+                               std::nullopt,
+                               recording.phases.act_begin,
+                               recording.outcome == Outcome::kOk};
+  if (source.reactor.frames() > 0) evidence.model = human_agent(source.reactor.joints);
+  Verdict verdict;
+  verdict.version = to_string(DetectorVersion::kInteraction);
+  verdict.thresholds = to_string(ThresholdSet::kAct);
+  if (const std::string why_not = cannot_judge(task, evidence); !why_not.empty()) {
+    verdict.parts["judged"] = false;
+    if (row.message.empty()) row.message = "cannot be judged under `interaction`: " + why_not;
+    return verdict;
+  }
+  return to_verdict(judge_interaction(task, evidence), DetectorVersion::kInteraction, ThresholdSet::kAct);
 }
 
 }  // namespace
@@ -216,15 +257,20 @@ void score_recording(const Recording& recording, const ActSource& source, const 
   row.trace = state_trace(recording, robot);
   if (rules.feet) row.feet = foot_trace(recording, robot);
   row.success = false;
+  const bool by_rule = rules.detector == DetectorVersion::kInteraction;
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper}) {
     for (const ThresholdSet set : kThresholdSets) {
       // Rows of suites that do not ask for it stay as they were before there was such a set.
-      if (set == ThresholdSet::kAct && rules.thresholds != ThresholdSet::kAct) continue;
+      if (set == ThresholdSet::kAct && rules.thresholds != ThresholdSet::kAct && !by_rule) continue;
       const DetectorResult result = detect(task, human, machine, version, set, rules.readings.detectors);
       row.verdicts.push_back(to_verdict(result, version, set));
       if (version == rules.detector && set == rules.thresholds)
         row.success = result.success && recording.outcome == Outcome::kOk;
     }
+  }
+  if (by_rule) {
+    row.verdicts.push_back(interaction_verdict(recording, source, human, machine, row));
+    row.success = row.verdicts.back().success;
   }
   add_finite(onsets(recording, robot), row.metrics);
   if (recording.frames() < kShortestScored) return;

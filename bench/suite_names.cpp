@@ -61,7 +61,8 @@ const NameTable<RecordTrajectories>& record_names() {
 
 const NameTable<DetectorVersion>& version_names() {
   static const NameTable<DetectorVersion> names = {{"robot", DetectorVersion::kRobot},
-                                                   {"paper", DetectorVersion::kPaper}};
+                                                   {"paper", DetectorVersion::kPaper},
+                                                   {"interaction", DetectorVersion::kInteraction}};
   return names;
 }
 

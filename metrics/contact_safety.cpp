@@ -37,6 +37,7 @@ void check(const ContactSafetyOptions& options, double dt) {
   check_positive("hold", options.hold);
   check_positive("dt", dt);
   require_option(dt <= options.hold, "dt", "at most 'hold'", dt);
+  check_positive("settle", options.settle);
   check_not_negative("bridge", options.bridge);
   require_option(options.bridge <= options.hold, "bridge", "at most 'hold'", options.bridge);
   check_positive("mean_window", options.mean_window);
@@ -62,6 +63,9 @@ void judge(RegionContact& figures, const RegionLimits& limits) {
     figures.transient_ratio = *figures.quasi_static_ratio + (figures.transient_contacts > 0 ? 1.0 : 0.0);
   }
   // An absent ratio is below every number.
+  const std::optional<double> settled = limits.transient_allowed ? limits.transient_n : limits.quasi_static_n;
+  figures.settled_ratio =
+      std::max(ratio(figures.settled_force, settled), ratio(figures.quasi_static_force, limits.quasi_static_n));
   figures.worst_ratio = std::max({figures.quasi_static_ratio, figures.transient_ratio, figures.pressure_ratio});
   if (!limits.transient_allowed && figures.transient_contacts > 0)
     figures.verdict = ContactVerdict::kNotAllowed;
@@ -80,9 +84,10 @@ void sum_up(ContactSafetyResult& result) {
     result.quasi_static_force = std::max(result.quasi_static_force, region.quasi_static_force);
     result.impulse += region.impulse;
     result.worst_ratio = std::max(result.worst_ratio, region.worst_ratio);
+    result.settled_ratio = std::max(result.settled_ratio, region.settled_ratio);
     result.verdict = std::max(result.verdict, region.verdict);
   }
-  if (!touched) result.worst_ratio = 0.0;
+  if (!touched) result.worst_ratio = result.settled_ratio = 0.0;
 }
 
 }  // namespace
@@ -100,7 +105,8 @@ ContactSafety::Steps ContactSafety::in_steps(const ContactSafetyOptions& options
   check(options, dt);
   return {.hold = steps_within(options.hold, dt),
           .bridge = steps_within(options.bridge, dt),
-          .mean = nearest_steps(options.mean_window, dt)};
+          .mean = nearest_steps(options.mean_window, dt),
+          .settle = nearest_steps(options.settle, dt)};
 }
 
 // A force is held over `hold + 1` steps, the shortest span longer than `hold`; so many means over `bridge` lie within.
@@ -230,6 +236,7 @@ void ContactSafety::end_step(Region& region) {
     if (!region.lasting) --figures.transient_contacts;
     region.lasting = true;
   }
+  if (length > steps_.settle) figures.settled_force = std::max(figures.settled_force, force);
   figures.longest = std::max(figures.longest, static_cast<double>(length) * dt_);
   figures.peak_force = std::max(figures.peak_force, force);
   figures.impulse += force * dt_;

@@ -26,6 +26,7 @@ namespace duet {
 
 struct ContactSafetyOptions {
   double hold = 0.5;          // what lasts longer is quasi-static [s]
+  double settle = 0.1;        // after it the blow of a touch is over [s]
   double bridge = 0.02;       // gaps up to this do not end a contact [s]
   double mean_window = 0.1;   // of the windowed mean [s]
   double least_force = 1e-3;  // contacts with less count as none [N]
@@ -55,6 +56,7 @@ struct RegionContact {
   // the mean over every `bridge` kept. [N]
   double quasi_static_force = 0.0;
   double transient_force = 0.0;  // largest force within the first `hold` of a contact [N]
+  double settled_force = 0.0;    // largest force later than `settle` after a contact's begin [N]
   double impulse = 0.0;          // [N s]
   double windowed_mean = 0.0;    // largest mean over `mean_window`; before and after a contact counts zero [N]
   // Estimate: force of a pair over a circle of radius sqrt(2 R depth), 1/R = 1/R_capsule + 1/R_link, as spheres
@@ -65,9 +67,12 @@ struct RegionContact {
   // Where the table allows no transient contact, all force of a longer contact counts as quasi-static, and
   // transient_ratio is that ratio, plus one where there was a contact no longer than `hold`.
   std::optional<double> quasi_static_ratio;
-  std::optional<double> transient_ratio;             // of peak_force: a blow late in a contact counts
-  std::optional<double> pressure_ratio;              // against the quasi-static limit, whatever the duration
-  std::optional<double> worst_ratio;                 // the largest of the three
+  std::optional<double> transient_ratio;  // of peak_force: a blow late in a contact counts
+  std::optional<double> pressure_ratio;   // against the quasi-static limit, whatever the duration
+  std::optional<double> worst_ratio;      // the largest of the three
+  // settled_force against the transient limit, or quasi_static_ratio where that is larger: what is left of the ratios
+  // where the first blow of each contact is forgiven.
+  std::optional<double> settled_ratio;
   ContactVerdict verdict = ContactVerdict::kWithin;  // a ratio of exactly 1 is within
 };
 
@@ -85,16 +90,17 @@ struct ContactEvent {
 };
 
 struct ContactSafetyResult {
-  std::vector<RegionContact> regions;      // every region of the body, in the order of its capsules
-  std::vector<ContactEvent> events;        // by begin, link, capsule
-  std::int64_t events_left_out = 0;        // those past max_events
-  std::int64_t contacts_unfollowed = 0;    // contacts of a step past max_pairs: in the regions, but in no event
-  std::int64_t contacts_not_finite = 0;    // contacts of a step that were ignored
-  double duration = 0.0;                   // [s]
-  double peak_force = 0.0;                 // largest of the regions [N]
-  double quasi_static_force = 0.0;         // largest of the regions [N]
-  double impulse = 0.0;                    // of all regions [N s]
-  std::optional<double> worst_ratio = {};  // largest of the regions; 0 without contact, absent without any limit
+  std::vector<RegionContact> regions;        // every region of the body, in the order of its capsules
+  std::vector<ContactEvent> events;          // by begin, link, capsule
+  std::int64_t events_left_out = 0;          // those past max_events
+  std::int64_t contacts_unfollowed = 0;      // contacts of a step past max_pairs: in the regions, but in no event
+  std::int64_t contacts_not_finite = 0;      // contacts of a step that were ignored
+  double duration = 0.0;                     // [s]
+  double peak_force = 0.0;                   // largest of the regions [N]
+  double quasi_static_force = 0.0;           // largest of the regions [N]
+  double impulse = 0.0;                      // of all regions [N s]
+  std::optional<double> worst_ratio = {};    // largest of the regions; 0 without contact, absent without any limit
+  std::optional<double> settled_ratio = {};  // likewise
   ContactVerdict verdict = ContactVerdict::kWithin;  // worst of the regions that were touched
   std::string limits;                                // "iso_ts_15066 (unverified limits)"
   bool limits_verified = false;
@@ -117,7 +123,7 @@ class ContactSafety {
 
  private:
   struct Steps {  // options in steps
-    int hold, bridge, mean;
+    int hold, bridge, mean, settle;
   };
   struct Capsule {
     double radius = 0.0;

@@ -24,6 +24,7 @@ std::map<std::string, double> contact_forces(const ContactSafetyResult& result) 
                                        {"human.impulse_ns", result.impulse},
                                        {"human.limits_verified", result.limits_verified ? 1.0 : 0.0}};
   if (result.worst_ratio) forces["human.worst_ratio"] = *result.worst_ratio;
+  if (result.settled_ratio) forces["human.settled_ratio"] = *result.settled_ratio;
   for (const RegionContact& region : result.regions) {
     if (region.contacts == 0) continue;
     const std::string prefix = "human." + region.region + ".";

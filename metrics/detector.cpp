@@ -42,7 +42,10 @@ Thresholds completed(Task task, const Thresholds& given, ThresholdSet set = Thre
 
 }  // namespace
 
-std::string_view to_string(DetectorVersion version) { return version == DetectorVersion::kPaper ? "paper" : "robot"; }
+std::string_view to_string(DetectorVersion version) {
+  if (version == DetectorVersion::kInteraction) return "interaction";
+  return version == DetectorVersion::kPaper ? "paper" : "robot";
+}
 std::string_view to_string(ThresholdSet set) {
   return set == ThresholdSet::kPaper ? "paper" : set == ThresholdSet::kStrict ? "strict" : "act";
 }
@@ -83,6 +86,8 @@ DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& pa
 
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version, ThresholdSet set,
                       DetectorReadings readings) {
+  require(version != DetectorVersion::kInteraction,
+          "detector: the rule `interaction` judges an episode, not two agents (metrics/interaction.h)");
   if (set != ThresholdSet::kPaper) readings = strict_readings(readings);
   const bool paper = version == DetectorVersion::kPaper;
   const Agent& performer = paper ? human : robot;

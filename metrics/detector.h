@@ -22,12 +22,14 @@ namespace duet {
 // verdict, a value or a margin of any clip changes (DetectorsVersion.StandsForTheseVerdicts says when).
 inline constexpr std::string_view kDetectorsVersion = "1";
 
-enum class DetectorVersion { kPaper, kRobot };
+// `kInteraction` is no view of a detector but the rule of metrics/interaction.h, which asks the set `act` of the robot
+// and more; `detect` refuses it.
+enum class DetectorVersion { kPaper, kRobot, kInteraction };
 // Table S11 | the stricter set, which also sets readings | the set of rules that know the act, where a task has one,
 // else the strict one (docs/detectors.md).
 enum class ThresholdSet { kPaper, kStrict, kAct };
 inline constexpr std::array kThresholdSets = {ThresholdSet::kPaper, ThresholdSet::kStrict, ThresholdSet::kAct};
-std::string_view to_string(DetectorVersion version);  // "paper", "robot"
+std::string_view to_string(DetectorVersion version);  // "paper", "robot", "interaction"
 std::string_view to_string(ThresholdSet set);         // "paper", "strict", "act"
 
 // Throws std::invalid_argument for another name, and lists these.

@@ -1,0 +1,212 @@
+#include "duet/metrics/interaction.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "duet/core/require.h"
+#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/evidence.h"
+
+namespace duet {
+namespace {
+
+using rules::FrameSpan;
+using rules::kRateHz;
+
+// The act is due from half a second before its phases to a second after them.
+constexpr double kEarlier = 0.5, kLater = 1.0;  // [s]
+
+// A hand that is raised by a fifth of an arm is on its way: 12 cm of a person. [1]
+constexpr double kRaised = 0.2;
+constexpr double kLeans = 10.0 * std::numbers::pi / 180.0;
+constexpr double kStays = 0.3;  // [s]
+// Of the two who shake hands in SBU and K3HI, 95 % begin at most so long before the other (5 % quantiles of both
+// roles: 0.46 and 0.28 s). [s]
+constexpr double kLead = 0.5;
+// Nobody has to wait longer than the person did in whose place the robot is, give or take this. [s]
+constexpr double kModelLead = 0.3;
+
+bool is_trunk(const std::string& region) {
+  return region == "chest" || region == "abdomen" || region == "back" || region == "pelvis";
+}
+
+bool hangs_on(const RobotModel& robot, int link, const std::vector<int>& arm) {
+  for (; link > 0; link = robot.links[link].parent)
+    if (std::ranges::find(arm, link - 1) != arm.end()) return true;
+  return false;
+}
+
+struct Interval {
+  double begin, end;
+};
+
+double union_of(std::vector<Interval> intervals) {
+  std::ranges::sort(intervals, {}, &Interval::begin);
+  double total = 0.0, reached = -std::numeric_limits<double>::infinity();
+  for (const Interval& interval : intervals) {
+    const double begin = std::max(interval.begin, reached);
+    if (interval.end > begin) total += interval.end - begin;
+    reached = std::max(reached, interval.end);
+  }
+  return total;
+}
+
+std::optional<int> first_kept(const FrameMask& mask) {
+  const int stay = static_cast<int>(std::lround(kStays * kRateHz));
+  for (const FrameSpan& span : rules::spans_of(mask))
+    if (span.frames() >= stay) return span.begin;
+  return std::nullopt;
+}
+
+// Height over the lowest place so far.
+Eigen::ArrayXd raised(const Eigen::Matrix3Xd& hand, const Agent& agent) {
+  Eigen::ArrayXd height = heights(hand, agent.root);
+  double lowest = std::numeric_limits<double>::infinity();
+  for (Eigen::Index t = 0; t < height.size(); ++t) {
+    lowest = std::min(lowest, height[t]);
+    height[t] -= lowest;
+  }
+  return height;
+}
+
+Eigen::ArrayXd inclination(const Agent& agent) {
+  Eigen::ArrayXd angle(agent.head.cols());
+  for (Eigen::Index t = 0; t < angle.size(); ++t) {
+    const Eigen::Vector3d trunk = agent.head.col(t) - agent.root.col(t);
+    angle[t] = std::atan2(trunk.head<2>().norm(), trunk.z());
+  }
+  return angle;
+}
+
+bool overlaps(const std::vector<bool>& frames, const ActWindow& window) {
+  for (int t = std::max(window.begin, 0); t < std::min(window.end, static_cast<int>(frames.size())); ++t)
+    if (frames[static_cast<std::size_t>(t)]) return true;
+  return false;
+}
+
+bool is_included(const InteractionRule& rule, Task other) {
+  return std::ranges::find(rule.includes, to_string(other)) != rule.includes.end();
+}
+
+// By how much the performer begins before it may. [s] Nothing to wait for: minus infinity.
+struct Lead {
+  double before_partner = std::numeric_limits<double>::quiet_NaN();
+  double over = -std::numeric_limits<double>::infinity();
+};
+
+Lead lead_of(ActOnset onset, const InteractionEvidence& e) {
+  const std::optional<int> own = act_onset(onset, e.performer), partner = act_onset(onset, e.partner);
+  if (!own || !partner) return {};
+  Lead lead{.before_partner = (*partner - *own) / kRateHz};
+  double earliest = *partner - kLead * kRateHz;
+  if (e.model)
+    if (const std::optional<int> model = act_onset(onset, *e.model))
+      earliest = std::min(earliest, e.model_begin + *model - kModelLead * kRateHz);
+  lead.over = (earliest - *own) / kRateHz;
+  return lead;
+}
+
+// The touch that the task asks for.
+struct Touched {
+  double seconds = std::numeric_limits<double>::quiet_NaN();  // of a solid partner
+  double margin = std::numeric_limits<double>::infinity();
+};
+
+Touched touched(const InteractionRule& rule, const InteractionEvidence& e, double hands_min) {
+  if (rule.touch == Touch::kNone) return {};
+  if (!e.touch)
+    return {.margin = rule.ghost_hands > 0.0 ? rule.ghost_hands - hands_min : std::numeric_limits<double>::infinity()};
+  const double seconds = rule.touch == Touch::kHands ? e.touch->hands_s : e.touch->trunk_s;
+  return {seconds, seconds - rule.touch_s};
+}
+
+double hands_min(const InteractionEvidence& e) {
+  const int begin = std::max(e.window.begin, 0);
+  const int end = std::min(e.window.end, static_cast<int>(e.performer.lhand.cols()));
+  if (end <= begin) return std::numeric_limits<double>::quiet_NaN();
+  return closest_hands(e.performer, e.partner).distance.segment(begin, end - begin).minCoeff();
+}
+
+}  // namespace
+
+ActWindow act_window(const Recording& recording) {
+  const double rate = recording.rate_hz;
+  return {recording.phases.act_begin - static_cast<int>(std::lround(kEarlier * rate)),
+          recording.phases.act_end + static_cast<int>(std::lround(kLater * rate))};
+}
+
+PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,
+                           const ActWindow& window, double rate_hz) {
+  const int hands[] = {robot.frames[robot.track_frame("lhand")].link, robot.frames[robot.track_frame("rhand")].link};
+  std::vector<Interval> at_hands, at_trunk;
+  for (const ContactEvent& event : safety.events) {
+    const Interval interval{std::max(event.begin, window.begin / rate_hz),
+                            std::min(event.begin + event.duration, window.end / rate_hz)};
+    if (interval.end <= interval.begin) continue;
+    const std::string& region = human.capsules[static_cast<std::size_t>(event.capsule)].region;
+    if (region == "hand" && (event.link == hands[0] || event.link == hands[1])) at_hands.push_back(interval);
+    const bool arm =
+        hangs_on(robot, event.link, robot.roles.arms[0]) || hangs_on(robot, event.link, robot.roles.arms[1]);
+    if (is_trunk(region) && arm) at_trunk.push_back(interval);
+  }
+  return {union_of(std::move(at_hands)), union_of(std::move(at_trunk)), safety.settled_ratio};
+}
+
+std::optional<int> act_onset(ActOnset onset, const Agent& raw) {
+  if (onset == ActOnset::kNone) return std::nullopt;
+  const Agent agent = rules::smoothed(raw);
+  if (onset == ActOnset::kTrunkLeans) return first_kept(at_least(inclination(agent), kLeans));
+  std::optional<int> first;
+  for (const Eigen::Matrix3Xd* hand : {&agent.lhand, &agent.rhand})
+    if (const std::optional<int> found = first_kept(at_least(raised(*hand, agent), kRaised * agent.arm)))
+      first = first ? std::min(*first, *found) : *found;
+  return first;
+}
+
+std::string cannot_judge(Task task, const InteractionEvidence& evidence) {
+  const TaskDefinition& definition = definition_of(task);
+  if (definition.rule == nullptr) return fmt::format("the task {} has no rule of its own", to_string(task));
+  if (evidence.partner.root.cols() == 0) return "no partner was recorded";
+  if (evidence.performer.lhand.cols() == 0) return "the robot has no hands";
+  return "";
+}
+
+DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
+  const std::string why_not = cannot_judge(task, e);
+  require(why_not.empty(), fmt::format("cannot be judged under `interaction`: {}", why_not));
+  const InteractionRule& rule = definition_of(task).interaction;
+  const DetectorResult act = detect_by_rule(task, e.performer, e.partner, {});
+  const double nearest = hands_min(e);
+  const Touched touch = touched(rule, e, nearest);
+  const Lead lead = lead_of(rule.onset, e);
+
+  DetectorResult result;
+  result.frames = act.frames;
+  result.values = {{"touch_s", touch.seconds}, {"hands_min", nearest}, {"lead_s", lead.before_partner}};
+  int others = 0;
+  for (const Task other : all_tasks()) {
+    if (other == task || definition_of(other).rule == nullptr || is_included(rule, other)) continue;
+    if (!detect_by_rule(other, e.performer, e.partner, {}).success) continue;
+    result.values[fmt::format("also_{}", to_string(other))] = 1.0;
+    ++others;
+  }
+  const double settled = e.touch && e.touch->settled_ratio ? *e.touch->settled_ratio : 0.0;
+  if (e.touch) result.values["settled_ratio"] = settled;
+  result.parts = {{"act", act.success && overlaps(act.frames, e.window)},
+                  {"alone", others == 0},
+                  {"touch", touch.margin >= 0.0},
+                  {"force", settled <= 1.0},
+                  {"reply", lead.over <= 0.0},
+                  {"stands", e.stands}};
+  result.margins = {{"touch", touch.margin}, {"force", 1.0 - settled}, {"reply", -lead.over}};
+  for (const auto& [name, margin] : act.margins) result.margins["act." + name] = margin;
+  result.success = std::ranges::all_of(result.parts, [](const auto& part) { return part.second; });
+  return result;
+}
+
+}  // namespace duet

@@ -1,0 +1,57 @@
+// Whether an episode of a task was the interaction: the robot did the act, with the partner, in reply to him, and no
+// other act, and stood to the end (docs/detectors.md, "The rule interaction"). Each condition is a part of the verdict,
+// so that a failed episode says why. Pure functions.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "duet/core/recording.h"
+#include "duet/metrics/contact_safety.h"
+#include "duet/metrics/detector.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+// How a solid partner was touched while the act was due. Times are of all touches together, gaps left out.
+struct PartnerTouch {
+  double hands_s = 0.0;                 // a hand of the robot at a hand of the partner [s]
+  double trunk_s = 0.0;                 // an arm of the robot at the partner's trunk [s]
+  std::optional<double> settled_ratio;  // see ContactSafetyResult
+};
+
+// Frames of the recording in which the act is due: somewhat more than its phases.
+struct ActWindow {
+  int begin = 0, end = 0;  // [begin, end)
+};
+ActWindow act_window(const Recording& recording);
+
+PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,
+                           const ActWindow& window, double rate_hz);
+
+// What the rule looks at, of one episode at 50 Hz.
+struct InteractionEvidence {
+  Agent performer, partner;                // of the whole episode
+  std::optional<PartnerTouch> touch = {};  // none: the partner is a ghost
+  ActWindow window = {};
+  // Who was in the performer's place when the clip was made, over the act: nobody has to wait longer than he did.
+  std::optional<Agent> model = {};
+  int model_begin = 0;  // frame of the episode at which `model` begins
+  bool stands = true;   // to the end
+};
+
+// When the act begins: the first time that a hand is raised by a fifth of an arm over the lowest place that it had so
+// far and stays up for 0.3 s, be it withdrawn afterwards; of a bow, that the trunk leans by 10 degrees. [frames]
+std::optional<int> act_onset(ActOnset onset, const Agent& agent);
+
+// Parts: act, alone, touch, force, reply, stands. Values: touch_s, hands_min [m], settled_ratio, lead_s (by which it
+// begins before its partner), also_<task> (1 where the act of that task was seen, too). Throws as detect_by_rule;
+// `why_not` says why such an episode cannot be judged.
+DetectorResult judge_interaction(Task task, const InteractionEvidence& evidence);
+
+// Why the rule cannot judge: a task without a rule, a partner who is absent, a robot without hands; empty: it can.
+std::string cannot_judge(Task task, const InteractionEvidence& evidence);
+
+}  // namespace duet
