@@ -1,7 +1,8 @@
 // The rule of an act: how the set `act` tells a task from its neighbours where no threshold of its detector can. A rule
 // looks at times and shapes (how long hands stay together and what they do meanwhile, where arms are round a trunk), so
 // it is as good on recordings of 15 Hz with centimetres of noise: tracks are smoothed first (tasks/rules/evidence.h).
-// Numbers were chosen on the SBU recordings and on synthetic clips (docs/detectors.md, "The set act").
+// Numbers were chosen on the recordings of SBU, K3HI and Kinder and on synthetic clips (docs/detectors.md, "The set
+// act").
 #pragma once
 
 #include <span>

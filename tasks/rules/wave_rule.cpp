@@ -1,7 +1,7 @@
 // Wave: one raised hand swings to and fro, several times on end at 0.6 Hz and faster, and comes back to where it began,
 // clear of the partner. The way up and the way down are no swings; who pushes or punches is near the partner or has
 // both hands up. A hand that is held up and waves from the wrist alone is not seen: its track stands still (five of
-// Kinder's nineteen).
+// Kinder's twenty).
 //
 // A swing is the way between two turning points of the hand along its main direction, slow drifts taken off.
 #include <Eigen/Eigenvalues>

@@ -157,17 +157,28 @@ TEST(ContactForces, NameWhatWasTouched) {
     return std::vector{touch(kChestA, 50.0, 0, 0.01), touch(kFoot, 30.0, 1)};
   });
   const std::map<std::string, double> forces = contact_forces(result);
-  EXPECT_THAT(forces, UnorderedElementsAre(Key("human.peak_n"), Key("human.impulse_ns"), Key("human.worst_ratio"),
-                                           Key("human.limits_verified"), Key("human.chest.peak_n"),
-                                           Key("human.chest.quasi_static_n"), Key("human.chest.transient_n"),
-                                           Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"),
-                                           Key("human.chest.worst_ratio"), Key("human.foot.peak_n"),
-                                           Key("human.foot.quasi_static_n"), Key("human.foot.transient_n"),
-                                           Key("human.foot.impulse_ns"), Key("human.foot.pressure_n_cm2")));
+  EXPECT_THAT(forces,
+              UnorderedElementsAre(
+                  Key("human.peak_n"), Key("human.impulse_ns"), Key("human.worst_ratio"), Key("human.settled_ratio"),
+                  Key("human.limits_verified"), Key("human.chest.peak_n"), Key("human.chest.quasi_static_n"),
+                  Key("human.chest.transient_n"), Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"),
+                  Key("human.chest.worst_ratio"), Key("human.foot.peak_n"), Key("human.foot.quasi_static_n"),
+                  Key("human.foot.transient_n"), Key("human.foot.impulse_ns"), Key("human.foot.pressure_n_cm2")));
   EXPECT_EQ(forces.at("human.peak_n"), 50.0);
   EXPECT_NEAR(forces.at("human.impulse_ns"), 80.0, kRounding);
   EXPECT_EQ(forces.at("human.foot.quasi_static_n"), 30.0);
   EXPECT_EQ(forces.at("human.worst_ratio"), forces.at("human.chest.worst_ratio"));
+}
+
+// A blow of 0.1 s is forgiven, what comes later is not.
+TEST(ContactSafety, ASettledForceIsWhatComesAfterTheBlow) {
+  const auto pushed = [](double blow, double after) {
+    return fed(0.4, [=](double t) { return std::vector{touch(kChestA, t < 0.099 ? blow : after, 0, 0.01)}; });
+  };
+  const double limit = contact_table().region("chest").transient_n.value();
+  EXPECT_NEAR(pushed(5.0 * limit, 0.5 * limit).settled_ratio.value(), 0.5, kRounding);
+  EXPECT_NEAR(pushed(0.5 * limit, 1.5 * limit).settled_ratio.value(), 1.5, kRounding);
+  EXPECT_EQ(fed(1.0, [](double) { return std::vector<Contact>{}; }).settled_ratio, 0.0);
 }
 
 TEST(ContactSafetyMetrics, AreInTheCatalogue) {
