@@ -34,11 +34,11 @@ double arm_of(const PointTracks& smpl24) {
     const PointTracks::ConstFrame joints = smpl24.frame(t);
     double both = 0.0;
     for (const auto& [from, to] : {std::pair{kLeftShoulder, kLeftElbow},
-                                  {kLeftElbow, kLeftWrist},
-                                  {kLeftWrist, kLeftHand},
-                                  {kRightShoulder, kRightElbow},
-                                  {kRightElbow, kRightWrist},
-                                  {kRightWrist, kRightHand}})
+                                   {kLeftElbow, kLeftWrist},
+                                   {kLeftWrist, kLeftHand},
+                                   {kRightShoulder, kRightElbow},
+                                   {kRightElbow, kRightWrist},
+                                   {kRightWrist, kRightHand}})
       both += (joints.col(to) - joints.col(from)).norm();
     arms.push_back(0.5 * both);
   }

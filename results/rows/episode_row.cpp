@@ -56,7 +56,8 @@ constexpr auto kRowFields = std::to_array<RowField>({
       "SHA-256 of the robot model, the controller's own body; empty where the controller is absent"},
      {.scanned = true, .tabled = false}},
     {{"arm", &Row::arm,
-      "`main`, `null` (a robot that stands still), `control` (a scripted policy that no score may reward), `shuffled` (a policy that sees the partner of another clip)"},
+      "`main`, `null` (a robot that stands still), `control` (a scripted policy that no score may reward), `shuffled` "
+      "(a policy that sees the partner of another clip)"},
      {.scanned = true, .check = check_arm}},
     {{"outcome", &Row::outcome, "`ok`, `fell`, `diverged`, `timeout`, `unsupported`, `error`"}, {.scanned = true}},
     {{"message", &Row::message, "why, where the outcome is not `ok`; else empty"}},

@@ -13,7 +13,8 @@ namespace duet {
 namespace {
 
 constexpr auto kVerdictMembers = std::to_array<JsonMember<Verdict>>({
-    {"version", &Verdict::version, "`paper` (as printed), `robot` (the performer's tracks are the robot's), `interaction` (the rule)"},
+    {"version", &Verdict::version,
+     "`paper` (as printed), `robot` (the performer's tracks are the robot's), `interaction` (the rule)"},
     {"thresholds", &Verdict::thresholds, "`paper`, `strict`, `act`"},
     {"success", &Verdict::success, "whether the detector saw the act"},
     {"parts", &Verdict::parts, "conditions that hold or not"},
