@@ -10,6 +10,7 @@
 #include "duet/core/file.h"
 #include "duet/core/npy.h"
 #include "duet/core/npy_header.h"
+#include "duet/core/number.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/core/zip.h"
@@ -193,6 +194,13 @@ std::vector<std::string> Npz::strings(const std::string& key, const std::vector<
 }
 
 double Npz::number(const std::string& key) const { return numbers(key, scalar_shape(*this, key)).front(); }
+
+double Npz::number_or_text(const std::string& key) const {
+  if (!std::holds_alternative<std::vector<std::string>>(array(key).values)) return number(key);
+  const std::string words = text(key);
+  if (const std::optional<double> value = parse_number(words)) return *value;
+  refuse(*this, key, fmt::format("expected a number, found '{}'", shown(words)));
+}
 
 std::int64_t Npz::integer(const std::string& key) const { return integers(key, scalar_shape(*this, key)).front(); }
 

@@ -46,6 +46,8 @@ class Npz {
   [[nodiscard]] std::vector<std::int64_t> integers(const std::string& key, const std::vector<long>& shape) const;
   [[nodiscard]] std::vector<std::string> strings(const std::string& key, const std::vector<long>& shape) const;
   [[nodiscard]] double number(const std::string& key) const;
+  // The same where files of others may have it as text ("30").
+  [[nodiscard]] double number_or_text(const std::string& key) const;
   [[nodiscard]] std::int64_t integer(const std::string& key) const;
   [[nodiscard]] std::string text(const std::string& key) const;
   [[nodiscard]] PointTracks tracks(const std::string& key, int points) const;  // (T, points, 3); points = -1: any

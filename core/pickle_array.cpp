@@ -5,8 +5,10 @@
 #include <cstring>
 
 #include "duet/core/half.h"
+#include "duet/core/number.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -37,11 +39,18 @@ ItemType item_type(const Pickle& pickle, const PickleNode& node, const PickleNod
   if (dtype.text == "f2") return {2, read_half};
   if (dtype.text == "f4") return {4, read_number<float>};
   if (dtype.text == "f8") return {8, read_number<double>};
+  if (dtype.text == "i1") return {1, read_number<std::int8_t>};
+  if (dtype.text == "i2") return {2, read_number<std::int16_t>};
   if (dtype.text == "i4") return {4, read_number<std::int32_t>};
   if (dtype.text == "i8") return {8, read_number<std::int64_t>};
+  if (dtype.text == "u1") return {1, read_number<std::uint8_t>};
+  if (dtype.text == "u2") return {2, read_number<std::uint16_t>};
+  if (dtype.text == "u4") return {4, read_number<std::uint32_t>};
+  if (dtype.text == "u8") return {8, read_number<std::uint64_t>};
   std::string found;
   for (const unsigned char c : dtype.text.substr(0, 20)) found += c >= 0x20 && c < 0x7f ? static_cast<char>(c) : '?';
-  pickle.fail(node.offset, fmt::format("{}: expected numbers of type f2, f4, f8, i4 or i8, found '{}'", what, found));
+  pickle.fail(node.offset,
+              fmt::format("{}: expected numbers of type f2, f4, f8, i1..i8 or u1..u8, found '{}'", what, found));
 }
 
 // The bytes of a node; protocol 2 keeps them as UTF-8 text of code points below 256.
@@ -90,6 +99,40 @@ std::vector<double> to_c_order(const std::vector<double>& values, const std::vec
   return result;
 }
 
+constexpr std::size_t kMostListNumbers = std::size_t{1} << 22;  // a pickle has at most 2^20 objects
+constexpr int kDeepestList = 8;
+
+bool is_list(const PickleNode& node) { return node.kind == PickleKind::kList || node.kind == PickleKind::kTuple; }
+
+// Appends the numbers of a node and of what it holds to `values`; returns their shape. `visits` counts the nodes on the
+// way: a file may name one list in many places, and lists of such lists are more numbers than it has bytes.
+std::vector<std::size_t> append_numbers(const Pickle& pickle, const PickleNode& node, const std::string& what,
+                                        int depth, std::size_t& visits, std::vector<double>& values) {
+  if (++visits > kMostListNumbers || values.size() > kMostListNumbers)
+    pickle.fail(node.offset, fmt::format("{}: expected lists of at most {} numbers", what, kMostListNumbers));
+  if (node.kind == PickleKind::kFloat || node.kind == PickleKind::kInt) {
+    values.push_back(node.kind == PickleKind::kFloat ? node.number : static_cast<double>(node.integer));
+    return {};
+  }
+  if (!is_list(node)) {
+    const std::vector<double> array = array_values(pickle, node, what);
+    values.insert(values.end(), array.begin(), array.end());
+    return node.shape;
+  }
+  if (depth == kDeepestList)
+    pickle.fail(node.offset, fmt::format("{}: expected lists at most {} deep", what, kDeepestList));
+  std::vector<std::size_t> shape;
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    std::vector<std::size_t> item = append_numbers(pickle, pickle[node.items[i]], what, depth + 1, visits, values);
+    if (i > 0 && item != shape)
+      pickle.fail(node.offset, fmt::format("{}: expected rows of one shape, found ({}) in row 0 and ({}) in row {}",
+                                           what, fmt::join(shape, ", "), fmt::join(item, ", "), i));
+    shape = std::move(item);
+  }
+  shape.insert(shape.begin(), node.items.size());
+  return shape;
+}
+
 }  // namespace
 
 std::vector<double> array_values(const Pickle& pickle, const PickleNode& node, const std::string& what) {
@@ -103,6 +146,29 @@ std::vector<double> array_values(const Pickle& pickle, const PickleNode& node, c
   std::vector<double> values(count);
   for (std::size_t i = 0; i < count; ++i) values[i] = type.read(bytes.data() + i * type.size, dtype.byte_order == '>');
   return node.fortran && node.shape.size() > 1 ? to_c_order(values, node.shape) : values;
+}
+
+PickleNumbers pickle_numbers(const Pickle& pickle, const PickleNode& node, const std::string& what) {
+  PickleNumbers numbers;
+  std::size_t visits = 0;
+  if (node.kind == PickleKind::kArray || is_list(node) || node.kind == PickleKind::kFloat ||
+      node.kind == PickleKind::kInt) {
+    numbers.shape = append_numbers(pickle, node, what, 0, visits, numbers.values);
+    return numbers;
+  }
+  pickle.fail(node.offset,
+              fmt::format("{}: expected numbers (a NumPy array or lists), found {}", what, to_string(node.kind)));
+}
+
+double pickle_number(const Pickle& pickle, const PickleNode& node, const std::string& what) {
+  if (node.kind == PickleKind::kText) {
+    if (const std::optional<double> number = parse_number(node.text)) return *number;
+    pickle.fail(node.offset, fmt::format("{}: expected a number, found '{}'", what, shown(node.text)));
+  }
+  const PickleNumbers numbers = pickle_numbers(pickle, node, what);
+  if (numbers.values.size() != 1)
+    pickle.fail(node.offset, fmt::format("{}: expected one number, found {}", what, numbers.values.size()));
+  return numbers.values.front();
 }
 
 }  // namespace duet

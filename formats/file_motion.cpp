@@ -131,6 +131,11 @@ class Interpreter {
       why = "detected";
     }
     fact_.radians = unit == AngleUnit::kDegrees ? kDegree : 1.0;
+    // What bends no joint by more than 3.1 degrees may be half a turn whose unit was taken for the other one.
+    const double bend = file_.q.size() > 0 ? file_.q.cwiseAbs().maxCoeff() * fact_.radians / kDegree : 0.0;
+    if (!options_.angles && bend > 0.0 && bend <= std::numbers::pi)
+      say(fmt::format(
+          "doubt: no joint is bent by more than {:.2g} degrees; is the unit of the angles right (--angles)?", bend));
     say(fmt::format("angles: {} ({}): within the joint limits {:.1f} % as rad, {:.1f} % as deg", to_string(unit), why,
                     100.0 * in_radians, 100.0 * in_degrees));
   }

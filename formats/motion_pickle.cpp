@@ -9,6 +9,7 @@
 #include "duet/core/data_file.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
+#include "duet/core/text.h"
 #include "duet/formats/pickle_fields.h"
 
 namespace duet {
@@ -18,6 +19,7 @@ constexpr std::size_t kMostMotionBytes = std::size_t{1} << 30;  // hours of one 
 constexpr double kUnitTolerance = 1e-6;
 constexpr double kRepairable = 0.1;  // deviation of a quaternion's length from 1 that is renormalised
 const std::array<std::string, 6> kKeys = {"fps", "root_pos", "root_rot", "dof_pos", "local_body_pos", "link_body_list"};
+const std::array<std::string, 3> kNameKeys = {"joint_names", "dof_names", "joint_order"};  // of files that have them
 
 // Rotations of the root; the sentence says what had to be mended.
 std::vector<Eigen::Quaterniond> get_rotations(const Pickle& pickle, const PickleNode& node,
@@ -44,21 +46,22 @@ std::vector<Eigen::Quaterniond> get_rotations(const Pickle& pickle, const Pickle
   return rotations;
 }
 
-std::vector<std::string> get_names(const Pickle& pickle, const PickleNode& node) {
+std::vector<std::string> get_names(const Pickle& pickle, const PickleNode& node, const std::string& key) {
   if (node.kind != PickleKind::kList && node.kind != PickleKind::kTuple)
-    pickle.fail(node.offset, fmt::format("key 'link_body_list': expected a list, found {}", to_string(node.kind)));
+    pickle.fail(node.offset, fmt::format("key '{}': expected a list, found {}", key, to_string(node.kind)));
   std::vector<std::string> names;
   for (const int item : node.items) {
     const PickleNode& name = pickle[item];
     if (name.kind != PickleKind::kText)
-      pickle.fail(name.offset, fmt::format("key 'link_body_list': expected a string, found {}", to_string(name.kind)));
+      pickle.fail(name.offset, fmt::format("key '{}': expected a string, found {}", key, to_string(name.kind)));
     names.emplace_back(name.text);
   }
   return names;
 }
 
 void read_bodies(const Pickle& pickle, const PickleDict& dict, std::size_t frames, PickledMotion& result) {
-  if (const PickleNode* names = dict.find("link_body_list")) result.link_body_list = get_names(pickle, *names);
+  if (const PickleNode* names = dict.find("link_body_list"))
+    result.link_body_list = get_names(pickle, *names, "link_body_list");
   const PickleNode* positions = dict.find("local_body_pos");
   if (positions == nullptr) {
     result.verdict.emplace_back("local_body_pos: none");
@@ -70,10 +73,27 @@ void read_bodies(const Pickle& pickle, const PickleDict& dict, std::size_t frame
   result.verdict.push_back(fmt::format("local_body_pos: {} bodies, {} named", bodies, result.link_body_list.size()));
 }
 
+// Names of the joints, and a sentence on the keys that tell nothing of the motion.
+void read_more(const Pickle& pickle, const PickleDict& dict, PickledMotion& result) {
+  std::vector<std::string> others;
+  for (const std::string& key : dict.keys()) {
+    if (std::find(kKeys.begin(), kKeys.end(), key) != kKeys.end()) continue;
+    const PickleNode* node = dict.find(key);
+    const bool names = std::find(kNameKeys.begin(), kNameKeys.end(), key) != kNameKeys.end();
+    if (names && node != nullptr && result.motion.joint_names.empty())
+      result.motion.joint_names = get_names(pickle, *node, key);
+    else
+      others.push_back(key);
+  }
+  if (!others.empty())
+    result.verdict.push_back(std::string(kLeftOutKeys) + "keys that are none of the format's: " +
+                             shown(fmt::format("{}", fmt::join(others, ", ")), kShownSentence));
+}
+
 }  // namespace
 
 PickledMotion motion_of_pickle(const Pickle& pickle) {
-  const PickleDict dict(pickle, pickle[pickle.root], kKeys);
+  const PickleDict dict(pickle, pickle[pickle.root]);
   PickledMotion result;
   RobotMotion& motion = result.motion;
   motion.rate_hz = pickle_rate(pickle, dict.get("fps"));
@@ -89,8 +109,9 @@ PickledMotion motion_of_pickle(const Pickle& pickle) {
   motion.q = Eigen::Map<const Eigen::MatrixXd>(joints.values.data(), static_cast<Eigen::Index>(joints.row_size),
                                                static_cast<Eigen::Index>(joints.rows));
   result.verdict = {fmt::format("rate: {} Hz, {} frames", motion.rate_hz, position.rows),
-                    fmt::format("joints: {}, not named by the file", joints.row_size), rotation_sentence};
+                    fmt::format("joints: {}", joints.row_size), rotation_sentence};
   read_bodies(pickle, dict, position.rows, result);
+  read_more(pickle, dict, result);
   return result;
 }
 

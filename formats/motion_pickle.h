@@ -12,8 +12,11 @@
 
 namespace duet {
 
+// How the sentence of the verdict begins that names keys beside the known ones.
+inline constexpr std::string_view kLeftOutKeys = "left out: ";
+
 struct PickledMotion {
-  RobotMotion motion;                       // joint_names empty: the files do not name them
+  RobotMotion motion;                       // joint_names empty where no key of the file names them
   PointTracks local_body_pos;               // (T, bodies, 3) as stored, may be empty
   std::vector<std::string> link_body_list;  // names of those bodies
   std::vector<std::string> verdict;  // what was found: rate, DoF, quaternions renormalised (worst deviation), ...

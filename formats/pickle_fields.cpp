@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
-#include "duet/core/names.h"
 #include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -21,11 +19,10 @@ std::string expected_table_text(std::size_t frames, const std::vector<std::size_
 
 }  // namespace
 
-PickleDict::PickleDict(const Pickle& pickle, const PickleNode& node, std::span<const std::string> known)
-    : pickle_(pickle) {
+PickleDict::PickleDict(const Pickle& pickle, const PickleNode& node) : pickle_(pickle) {
   if (node.kind != PickleKind::kDict)
     pickle.fail(node.offset, fmt::format("expected a dict, found {}", to_string(node.kind)));
-  for (std::size_t i = 0; i + 1 < node.items.size(); i += 2) add(pickle[node.items[i]], node.items[i + 1], known);
+  for (std::size_t i = 0; i + 1 < node.items.size(); i += 2) add(pickle[node.items[i]], node.items[i + 1]);
 }
 
 const PickleNode* PickleDict::find(const std::string& key) const {
@@ -46,12 +43,10 @@ std::vector<std::string> PickleDict::keys() const {
   return names;
 }
 
-void PickleDict::add(const PickleNode& key, int value, std::span<const std::string> known) {
+void PickleDict::add(const PickleNode& key, int value) {
   if (key.kind != PickleKind::kText)
     pickle_.fail(key.offset, fmt::format("expected a string as key, found {}", to_string(key.kind)));
   const std::string name(key.text);
-  if (!known.empty() && std::find(known.begin(), known.end(), name) == known.end())
-    pickle_.fail(key.offset, unknown_name_message("key", name, known));
   if (!values_.emplace(name, value).second)
     pickle_.fail(key.offset, fmt::format("key '{}' is there twice", shown(name)));
 }
@@ -59,14 +54,15 @@ void PickleDict::add(const PickleNode& key, int value, std::span<const std::stri
 PickleTable pickle_table(const Pickle& pickle, const PickleNode& node, const std::string& key, std::size_t frames,
                          const std::vector<std::size_t>& rest) {
   const std::string what = "key '" + key + "'";
-  PickleTable table{.values = array_values(pickle, node, what)};
-  bool fits = node.shape.size() == rest.size() + 1 && (frames == 0 || node.shape[0] == frames);
+  PickleNumbers numbers = pickle_numbers(pickle, node, what);
+  const std::vector<std::size_t>& shape = numbers.shape;
+  bool fits = shape.size() == rest.size() + 1 && (frames == 0 || shape[0] == frames);
   for (std::size_t d = 0; fits && d < rest.size(); ++d)
-    fits = rest[d] == 0 ? node.shape[d + 1] > 0 : node.shape[d + 1] == rest[d];
+    fits = rest[d] == 0 ? shape[d + 1] > 0 : shape[d + 1] == rest[d];
   if (!fits)
     pickle.fail(node.offset, fmt::format("{}: expected shape {}, found ({})", what, expected_table_text(frames, rest),
-                                         fmt::join(node.shape, ", ")));
-  table.rows = node.shape[0];
+                                         fmt::join(shape, ", ")));
+  PickleTable table{.rows = shape[0], .values = std::move(numbers.values)};
   if (table.rows < 2 || table.rows > 100'000'000)
     pickle.fail(node.offset, fmt::format("{}: expected at least 2 frames, found {}", what, table.rows));
   table.row_size = table.values.size() / table.rows;
@@ -78,17 +74,7 @@ PickleTable pickle_table(const Pickle& pickle, const PickleNode& node, const std
 }
 
 double pickle_rate(const Pickle& pickle, const PickleNode& node) {
-  double rate_hz = 0.0;
-  if (node.kind == PickleKind::kFloat) {
-    rate_hz = node.number;
-  } else if (node.kind == PickleKind::kInt) {
-    rate_hz = static_cast<double>(node.integer);
-  } else {
-    const std::vector<double> values = array_values(pickle, node, "key 'fps'");
-    if (values.size() != 1)
-      pickle.fail(node.offset, fmt::format("key 'fps': expected one number, found {}", values.size()));
-    rate_hz = values[0];
-  }
+  const double rate_hz = pickle_number(pickle, node, "key 'fps'");
   if (!std::isfinite(rate_hz) || rate_hz <= 0.0)
     pickle.fail(node.offset, fmt::format("key 'fps': expected a positive rate, found {}", rate_hz));
   return rate_hz;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <map>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -14,8 +13,7 @@ namespace duet {
 // A dict whose keys are strings. Keeps a reference: the pickle must outlive it.
 class PickleDict {
  public:
-  // Where `known` is not empty, any other key is refused.
-  PickleDict(const Pickle& pickle, const PickleNode& node, std::span<const std::string> known = {});
+  PickleDict(const Pickle& pickle, const PickleNode& node);
 
   // nullptr where the key is absent or None.
   [[nodiscard]] const PickleNode* find(const std::string& key) const;
@@ -23,7 +21,7 @@ class PickleDict {
   [[nodiscard]] std::vector<std::string> keys() const;  // sorted
 
  private:
-  void add(const PickleNode& key, int value, std::span<const std::string> known);
+  void add(const PickleNode& key, int value);
 
   const Pickle& pickle_;
   std::map<std::string, int> values_;
@@ -35,11 +33,11 @@ struct PickleTable {
   std::vector<double> values;  // row by row, finite
 };
 
-// An array of `frames` rows (0: any number of at least 2) of shape `rest` (0: any size), all finite.
+// An array, or lists, of `frames` rows (0: any number of at least 2) of shape `rest` (0: any size), all finite.
 PickleTable pickle_table(const Pickle& pickle, const PickleNode& node, const std::string& key, std::size_t frames,
                          const std::vector<std::size_t>& rest);
 
-// A number, a NumPy scalar or an array of one: frames per second, above 0.
+// One number in any of the ways of pickle_number: frames per second, above 0.
 double pickle_rate(const Pickle& pickle, const PickleNode& node);
 
 }  // namespace duet

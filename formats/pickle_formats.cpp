@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/formats/file_arrays.h"
@@ -41,8 +42,10 @@ FileMotion read_gmr(const MotionSource& source, const RobotModel& /*robot*/, con
     motion.bodies_in_base = true;
     motion.body_names = std::move(pickled.link_body_list);
   }
+  motion.joint_names = std::move(pickled.motion.joint_names);
   for (const std::string& sentence : pickled.verdict)
-    if (sentence.find("renormalised") != std::string::npos) motion.evidence.push_back(sentence);
+    if (sentence.find("renormalised") != std::string::npos || sentence.starts_with(kLeftOutKeys))
+      motion.evidence.push_back(sentence);
   return motion;
 }
 
@@ -98,7 +101,8 @@ const PickleNode& chosen_motion(const Pickle& pickle, const std::string& name) {
 
 // (T, n) or (T, n, 1).
 PickleTable joint_table(const Pickle& pickle, const PickleNode& node, std::size_t frames) {
-  if (node.shape.size() == 3) return pickle_table(pickle, node, "dof", frames, {0, 1});
+  const std::size_t dimensions = pickle_numbers(pickle, node, "key 'dof'").shape.size();
+  if (dimensions == 3) return pickle_table(pickle, node, "dof", frames, {0, 1});
   return pickle_table(pickle, node, "dof", frames, {0});
 }
 

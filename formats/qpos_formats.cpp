@@ -49,7 +49,7 @@ FileMotion read_omniretarget(const MotionSource& source, const RobotModel& robot
   const Eigen::MatrixXd qpos = matrix_of(*source.npz, "qpos");
   require_height(source, qpos);
   take_qpos(qpos, joints_before_objects(robot, qpos.rows(), motion), motion);
-  if (source.has("fps")) motion.rate_hz = source.npz->number("fps");
+  if (source.has("fps")) motion.rate_hz = source.npz->number_or_text("fps");
   return motion;
 }
 
@@ -99,7 +99,7 @@ std::pair<Eigen::Index, Eigen::Index> chosen_frames(const MotionSource& source, 
 FileMotion read_locomujoco(const MotionSource& source, const RobotModel& /*robot*/, const RobotMotionOptions& options) {
   const Npz& npz = *source.npz;
   FileMotion motion{
-      .path = source.path, .rate_hz = npz.number("frequency"), .joint_names = npz.strings("joint_names", {-1})};
+      .path = source.path, .rate_hz = npz.number_or_text("frequency"), .joint_names = npz.strings("joint_names", {-1})};
   const Eigen::MatrixXd qpos = matrix_of(npz, "qpos");
   const auto joints = static_cast<Eigen::Index>(motion.joint_names.size()) - 1;
   if (joints < 1 || qpos.rows() != kFreeJoint + joints)

@@ -22,21 +22,33 @@ constexpr std::string_view kBonesJoint = "_dof";
 const std::array<std::string, 8> kToolsRoot = {"time",    "root_x",  "root_y",  "root_z",
                                                "root_qx", "root_qy", "root_qz", "root_qw"};
 constexpr std::string_view kToolsJoint = "dof_";
+constexpr double kSameRate = 0.01;  // what two statements of a rate may differ by, as a share
 
-// From the meta line, else from the mean step of the column of times.
-std::optional<double> rate_of(const CsvTable& table) {
-  for (const char* key : {"sample_rate", "fps"}) {
-    const auto found = table.meta.find(key);
-    if (found == table.meta.end()) continue;
-    if (const std::optional<double> rate = parse_number(found->second); rate && *rate > 0.0) return rate;
-    throw InputError(fmt::format("'{}': {}: expected a rate above 0 Hz, found '{}'", table.name, key, found->second));
-  }
+// From the mean step of the column of times. Throws InputError where they do not ascend.
+std::optional<double> rate_of_times(const CsvTable& table) {
   const int time = table.find(kToolsRoot[0]);
   if (time < 0 || table.rows() < 2) return std::nullopt;
   const double span = table.values(time, table.rows() - 1) - table.values(time, 0);
   if (!(span > 0.0))
     throw InputError(fmt::format("'{}': column 'time': expected ascending times, found {} s in all", table.name, span));
   return (table.rows() - 1) / span;
+}
+
+// From the meta line, else from the times; a sentence where the two disagree.
+std::optional<double> rate_of(const CsvTable& table, std::vector<std::string>& evidence) {
+  const std::optional<double> by_times = rate_of_times(table);
+  for (const char* key : {"sample_rate", "fps"}) {
+    const auto found = table.meta.find(key);
+    if (found == table.meta.end()) continue;
+    if (const std::optional<double> rate = parse_number(found->second); rate && *rate > 0.0) {
+      if (by_times && std::abs(*by_times / *rate - 1.0) > kSameRate)
+        evidence.push_back(
+            fmt::format("doubt: '{}' of the file says {} Hz, its column 'time' {:.5g} Hz", key, *rate, *by_times));
+      return rate;
+    }
+    throw InputError(fmt::format("'{}': {}: expected a rate above 0 Hz, found '{}'", table.name, key, found->second));
+  }
+  return by_times;
 }
 
 // ---- Unitree and LAFAN1: without names, or with a line of them
@@ -167,7 +179,7 @@ FileMotion read_unitree(const MotionSource& source, const RobotModel& /*robot*/,
     take_qpos(table.values, table.values.rows() - kRootColumns, motion);
   } else {
     take_named_columns(table, motion);
-    motion.rate_hz = rate_of(table);
+    motion.rate_hz = rate_of(table, motion.evidence);
   }
   if (options.rate_hz || motion.rate_hz) return motion;
   motion.rate_hz = rate_in_name(source.path);
@@ -244,7 +256,8 @@ bool is_hhtools(const MotionSource& source) { return source.table && source.tabl
 FileMotion read_hhtools(const MotionSource& source, const RobotModel& /*robot*/,
                         const RobotMotionOptions& /*options*/) {
   const CsvTable& table = *source.table;
-  FileMotion motion{.path = source.path, .rate_hz = rate_of(table)};
+  FileMotion motion{.path = source.path};
+  motion.rate_hz = rate_of(table, motion.evidence);
   std::array<int, 7> row{};
   for (std::size_t i = 0; i < row.size(); ++i) row[i] = table.get(kToolsRoot[i + 1]);
   for (int t = 0; t < table.rows(); ++t) {

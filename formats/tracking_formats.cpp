@@ -68,7 +68,7 @@ FileMotion read_beyondmimic(const MotionSource& source, const RobotModel& /*robo
     motion.position.emplace_back(motion.bodies.at(t, 0));
     motion.quaternion.emplace_back(Eigen::Map<const Eigen::Vector4d>(&quat[static_cast<std::size_t>(t) * row]));
   }
-  if (source.has("fps")) motion.rate_hz = npz.number("fps");
+  if (source.has("fps")) motion.rate_hz = npz.number_or_text("fps");
   if (source.has("joint_names")) motion.joint_names = npz.strings("joint_names", {-1});
   if (source.has("body_names")) motion.body_names = npz.strings("body_names", {-1});
   return motion;
@@ -95,7 +95,7 @@ FileMotion read_holosoma(const MotionSource& source, const RobotModel& /*robot*/
   const auto joints = static_cast<Eigen::Index>(motion.joint_names.size());
   take_qpos(columns_of(npz.numbers("joint_pos", {-1, joints + 7}), static_cast<std::size_t>(joints) + 7), joints,
             motion);
-  if (source.has("fps")) motion.rate_hz = npz.number("fps");
+  if (source.has("fps")) motion.rate_hz = npz.number_or_text("fps");
   if (source.has("body_names")) {
     motion.body_names = npz.strings("body_names", {-1});
     motion.bodies = npz.tracks("body_pos_w", static_cast<int>(motion.body_names.size()));

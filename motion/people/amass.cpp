@@ -77,7 +77,7 @@ AmassPerson read_amass_person(const std::string& path) {
   if (npz.contains("betas")) person.motion.betas = mean_betas(table_of(npz, "betas"));
   for (const char* key : {"mocap_framerate", "mocap_frame_rate", "fps"}) {
     if (!npz.contains(key)) continue;
-    person.rate_hz = npz.number(key);
+    person.rate_hz = npz.number_or_text(key);
     if (!(person.rate_hz > 0.0 && person.rate_hz <= 10'000.0))
       throw InputError(fmt::format("'{}': array '{}': expected a rate of at most 10000 Hz, found {}", shown(path), key,
                                    person.rate_hz));

@@ -56,11 +56,7 @@ double interhuman_rate(const Pickle& pickle, std::vector<std::string>& evidence)
   for (const char* key : {"mocap_framerate", "mocap_frame_rate", "fps"}) {
     const PickleNode* node = pickle.find(pickle[pickle.root], key);
     if (node == nullptr) continue;
-    double rate_hz = node->kind == PickleKind::kFloat ? node->number : static_cast<double>(node->integer);
-    if (node->kind == PickleKind::kArray) {
-      const NumberTable table = table_of(pickle, *node, fmt::format("'{}'", key));
-      rate_hz = table.values.size() == 1 ? table.values[0] : 0.0;
-    }
+    const double rate_hz = pickle_number(pickle, *node, fmt::format("'{}'", key));
     if (!(rate_hz > 0.0 && rate_hz <= 10'000.0))
       pickle.fail(node->offset, fmt::format("'{}': expected a rate of at most 10000 Hz, found {}", key, rate_hz));
     evidence.push_back(fmt::format("rate: {:g} Hz ('{}' of the file)", rate_hz, key));

@@ -44,9 +44,10 @@ NumberTable table_of(const Npz& npz, const std::string& key) {
 }
 
 NumberTable table_of(const Pickle& pickle, const PickleNode& node, const std::string& what) {
+  PickleNumbers numbers = pickle_numbers(pickle, node, what);
   return checked({.what = fmt::format("'{}': byte {}: {}", pickle.name, node.offset, what),
-                  .shape = node.shape,
-                  .values = array_values(pickle, node, what)});
+                  .shape = std::move(numbers.shape),
+                  .values = std::move(numbers.values)});
 }
 
 NumberTable table_of(const TorchFile& file, const PickleNode& node, const std::string& what) {

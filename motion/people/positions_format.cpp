@@ -219,7 +219,7 @@ Keys take_npz(const std::string& path, RawPeople& people) {
     throw InputError(fmt::format("'{}': no positions with values in it; looked for arrays {}",
                                  shown(path, kShownSentence), fmt::join(both_keys(), ", ")));
   for (const std::string& key : kRateKeys)
-    if (npz.contains(key)) people.rate_hz = npz.number(key);
+    if (npz.contains(key)) people.rate_hz = npz.number_or_text(key);
   for (const std::string& key : kLabelKeys)
     if (is_text(key)) people.source["label"] = npz.text(key);
   for (const std::string& key : kUpKeys)

@@ -50,6 +50,12 @@ TEST(Npz, ANumberIsOneWhateverItsShape) {
   npz.set("two", std::vector<double>{30.0, 60.0}, {2});
   EXPECT_EQ(npz.number("fps"), 30.0);
   EXPECT_THROW((void)npz.number("two"), InputError);
+  EXPECT_EQ(npz.number_or_text("fps"), 30.0);
+  npz.set_text("words", "29.97");
+  npz.set_text("none", "thirty");
+  EXPECT_EQ(npz.number_or_text("words"), 29.97);
+  EXPECT_THROW((void)npz.number("words"), InputError);
+  EXPECT_THROW((void)npz.number_or_text("none"), InputError);
 }
 
 TEST(Npz, ReturnsWhatWasWritten) {

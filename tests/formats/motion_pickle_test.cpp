@@ -103,14 +103,61 @@ TEST(Pickle, ReadsTypesByteOrdersAndMemoryOrders) {
   }
 }
 
+// Lists of numbers, of lists, of tuples and of arrays; in half precision; of a few bytes that would be many numbers.
+TEST(Pickle, ReadsListsAndHalfPrecision) {
+  const std::string halves("\x00\x3c\x00\x40\x00\x42\x00\x44\x00\x45\x00\x46", 12);
+  const std::vector<Entry> same = {[](PickleWriter& out) {
+                                     out.raw("](");
+                                     for (const int t : {1, 3, 5}) out.raw("](").real(t).integer(t + 1).raw("e");
+                                     out.raw("e");
+                                   },
+                                   [](PickleWriter& out) {
+                                     out.raw("(");
+                                     for (const int t : {1, 3, 5}) out.doubles({2}, {t + 0.0, t + 1.0});
+                                     out.raw("t");
+                                   },
+                                   [&](PickleWriter& out) {
+                                     out.array({3, 2}, halves, "f2");
+                                   }};
+  for (const Entry& dof_pos : same) {
+    const RobotMotion motion = parse_motion_pickle(pickle({.dof_pos = dof_pos}), "x.pkl").motion;
+    for (int t = 0; t < kFrames; ++t)
+      for (int j = 0; j < 2; ++j) EXPECT_EQ(motion.q(j, t), 2 * t + j + 1);
+  }
+  const auto nested = [](int deep) {
+    return [deep](PickleWriter& out) {
+      std::string lists =
+          "](K\x01"
+          "eq\x01";
+      for (int d = 1; d <= deep; ++d) {
+        lists = "](" + lists;
+        for (int i = 0; i < 200; ++i) lists += std::string("h") + static_cast<char>(d);
+        lists += std::string("eq") + static_cast<char>(d + 1);
+      }
+      out.raw(lists);
+    };
+  };
+  EXPECT_THAT(refusal(pickle({.dof_pos = nested(5)})), HasSubstr("expected lists of at most 4194304 numbers"));
+  EXPECT_THAT(refusal(pickle({.dof_pos = nested(9)})), HasSubstr("expected lists at most 8 deep"));
+}
+
 TEST(Pickle, RateMayBeANumberOrANumPyScalar) {
   const std::vector<Entry> same = {
-      [](PickleWriter& out) { out.integer(30); }, [](PickleWriter& out) { out.real(30.0); },
+      [](PickleWriter& out) { out.integer(30); },
+      [](PickleWriter& out) { out.real(30.0); },
       [](PickleWriter& out) { out.raw("\x8a\x01\x1e"); },
       [](PickleWriter& out) {
         out.call("numpy.core.multiarray", "scalar").dtype("f8").bytes(PickleWriter::packed({30.0})).raw("\x86R");
       },
-      [](PickleWriter& out) { out.doubles({1}, {30.0}); }};
+      [](PickleWriter& out) { out.doubles({1}, {30.0}); },
+      [](PickleWriter& out) {
+        out.doubles({1, 1}, {30.0});
+      },
+      [](PickleWriter& out) { out.raw("](").integer(30).raw("e"); },
+      [](PickleWriter& out) { out.text("30"); },
+      [](PickleWriter& out) {
+        out.call("numpy.core.multiarray", "scalar").dtype("u1", "|").bytes("\x1e").raw("\x86R");
+      }};
   for (const Entry& fps : same) EXPECT_EQ(parse_motion_pickle(pickle({.fps = fps}), "x.pkl").motion.rate_hz, 30.0);
 }
 
@@ -245,13 +292,17 @@ TEST(Pickle, BrokenArraysAreRefused) {
   EXPECT_THAT(with([&](PickleWriter& out) {
                 out.array({3, 2}, six, "O");
               }),
-              HasSubstr("expected numbers of type f2, f4, f8, i4 or i8, found 'O'"));
+              HasSubstr("expected numbers of type f2, f4, f8, i1..i8 or u1..u8, found 'O'"));
   EXPECT_THAT(with([&](PickleWriter& out) {
                 out.array({3, 2}, six, "f8", "=");
               }),
               HasSubstr("byte order: expected '<', '>' or '|', found '='"));
   EXPECT_THAT(with([](PickleWriter& out) { out.raw("](").real(1).real(2).raw("e"); }),
-              HasSubstr("key 'dof_pos': expected a NumPy array, found a list"));
+              HasSubstr("key 'dof_pos': expected shape (3, n), found (2)"));
+  EXPECT_THAT(with([](PickleWriter& out) { out.raw("](](").real(1).real(2).raw("e](").real(3).raw("ee"); }),
+              HasSubstr("key 'dof_pos': expected rows of one shape, found (2) in row 0 and (1) in row 1"));
+  EXPECT_THAT(with([](PickleWriter& out) { out.raw("](").real(1).text("two").raw("e"); }),
+              HasSubstr("key 'dof_pos': expected a NumPy array, found a string"));
   EXPECT_THAT(with([](PickleWriter& out) {
                 out.call("numpy.core.multiarray", "_reconstruct").call("numpy", "ndarray").integer(0).raw("\x85");
                 out.bytes("b").raw("\x87R");
@@ -310,15 +361,20 @@ TEST(Pickle, MotionsThatDoNotFitAreRefused) {
   EXPECT_THAT(refusal(pickle({.fps = [](PickleWriter& out) { out.real(0.0); }})),
               HasSubstr("key 'fps': expected a positive rate, found 0"));
   EXPECT_THAT(refusal(pickle({.fps = [=](PickleWriter& out) { out.real(nan); }})), HasSubstr("key 'fps'"));
-  EXPECT_THAT(refusal(pickle({.fps = [](PickleWriter& out) { out.text("30"); }})),
-              HasSubstr("key 'fps': expected a NumPy array, found a string"));
+  EXPECT_THAT(refusal(pickle({.fps = [](PickleWriter& out) { out.text("thirty"); }})),
+              HasSubstr("key 'fps': expected a number, found 'thirty'"));
+  EXPECT_THAT(refusal(pickle({.fps = [](PickleWriter& out) { out.none(); }})), HasSubstr("missing key 'fps'"));
   EXPECT_THAT(refusal(pickle({.link_body_list = [](PickleWriter& out) { out.raw("](").integer(1).raw("e"); }})),
               HasSubstr("key 'link_body_list': expected a string, found an integer"));
 }
 
 TEST(Pickle, KeysAreChecked) {
-  EXPECT_THAT(refusal(pickle({.more = [](PickleWriter& out) { out.text("dof_poses").none(); }})),
-              HasSubstr("unknown key 'dof_poses': did you mean 'dof_pos'?"));
+  const auto with_more = [](PickleWriter& out) { out.text("robot_type").text("unitree_g1").text("height").real(1.7); };
+  EXPECT_THAT(parse_motion_pickle(pickle({.more = with_more}), "x.pkl").verdict,
+              Contains("left out: keys that are none of the format's: height, robot_type"));
+  const auto with_names = [](PickleWriter& out) { out.text("dof_names").raw("](").text("a").text("b").raw("e"); };
+  EXPECT_EQ(parse_motion_pickle(pickle({.more = with_names}), "x.pkl").motion.joint_names,
+            (std::vector<std::string>{"a", "b"}));
   EXPECT_THAT(refusal(pickle({.more = [](PickleWriter& out) { out.text("fps").real(1.0); }})),
               HasSubstr("key 'fps' is there twice"));
   EXPECT_THAT(refusal(PickleWriter().raw("}(").text("fps").real(30.0).raw("u.").str()),
