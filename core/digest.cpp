@@ -1,11 +1,14 @@
 #include "duet/core/digest.h"
 
+#include <fmt/format.h>
 #include <openssl/evp.h>
 
 #include <array>
+#include <filesystem>
 #include <stdexcept>
 
 #include "duet/core/file.h"
+#include "duet/core/read_observer.h"
 
 namespace duet {
 namespace {
@@ -94,5 +97,53 @@ std::string sha256_hex(std::string_view text) {
 }
 
 std::string sha256_file(const std::string& path) { return sha256_hex(read_file(path)); }
+
+namespace {
+
+std::string whole_path(const std::string& path) { return std::filesystem::absolute(path).lexically_normal().string(); }
+
+// The innermost of this thread: a reader knows nothing of who wants to know what it read.
+DigestReads*& innermost() {
+  thread_local DigestReads* reads = nullptr;
+  return reads;
+}
+
+}  // namespace
+
+std::string FileDigests::find(const std::string& path) const {
+  const auto found = by_path_.find(whole_path(path));
+  return found == by_path_.end() ? "" : found->second;
+}
+
+std::string FileDigests::of(const std::string& path) {
+  if (std::string known = find(path); !known.empty()) return known;
+  std::string digest = sha256_file(path);
+  add(path, digest);
+  return digest;
+}
+
+void FileDigests::add(const std::string& path, const std::string& sha256) {
+  const auto [entry, added] = by_path_.try_emplace(whole_path(path), sha256);
+  if (!added && entry->second != sha256)
+    throw InputError(
+        fmt::format("'{}' was replaced while it was used: SHA-256 {:.12} when it was read first, {:.12} now", path,
+                    entry->second, sha256));
+}
+
+DigestReads::DigestReads(FileDigests& digests) : digests_(digests), outer_(innermost()) {
+  innermost() = this;
+  read_observer() = note;
+}
+
+DigestReads::~DigestReads() {
+  innermost() = outer_;
+  if (outer_ == nullptr) read_observer() = nullptr;
+}
+
+void DigestReads::note(const std::string& path, std::string_view bytes) {
+  if (innermost() == nullptr) return;
+  const std::string digest = sha256_hex(bytes);
+  for (DigestReads* reads = innermost(); reads != nullptr; reads = reads->outer_) reads->digests_.add(path, digest);
+}
 
 }  // namespace duet

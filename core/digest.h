@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -35,5 +36,36 @@ class Sha256 {
 std::string sha256_hex(std::string_view text);
 // Throws InputError where the file cannot be read.
 std::string sha256_file(const std::string& path);
+
+// Digests of files by their paths, of the bytes that were used: a file that is replaced later keeps the digest of what
+// was loaded. Not thread-safe.
+class FileDigests {
+ public:
+  // The one that is known; "" where none is.
+  [[nodiscard]] std::string find(const std::string& path) const;
+  // Likewise, but a file that is not known is read now. Throws as sha256_file.
+  std::string of(const std::string& path);
+  // Throws InputError where another digest of that path is known: the file changed between two reads.
+  void add(const std::string& path, const std::string& sha256);
+
+ private:
+  std::map<std::string, std::string> by_path_;  // absolute
+};
+
+// While it lives, each file that this thread reads whole (core/file.h) is added to `digests`; where another one lives
+// already, to that one's too.
+class DigestReads {
+ public:
+  explicit DigestReads(FileDigests& digests);
+  ~DigestReads();
+  DigestReads(const DigestReads&) = delete;
+  DigestReads& operator=(const DigestReads&) = delete;
+  // Called by read_file.
+  static void note(const std::string& path, std::string_view bytes);
+
+ private:
+  FileDigests& digests_;
+  DigestReads* outer_;
+};
 
 }  // namespace duet

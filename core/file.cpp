@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "duet/core/no_data.h"
+#include "duet/core/read_observer.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -165,6 +166,7 @@ std::string read_file(const std::string& path, std::int64_t most) {
       throw InputError(fmt::format("cannot read '{}': expected at most {} bytes, found more", path, limit));
   }
   refuse_no_data(path, bytes);
+  if (read_observer() != nullptr) read_observer()(path, bytes);
   return bytes;
 }
 

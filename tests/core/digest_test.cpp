@@ -1,5 +1,7 @@
 #include "duet/core/digest.h"
 
+#include <gmock/gmock.h>
+
 #include <functional>
 #include <vector>
 
@@ -78,6 +80,41 @@ TEST(Sha256, HashesAFileAndNamesAMissingOne) {
   EXPECT_EQ(sha256_file(folder / "abc"), sha256_hex("abc"));
   const std::string message = test::thrown_message<InputError>([&] { sha256_file(folder / "none"); });
   EXPECT_EQ(message, "cannot read '" + (folder / "none") + "': No such file or directory");
+}
+
+TEST(FileDigests, AreOfTheBytesThatWereReadWhateverBecomesOfTheFile) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net";
+  write_file(path, "one");
+  FileDigests digests;
+  std::string used;
+  {
+    const DigestReads reads(digests);
+    used = read_file(path);
+  }
+  write_file(path, "two");
+  EXPECT_EQ(digests.of(path), sha256_hex(used));
+  EXPECT_EQ(digests.find(folder / "other/../net"), sha256_hex(used));
+  EXPECT_EQ(digests.find(folder / "absent"), "");
+  FileDigests later;
+  EXPECT_EQ(later.of(path), sha256_hex("two"));  // one that nobody has read is read now
+}
+
+TEST(FileDigests, AFileThatChangesBetweenTwoReadsIsRefused) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "net";
+  write_file(path, "one");
+  FileDigests digests, outer;
+  const DigestReads around(outer);
+  {
+    const DigestReads reads(digests);
+    read_file(path);
+    read_file(path);
+    write_file(path, "two");
+    EXPECT_THAT(test::thrown_message<InputError>([&] { read_file(path); }),
+                testing::HasSubstr("net' was replaced while it was used: SHA-256"));
+  }
+  EXPECT_EQ(outer.find(path), sha256_hex("one"));
 }
 
 }  // namespace
