@@ -11,6 +11,7 @@
 #include "duet/formats/qpos_formats.h"
 #include "duet/formats/table_formats.h"
 #include "duet/formats/tracking_formats.h"
+#include "duet/robots/origin.h"
 
 namespace duet {
 namespace {
@@ -73,8 +74,22 @@ const RobotMotionFormat& robot_motion_format(std::string_view name) {
   throw std::invalid_argument(unknown_name_message("robot motion format", name, robot_motion_format_names()));
 }
 
+namespace {
+
+// A file's root is the URDF's origin; of a robot whose base's frame is elsewhere it is moved there and back. [m], in B
+void move_root(RobotMotion& motion, const Eigen::Vector3d& by) {
+  for (Pose& X_WB : motion.root) X_WB.p += X_WB.R * by;
+}
+
+}  // namespace
+
 RobotMotionFile read_robot_motion(const MotionSource& source, const RobotModel& robot,
                                   const RobotMotionOptions& options, const std::string& format) {
+  if (const Eigen::Vector3d p_BU = urdf_origin(robot); !p_BU.isZero(0.0)) {
+    RobotMotionFile file = read_robot_motion(source, with_origin_at(robot, p_BU), options, format);
+    move_root(file.motion, -p_BU);
+    return file;
+  }
   const RobotMotionFormat& row = format_of(source, format);
   RobotMotionFile file = interpret(row.read(source, robot, options), row.layout, robot, options);
   file.format = row.name;
@@ -95,6 +110,11 @@ double written_rate(const RobotMotionFormat& format, double rate_hz, const Robot
 
 MotionFiles robot_motion_files(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format,
                                const RobotMotionWriting& writing) {
+  if (const Eigen::Vector3d p_BU = urdf_origin(robot); !p_BU.isZero(0.0)) {
+    RobotMotion moved = motion;
+    move_root(moved, p_BU);
+    return robot_motion_files(moved, with_origin_at(robot, p_BU), format, writing);
+  }
   require_writable(motion, robot, format);
   const double rate_hz = written_rate(format, motion.rate_hz, writing);
   require(rate_hz >= kLowestRate && rate_hz <= kHighestRate,

@@ -10,6 +10,7 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/robots/origin.h"
 #include "duet/robots/roles.h"
 
 namespace duet {
@@ -173,9 +174,24 @@ class RoleBinder {
     robot_.fall = given.fall.value_or(FallRule{kFallShare * robot_.standing_height});
     robot_.stance = given.stance;
     robot_.root_bounds = given.root_bounds;
+    move_heights();
   }
 
  private:
+  // The card's heights are of the URDF's origin, or, where that is below them when the robot stands, of the pelvis.
+  void move_heights() {
+    const double below = urdf_origin(robot_).z(), standing = robot_.standing_height + below;  // of the URDF's origin
+    if (below == 0.0) return;
+    const auto move = [&](double& height) {
+      if (height < standing) height -= below;
+    };
+    if (card_.roles.fall) move(robot_.fall.height);
+    if (!robot_.root_bounds) return;
+    RootBounds& bounds = *robot_.root_bounds;
+    if (bounds.lowest >= standing) return;
+    for (double* height : {&bounds.lowest, &bounds.highest, &bounds.least_crouch}) *height -= below;
+  }
+
   [[nodiscard]] bool is_locked(const std::string& joint) const {
     return std::ranges::any_of(card_.locked, [&](const CardLock& lock) { return lock.joint == joint; });
   }

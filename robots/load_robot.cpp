@@ -6,15 +6,18 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/skeleton.h"
 #include "duet/robots/card.h"
 #include "duet/robots/card_digest.h"
 #include "duet/robots/card_reader.h"
 #include "duet/robots/card_roles.h"
 #include "duet/robots/kinematics.h"
+#include "duet/robots/origin.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/urdf.h"
 
@@ -60,6 +63,7 @@ class Loader {
     std::sort(model_.self_collision.begin(), model_.self_collision.end());
     check_links();
     set_standing_height();
+    move_origin();
     bind_roles(card_, model_);
     return std::move(model_);
   }
@@ -110,6 +114,22 @@ class Loader {
                                  [&](const CardLock& lock) { return lock.joint == name; });
     return it == card_.locked.end() ? nullptr : &*it;
   }
+  const UrdfJoint* urdf_joint(const std::string& name) const {
+    const auto it = std::find_if(urdf_.joints.begin(), urdf_.joints.end(),
+                                 [&](const UrdfJoint& joint) { return joint.name == name; });
+    return it == urdf_.joints.end() ? nullptr : &*it;
+  }
+
+  // Where the card locks it, or what it mimics. `depth`: a chain of those that mimic one another has an end.
+  std::optional<double> locked_at(const UrdfJoint& joint, std::size_t depth = 0) const {
+    if (const CardLock* const lock = card_lock(joint.name)) return lock->position;
+    const UrdfJoint* const other = joint.mimics.empty() ? nullptr : urdf_joint(joint.mimics);
+    if (other == nullptr || card_joint(joint.name) != nullptr || depth > urdf_.joints.size()) return std::nullopt;
+    const std::optional<double> at = locked_at(*other, depth + 1);
+    if (!at) return std::nullopt;
+    return joint.mimic_factor * *at + joint.mimic_offset;
+  }
+  bool is_locked(const UrdfJoint& joint) const { return locked_at(joint).has_value(); }
   bool above_base(const UrdfJoint& joint) const { return joint.child <= base_; }
 
   void check_joints() const {
@@ -117,7 +137,12 @@ class Loader {
     for (const UrdfJoint& joint : urdf_.joints) {
       if (joint.type == UrdfJointType::kFixed || above_base(joint)) continue;
       movable.push_back(joint.name);
-      if (card_lock(joint.name) != nullptr) continue;
+      if (is_locked(joint)) continue;
+      if (!joint.mimics.empty())
+        fail_urdf(
+            fmt::format("joint '{}': expected an independent joint, or one that the card locks ('locked'), found one "
+                        "that mimics '{}'",
+                        joint.name, joint.mimics));
       if (joint.type != UrdfJointType::kRevolute && joint.type != UrdfJointType::kContinuous)
         fail_urdf(fmt::format("joint '{}': expected revolute, continuous or fixed, found {}", joint.name,
                               to_string(joint.type)));
@@ -142,18 +167,18 @@ class Loader {
 
   // Pose of a joint's child in its parent with a locked joint at its position.
   Pose locked_pose(const UrdfJoint& joint) const {
-    const CardLock* const lock = card_lock(joint.name);
-    if (lock == nullptr) return joint.X_PC;
+    const std::optional<double> position = locked_at(joint);
+    if (!position) return joint.X_PC;
     if (joint.type == UrdfJointType::kFloating || joint.type == UrdfJointType::kPlanar)
       fail_urdf(
           fmt::format("joint '{}': expected one that can be locked, found {}", joint.name, to_string(joint.type)));
-    if (lock->position < joint.lower || lock->position > joint.upper)
+    const CardLock* const lock = card_lock(joint.name);
+    if (lock != nullptr && (*position < joint.lower || *position > joint.upper))
       fail_card(lock->place, fmt::format("locked joint '{}': expected a position in [{}, {}], found {}", joint.name,
-                                         joint.lower, joint.upper, lock->position));
+                                         joint.lower, joint.upper, *position));
     if (joint.type == UrdfJointType::kPrismatic)
-      return joint.X_PC * Pose{Eigen::Quaterniond::Identity(), lock->position * joint.axis};
-    return joint.X_PC *
-           Pose{Eigen::Quaterniond(Eigen::AngleAxisd(lock->position, joint.axis)), Eigen::Vector3d::Zero()};
+      return joint.X_PC * Pose{Eigen::Quaterniond::Identity(), *position * joint.axis};
+    return joint.X_PC * Pose{Eigen::Quaterniond(Eigen::AngleAxisd(*position, joint.axis)), Eigen::Vector3d::Zero()};
   }
 
   // Links in the card's order of joints; every URDF link gets its place (link, pose in it).
@@ -315,6 +340,36 @@ class Loader {
     model_.standing_height = -lowest;
   }
 
+  // The pelvis pair's place in the base's frame, in the neutral pose; without one, the middle between the hips.
+  [[nodiscard]] std::optional<Eigen::Vector3d> pelvis() const {
+    Kinematics kinematics(model_);
+    kinematics.update({}, model_.neutral);
+    for (const RetargetPair& pair : model_.pairs)
+      if (pair.smpl == kPelvis) return kinematics.frame_position(pair.frame);
+    Eigen::Vector3d hips = Eigen::Vector3d::Zero();
+    for (const std::vector<CardName>& leg : card_.roles.legs) {
+      const auto hip = std::find_if(model_.joints.begin(), model_.joints.end(), [&](const RobotJoint& joint) {
+        return !leg.empty() && joint.name == leg.front().name;
+      });
+      if (hip == model_.joints.end()) return std::nullopt;
+      hips += 0.5 * kinematics.p_WL(static_cast<int>(hip - model_.joints.begin()) + 1);
+    }
+    return hips;
+  }
+
+  // A URDF may have its origin anywhere, as exports from CAD do; a fall, a stance and a root are of the body.
+  void move_origin() {
+    if (model_.feet.empty()) return;
+    const std::optional<Eigen::Vector3d> p_BP = pelvis();
+    if (!p_BP && model_.standing_height <= 0.0)
+      throw InputError(
+          fmt::format("{}: the base's origin in {} is {:.2f} m below its soles: expected 'pairs' with the "
+                      "pelvis, or 'legs', that tell where the body is, found neither",
+                      card_file_, urdf_file_, -model_.standing_height));
+    if (!p_BP || p_BP->norm() <= kOriginShare * (p_BP->z() + model_.standing_height)) return;
+    model_ = with_origin_at(std::move(model_), *p_BP);
+  }
+
   const RobotCard& card_;
   const UrdfModel& urdf_;
   std::string card_file_, urdf_file_;
@@ -322,6 +377,24 @@ class Loader {
   std::vector<Place> place_;  // per URDF link
   RobotModel model_;
 };
+
+// Damping and friction of the joints that the robot moves.
+std::string dynamics_note(const RobotModel& robot, const UrdfModel& urdf, const std::string& file) {
+  int joints = 0;
+  double damping = 0.0, friction = 0.0;
+  for (const UrdfJoint& joint : urdf.joints) {
+    const bool moved = std::ranges::find(robot.joints, joint.name, &RobotJoint::name) != robot.joints.end();
+    if (!moved || (joint.damping == 0.0 && joint.friction == 0.0)) continue;
+    ++joints;
+    damping = std::max(damping, joint.damping);
+    friction = std::max(friction, joint.friction);
+  }
+  if (joints == 0) return "";
+  return fmt::format(
+      "{}: <dynamics> of {} joints (damping up to {:g} N m s/rad, friction up to {:g} N m) is not "
+      "simulated: joints move without either",
+      file, joints, damping, friction);
+}
 
 }  // namespace
 
@@ -335,6 +408,22 @@ RobotModel load_robot(const std::string& card_path, const std::string& urdf_path
   RobotModel model = Loader(card, card_path, urdf, path).load();
   model.digest = robot_digest(urdf_text, card.content);
   return model;
+}
+
+std::vector<std::string> robot_notes(const std::string& card) {
+  const std::string path = card_path(card);
+  const RobotModel robot = load_robot(path);
+  const std::string file =
+      (std::filesystem::path(path).parent_path() / parse_card(read_text(path), path).urdf).string();
+  std::vector<std::string> notes;
+  if (const double away = urdf_origin(robot).norm(); away > 0.0)
+    notes.push_back(
+        fmt::format("{}: its base's origin is {:.2f} m from the pelvis in the neutral pose; heights of the "
+                    "base are the pelvis's",
+                    file, away));
+  if (std::string note = dynamics_note(robot, parse_urdf(read_text(file), file), file); !note.empty())
+    notes.push_back(std::move(note));
+  return notes;
 }
 
 }  // namespace duet

@@ -77,10 +77,33 @@ void check_joints(const TiXmlElement& robot, const std::string& file) {
       throw InputError(fmt::format("{}: link '{}': expected joints that form a tree, found a cycle", file, link));
 }
 
+// By the file's first bytes.
+void check_encoding(std::string_view text, const std::string& file) {
+  const auto begins = [&](std::string_view bytes) { return text.starts_with(bytes); };
+  const bool wide = begins("\xff\xfe") || begins("\xfe\xff") || begins(std::string_view("<\0", 2)) ||
+                    begins(std::string_view("\0<", 2)) || begins(std::string_view("\0\0", 2));
+  if (wide) throw InputError(fmt::format("{}: expected UTF-8, found UTF-16 or UTF-32: save it as UTF-8", file));
+}
+
+// A file that xacro is still to be run on: any of its elements, or "${...}" and "$(...)" in an attribute.
+void refuse_xacro(const TiXmlElement& element, const std::string& file) {
+  const auto refuse = [&](const std::string& found) {
+    throw InputError(fmt::format("{}:{}: expected a URDF, found {}: xacro is not expanded; run `xacro {} > robot.urdf`",
+                                 file, element.Row(), found, file));
+  };
+  if (element.ValueStr().starts_with("xacro:")) refuse(fmt::format("the element <{}>", shown(element.ValueStr())));
+  for (const TiXmlAttribute* one = element.FirstAttribute(); one != nullptr; one = one->Next())
+    if (one->ValueStr().find("${") != std::string::npos || one->ValueStr().find("$(") != std::string::npos)
+      refuse(fmt::format("'{}' in an attribute of <{}>", shown(one->ValueStr()), shown(element.ValueStr())));
+  for (const TiXmlElement* child = element.FirstChildElement(); child != nullptr; child = child->NextSiblingElement())
+    refuse_xacro(*child, file);
+}
+
 // The text without what duet does not look at: a shape or material that urdfdom does not know is then no error.
 std::string without_geometry(const std::string& text, const std::string& file) {
   if (text.find_first_not_of(" \t\r\n") == std::string::npos)
     throw InputError(fmt::format("{}: expected a URDF, found an empty file", file));
+  check_encoding(text, file);
   check_xml_nesting(text, file);
   TiXmlDocument document;
   document.Parse(text.c_str());
@@ -89,6 +112,7 @@ std::string without_geometry(const std::string& text, const std::string& file) {
                                  document.ErrorDesc()));
   TiXmlElement* const robot = document.FirstChildElement("robot");
   if (robot == nullptr) throw InputError(fmt::format("{}: expected the element <robot>, found none", file));
+  refuse_xacro(*robot, file);
   check_joints(*robot, file);
   for (const char* name : {"material", "transmission", "gazebo", "mujoco", "sensor"}) remove_children(*robot, name);
   for (TiXmlElement* link = robot->FirstChildElement("link"); link != nullptr; link = link->NextSiblingElement("link"))
@@ -226,9 +250,15 @@ UrdfJoint to_joint(const urdf::Joint& source, const std::string& file) {
     throw InputError(fmt::format("{}: {}: expected an axis with a direction, found ({}, {}, {})", file, element,
                                  axis.x(), axis.y(), axis.z()));
   joint.axis = axis.normalized();
-  if (source.mimic)
-    throw InputError(fmt::format("{}: {}: expected an independent joint, found one that mimics '{}'", file, element,
-                                 source.mimic->joint_name));
+  if (source.mimic) {
+    joint.mimics = source.mimic->joint_name;
+    joint.mimic_factor = source.mimic->multiplier;
+    joint.mimic_offset = source.mimic->offset;
+  }
+  if (source.dynamics) {
+    joint.damping = source.dynamics->damping;
+    joint.friction = source.dynamics->friction;
+  }
   read_limits(source, file, joint);
   return joint;
 }

@@ -29,6 +29,9 @@ struct UrdfJoint {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // in the child, unit
   double lower = 0.0, upper = 0.0;                  // [rad] or [m]; +-2 pi for a continuous joint
   double effort = 0.0, velocity = 0.0;              // 0 where a continuous joint gives none
+  double damping = 0.0, friction = 0.0;             // of <dynamics> [N m s/rad, N m]
+  std::string mimics;                               // joint whose angle it follows; "": none
+  double mimic_factor = 1.0, mimic_offset = 0.0;    // its angle: factor times the other's, plus offset
 };
 
 struct UrdfModel {

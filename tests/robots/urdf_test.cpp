@@ -201,8 +201,63 @@ TEST(UrdfErrors, Joints) {
   EXPECT_THAT(
       urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 zero\"/>")),
       AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("axis"), HasSubstr("[shoulder]"), HasSubstr("zero")));
-  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<axis xyz=\"0 1 0\"/>", "<axis xyz=\"0 1 0\"/><mimic joint=\"elbow\"/>")),
-            "x.urdf: joint 'shoulder': expected an independent joint, found one that mimics 'elbow'");
+}
+
+// What mimics a joint that moves is refused where the card does not lock it; what mimics a locked one is locked with
+// it.
+TEST(UrdfErrors, MimicsThatTheCardDoesNotLock) {
+  const auto with_fingers = [](const std::string& locked) {
+    const test::ScratchFolder folder;
+    const std::string finger =
+        "<link name=\"{0}\"><inertial><mass value=\"0.1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\" ixy=\"0\" "
+        "ixz=\"0\" "
+        "iyz=\"0\"/></inertial></link><joint name=\"j{0}\" type=\"revolute\"><parent link=\"base\"/><child "
+        "link=\"{0}\"/>"
+        "<origin xyz=\"0 0 1\"/><axis xyz=\"1 0 0\"/><limit lower=\"-3\" upper=\"3\" effort=\"1\" "
+        "velocity=\"1\"/>{1}</joint>";
+    std::string urdf = kSmallUrdf;
+    urdf.insert(urdf.find("</robot>"),
+                fmt::format(fmt::runtime(finger), "a", "") +
+                    fmt::format(fmt::runtime(finger), "b", "<mimic joint=\"ja\" multiplier=\"2\" offset=\"0.5\"/>"));
+    write_file(folder / "small.urdf", urdf);
+    write_file(folder / "small.yaml", kSmallCard + locked);
+    return load_robot(folder / "small.yaml", folder / "small.urdf");
+  };
+  EXPECT_THAT(test::thrown_message<InputError>([&] { with_fingers("locked: [{name: jc, position: 0}]\n"); }),
+              HasSubstr("joint 'jb': expected an independent joint, or one that the card locks ('locked'), found one "
+                        "that mimics 'ja'"));
+  const auto angle = [](const RobotModel& robot) {
+    return Eigen::AngleAxisd(robot.frames[robot.frame_index("b")].X_LF.R).angle();
+  };
+  EXPECT_NEAR(angle(with_fingers("locked: [{name: ja, position: 0.25}]\n")), 1.0, 1e-12);
+  EXPECT_NEAR(angle(with_fingers("locked: [{name: ja, position: 0.25}, {name: jb, position: 0.1}]\n")), 0.1, 1e-12);
+}
+
+TEST(UrdfErrors, WhatXacroIsStillToBeRunOnIsRefused) {
+  EXPECT_EQ(urdf_error(replaced(kSmallUrdf, "<robot name=\"small\">",
+                                "<robot name=\"small\">\n<xacro:property name=\"w\" value=\"1\"/>")),
+            "x.urdf:3: expected a URDF, found the element <xacro:property>: xacro is not expanded; run `xacro x.urdf > "
+            "robot.urdf`");
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<mass value=\"2\"/>", "<mass value=\"${m}\"/>")),
+              HasSubstr("found '${m}' in an attribute of <mass>: xacro is not expanded"));
+  EXPECT_THAT(urdf_error(replaced(kSmallUrdf, "<inertial>", "<xacro:if value=\"1\"/><inertial>")),
+              HasSubstr("<xacro:if>"));
+}
+
+TEST(UrdfErrors, EncodingsOtherThanUtf8AreTold) {
+  const auto wide = [](int bytes, bool big, bool mark) {
+    std::string text;
+    const auto add = [&](unsigned code) {
+      for (int i = 0; i < bytes; ++i) text += static_cast<char>(code >> 8 * (big ? bytes - 1 - i : i) & 0xff);
+    };
+    if (mark) add(0xfeff);
+    for (const char c : kSmallUrdf) add(static_cast<unsigned char>(c));
+    return text;
+  };
+  for (const int bytes : {2, 4})
+    for (const bool big : {false, true})
+      for (const bool mark : {false, true})
+        EXPECT_THAT(urdf_error(wide(bytes, big, mark)), HasSubstr("expected UTF-8, found UTF-16 or UTF-32"));
 }
 
 TEST(UrdfErrors, Inertia) {
