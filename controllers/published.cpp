@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "duet/controllers/descriptor_controller.h"
+#include "duet/controllers/network_facts.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -54,18 +55,16 @@ LoadedFiles published_files(const std::string& name, const ControllerOptions& op
   return files;
 }
 
-std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                                           const ControllerOptions& options) {
-  return make_told(name, std::move(robot), options, nullptr);
-}
-
-std::unique_ptr<Controller> make_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                                      const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told) {
+ToldLoader load_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                     const ControllerOptions& options) {
   const Descriptor descriptor = load_descriptor(name);
   const std::string path = find_network(descriptor, options);
-  return make_descriptor_controller(descriptor, std::move(robot),
-                                    load_network(path, option_or(options, "engine", "duet")), path, options,
-                                    std::move(told));
+  const NetworkFile network = load_network_file(path, option_or(options, "engine", "duet"));
+  return {[=, robot = std::move(robot), make = network.make](const ControllerOptions& now,
+                                                             std::shared_ptr<const VelocityCommand> told) {
+            return make_descriptor_controller(descriptor, robot, make(), path, now, std::move(told));
+          },
+          compare_with_network(descriptor, network.metadata, path)};
 }
 
 }  // namespace duet

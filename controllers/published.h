@@ -1,6 +1,8 @@
 // The published controllers that ship as IO descriptors (controllers/descriptors), and where their networks are.
 #pragma once
 
+#include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -19,11 +21,17 @@ Descriptor load_descriptor(const std::string& name);
 // Throws MissingError naming the places.
 std::string find_network(const Descriptor& descriptor, const ControllerOptions& options = {});
 
-std::unique_ptr<Controller> make_published(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                                           const ControllerOptions& options);
-// The same, told a velocity as make_descriptor_controller has it; `told` is not null.
-std::unique_ptr<Controller> make_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
-                                      const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told);
+// Descriptor and network, loaded once for many controllers, each told a velocity as make_descriptor_controller has it;
+// `told` may be null. The options are those of load_controller (controllers/registry.h). Thread-safe.
+struct ToldLoader {
+  std::function<std::unique_ptr<Controller>(const ControllerOptions& options,
+                                            std::shared_ptr<const VelocityCommand> told)>
+      make;
+  std::vector<std::string> notes;  // sentences: where the network's file and the descriptor disagree
+};
+// Throws InputError too where the network's file has the joints in another order.
+ToldLoader load_told(const std::string& name, std::shared_ptr<const RobotModel> robot,
+                     const ControllerOptions& options);
 // The descriptor, its network, and each file of the network's external data ("network data NAME").
 LoadedFiles published_files(const std::string& name, const ControllerOptions& options);
 

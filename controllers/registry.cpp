@@ -24,7 +24,7 @@ using Robot = std::shared_ptr<const RobotModel>;
 struct Entry {
   const char* name;
   ControllerInfo (*info)(const std::string& name);
-  std::unique_ptr<Controller> (*make)(const std::string& name, Robot robot, const ControllerOptions& options);
+  LoadedController (*load)(const std::string& name, Robot robot, const ControllerOptions& options);
   LoadedFiles (*files)(const std::string& name, const ControllerOptions& options);
 };
 
@@ -33,20 +33,23 @@ LoadedFiles no_files(const std::string&, const ControllerOptions&) { return {}; 
 ControllerInfo pd_info(const std::string& name) {
   return {name, "The card's gains around the reference's joint angles, without balance", "", false, {}};
 }
-std::unique_ptr<Controller> make_pd(const std::string&, Robot robot, const ControllerOptions&) {
-  return make_pd_controller(std::move(robot));
+LoadedController load_pd(const std::string&, Robot robot, const ControllerOptions&) {
+  return {[robot = std::move(robot)](const ControllerOptions&) { return make_pd_controller(robot); }};
 }
 
 ControllerInfo vmc_info(const std::string& name) {
   return {name, "Inverse dynamics with planned contact forces; balances on both feet and does not step", "", false, {}};
 }
-std::unique_ptr<Controller> make_vmc(const std::string&, Robot robot, const ControllerOptions&) {
-  return make_vmc_controller(std::move(robot));
+LoadedController load_vmc(const std::string&, Robot robot, const ControllerOptions&) {
+  return {[robot = std::move(robot)](const ControllerOptions&) { return make_vmc_controller(robot); }};
 }
 
 ControllerInfo wbc_sim_entry(const std::string&) { return wbc_sim_info(); }
-std::unique_ptr<Controller> make_wbc_sim(const std::string&, Robot robot, const ControllerOptions& options) {
-  return make_wbc_sim_controller(std::move(robot), options);
+LoadedController load_wbc_sim(const std::string&, Robot robot, const ControllerOptions& options) {
+  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(wbc_sim_network_path(options), *robot));
+  return {[robot = std::move(robot), network](const ControllerOptions&) {
+    return make_wbc_sim_controller(robot, network);
+  }};
 }
 
 LoadedFiles wbc_sim_files(const std::string&, const ControllerOptions& options) {
@@ -54,26 +57,30 @@ LoadedFiles wbc_sim_files(const std::string&, const ControllerOptions& options) 
 }
 
 ControllerInfo published_info(const std::string& name) { return descriptor_info(load_descriptor(name)); }
+LoadedController load_published(const std::string& name, Robot robot, const ControllerOptions& options) {
+  const ToldLoader told = load_told(name, std::move(robot), options);
+  return {[make = told.make](const ControllerOptions& now) { return make(now, nullptr); }, told.notes};
+}
 
-constexpr Entry kControllers[] = {{"pd", pd_info, make_pd, no_files},
-                                  {"vmc", vmc_info, make_vmc, no_files},
-                                  {"wbc_sim", wbc_sim_entry, make_wbc_sim, wbc_sim_files},
-                                  {"homie", published_info, make_published, published_files},
-                                  {"twist2", published_info, make_published, published_files},
-                                  {"playground", published_info, make_published, published_files},
-                                  {"rl_gym", published_info, make_published, published_files},
-                                  {"gmt", published_info, make_published, published_files},
-                                  {"beyond_mimic", published_info, make_published, published_files},
-                                  {"holosoma", published_info, make_published, published_files},
-                                  {"holosoma_fastsac", published_info, make_published, published_files},
-                                  {"holosoma_t1", published_info, make_published, published_files},
-                                  {"falcon", published_info, make_published, published_files},
-                                  {"falcon_dec_loco", published_info, make_published, published_files},
-                                  {"unitree_rl_lab", published_info, make_published, published_files},
-                                  {"unitree_rl_mjlab", published_info, make_published, published_files},
-                                  {"rl_sar_dance", published_info, make_published, published_files}};
+constexpr Entry kControllers[] = {{"pd", pd_info, load_pd, no_files},
+                                  {"vmc", vmc_info, load_vmc, no_files},
+                                  {"wbc_sim", wbc_sim_entry, load_wbc_sim, wbc_sim_files},
+                                  {"homie", published_info, load_published, published_files},
+                                  {"twist2", published_info, load_published, published_files},
+                                  {"playground", published_info, load_published, published_files},
+                                  {"rl_gym", published_info, load_published, published_files},
+                                  {"gmt", published_info, load_published, published_files},
+                                  {"beyond_mimic", published_info, load_published, published_files},
+                                  {"holosoma", published_info, load_published, published_files},
+                                  {"holosoma_fastsac", published_info, load_published, published_files},
+                                  {"holosoma_t1", published_info, load_published, published_files},
+                                  {"falcon", published_info, load_published, published_files},
+                                  {"falcon_dec_loco", published_info, load_published, published_files},
+                                  {"unitree_rl_lab", published_info, load_published, published_files},
+                                  {"unitree_rl_mjlab", published_info, load_published, published_files},
+                                  {"rl_sar_dance", published_info, load_published, published_files}};
 // A name that is the path of an IO descriptor.
-constexpr Entry kDescriptor = {"", published_info, make_published, published_files};
+constexpr Entry kDescriptor = {"", published_info, load_published, published_files};
 
 // One that a program has added.
 struct Registered {
@@ -89,12 +96,14 @@ OpenRegistry<Registered>& registered() {
 }
 
 ControllerInfo registered_info(const std::string& name) { return registered().find(name)->about; }
-std::unique_ptr<Controller> make_registered(const std::string& name, Robot robot, const ControllerOptions& options) {
-  std::unique_ptr<Controller> controller = registered().find(name)->maker(std::move(robot), options);
-  require(controller != nullptr, fmt::format("controller '{}': its maker made none", name));
-  return controller;
+LoadedController load_registered(const std::string& name, Robot robot, const ControllerOptions&) {
+  return {[name, robot = std::move(robot), maker = registered().find(name)->maker](const ControllerOptions& options) {
+    std::unique_ptr<Controller> controller = maker(robot, options);
+    require(controller != nullptr, fmt::format("controller '{}': its maker made none", name));
+    return controller;
+  }};
 }
-constexpr Entry kRegistered = {"", registered_info, make_registered, no_files};
+constexpr Entry kRegistered = {"", registered_info, load_registered, no_files};
 
 std::vector<std::string> shipped_names() {
   std::vector<std::string> names;
@@ -144,10 +153,17 @@ void check_controller_options(const ControllerInfo& info, const ControllerOption
 
 std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options) {
+  return load_controller(name, robot, options).make(options);
+}
+
+LoadedController load_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                 const ControllerOptions& options) {
   require(robot != nullptr, "make_controller: no robot");
   const Entry& entry = find_entry(name);
   check_controller_options(entry.info(name), options);
-  return make_guarded(entry.make(name, robot, options), robot);
+  const LoadedController loaded = entry.load(name, robot, options);
+  return {[robot, make = loaded.make](const ControllerOptions& now) { return make_guarded(make(now), robot); },
+          loaded.notes};
 }
 
 }  // namespace duet

@@ -29,6 +29,16 @@ void check_controller_options(const ControllerInfo& info, const ControllerOption
 std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
                                             const ControllerOptions& options = {});
 
+// What a controller loads, once for many episodes: all that it makes have the files as they were. An episode may have
+// another `command` than the options that it was loaded with, and nothing else. Thread-safe.
+struct LoadedController {
+  std::function<std::unique_ptr<Controller>(const ControllerOptions& options)> make;
+  std::vector<std::string> notes{};  // sentences: what a user should know of its files
+};
+// Throws as make_controller.
+LoadedController load_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                 const ControllerOptions& options = {});
+
 // Makes one controller per episode. The robot is never null; options are known to be those of the ControllerInfo.
 using ControllerMaker =
     std::function<std::unique_ptr<Controller>(std::shared_ptr<const RobotModel> robot, const ControllerOptions&)>;

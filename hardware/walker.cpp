@@ -33,16 +33,33 @@ double least_step_speed(const std::string& controller) {
 }
 
 Walker::Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot)
-    : name_(controller), robot_(std::move(robot)) {
+    : Walker(std::move(*load(controller, options, robot)())) {}
+
+std::function<std::unique_ptr<Walker>()> Walker::load(const std::string& controller, const ControllerOptions& options,
+                                                      const std::shared_ptr<const RobotModel>& robot) {
   const ControllerInfo info = controller_info(controller);
   require(info.walks, fmt::format("walker: expected a controller that walks, found '{}'", controller));
   check_controller_options(info, options);
-  steps_from_ = least_step_speed(controller);
+  const double steps_from = least_step_speed(controller);
   if (has_descriptor(controller) && load_descriptor(controller).command) {
-    told_ = std::make_shared<VelocityCommand>();
-    controller_ = make_guarded(make_told(controller, robot_, options, told_), robot_);
+    return [=, make = load_told(controller, robot, options).make] {
+      auto told = std::make_shared<VelocityCommand>();
+      return std::unique_ptr<Walker>(
+          new Walker(controller, steps_from, robot, told, make_guarded(make(options, told), robot)));
+    };
   }
-  if (controller_ == nullptr) controller_ = make_controller(controller, robot_, options);
+  return [=, make = load_controller(controller, robot, options).make] {
+    return std::unique_ptr<Walker>(new Walker(controller, steps_from, robot, nullptr, make(options)));
+  };
+}
+
+Walker::Walker(std::string name, double steps_from, std::shared_ptr<const RobotModel> robot,
+               std::shared_ptr<VelocityCommand> told, std::unique_ptr<Controller> controller)
+    : name_(std::move(name)),
+      steps_from_(steps_from),
+      robot_(std::move(robot)),
+      told_(std::move(told)),
+      controller_(std::move(controller)) {
   command_ = robot_->default_command(robot_->neutral);
   reference_.q = robot_->neutral;
 }

@@ -4,6 +4,7 @@
 // thread.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ class Walker {
  public:
   // Throws as make_controller; std::invalid_argument for a controller that does not walk.
   Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot);
+  // Makes walkers, all of the files as they are now. Throws likewise. Thread-safe.
+  static std::function<std::unique_ptr<Walker>()> load(const std::string& controller, const ControllerOptions& options,
+                                                       const std::shared_ptr<const RobotModel>& robot);
 
   // Begins in `state`, standing.
   void begin(const RobotState& state);
@@ -33,6 +37,8 @@ class Walker {
   [[nodiscard]] ControllerFaults faults() const { return controller_->faults(); }
 
  private:
+  Walker(std::string name, double steps_from, std::shared_ptr<const RobotModel> robot,
+         std::shared_ptr<VelocityCommand> told, std::unique_ptr<Controller> controller);
   void lead(const RobotState& state, const VelocityCommand& velocity);
 
   std::string name_;

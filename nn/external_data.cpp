@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 #include "duet/core/data_file.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
@@ -42,25 +42,25 @@ std::string location_fault(const std::string& folder, const std::string& locatio
   return "";
 }
 
-std::string read_external(const std::string& folder, const ExternalPlace& place, const std::string& where) {
+std::string ExternalData::read(const ExternalPlace& place, const std::string& where) {
   const auto refuse = [&](const std::string& problem) {
     throw InputError(fmt::format("{}: {}", where, shown(problem, kShownSentence)));
   };
-  if (const std::string fault = location_fault(folder, place.location); !fault.empty()) refuse(fault);
-  const fs::path file = fs::path(folder) / place.location;
-  const auto size = static_cast<std::int64_t>(fs::file_size(file));
+  if (const std::string fault = location_fault(folder_, place.location); !fault.empty()) refuse(fault);
+  auto found = files_.find(place.location);
+  if (found == files_.end())
+    found = files_.emplace(place.location, read_file((fs::path(folder_) / place.location).string())).first;
+  const std::string& bytes = found->second;
+  const auto size = static_cast<std::int64_t>(bytes.size());
   const std::int64_t length = place.length.value_or(size - std::min(size, place.offset));
   if (place.offset > size || length > size - place.offset) {
-    require_data(file.string());
+    require_data((fs::path(folder_) / place.location).string());
     refuse(fmt::format("expected {} bytes from {} on in '{}', found a file of {} (truncated?)", length, place.offset,
                        place.location, size));
   }
   if (length > kMostExternalBytes)
     refuse(fmt::format("expected at most {} bytes in '{}', found {}", kMostExternalBytes, place.location, length));
-  std::string bytes(static_cast<std::size_t>(length), '\0');
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream.seekg(place.offset).read(bytes.data(), length)) refuse(fmt::format("cannot read '{}'", file.string()));
-  return bytes;
+  return bytes.substr(static_cast<std::size_t>(place.offset), static_cast<std::size_t>(length));
 }
 
 }  // namespace duet

@@ -1,10 +1,12 @@
 // Numbers of an ONNX file that lie in files beside it ("external data"). A model comes from others: it names files of
-// its own folder alone. Internal to nn/. Thread-safe.
+// its own folder alone. Internal to nn/.
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace duet {
 
@@ -20,8 +22,18 @@ inline constexpr std::int64_t kMostExternalBytes = std::int64_t{1} << 30;  // of
 // what it leads to, links followed, is a file of `folder` or below it.
 std::string location_fault(const std::string& folder, const std::string& location);
 
-// Those bytes. Throws InputError beginning with `where` ("'net.onnx': constant 'W'"): a location with a fault, a file
-// that is not there or shorter than is said, a tensor of more than kMostExternalBytes.
-std::string read_external(const std::string& folder, const ExternalPlace& place, const std::string& where);
+// The files of one model's folder, each read once and whole, so that its digest is of what was used. Not thread-safe.
+class ExternalData {
+ public:
+  explicit ExternalData(std::string folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] const std::string& folder() const { return folder_; }
+  // Those bytes. Throws InputError beginning with `where` ("'net.onnx': constant 'W'"): a location with a fault, a file
+  // that is not there or shorter than is said, a tensor of more than kMostExternalBytes.
+  std::string read(const ExternalPlace& place, const std::string& where);
+
+ private:
+  std::string folder_;
+  std::map<std::string, std::string> files_;  // by location
+};
 
 }  // namespace duet

@@ -6,7 +6,7 @@ namespace duet {
 
 bool libtorch_built_in() { return false; }
 
-std::unique_ptr<Network> libtorch_network(const std::string& path) {
+std::unique_ptr<Network> libtorch_network(const std::string&, const std::string& path) {
   throw MissingError("cannot read '" + path + "': this build has no libtorch");
 }
 

@@ -4,6 +4,7 @@
 #include <torch/script.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "duet/core/require.h"
 #include "duet/nn/network_engines.h"
@@ -27,7 +28,7 @@ int input_size(const torch::jit::Module& module, const std::string& file) {
 
 class LibtorchNetwork final : public Network {
  public:
-  explicit LibtorchNetwork(const std::string& path) : module_(torch::jit::load(path)) {
+  LibtorchNetwork(std::istream& bytes, const std::string& path) : module_(torch::jit::load(bytes)) {
     at::set_num_threads(1);
     module_.eval();
     inputs_ = {{"x", input_size(module_, path)}};
@@ -63,9 +64,10 @@ class LibtorchNetwork final : public Network {
 
 bool libtorch_built_in() { return true; }
 
-std::unique_ptr<Network> libtorch_network(const std::string& path) {
+std::unique_ptr<Network> libtorch_network(const std::string& bytes, const std::string& path) {
   try {
-    return std::make_unique<LibtorchNetwork>(path);
+    std::istringstream stream(bytes);
+    return std::make_unique<LibtorchNetwork>(stream, path);
   } catch (const c10::Error& error) {
     throw InputError(fmt::format("'{}': libtorch: {}", path, error.what_without_backtrace()));
   }

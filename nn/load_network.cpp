@@ -39,7 +39,7 @@ class MlpNetwork final : public Network {
 };
 
 // The one perceptron that a file holds: "<prefix>.0.weight" names it.
-std::unique_ptr<Network> mlp_network(const SafeTensors& content, const std::string& file) {
+Mlp one_mlp(const SafeTensors& content, const std::string& file) {
   constexpr std::string_view kFirst = ".0.weight";
   std::vector<std::string> prefixes;
   for (const auto& [name, tensor] : content.tensors)
@@ -47,7 +47,7 @@ std::unique_ptr<Network> mlp_network(const SafeTensors& content, const std::stri
   if (prefixes.size() != 1)
     throw InputError(fmt::format("'{}': expected one multilayer perceptron ('<name>.0.weight'), found {} [{}]", file,
                                  prefixes.size(), shown(fmt::format("{}", fmt::join(prefixes, ", ")))));
-  return std::make_unique<MlpNetwork>(read_mlp(content, prefixes[0], file));
+  return read_mlp(content, prefixes[0], file);
 }
 
 bool is_zip(std::string_view bytes) { return bytes.starts_with("PK"); }
@@ -89,16 +89,23 @@ std::vector<std::string> network_engines() {
 }
 
 std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine) {
+  return load_network_file(path, engine).make();
+}
+
+NetworkFile load_network_file(const std::string& path, const std::string& engine) {
   const std::vector<std::string> engines = network_engines();
   require(std::ranges::find(engines, engine) != engines.end(),
           fmt::format("no network engine '{}' in this build. It has: {}", engine, fmt::join(engines, ", ")));
   require_data(path);
-  if (engine == "libtorch") return libtorch_network(path);
   const std::string bytes = read_data(path);
+  if (engine == "libtorch") return {[bytes, path] { return libtorch_network(bytes, path); }};
   check_is_network(bytes, path);
-  if (is_zip(bytes)) return torch_script_network(bytes, path);
-  if (is_safetensors(bytes)) return mlp_network(parse_safetensors(bytes, path), path);
-  return onnx_network(bytes, path, folder_of(path));
+  if (is_zip(bytes)) return {torch_script_maker(bytes, path)};
+  if (is_safetensors(bytes)) {
+    return {[mlp = one_mlp(parse_safetensors(bytes, path), path)] { return std::make_unique<MlpNetwork>(mlp); }};
+  }
+  const auto graph = std::make_shared<const OnnxGraph>(parse_onnx(bytes, path, folder_of(path)));
+  return {[graph] { return onnx_network(*graph); }, graph->metadata};
 }
 
 LoadedFiles network_files(const std::string& path) {

@@ -1,6 +1,8 @@
 // Networks from files of every kind that duet reads.
 #pragma once
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,6 +18,16 @@ namespace duet {
 // `engine`: "duet" (ours), or "libtorch" where it was built in (std::invalid_argument otherwise, naming those present).
 std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine = "duet");
 std::vector<std::string> network_engines();
+
+// Makes networks of one file that is read once: all are of the bytes that were there when it was loaded. Thread-safe.
+using NetworkMaker = std::function<std::unique_ptr<Network>()>;
+
+struct NetworkFile {
+  NetworkMaker make;
+  std::map<std::string, std::string> metadata{};  // what an ONNX file says of itself, by key
+};
+// Throws as load_network.
+NetworkFile load_network_file(const std::string& path, const std::string& engine = "duet");
 
 // What the network of that path is loaded from: "network", and for each file of an ONNX model's external data "network
 // data NAME"; those that load_network refuses (absent, outside of its folder) are left out. Throws InputError where the

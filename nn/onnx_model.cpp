@@ -53,13 +53,14 @@ std::vector<float> halves_of(const TensorProto& tensor) {
 
 class Parser {
  public:
-  Parser(const std::string& file, const std::string& folder) : folder_(folder) { graph_.file = file; }
+  Parser(const std::string& file, const std::string& folder) : external_(folder) { graph_.file = file; }
 
   OnnxGraph parse(std::string_view bytes) {
     onnx::ModelProto model;
     if (bytes.empty() || bytes.size() > INT_MAX || !model.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
       refuse("expected an ONNX model, found bytes that are not one (truncated?)");
     graph_.opset = opset(model);
+    for (const auto& entry : model.metadata_props()) graph_.metadata[entry.key()] = entry.value();
     read(model.graph());
     return std::move(graph_);
   }
@@ -125,10 +126,11 @@ class Parser {
 
   // The tensor as if its bytes stood in the model's own file.
   [[nodiscard]] TensorProto with_external_bytes(const TensorProto& from, const std::string& place) const {
-    if (folder_.empty()) refuse(place + ": expected its numbers in the file, found them in another (external data)");
+    if (external_.folder().empty())
+      refuse(place + ": expected its numbers in the file, found them in another (external data)");
     const std::string where = fmt::format("'{}': {}", graph_.file, shown(place));
     TensorProto tensor = from;
-    tensor.set_raw_data(read_external(folder_, external_place(from, place), where));
+    tensor.set_raw_data(external_.read(external_place(from, place), where));
     return tensor;
   }
 
@@ -241,7 +243,7 @@ class Parser {
     }
   }
 
-  std::string folder_;  // of external data; "": there is none
+  mutable ExternalData external_;  // keeps what it has read; its folder is "" where there is none
   OnnxGraph graph_;
 };
 

@@ -45,7 +45,8 @@ struct OnnxGraph {
   std::vector<OnnxPort> inputs;  // without those that are constants; float
   std::vector<OnnxPort> outputs;
   std::map<std::string, OnnxTensor> constants;
-  std::vector<OnnxNode> nodes;  // each after those whose outputs it reads
+  std::vector<OnnxNode> nodes;                    // each after those whose outputs it reads
+  std::map<std::string, std::string> metadata{};  // what the file says of itself, by key
 };
 
 inline constexpr int kOldestOpset = 11, kNewestOpset = 18;

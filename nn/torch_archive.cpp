@@ -20,9 +20,6 @@ std::vector<float> floats(const TorchArchive& archive, const std::string& entry,
     archive.refuse(fmt::format("tensor '{}': expected 4 bytes a number, found {} bytes", entry, content.size()));
   std::vector<float> values(content.size() / sizeof(float));
   if (!values.empty()) std::memcpy(values.data(), content.data(), content.size());
-  for (const float value : values)
-    if (!std::isfinite(value))
-      archive.refuse(fmt::format("tensor '{}': expected finite numbers, found {}", entry, value));
   return values;
 }
 
@@ -51,6 +48,14 @@ bool holds_torch_code(std::string_view bytes, const std::string& file) {
   };
   read_zip(bytes, file, kLimits, is_code, [](const std::string&, const std::string&) {});
   return found;
+}
+
+const std::vector<float>& TorchArchive::finite(int number) const {
+  const std::vector<float>& values = tensors.at(number);
+  for (const float value : values)
+    if (!std::isfinite(value))
+      refuse(fmt::format("tensor 'data/{}': expected finite numbers, found {}", number, value));
+  return values;
 }
 
 TorchArchive read_torch_archive(std::string_view bytes, const std::string& file) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <string_view>
 #include <utility>
@@ -42,6 +43,12 @@ class TorchReader {
     const std::string_view part = take(static_cast<std::size_t>(bytes));
     for (int i = bytes - 1; i >= 0; --i) value = value << 8 | static_cast<unsigned char>(part[i]);
     return static_cast<std::int64_t>(value);
+  }
+
+  double real() {  // big-endian
+    std::uint64_t bits = 0;
+    for (const char byte : take(8)) bits = bits << 8 | static_cast<unsigned char>(byte);
+    return std::bit_cast<double>(bits);
   }
 
   std::string line() {
@@ -99,8 +106,8 @@ class TorchReader {
         return push({.kind = TorchKind::kNumber, .number = whole(2)}), true;
       case 'J':
         return push({.kind = TorchKind::kNumber, .number = static_cast<std::int32_t>(whole(4))}), true;
-      case 'G':  // a floating-point number: no tensor needs one
-        return (void)take(8), push({}), true;
+      case 'G':
+        return push({.kind = TorchKind::kReal, .real = real()}), true;
       case 'X':
         return push({.kind = TorchKind::kText, .text = std::string(take(static_cast<std::size_t>(whole(4))))}), true;
       default:

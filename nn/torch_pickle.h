@@ -11,12 +11,13 @@
 
 namespace duet {
 
-enum class TorchKind { kNone, kNumber, kText, kTuple, kDict, kClass, kStorage, kTensor, kObject };
+enum class TorchKind { kNone, kNumber, kReal, kText, kTuple, kDict, kClass, kStorage, kTensor, kObject };
 
 // One value; others are named by their places in TorchPickle::nodes.
 struct TorchNode {
   TorchKind kind = TorchKind::kNone;
   std::int64_t number = 0;               // kNumber (flags too); first number of a kTensor in its storage
+  double real = 0.0;                     // kReal
   std::string text{};                    // kText; name of a kClass and of a kObject's; kind of a kStorage's numbers
   std::vector<int> items{};              // kTuple (lists too)
   std::map<std::string, int> members{};  // kDict by text keys, kObject

@@ -100,7 +100,7 @@ class LstmReader {
   }
 
   [[nodiscard]] MlpLayer layer(int first, int inputs) const {
-    const std::vector<float>&W = archive_.tensors.at(first), &b = archive_.tensors.at(first + 1);
+    const std::vector<float>&W = archive_.finite(first), &b = archive_.finite(first + 1);
     check(!b.empty() && W.size() == b.size() * inputs, first);
     MlpLayer layer;
     layer.b = Eigen::Map<const Eigen::VectorXf>(b.data(), static_cast<Eigen::Index>(b.size()));
@@ -109,7 +109,7 @@ class LstmReader {
   }
 
   void read_lstm(int first, int hidden, Module& module) const {
-    const auto tensor = [&](int k) -> const std::vector<float>& { return archive_.tensors.at(first + k); };
+    const auto tensor = [&](int k) -> const std::vector<float>& { return archive_.finite(first + k); };
     const std::size_t rows = 4 * static_cast<std::size_t>(hidden);
     check(!tensor(0).empty() && tensor(0).size() % rows == 0, first);
     check(tensor(1).size() == rows * hidden, first + 1);
@@ -164,13 +164,54 @@ class LstmPolicy final : public Network {
   std::vector<Port> inputs_, outputs_;
 };
 
+// A network whose first input and output are its own, while the others are its memory: what comes out of each goes in
+// at the next evaluation.
+class RememberingNetwork final : public Network {
+ public:
+  explicit RememberingNetwork(std::unique_ptr<Network> network)
+      : network_(std::move(network)), inputs_{network_->inputs()[0]}, outputs_{network_->outputs()[0]} {
+    for (const Port& port : network_->inputs().subspan(1)) memory_.emplace_back(port.size, 0.0F);
+    next_ = memory_;
+  }
+
+  [[nodiscard]] std::span<const Port> inputs() const override { return inputs_; }
+  [[nodiscard]] std::span<const Port> outputs() const override { return outputs_; }
+
+  void run(std::span<const std::span<const float>> inputs, std::span<const std::span<float>> outputs) override {
+    in_.assign({inputs[0]});
+    out_.assign({outputs[0]});
+    for (const std::vector<float>& state : memory_) in_.emplace_back(state);
+    for (std::vector<float>& state : next_) out_.emplace_back(state);
+    network_->run(in_, out_);
+    std::swap(memory_, next_);
+  }
+
+  void reset() override {
+    for (std::vector<float>& state : memory_) std::ranges::fill(state, 0.0F);
+  }
+
+ private:
+  std::unique_ptr<Network> network_;
+  std::vector<Port> inputs_, outputs_;
+  std::vector<std::vector<float>> memory_, next_;
+  std::vector<std::span<const float>> in_;  // kept: nothing allocates after the first run
+  std::vector<std::span<float>> out_;
+};
+
 }  // namespace
 
-std::unique_ptr<Network> torch_script_network(std::string_view bytes, const std::string& file) {
+std::function<std::unique_ptr<Network>()> torch_script_maker(std::string_view bytes, const std::string& file) {
   const TorchArchive archive = read_torch_archive(bytes, file);
   const LstmReader lstm(archive);
-  if (lstm.is_one()) return std::make_unique<LstmPolicy>(lstm.read());
-  return onnx_network(torch_mlp_graph(archive));
+  if (lstm.is_one()) return [module = lstm.read()] { return std::make_unique<LstmPolicy>(module); };
+  return [graph = torch_graph(archive)]() -> std::unique_ptr<Network> {
+    if (graph.states.empty()) return onnx_network(graph.graph);
+    return std::make_unique<RememberingNetwork>(onnx_network(graph.graph));
+  };
+}
+
+std::unique_ptr<Network> torch_script_network(std::string_view bytes, const std::string& file) {
+  return torch_script_maker(bytes, file)();
 }
 
 }  // namespace duet

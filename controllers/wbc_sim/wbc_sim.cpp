@@ -98,10 +98,4 @@ ControllerInfo wbc_sim_info() {
           true, option_list<ControllerOption>(wbc_sim_options())};
 }
 
-std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
-                                                    const ControllerOptions& options) {
-  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(wbc_sim_network_path(options), *robot));
-  return make_wbc_sim_controller(std::move(robot), std::move(network));
-}
-
 }  // namespace duet

@@ -14,11 +14,8 @@ namespace duet {
 std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
                                                     std::shared_ptr<const WbcNetwork> network);
 
-// Options: network: student | braced | oracle | braced_oracle | a path. Throws what controllers/controller.h says of
-// make_controller.
+// Options: network: student | braced | oracle | braced_oracle | a path.
 ControllerInfo wbc_sim_info();
 std::string wbc_sim_network_path(const ControllerOptions& options);  // MissingError where the shipped one is not there
-std::unique_ptr<Controller> make_wbc_sim_controller(std::shared_ptr<const RobotModel> robot,
-                                                    const ControllerOptions& options);
 
 }  // namespace duet

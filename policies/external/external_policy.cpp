@@ -105,8 +105,9 @@ PolicyMaker onnx_maker(const PolicyDescriptor& descriptor, const std::shared_ptr
                        const PolicyOptions& given) {
   const OnnxOptions options = read_options("policy", descriptor.name, onnx_options(), given);
   const std::string path = network_path(descriptor, options);
-  const auto make = [=, engine = options.engine, language = language_of(descriptor, options)] {
-    return make_onnx_policy(descriptor, robot, load_network(path, engine), path, language);
+  const auto make = [=, network = load_network_file(path, options.engine).make,
+                     language = language_of(descriptor, options)] {
+    return make_onnx_policy(descriptor, robot, network(), path, language);
   };
   static_cast<void>(make());  // what cannot be made is refused now, not in every episode
   return make;

@@ -193,8 +193,8 @@ TEST(TorchMlp, OtherModulesAreRefusedByName) {
   Mlp3 file;
   file.between = activation("Softmax");
   EXPECT_EQ(file.refusal(),
-            "'policy.pt': TorchScript: expected a PolicyExporterLSTM, or linear layers and activations one after "
-            "another, found 'activation.Softmax' as 'b/Elu' (TorchScript of another kind; needs libtorch)");
+            "'policy.pt': TorchScript: expected a policy of linear, recurrent and normalising layers, found "
+            "'activation.Softmax' as 'b/Elu' (TorchScript of another kind; needs libtorch)");
   Mlp3 none;
   none.forward = "    return input_1\n";
   EXPECT_THAT(none.refusal(), HasSubstr("found none (TorchScript of another kind"));
@@ -206,7 +206,7 @@ TEST(TorchMlp, OtherModulesAreRefusedByName) {
   EXPECT_THAT(unknown.refusal(), HasSubstr("no code of '__torch__.torch.nn.modules.activation.ELU'"));
   Mlp3 number;
   number.between = "K\x05";
-  EXPECT_THAT(number.refusal(), HasSubstr("'b/Elu', which is no module"));
+  EXPECT_THAT(number.refusal(), HasSubstr("the line 'b_elu = (b_Elu).forward(a_gemm, )' in the code of 'module'"));
 }
 
 TEST(TorchMlp, CodeThatDoesMoreThanHandOneTensorOnIsRefused) {
@@ -215,11 +215,13 @@ TEST(TorchMlp, CodeThatDoesMoreThanHandOneTensorOnIsRefused) {
     file.forward = code + "    return input_1\n";
     return file.refusal();
   };
-  EXPECT_THAT(line("    x = torch.add(input_1, input_1)\n"),
-              HasSubstr("found the line 'x = torch.add(input_1, input_1)' in the code of 'module'"));
+  EXPECT_THAT(line("    x = torch.cumsum(input_1, 0)\n"),
+              HasSubstr("found the line 'x = torch.cumsum(input_1, 0)' in the code of 'module'"));
+  EXPECT_THAT(line("    x = torch.add(input_1, input_1, alpha=2)\n"), HasSubstr("the line 'x = torch.add("));
+  EXPECT_THAT(line("    x = torch.add(input_1\n"), HasSubstr("the line 'x = torch.add(input_1' in"));
   EXPECT_THAT(line("    x = (a).forward(input_1, )\n"), HasSubstr("the line 'x = (a).forward(input_1, )'"));
   EXPECT_THAT(line("    x = (self.gone).forward(input_1, )\n"), HasSubstr("no member 'gone' in 'module'"));
-  EXPECT_THAT(line("    if True:\n"), HasSubstr("the line 'if True:'"));
+  EXPECT_THAT(line("    if input_1:\n      pass\n    else:\n      pass\n"), HasSubstr("the line 'if input_1:'"));
   Mlp3 endless;
   endless.forward = "    a = getattr(self, \"a/Gemm\")\n";
   EXPECT_THAT(endless.refusal(), HasSubstr("no return in the code of 'module'"));
@@ -255,7 +257,7 @@ TEST(TorchMlp, TensorsThatDoNotFitTheirNumbersAreRefused) {
   EXPECT_THAT(weight({.storage = 0, .sizes = {0, 3}, .strides = {3, 1}}), HasSubstr(fits));
   EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3}}), HasSubstr(fits));
   EXPECT_THAT(weight({.storage = 9, .sizes = {4, 3}, .strides = {3, 1}}), HasSubstr("no 'data/9' for 'a/Gemm.weight'"));
-  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3, 1}, .kind = "DoubleStorage"}),
+  EXPECT_THAT(weight({.storage = 0, .sizes = {4, 3}, .strides = {3, 1}, .kind = "LongStorage"}),
               HasSubstr("numbers of 'a/Gemm.weight' that are not float"));
   EXPECT_THAT(weight({.storage = 0, .sizes = {12}, .strides = {1}}), HasSubstr("'a/Gemm' without a matrix 'weight'"));
   Mlp3 narrow;
@@ -276,6 +278,170 @@ TEST(TorchMlp, PicklesThatDoMoreThanHoldTensorsAreRefused) {
   const std::string whole = file.module();
   for (std::size_t size = 0; size < whole.size(); size += 7)
     EXPECT_THAT(file.refusal(whole.substr(0, size)), HasSubstr("'policy.pt': TorchScript: ")) << size;
+}
+
+// ---- IsaacLab's exporter (isaaclab_rl.rsl_rl.exporter._TorchPolicyExporter, rsl_rl's normaliser), as torch.jit.script
+// prints it.
+constexpr const char* kExporterHead =
+    "class _TorchPolicyExporter(Module):\n  __parameters__ = []\n  training : bool\n  is_recurrent : bool\n"
+    "  def forward(self: __torch__.exporter._TorchPolicyExporter,\n    x: Tensor) -> Tensor:\n";
+constexpr const char* kNormaliser =
+    "class EmpiricalNormalization(Module):\n  __parameters__ = []\n  _mean : Tensor\n  _std : Tensor\n  training : "
+    "bool\n"
+    "  eps : float\n"
+    "  def forward(self: __torch__.rsl_rl.EmpiricalNormalization,\n    x: Tensor) -> Tensor:\n"
+    "    training = self.training\n    if training:\n      _0 = (self).update(x, )\n    else:\n      pass\n"
+    "    _mean = self._mean\n    _std = self._std\n    eps = self.eps\n"
+    "    return torch.div(torch.sub(x, _mean), torch.add(_std, eps))\n";
+constexpr const char* kChainForward =
+    "    actor = self.actor\n    normalizer = self.normalizer\n"
+    "    _0 = (actor).forward((normalizer).forward(x, ), )\n    return _0\n"
+    "  def reset(self: __torch__.exporter._TorchPolicyExporter) -> NoneType:\n    return None\n";
+
+std::string real(double value) {  // BINFLOAT: big-endian
+  std::string bytes(sizeof value, '\0');
+  std::memcpy(bytes.data(), &value, sizeof value);
+  return "G" + std::string(bytes.rbegin(), bytes.rend());
+}
+
+// Tensors 0 to 3 are the actor's; 4 and 5 the normaliser's mean and deviation.
+struct Exporter : Mlp3 {
+  std::string actor,
+      normaliser = object("__torch__.torch.nn.modules.linear", "Identity", text("training") + byte_of(0x89));
+
+  Exporter() {
+    sources["torch/nn/modules/container.py"] =
+        "class Sequential(Module):\n"
+        "  def forward(self: __torch__.torch.nn.modules.container.Sequential,\n    input: Tensor) -> Tensor:\n"
+        "    _0 = getattr(self, \"0\")\n    _1 = getattr(self, \"1\")\n    _2 = getattr(self, \"2\")\n"
+        "    input0 = (_0).forward(input, )\n    input1 = (_1).forward(input0, )\n    return (_2).forward(input1, )\n";
+    sources["exporter.py"] = std::string(kExporterHead) + kChainForward;
+    sources["rsl_rl.py"] = kNormaliser;
+    actor = object("__torch__.torch.nn.modules.container", "Sequential",
+                   text("0") + linear(first, bias) + text("1") + between + text("2") + linear(second, last_bias));
+    tensors.push_back(operand({3}, 4));
+    tensors.push_back(operand({3}, 5));
+    for (float& value : tensors[5].values) value = std::abs(value) + 0.5F;
+  }
+  void normalise() {
+    normaliser = object("__torch__.rsl_rl", "EmpiricalNormalization",
+                        text("_mean") + tensor({.storage = 4, .sizes = {1, 3}, .strides = {3, 1}}) + text("_std") +
+                            tensor({.storage = 5, .sizes = {1, 3}, .strides = {3, 1}}) + text("training") +
+                            byte_of(0x89) + text("eps") + real(0.01));
+  }
+  [[nodiscard]] std::string module_with(const std::string& more) const {
+    return object("__torch__.exporter", "_TorchPolicyExporter",
+                  text("training") + byte_of(0x89) + text("actor") + actor + text("normalizer") + normaliser + more);
+  }
+  [[nodiscard]] std::vector<double> normalised(const std::vector<float>& x) const {
+    std::vector<double> values(x.begin(), x.end());
+    if (normaliser.find("Identity") != std::string::npos) return values;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] =
+          (values[i] - static_cast<double>(tensors[4].values[i])) / (static_cast<double>(tensors[5].values[i]) + 0.01);
+    return values;
+  }
+  [[nodiscard]] std::vector<double> acted(const std::vector<double>& x) const {
+    std::vector<double> hidden = layer(tensors, 0, x);
+    for (double& value : hidden) value = half_elu(value);
+    return layer(tensors, 2, hidden);
+  }
+};
+
+TEST(TorchMlp, IsaacLabsExporterIsItsActorBehindItsNormaliser) {
+  Exporter plain;
+  const auto alone = plain.network(plain.module_with(""));
+  EXPECT_EQ(alone->inputs()[0].size, 3);
+  expect_near(evaluate(*alone, {wave(3)})[0], plain.acted(plain.normalised(wave(3))));
+  EXPECT_EQ(evaluate(*alone, {wave(3)})[0], evaluate(*Mlp3().network(), {wave(3)})[0]);
+  Exporter normalising;
+  normalising.normalise();
+  const auto network = normalising.network(normalising.module_with(""));
+  EXPECT_EQ(network->inputs()[0].size, 3);
+  expect_near(evaluate(*network, {wave(3)})[0], normalising.acted(normalising.normalised(wave(3))));
+}
+
+double logistic(double x) { return 1.0 / (1.0 + std::exp(-x)); }
+
+// A recurrent layer of 3 inputs and 3 hidden before the actor; its tensors are 6 to 9.
+struct RecurrentExporter : Exporter {
+  bool lstm;
+  int gates;
+  std::vector<double> h, c;
+
+  explicit RecurrentExporter(bool lstm_) : lstm(lstm_), gates(lstm_ ? 4 : 3), h(3, 0.0), c(3, 0.0) {
+    for (const Shape& shape : {Shape{gates * 3, 3}, Shape{gates * 3, 3}, Shape{gates * 3}, Shape{gates * 3}})
+      tensors.push_back(operand(shape, static_cast<int>(tensors.size())));
+    tensors.push_back(operand({3}, 0));  // the memory at the export, which is not looked at
+    const std::string call =
+        lstm ? "(rnn).forward__0(_0, (hidden_state, cell_state), )" : "(rnn).forward__0(_0, hidden_state, )";
+    sources["exporter.py"] =
+        std::string(kExporterHead) +
+        "    normalizer = self.normalizer\n    x0 = (normalizer).forward(x, )\n    rnn = self.rnn\n"
+        "    _0 = torch.unsqueeze(x0, 0)\n    hidden_state = self.hidden_state\n" +
+        (lstm ? "    cell_state = self.cell_state\n" : "") + "    _1 = " + call + "\n    x1, _2, = _1\n" +
+        (lstm ? "    h, c, = _2\n" : "    h = _2\n") +
+        "    hidden_state0 = self.hidden_state\n    _3 = torch.copy_(torch.slice(hidden_state0), h)\n" +
+        (lstm ? "    cell_state0 = self.cell_state\n    _4 = torch.copy_(torch.slice(cell_state0), c)\n" : "") +
+        "    actor = self.actor\n    _5 = (actor).forward(torch.squeeze(x1, 0), )\n    return _5\n";
+    sources["torch/nn/modules/rnn.py"] = std::string("class ") + (lstm ? "LSTM" : "GRU") +
+                                         "(Module):\n  num_layers : Final[int] = 1\n  proj_size : Final[int] = 0\n"
+                                         "  bidirectional : Final[bool] = False\n";
+  }
+  [[nodiscard]] std::unique_ptr<Network> recurrent() const {
+    const auto matrix = [&](int storage) {
+      return tensor({.storage = storage, .sizes = {gates * 3, 3}, .strides = {3, 1}});
+    };
+    const auto vector = [&](int storage) { return tensor({.storage = storage, .sizes = {gates * 3}, .strides = {1}}); };
+    const std::string state = tensor({.storage = 10, .sizes = {1, 1, 3}, .strides = {3, 3, 1}});
+    return network(module_with(text("rnn") +
+                               object("__torch__.torch.nn.modules.rnn", lstm ? "LSTM" : "GRU",
+                                      text("weight_ih_l0") + matrix(6) + text("weight_hh_l0") + matrix(7) +
+                                          text("bias_ih_l0") + vector(8) + text("bias_hh_l0") + vector(9)) +
+                               text("hidden_state") + state + (lstm ? text("cell_state") + state : "")));
+  }
+  [[nodiscard]] double row(int matrix, int bias, int row, const std::vector<double>& x) const {
+    double sum = static_cast<double>(tensors[bias].values[row]);
+    for (int k = 0; k < 3; ++k) sum += static_cast<double>(tensors[matrix].values[row * 3 + k]) * x[k];
+    return sum;
+  }
+  // PyTorch's formulas of LSTM (i, f, g, o) and GRU (r, z, n).
+  std::vector<double> step(const std::vector<float>& input) {
+    const std::vector<double> x = normalised(input), old = h;
+    const auto in = [&](int gate, int k) { return row(6, 8, gate * 3 + k, x); };
+    const auto back = [&](int gate, int k) { return row(7, 9, gate * 3 + k, old); };
+    for (int k = 0; k < 3; ++k) {
+      if (lstm) {
+        c[k] =
+            logistic(in(1, k) + back(1, k)) * c[k] + logistic(in(0, k) + back(0, k)) * std::tanh(in(2, k) + back(2, k));
+        h[k] = logistic(in(3, k) + back(3, k)) * std::tanh(c[k]);
+      } else {
+        const double r = logistic(in(0, k) + back(0, k)), z = logistic(in(1, k) + back(1, k));
+        h[k] = (1.0 - z) * std::tanh(in(2, k) + r * back(2, k)) + z * old[k];
+      }
+    }
+    return acted(h);
+  }
+};
+
+TEST(TorchMlp, IsaacLabsRecurrentExportersRememberAndForget) {
+  for (const bool lstm : {true, false})
+    for (const bool normalising : {false, true}) {
+      RecurrentExporter file(lstm);
+      if (normalising) file.normalise();
+      const auto network = file.recurrent();
+      ASSERT_EQ(network->inputs().size(), 1U);
+      ASSERT_EQ(network->outputs().size(), 1U);
+      EXPECT_EQ(network->inputs()[0].size, 3);
+      std::vector<std::vector<float>> first;
+      for (int t = 0; t < 4; ++t) {
+        first.push_back(evaluate(*network, {wave(3)})[0]);
+        expect_near(first.back(), file.step(wave(3)));
+      }
+      EXPECT_NE(first[0], first[1]);
+      network->reset();
+      EXPECT_EQ(evaluate(*network, {wave(3)})[0], first[0]);
+    }
 }
 
 TEST(TorchMlp, RlSarsTrackerEqualsItsFormula) {
