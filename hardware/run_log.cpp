@@ -165,7 +165,8 @@ RunLog::RunLog(const std::string& path, const GuardSetup& setup)
       {"odometry", kOdometryNames[static_cast<std::size_t>(setup.odometry)]},
       {"executor", executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints),
                                           *limiter.robot)}};
-  if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(json.dump())) || !writer_.flush())
+  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(text)) || !writer_.flush())
     throw StorageError(fmt::format("cannot write '{}'", path));
   thread_ = std::thread([this] { write_slots(); });
 }
@@ -192,6 +193,8 @@ void RunLog::add(const RobotGuard& guard) {
   slot.cause = status.safety.cause;
   slot.changed = slot.state != last_state_;
   last_state_ = slot.state;
+  slot.dropped = dropped_ - told_;
+  told_ += slot.dropped;
   added_.store(added + 1, std::memory_order_release);
 }
 
@@ -206,19 +209,27 @@ void RunLog::write_slots() {
     good_ = writer_.flush();
     if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
+  if (const long rest = dropped_ - told_; rest > 0)
+    write_event(nanoseconds(last_.tick.now), last_.state, last_.cause, rest);
   good_ = writer_.finish();
 }
 
 void RunLog::write_slot(const Slot& slot) {
   const std::uint64_t time = nanoseconds(slot.tick.now);
   ++sequence_;
+  if (slot.dropped > 0) write_event(time, last_.state, last_.cause, slot.dropped);
+  last_ = slot;
   writer_.write(kTickChannel, sequence_, time, std::as_bytes(std::span(&slot.tick, 1)));
   if (slot.took) write_frame(kStateChannel, time, std::as_bytes(std::span(&slot.received, 1)));
   if (slot.sent) write_frame(kFrameChannel, time, std::as_bytes(std::span(&slot.frame, 1)));
-  if (slot.changed) {
-    const nlohmann::json event = {{"state", safety_state_name(slot.state)}, {"cause", stop_cause_name(slot.cause)}};
-    writer_.write(kEventChannel, sequence_, time, bytes_of_text(event.dump()));
-  }
+  if (slot.changed) write_event(time, slot.state, slot.cause, 0);
+}
+
+// A change of state, or, with `dropped`, that so many ticks are not in the log here.
+void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, long dropped) {
+  nlohmann::json event = {{"state", safety_state_name(state)}, {"cause", stop_cause_name(cause)}};
+  if (dropped > 0) event["dropped"] = dropped;
+  writer_.write(kEventChannel, sequence_, time, bytes_of_text(event.dump()));
 }
 
 void RunLog::write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame) {
@@ -254,6 +265,9 @@ LogReplay replay_log(const std::string& path) {
       replay.different += limiter->agrees(record) ? 0 : 1;
     } else if (channel.topic == "guard/events") {
       replay.events.emplace_back(text);
+      const nlohmann::json event = nlohmann::json::parse(text, nullptr, false);
+      if (event.is_object() && event.contains("dropped") && event["dropped"].is_number_integer())
+        replay.dropped += event["dropped"].get<long>();
     }
   };
   replay.whole = read_mcap(bytes_of_text(bytes), path, each).whole;

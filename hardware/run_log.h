@@ -53,6 +53,7 @@ class RunLog {
 
   // Of the guard's last tick. No allocation, no file, no lock.
   void add(const RobotGuard& guard);
+  // Ticks that found no room; an event of the log says where and how many ("dropped").
   [[nodiscard]] long dropped() const { return dropped_; }
   [[nodiscard]] bool good() const { return good_; }
 
@@ -62,11 +63,13 @@ class RunLog {
     LowStateFrame received;
     LowCommandFrame frame;
     bool took = false, sent = false, changed = false;
+    long dropped = 0;  // ticks before it that found no room
     SafetyState state = SafetyState::kOffline;
     StopCause cause = StopCause::kNone;
   };
   void write_slots();
   void write_slot(const Slot& slot);
+  void write_event(std::uint64_t time, SafetyState state, StopCause cause, long dropped);
   void write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame);
 
   McapWriter writer_;
@@ -74,13 +77,16 @@ class RunLog {
   std::atomic<std::uint64_t> added_ = 0, written_ = 0;
   std::atomic<bool> ends_ = false, good_ = true;
   SafetyState last_state_ = SafetyState::kOffline;
-  long dropped_ = 0;
+  std::atomic<long> dropped_ = 0;
+  long told_ = 0;   // of them, by a slot
+  Slot last_ = {};  // that was written
   std::uint32_t sequence_ = 0;
   std::thread thread_;
 };
 
 struct LogReplay {
   long ticks = 0, different = 0;
+  long dropped = 0;                 // ticks that are not in the log: the next one may differ for it
   bool whole = false;               // the log has its end
   std::vector<std::string> events;  // states and causes, in order
 };

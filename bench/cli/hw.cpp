@@ -298,9 +298,14 @@ void add_seconds(CLI::App* app, HardwareArguments& arguments) {
 void run_replay(Session& session, const std::string& path) {
   const LogReplay replay = replay_log(path);
   print(session,
-        fmt::format("{}: {} ticks, {} with another output; the log {}", path, replay.ticks, replay.different,
+        fmt::format("{}: {} ticks, {} with another output{}; the log {}", path, replay.ticks, replay.different,
+                    replay.dropped == 0 ? "" : fmt::format(" ({} ticks are not in it)", replay.dropped),
                     replay.whole ? "is whole" : "was cut off"),
-        {{"ticks", replay.ticks}, {"different", replay.different}, {"whole", replay.whole}, {"events", replay.events}});
+        {{"ticks", replay.ticks},
+         {"different", replay.different},
+         {"dropped", replay.dropped},
+         {"whole", replay.whole},
+         {"events", replay.events}});
   if (replay.different > 0) session.exit_code = kExitDeterminism;
 }
 

@@ -300,6 +300,26 @@ TEST(RunLog, ACutLogIsReplayedAsFarAsItGoes) {
   EXPECT_FALSE(replay.whole);
 }
 
+// A ring that is full while the writer sleeps: the log says where ticks are missing, and how many.
+TEST(RunLog, TicksThatFoundNoRoomAreSaidInTheLog) {
+  const test::ScratchFolder folder;
+  long dropped = 0;
+  {
+    GuardedTwin robot(test::twin_guard(), {});
+    RunLog log(folder / "run.mcap", test::twin_guard());
+    robot.tick();
+    constexpr long kMost = 5'000'000;
+    for (long added = 0; added < kMost && log.dropped() < 100; ++added) log.add(robot.guard);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // the writer's turn
+    log.add(robot.guard);
+    dropped = log.dropped();
+  }
+  ASSERT_GE(dropped, 100);
+  const LogReplay replay = replay_log(folder / "run.mcap");
+  EXPECT_EQ(replay.dropped, dropped);
+  EXPECT_TRUE(replay.whole);
+}
+
 TEST(RunLog, RefusesWhatIsNoLogOfARun) {
   const test::ScratchFolder folder;
   (void)small_file(folder);
