@@ -1,6 +1,7 @@
 #include "duet/bench/bodies.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -10,7 +11,9 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/policies/on_other_body.h"
+#include "duet/results/rows/episode_row.h"
 #include "duet/robots/joint_map.h"
+#include "duet/robots/origin.h"
 
 namespace duet {
 namespace {
@@ -37,27 +40,61 @@ void require_joints_of(const RobotModel& nominal, const RobotModel& robot, const
                   controller, robot.name, nominal.name, robot.name));
 }
 
+bool is_simulated(const Suite& suite) {
+  return std::ranges::any_of(suite.engines, [](const std::string& engine) { return engine != kPlaybackEngine; });
+}
+
+// What every episode of the suite asks of the robot's card: found now, not after the physics of the first one.
+void require_parts_of(const Suite& suite, const RobotModel& robot, const std::string& card) {
+  std::vector<std::string> lacks;
+  if (suite.references.empty()) {
+    for (const char* track : {"head", "lhand", "rhand", "torso", "lshoulder", "rshoulder"})
+      if (!robot.tracks.contains(track)) lacks.push_back(fmt::format("tracks: {}", track));
+    for (const char* hand : {"left_hand", "right_hand"})
+      if (std::ranges::find(robot.keypoints, hand, &Keypoint::name) == robot.keypoints.end())
+        lacks.push_back(fmt::format("keypoints: {}", hand));
+    if (robot.pairs.empty()) lacks.emplace_back("pairs");
+  }
+  if (robot.feet.empty() && is_simulated(suite)) lacks.emplace_back("shapes with sole: true");
+  if (lacks.empty()) return;
+  throw InputError(fmt::format("{}: robot '{}': expected what suite '{}' needs of a robot, found no {}", card,
+                               robot.name, suite.name, fmt::join(lacks, ", ")));
+}
+
+// Its descriptor was read with the suite, and is now.
+void require_same_facts(const SuiteController& controller) {
+  const ControllerInfo then = about(controller), now = controller_info(controller.use);
+  const auto names = [](const ControllerInfo& info) {
+    std::vector<std::string> list;
+    for (const ControllerOption& option : info.options) list.push_back(option.name);
+    return list;
+  };
+  if (then.robot != now.robot || then.walks != now.walks || names(then) != names(now))
+    throw InputError(fmt::format("{}: was replaced since the suite was read: begin again", controller.use));
+}
+
 }  // namespace
+
+std::string contact_limits_of(const Suite& suite) {
+  return suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits;
+}
 
 std::string card_of(const Suite& suite, const SuiteController& controller) {
   if (!suite.robot.empty()) return suite.robot;
-  const std::string robot = controller_info(controller.use).robot;
+  const std::string robot = about(controller).robot;
   return robot.empty() ? default_card_path() : card_path(robot);
 }
 
 Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
                const std::vector<std::string>& skipped_policies, const std::map<std::string, PolicyLoader>& called) {
   require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
+  const DigestReads reads(read_);
+  if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(contact_limits_of(suite));
   add(suite.robot.empty() ? default_card_path() : suite.robot);
   for (const SuiteController& controller : suite.controllers) {
     if (contains(skipped_controllers, controller.name)) continue;
     try {
-      const std::size_t place = add(card_of(suite, controller));
-      if (suite.references.empty()) require_joints_of(*nominal(), *bodies_[place].robot, controller.name);
-      static_cast<void>(make_controller(controller.use, bodies_[place].robot, controller.options));
-      for (const Perturbation& perturbation : suite.perturbations)
-        check_perturbation(perturbation, *bodies_[place].robot);
-      place_[controller.name] = place;
+      load_controller_of(suite, controller);
     } catch (const MissingError& error) {
       absent_[controller.name] = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
     }
@@ -70,6 +107,21 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
   for (const std::string& control : suite.controls)
     if (!contains(skipped_policies, control)) add_policy(SuitePolicy{control}, by_name(control));
   add_policy(SuitePolicy{kNullPolicy}, by_name(kNullPolicy));
+}
+
+// Made once to see whether it can be.
+void Bodies::load_controller_of(const Suite& suite, const SuiteController& controller) {
+  require_same_facts(controller);
+  const std::size_t place = add(card_of(suite, controller));
+  const std::shared_ptr<const RobotModel>& robot = bodies_[place].robot;
+  if (suite.references.empty()) require_joints_of(*nominal(), *robot, controller.name);
+  require_parts_of(suite, *robot, card_of(suite, controller));
+  LoadedController loaded = load_controller(controller.use, robot, controller.options);
+  static_cast<void>(loaded.make(controller.options));
+  take_notes(loaded.notes);
+  for (const Perturbation& perturbation : suite.perturbations) check_perturbation(perturbation, *robot);
+  controllers_[controller.name] = std::move(loaded);
+  place_[controller.name] = place;
 }
 
 // What was made for the nominal body goes by the joints' names on one that it does not fit. Its files were read for the
@@ -102,7 +154,13 @@ std::size_t Bodies::add(const std::string& card) {
   const auto found = std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.card == card; });
   if (found != bodies_.end()) return static_cast<std::size_t>(found - bodies_.begin());
   bodies_.push_back({card, load_shared_robot(card), {}});
+  take_notes(robot_notes(card));
   return bodies_.size() - 1;
+}
+
+void Bodies::take_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes)
+    if (!contains(notes_, note)) notes_.push_back(note);
 }
 
 void Bodies::take_clips(std::vector<PairedMotion> clips) {

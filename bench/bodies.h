@@ -1,15 +1,19 @@
 // The robot that each controller of a suite was made for, the clips and the policies on that robot, and what this
-// machine cannot run. Each card is loaded once, and what a policy loads once per body. Immutable once the clips are
-// there; shared by threads.
+// machine cannot run. Each card, each network and the table of limits is loaded once, here, for all episodes. Immutable
+// once the clips are there; shared by threads.
 #pragma once
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "duet/bench/suite.h"
+#include "duet/controllers/registry.h"
+#include "duet/core/digest.h"
+#include "duet/metrics/contact_limits.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/policies/registry.h"
 #include "duet/robots/robot_model.h"
@@ -22,15 +26,19 @@ struct PolicyOnBody {
   std::string refusal;  // its files are not on this machine; empty where it can
 };
 
+// The table that contacts with a solid partner are held against.
+std::string contact_limits_of(const Suite& suite);
+
 // The card of the robot that one of the suite's controllers runs on. Throws MissingError where it is not there.
 std::string card_of(const Suite& suite, const SuiteController& controller);
 
 class Bodies {
  public:
-  // Throws as load_robot for the suite's own card and for a card that is broken, and as policy_maker where a policy
-  // does not fit nominal() or its files are broken. InputError too for programs that are not allowed. A controller or
-  // policy whose files are not on this machine is absent, not an error; those in `skipped` are not looked at. `called`:
-  // how policies are made that the caller brings, by their names in the suite.
+  // Throws as load_robot for the suite's own card and for a card that is broken, as policy_maker where a policy does
+  // not fit nominal() or its files are broken, and InputError for a file that was replaced since the suite was read.
+  // InputError too for programs that are not allowed. A controller or policy whose files are not on this machine is
+  // absent, not an error; those in `skipped` are not looked at. `called`: how policies are made that the caller brings,
+  // by their names in the suite.
   explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
                   const std::vector<std::string>& skipped_policies = {},
                   const std::map<std::string, PolicyLoader>& called = {});
@@ -40,6 +48,14 @@ class Bodies {
 
   // That clips are retargeted to: the suite's robot, or the one that ships with duet.
   [[nodiscard]] const std::shared_ptr<const RobotModel>& nominal() const { return bodies_.front().robot; }
+  // With what the suite's controller has loaded. Throws std::out_of_range for one that is absent or was skipped.
+  [[nodiscard]] const LoadedController& controller(const std::string& name) const { return controllers_.at(name); }
+  // None where no partner is solid.
+  [[nodiscard]] const std::optional<ContactLimits>& limits() const { return limits_; }
+  // Digests of the files that were loaded, of the bytes that are used.
+  [[nodiscard]] const FileDigests& read() const { return read_; }
+  // Sentences of what was loaded, each once: what of a URDF is not simulated, where two files of a controller disagree.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   // Of a controller of the suite; nominal() for one that is absent.
   [[nodiscard]] const std::shared_ptr<const RobotModel>& robot(const std::string& controller) const;
   [[nodiscard]] const std::vector<PairedMotion>& clips(const std::string& controller) const;
@@ -57,6 +73,8 @@ class Bodies {
     std::vector<PairedMotion> clips;
   };
   std::size_t add(const std::string& card);
+  void take_notes(const std::vector<std::string>& notes);
+  void load_controller_of(const Suite& suite, const SuiteController& controller);
   void add_policy(const SuitePolicy& policy, const PolicyLoader& load);
   // Called while an exception is handled; throws it again where there is nothing to map.
   void map_policy(const std::string& name, std::size_t place);
@@ -64,6 +82,10 @@ class Bodies {
 
   std::vector<Body> bodies_;                  // the nominal first
   std::map<std::string, std::size_t> place_;  // of a controller's body
+  std::map<std::string, LoadedController> controllers_;
+  std::optional<ContactLimits> limits_;
+  FileDigests read_;
+  std::vector<std::string> notes_;
   std::map<std::string, std::string> absent_, absent_policies_;
   std::map<std::pair<std::string, std::size_t>, PolicyOnBody> policies_;  // by name and body
 };

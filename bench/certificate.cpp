@@ -105,7 +105,7 @@ std::string digest_of(const Certificate& certificate) {
   for (json& engine : content["engines"])
     for (json& curve : engine["accuracy"])
       for (json& point : curve["points"]) point.erase("cost");
-  return sha256_hex(content.dump());
+  return sha256_hex(dumped(content));
 }
 
 // Calls read(element, "engines[2]") for each element of the list at `key`.

@@ -158,17 +158,33 @@ LoadedMotion find_or_make(const PreparedClips& prepared, const std::string& labe
   return made;
 }
 
+struct DigestedNpz {
+  Npz npz;
+  std::string sha256;
+};
+
+DigestedNpz load_digested(const std::string& file, const FileDigests* expected) {
+  FileDigests read;
+  const DigestReads reads(read);
+  Npz npz = Npz::load(file);
+  const std::string sha256 = read.of(file), known = expected == nullptr ? "" : expected->find(file);
+  if (!known.empty() && known != sha256)
+    throw InputError(
+        fmt::format("'{}' was replaced while it was used: SHA-256 expected {}, found {}", file, known, sha256));
+  return {std::move(npz), sha256};
+}
+
 // A file that is only read is not kept.
 LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const PairOptions& options,
-                       const ClipPadding& pad, const PreparedClips& prepared) {
+                       const ClipPadding& pad, const PreparedClips& prepared, const FileDigests* files) {
   const std::string role = source.other_role ? " other role" : "";
   if (const auto* file = std::get_if<std::string>(&source.from)) {
-    const Npz npz = Npz::load(*file);
-    const auto read = [&] {
+    const auto [npz, sha256] = load_digested(*file, files);
+    const auto read = [&, &npz = npz] {
       return load_or_retarget(npz, robot, options, Implausible::kRefused, pad, source.other_role);
     };
     const bool keep = prepared.keeps() && kind_of(npz) == MotionFile::kClip;
-    return keep ? find_or_make(prepared, sha256_file(*file) + role, read) : read();
+    return keep ? find_or_make(prepared, sha256 + role, read) : read();
   }
   const auto& clip = std::get<SyntheticClip>(source.from);
   const auto make = [&] {
@@ -192,12 +208,12 @@ void note_all(const std::vector<LoadedMotion>& made, Progress& progress) {
 std::vector<LoadedMotion> make_clips(const std::vector<ClipSource>& sources, const RobotModel& robot,
                                      const PairOptions& options, int threads, Progress& progress,
                                      const ClipPadding& pad = {}, const PreparedClips& prepared = {"", ""},
-                                     const StopSign* stop = nullptr) {
+                                     const StopSign* stop = nullptr, const FileDigests* files = nullptr) {
   std::vector<LoadedMotion> made(sources.size());
   progress.start("preparing clips", static_cast<int>(sources.size()), "clips");
   parallel_for_each(static_cast<int>(sources.size()), threads, [&](int i) {
     if (stop != nullptr && stop->asked()) throw Stopped();
-    made[i] = make_clip(sources[i], robot, options, pad, prepared);
+    made[i] = make_clip(sources[i], robot, options, pad, prepared, files);
     progress.advance();
   });
   progress.finish();
@@ -308,7 +324,8 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
   if (!suite.references.empty()) return empty_clips(suite.references);
   const PreparedClips prepared(prepare.keep_in, maker_of(suite, robot));
   const auto make = [&](const std::vector<ClipSource>& sources) {
-    return make_clips(sources, robot, pair_options(suite), threads, progress, suite.clips.pad, prepared, prepare.stop);
+    return make_clips(sources, robot, pair_options(suite), threads, progress, suite.clips.pad, prepared, prepare.stop,
+                      prepare.files);
   };
   std::vector<LoadedMotion> made = make(list_sources(suite.tasks, suite.clips));
   if (suite.clips.synth_per_file > 0) std::ranges::move(make(list_twins(made, suite)), std::back_inserter(made));

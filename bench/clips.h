@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "duet/bench/suite.h"
+#include "duet/core/digest.h"
 #include "duet/core/npz.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/plausibility.h"
@@ -20,6 +21,8 @@ class StopSign;
 struct PrepareOptions {
   std::string keep_in = {};        // a run folder that keeps the clips as each is finished (bench/prepared_clips.h)
   const StopSign* stop = nullptr;  // asked before each clip
+  // Digests that the files' must be (RunIdentity::files), for those that it has; InputError for another one.
+  const FileDigests* files = nullptr;
 };
 
 // What an NPZ of motion holds, by its key `schema`. Throws InputError for anything else.

@@ -40,8 +40,13 @@ Take take_of(const PairedMotion& clip, const RobotModel& robot, StartMode start,
   return take;
 }
 
+ControllerOptions controller_options(const DemonstrationOptions& options) {
+  if (options.controller_network.empty()) return {};
+  return {{"network", options.controller_network}};
+}
+
 void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options,
-            const PolicyMaker& make_policy) {
+            const PolicyMaker& make_policy, const LoadedController& make_controller) {
   const std::unique_ptr<Policy> policy = make_policy();
   RolloutSetup setup;
   setup.clip = take.clip;
@@ -56,10 +61,7 @@ void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const De
     scene.robot = robot;
     scene.human = make_human_body(bone_lengths(take.clip->partner));
     const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
-    const ControllerOptions network = options.controller_network.empty()
-                                          ? ControllerOptions{}
-                                          : ControllerOptions{{"network", options.controller_network}};
-    rollout = roll_out(setup, *backend, *make_controller(options.controller, robot, network), *policy);
+    rollout = roll_out(setup, *backend, *make_controller.make(controller_options(options)), *policy);
   }
   take.followed = std::move(rollout.recording.robot);
   if (rollout.recording.outcome == Outcome::kOk) return;
@@ -88,6 +90,7 @@ struct Demonstrators {
   const std::shared_ptr<const RobotModel>& robot;
   const DemonstrationOptions& options;
   const PolicyMaker& make_policy;
+  const LoadedController& make_controller;  // empty where no engine follows
   Progress& progress;
   const std::function<bool()>& stop;
 };
@@ -108,7 +111,7 @@ bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& p
     const PairedMotion& clip = clips[i / starts];
     made[i] = take_of(clip, *by.robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
     const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
-    if (followed) follow(*made[i], by.robot, options, by.make_policy);
+    if (followed) follow(*made[i], by.robot, options, by.make_policy, by.make_controller);
     by.progress.advance();
   });
   by.progress.finish();
@@ -148,13 +151,16 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
                                                     const DemonstrationOptions& options, Progress& progress,
                                                     const std::function<bool()>& stop) {
   const PolicyMaker maker = policy_maker(options.policy, robot, options.policy_options);
+  const bool simulated = !options.engine.empty() && options.engine != kPlaybackEngine;
+  const LoadedController controller =
+      simulated ? load_controller(options.controller, robot, controller_options(options)) : LoadedController();
   const PairOptions pair = make_pair_options({{"mode", options.pair_mode}});
   DemonstrationSet set;
   set.robot_digest = robot->digest;
   set.origin = origin_of(options);
   for (const DemonstrationClips& kind : options.clips)
     for (const Task task : kPaperTasks)  // one at a time: hours of clips and takes are gigabytes
-      if (!demonstrate(task, kind, pair, {robot, options, maker, progress, stop}, set)) return std::nullopt;
+      if (!demonstrate(task, kind, pair, {robot, options, maker, controller, progress, stop}, set)) return std::nullopt;
   return set;
 }
 

@@ -1,11 +1,11 @@
 #include "duet/bench/episode.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
 #include "duet/bench/suite_names.h"
-#include "duet/controllers/registry.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/results/analyses/walk_table.h"
@@ -18,7 +18,7 @@ namespace {
 bool one_playback(const Suite& suite) {
   const auto robot = [&](const SuiteController& controller) {
     if (!suite.robot.empty()) return suite.robot;
-    const std::string made_for = controller_info(controller.use).robot;
+    const std::string made_for = about(controller).robot;
     return made_for.empty() ? default_robot() : made_for;
   };
   const SuiteController& first = suite.controllers.front();
@@ -92,34 +92,43 @@ StartMode start_mode(const Suite& suite, const SuiteController& controller) {
     case SuiteStart::kAuto:
       break;
   }
-  return controller_info(controller.use).walks ? StartMode::kApproach : StartMode::kAct;
+  return about(controller).walks ? StartMode::kApproach : StartMode::kAct;
 }
 
-EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies)
+EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part)
     : suite_(suite),
       bodies_(bodies),
       suite_id_(suite.name + "@" + suite.version),
       combinations_(combinations_of(suite)),
-      arms_(arms_of(suite)),
-      clips_(static_cast<std::int64_t>(bodies.clips(suite.controllers.front().name).size())) {
-  require_sane_size(suite, clips_);
+      arms_(arms_of(suite)) {
   const std::vector<PairedMotion>& clips = bodies.clips(suite.controllers.front().name);
+  require_sane_size(suite, static_cast<std::int64_t>(clips.size()));
   for (const EpisodeArm& arm : arms_)
     for (const PairedMotion& clip : clips)
       if (arm.shuffled) static_cast<void>(next_of_task(clips, clip, arm.policy));
+  std::erase_if(combinations_, [&](const EpisodeSpec& spec) {
+    return !chosen(part.engines, spec.engine) || !chosen(part.controllers, spec.controller) ||
+           (spec.engine != kPlaybackEngine && !chosen(part.perturbations, spec.perturbation));
+  });
+  std::erase_if(arms_, [&](const EpisodeArm& arm) { return arm.name != "null" && !chosen(part.policies, arm.policy); });
+  for (std::size_t i = 0; i < clips.size(); ++i)
+    if (chosen(part.tasks, to_string(clips[i].task))) clips_.push_back(i);
+  if (!part.is_whole() && size() == 0)
+    throw InputError(fmt::format("{}: no episode is in what was asked for", suite.file));
 }
 
 std::int64_t EpisodePlan::size() const {
-  return static_cast<std::int64_t>(combinations_.size() * arms_.size()) * clips_ * suite_.episodes_per_clip;
+  return static_cast<std::int64_t>(combinations_.size() * arms_.size() * clips_.size()) * suite_.episodes_per_clip;
 }
 
 EpisodeSpec EpisodePlan::at(std::int64_t i) const {
-  const auto arms = static_cast<std::int64_t>(arms_.size());
+  const auto arms = static_cast<std::int64_t>(arms_.size()), count = static_cast<std::int64_t>(clips_.size());
   const std::int64_t per_clip = arms * suite_.episodes_per_clip;
   const EpisodeArm& arm = arms_[i % arms];
-  EpisodeSpec spec = combinations_[i / (per_clip * clips_)];
+  EpisodeSpec spec = combinations_[i / (per_clip * count)];
+  spec.bodies = &bodies_;
   const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller);
-  spec.clip = &clips[i / per_clip % clips_];
+  spec.clip = &clips[clips_[i / per_clip % count]];
   spec.episode = static_cast<int>(i / arms % suite_.episodes_per_clip);
   spec.seen = arm.shuffled ? &next_of_task(clips, *spec.clip, arm.policy) : nullptr;
   spec.policy = arm.policy;
@@ -138,6 +147,29 @@ std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies)
   std::vector<EpisodeSpec> all;
   for (std::int64_t i = 0; i < plan.size(); ++i) all.push_back(plan.at(i));
   return all;
+}
+
+std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known) {
+  std::vector<std::string> names;
+  for (const std::string& name : known)
+    if (!chosen(filter, name)) names.push_back(name);
+  return names;
+}
+
+void check_filters(const RunPart& part, const Suite& suite) {
+  const auto check = [](const std::vector<std::string>& filter, const std::vector<std::string>& known,
+                        const char* kind) {
+    for (const std::string& name : filter)
+      require(std::ranges::find(known, name) != known.end(),
+              fmt::format("the suite has no {} '{}'; it has: {}", kind, name, fmt::join(known, ", ")));
+  };
+  std::vector<std::string> tasks;
+  for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
+  check(part.engines, suite.engines, "engine");
+  check(part.controllers, controller_names_of(suite), "controller");
+  check(part.policies, policy_names_of(suite), "policy");
+  check(part.tasks, tasks, "task");
+  check(part.perturbations, perturbation_names_of(suite), "perturbation");
 }
 
 bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {

@@ -26,6 +26,7 @@ struct EpisodeSpec {
   std::string perturbation = kCleanName;
   std::uint64_t perturbation_seed = 0;  // likewise
   const PairedMotion* seen = nullptr;   // whose partner the policy sees in the place of this clip's; null: this one's
+  const Bodies* bodies = nullptr;       // with what was loaded for all episodes; null: this one loads it itself
 };
 
 // Whether this machine can run episodes in it: playback always.
@@ -52,8 +53,11 @@ struct EpisodeArm {
 // is made when it is asked for. Suite and bodies must outlive it.
 class EpisodePlan {
  public:
-  // Throws InputError where a task with a shuffled partner has one clip alone, and for more than kMostEpisodes.
-  EpisodePlan(const Suite& suite, const Bodies& bodies);
+  // `part`: those of it alone, in the same order. Throws InputError where a task with a shuffled partner has one clip
+  // alone, for more than kMostEpisodes, and for a part without an episode.
+  EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part = {});
+  EpisodePlan(const EpisodePlan&) = delete;
+  EpisodePlan& operator=(const EpisodePlan&) = delete;
 
   [[nodiscard]] std::int64_t size() const;
   [[nodiscard]] EpisodeSpec at(std::int64_t i) const;
@@ -66,7 +70,7 @@ class EpisodePlan {
   std::string suite_id_;
   std::vector<EpisodeSpec> combinations_;  // engine, controller and perturbation alone
   std::vector<EpisodeArm> arms_;
-  std::int64_t clips_ = 0;  // the same on every body
+  std::vector<std::size_t> clips_;  // that are in the part; the same on every body
 };
 
 // All of it at once.
@@ -74,6 +78,12 @@ std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies)
 
 // Whether the choice holds this name; none at all is a choice of every name.
 bool chosen(const std::vector<std::string>& names, std::string_view name);
+
+// Those of `known` that a filter leaves out.
+std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known);
+
+// Throws std::invalid_argument for a name that the suite does not have: a mistake, not an empty run.
+void check_filters(const RunPart& part, const Suite& suite);
 
 // Whether the episode, of a clip of this task, belongs to the part; playback to every choice of perturbations, the null
 // arm to every choice of policies.

@@ -8,6 +8,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/hardware/guard_loop.h"
+#include "duet/results/rows/json_fields.h"
 #include "duet/robots/robot_cards.h"
 
 namespace duet {
@@ -149,7 +150,7 @@ Suite suite_of_clip(const std::string& clip, const std::string& policy, const st
   return parse_suite(
       fmt::format("schema: duet.suite/1\nname: hw-run\nversion: 1.0.0\nclips: {{files: [{}]}}\ntasks: [{}]\nengines: "
                   "[playback]\ncontrollers: [{}]\npolicies: [{}]\nrobot: {}\nstart: {}\nnull_arm: false\n",
-                  quoted.dump(), fmt::join(tasks, ", "), controller, policy, default_robot(), start),
+                  dumped(quoted), fmt::join(tasks, ", "), controller, policy, default_robot(), start),
       "hw-run.yaml");
 }
 

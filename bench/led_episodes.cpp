@@ -54,12 +54,13 @@ Suite narrowed(Suite suite, const LedPart& part) {
 }  // namespace
 
 LedSuite::LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress)
-    : suite_(narrowed(std::move(suite), part)), identity_(identity_of(suite_)) {
-  identity_.policies[kCaller].clear();  // what the caller is nobody knows
+    : suite_(narrowed(std::move(suite), part)) {
   if (suite_.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite_.engines.front()));
   bodies_ = std::make_unique<Bodies>(suite_);
   if (!bodies_->absent().empty()) throw MissingError(bodies_->absent().begin()->second);
-  bodies_->take_clips(prepare_clips(suite_, *bodies_->nominal(), threads, progress));
+  identity_ = identity_of(suite_, bodies_->read());
+  identity_.policies[kCaller].clear();  // what the caller is nobody knows
+  bodies_->take_clips(prepare_clips(suite_, *bodies_->nominal(), threads, progress, {.files = &identity_.files}));
   plan_ = std::make_unique<EpisodePlan>(suite_, *bodies_);
 }
 
@@ -147,6 +148,7 @@ void LedEpisode::answer(std::span<const double> numbers, int rows) {
 
 std::shared_ptr<const PlanRequest> LedEpisode::next() {
   require_same_process();
+  require(queue_ != nullptr, "the episode has not begun: begin one");
   question_.reset();
   std::vector<std::shared_ptr<const PlanRequest>> taken;
   while (taken.empty() && !queue_->closed()) taken = queue_->take(kWhile);

@@ -36,6 +36,8 @@ class LedSuite {
   // Throws std::invalid_argument for a name that the suite does not have, MissingError for an engine or a controller
   // that this machine lacks, InputError (clips, cards, a suite of walking commands).
   LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress);
+  LedSuite(const LedSuite&) = delete;  // the plan points into it
+  LedSuite& operator=(const LedSuite&) = delete;
 
   [[nodiscard]] int size() const { return static_cast<int>(plan_->size()); }
   [[nodiscard]] EpisodeSpec at(int episode) const { return plan_->at(episode); }
@@ -82,6 +84,7 @@ class LedEpisode {
   // The same in two halves, so that many episodes compute at once.
   void start(int episode);
   void answer(std::span<const double> numbers, int rows);
+  // Throws std::invalid_argument before the first start().
   std::shared_ptr<const PlanRequest> next();
   // Where the partner is to be at the ticks up to the next question, where both are led and the episode is not over: at
   // first as in the clip, then as it was led. Of kTicksPerPlan frames; past the episode's end the last one stands.

@@ -44,7 +44,8 @@ std::unique_ptr<Controller> episode_controller(const EpisodeSpec& spec, const Su
   const SuiteController& controller = controller_of(suite, spec.controller);
   ControllerOptions options = controller.options;
   if (!suite.references.empty())
-    options = with_command(controller.use, options, reference_of(suite.references, spec.clip->clip_id));
+    options = with_command(about(controller), options, reference_of(suite.references, spec.clip->clip_id));
+  if (spec.bodies != nullptr) return spec.bodies->controller(spec.controller).make(options);
   return make_controller(controller.use, robot, options);
 }
 
@@ -151,12 +152,11 @@ RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const Ro
     setup.seen_partner = partner_from_elsewhere(
         *spec.seen, adapt_by_phase(spec.seen->robot, spec.seen->phases, robot, options, spec.seed), setup.reference);
   setup.seed = spec.seed;
-  setup.foot_trace = spec.engine != kPlaybackEngine && spec.arm == "main" && controller_info(controller.use).walks;
+  setup.foot_trace = spec.engine != kPlaybackEngine && spec.arm == "main" && about(controller).walks;
   setup.fuse_ticks = suite.fuse_ticks;
   setup.max_root_speed = suite.max_root_speed;
   if (suite.partner == PartnerMode::kSolid)
-    setup.limits =
-        load_contact_limits(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
+    setup.limits = spec.bodies != nullptr ? spec.bodies->limits() : load_contact_limits(contact_limits_of(suite));
   return setup;
 }
 

@@ -2,14 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
+#include <utility>
 
 #include "duet/bench/bodies.h"
 #include "duet/bench/suite_names.h"
 #include "duet/controllers/registry.h"
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
-#include "duet/metrics/contact_limits.h"
 #include "duet/metrics/detector.h"
 #include "duet/policies/registry.h"
 
@@ -29,10 +28,11 @@ std::string said_of(const std::string& use, const Options& options) {
 }
 
 template <typename FilesOf>
-ActorIdentity identity(std::string text, const FilesOf& files_of) {
+ActorIdentity identity(std::string text, const FilesOf& files_of, FileDigests& digests) {
   ActorIdentity identity;
+  const DigestReads reads(digests);
   try {
-    for (const LoadedFile& file : files_of()) identity.files.push_back({file.role, file.path, sha256_file(file.path)});
+    for (const LoadedFile& file : files_of()) identity.files.push_back({file.role, file.path, digests.of(file.path)});
   } catch (const MissingError& error) {
     return {.digest = "", .files = {}, .absence = error.what()};
   }
@@ -55,53 +55,68 @@ std::string robots_text(const Suite& suite, const RobotModel& nominal) {
   return text;
 }
 
-std::string limits_digest(const Suite& suite) {
-  if (suite.partner != PartnerMode::kSolid) return "";
-  return sha256_file(suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits);
+std::string limits_digest(const Suite& suite, FileDigests& files) {
+  return suite.partner == PartnerMode::kSolid ? files.of(contact_limits_of(suite)) : "";
 }
 
-SuiteController without_places(SuiteController controller) {
-  if (is_descriptor(controller.use)) controller.use = sha256_file(controller.use);
+SuiteController without_places(SuiteController controller, FileDigests& files) {
+  if (is_descriptor(controller.use)) controller.use = files.of(controller.use);
   std::erase_if(controller.options, [](const auto& option) { return is_path_option(option.first); });
   return controller;
 }
 
-}  // namespace
-
-ActorIdentity identity_of(const SuitePolicy& policy) {
-  const std::string text =
-      fmt::format("policy\n{}prompt: {}:{}\npartner: {}\n", said_of(policy.use, policy.options), policy.prompt.size(),
-                  policy.prompt, policy.shuffled_partner ? "shuffled" : "own");
-  return identity(text, [&] { return policy_files(policy.use, policy.options); });
-}
-
-ActorIdentity identity_of(const SuiteController& controller) {
-  return identity("controller\n" + said_of(controller.use, controller.options),
-                  [&] { return controller_files(controller.use, controller.options); });
-}
-
-std::string suite_hash(const Suite& suite) {
+std::string hash_of(const Suite& suite, FileDigests& files) {
+  const DigestReads reads(files);
   Suite said = suite;
   said.policies.clear();
   said.engines.clear();
   said.robot.clear();  // robots_text
-  for (std::string& file : said.clips.files) file = sha256_file(file);
-  said.contact_limits = limits_digest(suite);
-  for (SuiteController& controller : said.controllers) controller = without_places(controller);
+  for (std::string& file : said.clips.files) file = files.of(file);
+  said.contact_limits = limits_digest(suite, files);
+  for (SuiteController& controller : said.controllers) controller = without_places(controller, files);
   const RobotModel nominal = load_robot(suite.robot.empty() ? default_card_path() : suite.robot);
   for (Perturbation& perturbation : said.perturbations) perturbation = with_links(perturbation, nominal);
   return sha256_hex(
       fmt::format("{}{}detectors: {}\n", resolved_yaml(said), robots_text(suite, nominal), kDetectorsVersion));
 }
 
-RunIdentity identity_of(const Suite& suite) {
-  RunIdentity identity{.suite_hash = suite_hash(suite)};
-  for (const SuitePolicy& policy : suite.policies) identity.policies[policy.name] = identity_of(policy).digest;
+}  // namespace
+
+ActorIdentity identity_of(const SuitePolicy& policy, FileDigests& files) {
+  const std::string text =
+      fmt::format("policy\n{}prompt: {}:{}\npartner: {}\n", said_of(policy.use, policy.options), policy.prompt.size(),
+                  policy.prompt, policy.shuffled_partner ? "shuffled" : "own");
+  return identity(
+      text, [&] { return policy_files(policy.use, policy.options); }, files);
+}
+
+ActorIdentity identity_of(const SuiteController& controller, FileDigests& files) {
+  return identity(
+      "controller\n" + said_of(controller.use, controller.options),
+      [&] { return controller_files(controller.use, controller.options); }, files);
+}
+
+ActorIdentity identity_of(const SuitePolicy& policy) {
+  FileDigests files;
+  return identity_of(policy, files);
+}
+
+ActorIdentity identity_of(const SuiteController& controller) {
+  FileDigests files;
+  return identity_of(controller, files);
+}
+
+std::string suite_hash(const Suite& suite, FileDigests files) { return hash_of(suite, files); }
+
+RunIdentity identity_of(const Suite& suite, FileDigests files) {
+  RunIdentity identity{.suite_hash = hash_of(suite, files)};
+  for (const SuitePolicy& policy : suite.policies) identity.policies[policy.name] = identity_of(policy, files).digest;
   for (const std::string& control : suite.controls)
-    identity.policies[control] = identity_of(SuitePolicy{control}).digest;
-  identity.policies[kNullPolicy] = identity_of(SuitePolicy{kNullPolicy}).digest;
+    identity.policies[control] = identity_of(SuitePolicy{control}, files).digest;
+  identity.policies[kNullPolicy] = identity_of(SuitePolicy{kNullPolicy}, files).digest;
   for (const SuiteController& controller : suite.controllers)
-    identity.controllers[controller.name] = identity_of(controller).digest;
+    identity.controllers[controller.name] = identity_of(controller, files).digest;
+  identity.files = std::move(files);
   return identity;
 }
 

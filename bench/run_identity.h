@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "duet/bench/suite.h"
+#include "duet/core/digest.h"
 
 namespace duet {
 
@@ -24,20 +25,25 @@ struct ActorIdentity {
   std::string absence;  // why the digest is empty
 };
 
-// Throws as policy_files and controller_files for what is broken.
+// Throws as policy_files and controller_files for what is broken. `files`: digests of what was loaded already; those of
+// files that are not in it are taken now, and added.
+ActorIdentity identity_of(const SuitePolicy& policy, FileDigests& files);
+ActorIdentity identity_of(const SuiteController& controller, FileDigests& files);
 ActorIdentity identity_of(const SuitePolicy& policy);
 ActorIdentity identity_of(const SuiteController& controller);
 
 // SHA-256 of what the suite and its profile say: all but the list of policies, the list of engines and the places of
 // files. In the place of clips, limits, cards and descriptors stand their contents; the version of the detectors is in
 // it. Policies, engines and what a controller loads are told by each row.
-std::string suite_hash(const Suite& suite);
+std::string suite_hash(const Suite& suite, FileDigests files = {});
 
 struct RunIdentity {
   std::string suite_hash;
   std::map<std::string, std::string> policies{}, controllers{};  // name -> digest, "" where absent; the null arm's too
+  FileDigests files{};                                           // of all that was digested
 };
 
-RunIdentity identity_of(const Suite& suite);
+// `files`: of what was loaded for the run (Bodies::read). Throws InputError where one of them is another now.
+RunIdentity identity_of(const Suite& suite, FileDigests files = {});
 
 }  // namespace duet

@@ -68,7 +68,9 @@ bool names_card_by_path(const SuiteController& controller) {
 
 class Keeper {
  public:
-  Keeper(const Suite& suite, const std::string& folder) : folder_(folder) { kept_.suite = suite; }
+  Keeper(const Suite& suite, const std::string& folder, FileDigests files) : folder_(folder), files_(std::move(files)) {
+    kept_.suite = suite;
+  }
 
   KeptSuite keep() {
     keep_clips();
@@ -82,8 +84,8 @@ class Keeper {
 
  private:
   std::string copy(const std::string& of, const std::string& role, const std::string& from, const std::string& to) {
-    kept_.copies.push_back({from, to});
-    kept_.inputs.push_back({of, role, to, sha256_file(from), true});
+    kept_.copies.push_back({from, to, files_.of(from)});
+    kept_.inputs.push_back({of, role, to, files_.of(from), true});
     return to;
   }
 
@@ -97,7 +99,7 @@ class Keeper {
       if (bytes <= kMostClipBytes) {
         files[i] = copy(kClips, "", files[i], fmt::format("inputs/clips/{:04}_{}", i, name));
       } else {
-        kept_.inputs.push_back({kClips, "", name, sha256_file(files[i]), false});
+        kept_.inputs.push_back({kClips, "", name, files_.of(files[i]), false});
         files[i] = from_folder(files[i], folder_);
       }
     }
@@ -124,7 +126,7 @@ class Keeper {
     const std::string of = fmt::format("{} {}", kind, actor.name);
     const std::string place = fmt::format("inputs/{}/{}/", kind == "policy" ? "policies" : "controllers", actor.name);
     const bool stays = names_card_by_path(actor), descriptor = actor.use.ends_with(".yaml");
-    const std::vector<HashedFile> files = identity_of(actor).files;
+    const std::vector<HashedFile> files = identity_of(actor, files_).files;
     if (stays) actor.use = from_folder(actor.use, folder_);
     if (files.empty() && descriptor && !stays)  // its network is absent
       actor.use = copy(of, "descriptor", actor.use, place + fs::path(actor.use).filename().string());
@@ -144,6 +146,7 @@ class Keeper {
   }
 
   std::string folder_;
+  FileDigests files_;
   KeptSuite kept_;
 };
 
@@ -346,17 +349,22 @@ Suite rebased(Suite suite, const std::string& from, const std::string& to) {
   return suite;
 }
 
-KeptSuite kept_suite(const Suite& suite, const std::string& folder) { return Keeper(suite, folder).keep(); }
+KeptSuite kept_suite(const Suite& suite, const std::string& folder, const FileDigests& files) {
+  return Keeper(suite, folder, files).keep();
+}
 
 void keep_inputs(const KeptSuite& kept, const std::string& folder) {
   for (const KeptSuite::Copy& copy : kept.copies) {
     const std::string to = inside(folder, copy.to);
     if (fs::exists(to)) continue;
-    write_file(to, read_file(copy.from));
+    const std::string bytes = read_file(copy.from);
+    if (sha256_hex(bytes) != copy.sha256)
+      throw InputError(fmt::format("'{}' was replaced since the run has loaded it: begin again", copy.from));
+    write_file(to, bytes);
     fs::permissions(to, fs::status(copy.from).permissions() | fs::perms::owner_write);
   }
   if (const std::string index = inside(folder, kIndex); !fs::exists(index))
-    write_file(index, to_json(kept.inputs).dump(2) + "\n");
+    write_file(index, dumped(to_json(kept.inputs), 2) + "\n");
 }
 
 bool has_inputs(const std::string& folder) { return fs::exists(in(folder, kIndex)); }

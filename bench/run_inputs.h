@@ -24,6 +24,7 @@ struct RunInput {
 struct KeptSuite {
   struct Copy {
     std::string from, to;  // to: from the run directory
+    std::string sha256;    // of what is used
   };
   Suite suite;  // its paths start at the run directory
   std::vector<Copy> copies;
@@ -31,11 +32,12 @@ struct KeptSuite {
 };
 
 // What `folder` is to keep of a suite. Clips of more than kMostClipBytes in all stay where they are. Writes nothing;
-// throws InputError for a file that cannot be read.
+// throws InputError for a file that cannot be read. `files`: digests of what the run has loaded (RunIdentity::files).
 inline constexpr std::uintmax_t kMostClipBytes = std::uintmax_t{1} << 28;
-KeptSuite kept_suite(const Suite& suite, const std::string& folder);
+KeptSuite kept_suite(const Suite& suite, const std::string& folder, const FileDigests& files = {});
 
-// Copies what is not in `folder` yet and writes inputs.json, in this order.
+// Copies what is not in `folder` yet and writes inputs.json, in this order. Throws InputError for a file that is
+// another one by now than the run has loaded.
 void keep_inputs(const KeptSuite& kept, const std::string& folder);
 // Whether it has done so to its end.
 bool has_inputs(const std::string& folder);

@@ -1,5 +1,7 @@
 #include "duet/bench/run_work.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <numeric>
 #include <thread>
@@ -13,6 +15,16 @@ namespace {
 constexpr std::chrono::milliseconds kPatience(100);  // between two looks at episodes of other processes
 
 }  // namespace
+
+std::string error_text(const EpisodeRow& row) {
+  if (row.outcome != Outcome::kError) return "";
+  return fmt::format("{} {} of {}/{}/{}: {}", row.clip, row.episode, row.engine, row.controller, row.policy,
+                     row.message.empty() ? "no message" : row.message);
+}
+
+std::string errors_sentence(int count, const std::string& first_error) {
+  return fmt::format("{} episode{} ended with an error; the first, {}", count, count == 1 ? "" : "s", first_error);
+}
 
 void SharedWork::run(int count, int threads, const std::function<std::string(int)>& key_at,
                      const std::function<EpisodeRow(int)>& run_at, Progress& progress) {
@@ -70,6 +82,7 @@ void SharedWork::record(const EpisodeRow& row) {
   }
   ++done_;
   ++outcomes_[std::string(to_string(row.outcome))];
+  if (first_error_.empty()) first_error_ = error_text(row);
 }
 
 }  // namespace duet

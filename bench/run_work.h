@@ -18,6 +18,11 @@ namespace duet {
 // Thrown by an episode that was stopped: it leaves no row and runs again on resume.
 struct EpisodeInterrupted {};
 
+// What a row with outcome `error` says, and of which episode; "" for another one.
+std::string error_text(const EpisodeRow& row);
+// The sentence about `count` of them, of which the first said so.
+std::string errors_sentence(int count, const std::string& first_error);
+
 class SharedWork {
  public:
   SharedWork(RunDirectory& run, const StopSign& stop) : run_(run), stop_(stop) {}
@@ -30,6 +35,7 @@ class SharedWork {
   [[nodiscard]] std::int64_t done() const { return done_; }
   [[nodiscard]] std::int64_t done_by_others() const { return others_; }
   [[nodiscard]] const std::map<std::string, int>& outcomes() const { return outcomes_; }  // of those done here
+  [[nodiscard]] const std::string& first_error() const { return first_error_; }  // error_text of the first; "" for none
 
  private:
   Claim claim(const std::string& key);
@@ -42,6 +48,7 @@ class SharedWork {
   std::vector<int> taken_;  // by others
   std::int64_t done_ = 0, others_ = 0;
   std::map<std::string, int> outcomes_;
+  std::string first_error_;
 };
 
 }  // namespace duet

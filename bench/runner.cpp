@@ -15,31 +15,15 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/results/rows/environment.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet {
 namespace {
 
 RunPart part_of(const RunOptions& options) {
-  const std::vector<std::string>& policies = options.decide.asked() ? options.decide.policies : options.policies;
-  return {options.engines, options.controllers, policies, options.tasks, options.perturbations};
-}
-
-// The part of a filter that the suite does not have is a mistake of the user, not an empty run.
-void check_filter(const std::vector<std::string>& filter, const std::vector<std::string>& known, const char* kind) {
-  for (const std::string& name : filter)
-    require(std::find(known.begin(), known.end(), name) != known.end(),
-            fmt::format("the suite has no {} '{}'; it has: {}", kind, name, fmt::join(known, ", ")));
-}
-
-void check_filters(const RunOptions& options, const Suite& suite) {
-  std::vector<std::string> tasks;
-  for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
-  check_filter(options.engines, suite.engines, "engine");
-  check_filter(options.controllers, controller_names_of(suite), "controller");
-  check_filter(options.policies, policy_names_of(suite), "policy");
-  check_filter(options.decide.policies, policy_names_of(suite), "policy");
-  check_filter(options.tasks, tasks, "task");
-  check_filter(options.perturbations, perturbation_names_of(suite), "perturbation");
+  RunPart part = options;
+  if (options.decide.asked()) part.policies = options.decide.policies;
+  return part;
 }
 
 // Throws for what no decision can be of.
@@ -70,14 +54,6 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
   }
   if (present == 0 && !absent.empty()) throw MissingError(absent.begin()->second);
   return absent;
-}
-
-// What the filters leave out need not be there.
-std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known) {
-  std::vector<std::string> names;
-  for (const std::string& name : known)
-    if (!chosen(filter, name)) names.push_back(name);
-  return names;
 }
 
 // Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
@@ -216,6 +192,7 @@ struct Rollouts {
     summary.run += work.done();
     for (const auto& [outcome, count] : work.outcomes()) summary.outcomes[outcome] += count;
     summary.already_there += work.done_by_others();
+    if (summary.first_error.empty()) summary.first_error = work.first_error();
   }
 };
 
@@ -240,7 +217,7 @@ void run_until_decided(const Rollouts& rollouts, const RunOptions& options, cons
     decided.decision =
         decide(rows_of_part(load_run(run.path()).rows, part), schedule.rounds,
                {schedule.looks.begin(), schedule.looks.begin() + static_cast<long>(look) + 1}, options.decide);
-    write_file(inside(run.path(), "decision.json"), decided_run_json(decided).dump(2) + "\n");
+    write_file(inside(run.path(), "decision.json"), dumped(decided_run_json(decided), 2) + "\n");
     summary.decided = decided;
   }
   progress.finish();
@@ -325,16 +302,18 @@ void say_replaced(const std::string& directory, const Suite& suite, const std::v
 RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
   require_clips(suite);
   check_filters(options, suite);
+  check_filters(part_of(options), suite);
   check_decision_of(options, suite);
   RunSummary summary;
   summary.absent_engines = absent_engines(suite, options);
-  const RunIdentity identity = identity_of(suite);
   Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
                 left_out(part_of(options).policies, policy_names_of(suite)), options.called);
+  const RunIdentity identity = identity_of(suite, bodies.read());
   check_actors(bodies, suite, options);
+  for (const std::string& note : bodies.notes()) progress.note(note);
   summary.absent_controllers = bodies.absent();
   summary.absent_policies = bodies.absent_policies();
-  const KeptSuite kept = kept_suite(suite, directory);
+  const KeptSuite kept = kept_suite(suite, directory, identity.files);
   const RunInfo info = new_run_info(suite, kept, identity, options.argv, options.certificate);
   require_names_of(directory, suite);
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
@@ -344,7 +323,7 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   const StopSign stop(options.time_limit, options.begin, options.stop_asked);
   try {
     if (suite.clips.files.empty()) ask_for(suite, tasks_of_own_clips(suite), options, run, summary);
-    const PrepareOptions prepare{.keep_in = directory, .stop = &stop};
+    const PrepareOptions prepare{.keep_in = directory, .stop = &stop, .files = &identity.files};
     std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress, prepare);
     if (!suite.clips.files.empty()) ask_for(suite, tasks_of(clips), options, run, summary);
     bodies.take_clips(std::move(clips));

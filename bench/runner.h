@@ -22,13 +22,12 @@
 
 namespace duet {
 
-struct RunOptions {
+// As a RunPart, what is to run of the suite.
+struct RunOptions : RunPart {
   int threads = 1;
   double time_limit = 0.0;                                     // of the whole run [s]; 0 = none
   StopSign::Clock::time_point begin = StopSign::Clock::now();  // of the command: where the time limit counts from
   bool retry_errors = false;  // runs episodes again that ended with an error before, as time-outs
-  std::vector<std::string> engines, controllers, policies;  // where not empty: only these
-  std::vector<std::string> tasks, perturbations;
   std::vector<std::string> argv;
   DecisionOptions decide;  // where asked: runs only until these policies, and no others, are told apart
   std::size_t episodes_per_look = kEpisodesPerLook;  // of a decision
@@ -43,6 +42,7 @@ struct RunSummary {
   std::int64_t planned = 0, already_there = 0, run = 0;
   std::map<std::string, std::int64_t> there_of;  // already_there by policy
   std::map<std::string, int> outcomes;           // of those run now
+  std::string first_error = {};                  // which episode and what it says; "" where none of them ended so
   // Name -> reason; their episodes are rows with `unsupported`.
   std::map<std::string, std::string> absent_engines, absent_controllers, absent_policies;
   std::vector<std::string> warnings;  // sentences

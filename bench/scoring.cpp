@@ -135,17 +135,21 @@ Verdict interaction_verdict(const Recording& recording, const ActSource& source,
 
 StateTrace state_trace(const Recording& recording, const RobotModel& robot) {
   StateTrace trace;
-  trace.points = {"root", "left_hand", "right_hand"};
+  trace.points = {"root"};
+  std::vector<int> hands;  // of those that the card has: a walk needs none
+  for (const auto& [track, name] : {std::pair{"lhand", "left_hand"}, {"rhand", "right_hand"}}) {
+    if (!robot.tracks.contains(track)) continue;
+    hands.push_back(robot.track_frame(track));
+    trace.points.emplace_back(name);
+  }
   const int stride = static_cast<int>(std::lround(recording.rate_hz / trace.rate_hz));
-  const int left = robot.track_frame("lhand"), right = robot.track_frame("rhand");
   Kinematics kinematics(robot);
   for (int t = 0; t < recording.frames(); t += stride) {
     const RobotState& state = recording.robot[t];
     kinematics.update(state.X_WB, state.q);
     std::vector<int>& frame = trace.mm.emplace_back();
     append_point(state.X_WB.p, frame);
-    append_point(kinematics.frame_position(left), frame);
-    append_point(kinematics.frame_position(right), frame);
+    for (const int hand : hands) append_point(kinematics.frame_position(hand), frame);
   }
   return trace;
 }

@@ -64,6 +64,7 @@ struct SuiteController {
   std::string name;        // in rows and tables; once per suite
   std::string use = name;  // for make_controller
   ControllerOptions options = {};
+  std::optional<ControllerInfo> about = {};  // as it was when the suite was read; none: of a suite that no file said
 };
 
 // A policy as a suite names it, likewise.
@@ -108,6 +109,9 @@ struct Suite {
 
 using Overrides =
     std::vector<std::pair<std::string, std::string>>;  // dotted key -> value, as `-s clips.synth.per_task=3`
+
+// What is known of a controller: what the suite was read with, or what is known now.
+ControllerInfo about(const SuiteController& controller);
 
 // Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it is
 // playback's.

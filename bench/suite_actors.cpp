@@ -72,6 +72,7 @@ SuiteController read_controller(const YAML::Node& node, const Suite& suite) {
     controller.options = read_options(item, suite);
   }
   finish_names(suite, controller);
+  controller.about = controller_info(controller.use);
   return controller;
 }
 
@@ -160,8 +161,12 @@ std::string list_yaml(const char* key, const std::vector<Item>& items) {
 
 }  // namespace
 
+ControllerInfo about(const SuiteController& controller) {
+  return controller.about ? *controller.about : controller_info(controller.use);
+}
+
 void check_options_of(const SuiteController& controller) {
-  ControllerInfo info = controller_info(controller.use);
+  ControllerInfo info = about(controller);
   info.name = controller.name;
   check_controller_options(info, controller.options);
 }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 
-#include "duet/controllers/registry.h"
 #include "duet/core/names.h"
 #include "duet/core/plain_name.h"
 #include "duet/robots/yaml_range.h"
@@ -106,12 +105,12 @@ StreamOptions stream_options(const SuiteReference& reference) {
   return options;
 }
 
-bool takes_command(const std::string& controller) {
-  const std::vector<ControllerOption> options = controller_info(controller).options;
-  return std::ranges::any_of(options, [](const ControllerOption& option) { return option.name == kCommand; });
+bool takes_command(const ControllerInfo& controller) {
+  return std::ranges::any_of(controller.options,
+                             [](const ControllerOption& option) { return option.name == kCommand; });
 }
 
-ControllerOptions with_command(const std::string& controller, ControllerOptions options,
+ControllerOptions with_command(const ControllerInfo& controller, ControllerOptions options,
                                const SuiteReference& reference) {
   const Eigen::Vector3d& v = reference.velocity;
   if (takes_command(controller)) options.try_emplace(kCommand, fmt::format("{},{},{}", v.x(), v.y(), v.z()));

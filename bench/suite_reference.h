@@ -40,8 +40,8 @@ const SuiteReference& reference_of(const std::vector<SuiteReference>& references
 StreamOptions stream_options(const SuiteReference& reference);
 
 // A controller that takes a velocity by its option `command` gets the reference's, unless the suite gives it one.
-bool takes_command(const std::string& controller);
-ControllerOptions with_command(const std::string& controller, ControllerOptions options,
+bool takes_command(const ControllerInfo& controller);
+ControllerOptions with_command(const ControllerInfo& controller, ControllerOptions options,
                                const SuiteReference& reference);
 
 }  // namespace duet

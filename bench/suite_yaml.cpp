@@ -30,7 +30,7 @@ void refuse_clips(const YamlSection& top) {
 // A command that comes and goes is nothing for a controller that takes one for the whole episode.
 void check_commands(const YamlSection& top, const Suite& suite) {
   for (const SuiteController& controller : suite.controllers) {
-    if (!takes_command(controller.use)) continue;
+    if (!takes_command(about(controller))) continue;
     for (const SuiteReference& reference : suite.references)
       if (!reference.constant())
         top.fail(top.line("reference"),

@@ -65,6 +65,8 @@ void check_actors(const char* kind, const std::map<std::string, std::string>& cl
 
 class Verifier {
  public:
+  Verifier(const Verifier&) = delete;  // the plan points into the bodies
+  Verifier& operator=(const Verifier&) = delete;
   Verifier(const Run& run, const VerifyOptions& options, Progress& progress)
       : run_(run),
         options_(options),
@@ -72,7 +74,8 @@ class Verifier {
         suite_(read_suite()),
         bodies_(suite_, skipped_controllers_, skipped_policies_) {
     check_identity();
-    bodies_.take_clips(prepare_clips(suite_, *bodies_.nominal(), options_.threads, progress_));
+    bodies_.take_clips(
+        prepare_clips(suite_, *bodies_.nominal(), options_.threads, progress_, {.files = &identity_.files}));
     plan_ = plan_episodes(suite_, bodies_);
     for (std::size_t i = 0; i < plan_.size(); ++i) planned_.push_back(row_of(plan_[i]));
     for (std::size_t i = 0; i < plan_.size(); ++i) place_[planned_[i].key] = i;
@@ -118,7 +121,7 @@ class Verifier {
       if (row.detectors != kDetectorsVersion)
         throw InputError(fmt::format("'{}': its rows were judged by detectors {}, this program has {}", run_.path,
                                      row.detectors, kDetectorsVersion));
-    identity_ = identity_of(suite_);
+    identity_ = identity_of(suite_, bodies_.read());
     if (identity_.suite_hash != run_.info.suite_hash)
       throw InputError(fmt::format(
           "'{}': suite.yaml, with its inputs and this program's robots and limits, has the hash {}, run.json says {}",

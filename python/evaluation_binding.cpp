@@ -131,7 +131,7 @@ class Evaluation {
     const std::lock_guard lock(mutex_);
     require(over_, "the run goes on");
     if (error_) std::rethrow_exception(error_);
-    return summary_json(summary_).dump();
+    return dumped(summary_json(summary_));
   }
 
  private:

@@ -63,16 +63,28 @@ void run_bench(Session& session, const BenchArguments& arguments) {
   nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
   json["context"]["duet_version"] = duet_version();
   json["context"]["machine"] = describe_machine();
+  nlohmann::json missing = nlohmann::json::array();
   if (!session.json) fmt::print("{}\n{}\n", version_text(), describe_machine());
   for (const Benchmark& benchmark : benchmarks()) {
     if (!chosen(benchmark.name, arguments.names)) continue;
     note(session, "measuring " + benchmark.name);
-    for (const BenchmarkFigure& figure : benchmark.run(arguments.options)) {
+    std::vector<BenchmarkFigure> figures;
+    try {
+      figures = benchmark.run(arguments.options);
+    } catch (const MissingError& error) {
+      if (!arguments.names.empty()) throw;  // asked for by name
+      missing.push_back({{"name", benchmark.name}, {"lacks", error.what()}});
+      continue;
+    }
+    for (const BenchmarkFigure& figure : figures) {
       json["benchmarks"].push_back(to_json(figure));
       if (arguments.gate && !figure.reached) session.exit_code = kExitGate;
       if (!session.json) fmt::print("{}", line(figure));
     }
   }
+  for (const nlohmann::json& one : missing)
+    warn(fmt::format("{} was not measured: {}", one["name"].get<std::string>(), one["lacks"].get<std::string>()));
+  json["missing"] = std::move(missing);
   if (session.json) print(session, "", json);
 }
 

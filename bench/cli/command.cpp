@@ -10,6 +10,7 @@
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet::cli {
 namespace {
@@ -86,7 +87,7 @@ CLI::App* add_command(CLI::App& app, Session& session, const std::string& name, 
 
 void print(const Session& session, const std::string& text, const nlohmann::json& json) {
   if (session.json) {
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", dumped(json, 2));
   } else {
     fmt::print("{}", printable(text));
     if (!text.empty() && text.back() != '\n') fmt::print("\n");

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 
@@ -12,7 +11,9 @@
 #include "duet/bench/guarded_episode.h"
 #include "duet/bench/interrupt.h"
 #include "duet/bench/run_identity.h"
+#include "duet/bench/run_inputs.h"
 #include "duet/bench/run_work.h"
+#include "duet/bench/runner.h"
 #include "duet/bench/shipped_suites.h"
 #include "duet/bench/suite_actors.h"
 #include "duet/controllers/registry.h"
@@ -66,6 +67,8 @@ const SuiteController& walker_of(const Suite& suite, const std::string& name) {
 // What all episodes of a command share.
 class TwinEpisodes {
  public:
+  TwinEpisodes(const TwinEpisodes&) = delete;  // it points into its own suite
+  TwinEpisodes& operator=(const TwinEpisodes&) = delete;
   TwinEpisodes(Session& session, const EpisodesArguments& arguments)
       : session_(session),
         arguments_(arguments),
@@ -80,14 +83,18 @@ class TwinEpisodes {
       throw InputError(fmt::format("{}: it does not allow motion: 'allow_motion' is not true", arguments.config));
     if (const auto absent = bodies_.absent().find(walker_.name); absent != bodies_.absent().end())
       throw MissingError(absent->second);
-    std::filesystem::create_directories(arguments.output);
+    make_walker_ = Walker::load(walker_.use, walker_.options, bodies_.robot(walker_.name));
+    identity_ = identity_of(suite_, bodies_.read());
+    const KeptSuite kept = kept_suite(suite_, arguments.output, identity_.files);
+    const RunInfo info = new_run_info(suite_, kept, identity_, session.argv, {});
+    rows_.emplace(RunDirectory::open(arguments.output, info));
+    keep_inputs(kept, arguments.output);
   }
 
   void run() {
     say_first();
     Progress progress(session_.progress());
-    bodies_.take_clips(prepare_clips(suite_, *bodies_.nominal(), 1, progress));
-    const RunIdentity identity = identity_of(suite_);
+    bodies_.take_clips(prepare_clips(suite_, *bodies_.nominal(), 1, progress, {.files = &identity_.files}));
     const EpisodePlan plan(suite_, bodies_);
     int done = 0;
     for (std::int64_t i = 0; i < plan.size() && interrupt() == Interrupt::kNone; ++i) {
@@ -96,7 +103,7 @@ class TwinEpisodes {
         continue;
       if (arguments_.limit > 0 && done >= arguments_.limit) break;
       try {
-        run_both(spec, identity, done++);
+        run_both(spec, done++);
       } catch (const EpisodeInterrupted&) {  // it leaves no row
         break;
       }
@@ -141,9 +148,9 @@ class TwinEpisodes {
     return std::make_unique<TwinOverDds>(options, setup(), std::move(walker), &log);
   }
 
-  GuardedRun run_guarded(const EpisodeSpec& spec, const RunIdentity& identity, int index) {
+  GuardedRun run_guarded(const EpisodeSpec& spec, int index) {
     const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
-    auto walker = std::make_unique<Walker>(walker_.use, walker_.options, robot);
+    std::unique_ptr<Walker> walker = make_walker_();
     GuardedOptions options;
     options.config = config_;
     options.steps_from = walker->steps_from();
@@ -153,17 +160,17 @@ class TwinEpisodes {
     std::filesystem::remove(path(index, ".mcap"));
     RunLog log(path(index, ".mcap"), setup());
     const std::unique_ptr<GuardLink> link = make_link(spec, std::move(walker), log);
-    GuardedRun run = run_guarded_episode(spec, suite_, identity, robot,
+    GuardedRun run = run_guarded_episode(spec, suite_, identity_, robot,
                                          bodies_.policy(spec.controller, spec.policy).make, *link, options);
     dropped_ += log.dropped();
     return run;
   }
 
-  void run_both(const EpisodeSpec& spec, const RunIdentity& identity, int index) {
+  void run_both(const EpisodeSpec& spec, int index) {
     const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
     const EpisodeRow simulated =
-        run_episode(spec, suite_, identity, robot, "", {.policy = bodies_.policy(spec.controller, spec.policy).make});
-    const GuardedRun guarded = run_guarded(spec, identity, index);
+        run_episode(spec, suite_, identity_, robot, "", {.policy = bodies_.policy(spec.controller, spec.policy).make});
+    const GuardedRun guarded = run_guarded(spec, index);
     if (guarded.interrupted) throw EpisodeInterrupted();
     keep(simulated);
     keep(guarded.row);
@@ -180,12 +187,9 @@ class TwinEpisodes {
                      guarded.missed_reports, guarded.guard_seconds, guarded.row.wall_s));
   }
 
-  // Nothing that is finished is lost.
-  void keep(const EpisodeRow& row) const {
-    std::ofstream rows(std::filesystem::path(arguments_.output) / "episodes.jsonl", std::ios::app);
-    rows << to_json(row).dump() << '\n';
-    rows.flush();
-    if (!rows) throw StorageError(fmt::format("cannot write rows into '{}'", arguments_.output));
+  // Nothing that is finished is lost; a row that the folder has from before stands.
+  void keep(const EpisodeRow& row) {
+    if (rows_->claim(row.key) == Claim::kMine) rows_->append(row);
   }
 
   [[nodiscard]] std::string by_task() const {
@@ -246,8 +250,11 @@ class TwinEpisodes {
   RobotConfig config_;
   Suite suite_;
   Bodies bodies_;
+  RunIdentity identity_;
+  std::optional<RunDirectory> rows_;  // the output folder: a run that `duet report` reads
   const SuiteController& walker_;
   ScratchFolder scratch_;  // of the guard's socket
+  std::function<std::unique_ptr<Walker>()> make_walker_;
   PairedEpisodes episodes_;
   std::vector<GuardedRun> runs_;
   long dropped_ = 0;
@@ -326,8 +333,9 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
   const RobotConfig config = read_robot_config(arguments.config);
   const Suite suite = suite_of_clip(arguments.clip, arguments.policy, arguments.start, "pd");
   Bodies bodies(suite);
+  const RunIdentity identity = identity_of(suite, bodies.read());
   Progress progress(session.progress());
-  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, progress));
+  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, progress, {.files = &identity.files}));
   const EpisodePlan plan(suite, bodies);
   const EpisodeSpec spec = plan.at(0);
   const RolloutSetup setup = episode_setup(spec, suite, *bodies.nominal());
@@ -349,7 +357,7 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
   options.watch = [&](const GuardReport& report) {
     note(session, fmt::format("the guard: {} ({})", safety_state_name(report.state), stop_cause_name(report.cause)));
   };
-  const GuardedRun run = run_guarded_episode(spec, suite, identity_of(suite), bodies.nominal(),
+  const GuardedRun run = run_guarded_episode(spec, suite, identity, bodies.nominal(),
                                              bodies.policy("pd", arguments.policy).make, link, options);
   print(session,
         fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed; executed: {}",

@@ -111,6 +111,7 @@ void add_plan(CLI::App& app, Session& session) {
       ->required();
   command->add_option("--shards", arguments->shards, "how many, or auto: of about 4 minutes of a core each")
       ->capture_default_str();
+  add_filters(*command, arguments->options.part);
   command->add_option("--cost", arguments->costs,
                       "ENGINE/CONTROLLER=SECONDS of a core per second of motion, which is not measured then "
                       "(repeatable)");

@@ -112,6 +112,7 @@ void run_suite_command(Session& session, RunArguments arguments) {
   session.exit_code = exit_code(summary);
   for (const std::string& warning : summary.warnings) warn(warning);
   warn_of_timeouts(summary.outcomes);
+  if (!summary.first_error.empty()) warn(errors_sentence(summary.outcomes.at("error"), summary.first_error));
   note(session, describe(summary, suite, arguments.output));
   Run run = open_run(arguments.output, RowExtent::kLean);
   std::vector<std::string> notes;
@@ -189,12 +190,7 @@ void add_run(CLI::App& app, Session& session) {
                       "run directory; an unfinished run of the same suite is resumed");
   command->add_option("--certificate", arguments->certificate,
                       "parity certificate of `duet validate`, kept with the results");
-  command->add_option("--engines", options.engines, "only these")->delimiter(',');
-  command->add_option("--controllers", options.controllers, "only these")->delimiter(',');
-  command->add_option("--policies", options.policies, "only these (the null arm always runs)")->delimiter(',');
-  command->add_option("--tasks", options.tasks, "only these")->delimiter(',');
-  command->add_option("--perturbations", options.perturbations, "only these (playback is always clean)")
-      ->delimiter(',');
+  add_filters(*command, options);
   add_until_decided(*command, *arguments);
   add_threads(command, options.threads);
   command

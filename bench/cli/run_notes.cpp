@@ -9,6 +9,7 @@
 #include "duet/core/require.h"
 #include "duet/policies/densify.h"
 #include "duet/results/rows/distinct_episodes.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet::cli {
 namespace {
@@ -95,7 +96,7 @@ std::string with_notes(const std::string& format, const std::string& text, const
     nlohmann::json all = notes;
     for (nlohmann::json& own : json["notes"]) all.push_back(std::move(own));
     json["notes"] = std::move(all);
-    return json.dump(2) + "\n";
+    return dumped(json, 2) + "\n";
   }
   const Frame frame = frame_of(format);
   std::string lines;

@@ -30,6 +30,14 @@ void set_network(Suite& suite, const std::string& actor, const std::string& path
 
 }  // namespace
 
+void add_filters(CLI::App& command, RunPart& part) {
+  command.add_option("--engines", part.engines, "only these")->delimiter(',');
+  command.add_option("--controllers", part.controllers, "only these")->delimiter(',');
+  command.add_option("--policies", part.policies, "only these (the null arm always runs)")->delimiter(',');
+  command.add_option("--tasks", part.tasks, "only these")->delimiter(',');
+  command.add_option("--perturbations", part.perturbations, "only these (playback is always clean)")->delimiter(',');
+}
+
 Suite suite_of(const SuiteArguments& arguments) {
   Overrides overrides;
   for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "duet/bench/suite.h"
+#include "duet/results/rows/run_info.h"
 
 namespace duet::cli {
 
@@ -17,6 +18,9 @@ struct SuiteArguments {
 
 // SUITE, --clips, --set, --network, --start, --partner, --profile, --allow-programs.
 void add_suite_options(CLI::App& command, SuiteArguments& arguments);
+
+// --engines, --controllers, --policies, --tasks, --perturbations.
+void add_filters(CLI::App& command, RunPart& part);
 
 // Throws InputError (the suite, its clips, its limits) and std::invalid_argument (an option).
 Suite suite_of(const SuiteArguments& arguments);

@@ -13,6 +13,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/results/analyses/text_table.h"
+#include "duet/results/rows/json_fields.h"
 
 namespace duet::cli {
 namespace {
@@ -121,7 +122,7 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
       note(session, stale);
   if (!arguments.output.empty()) {
     const std::filesystem::path folder = arguments.output;
-    write_file(folder / "certificate.json", json.dump(1) + "\n");
+    write_file(folder / "certificate.json", dumped(json, 1) + "\n");
     write_file(folder / "parity.html", parity_page(certificate));
     if (const std::string picture = parity_svg(certificate); !picture.empty())
       write_file(folder / "parity.svg", picture);

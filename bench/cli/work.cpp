@@ -8,6 +8,7 @@
 #include "duet/bench/cli/run_notes.h"
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/interrupt.h"
+#include "duet/bench/run_work.h"
 #include "duet/core/file.h"
 
 namespace duet::cli {
@@ -60,6 +61,7 @@ void run_work(Session& session, const WorkArguments& arguments) {
     const WorkSummary summary = work_shard(arguments.run, arguments.shard, arguments.options, stop, progress);
     session.exit_code = code_of(summary);
     warn_of_timeouts(summary.outcomes);
+    if (!summary.first_error.empty()) warn(errors_sentence(summary.outcomes.at("error"), summary.first_error));
     print(session, text_of(summary, arguments),
           {{"run", arguments.run},
            {"shard", arguments.shard},

@@ -45,12 +45,13 @@ std::vector<PlannedClip> keep_clips(const std::vector<PairedMotion>& clips, cons
 // What a run needs while it is planned.
 class Planner {
  public:
-  Planner(const Suite& suite, std::string directory, const Bodies& bodies, const RunIdentity& identity)
+  Planner(const Suite& suite, std::string directory, const Bodies& bodies, const RunIdentity& identity,
+          const RunPart& part)
       : suite_(suite),
         directory_(std::move(directory)),
         bodies_(bodies),
         identity_(identity),
-        episodes_(suite, bodies),
+        episodes_(suite, bodies, part),
         per_clip_(episodes_of_clip()) {}
 
   [[nodiscard]] std::int64_t size() const { return episodes_.size(); }
@@ -154,11 +155,12 @@ class Planner {
   std::vector<std::pair<std::int64_t, EpisodeRow>> pilots_;
 };
 
-std::vector<std::string> lacks(const Suite& suite, const Bodies& bodies) {
+std::vector<std::string> lacks(const Suite& suite, const Bodies& bodies, const RunPart& part) {
   std::vector<std::string> warnings;
   const char* what = "; its episodes are rows with outcome `unsupported`";
   for (const std::string& engine : suite.engines)
-    if (!can_run_in(engine)) warnings.push_back(fmt::format("engine '{}' is absent{}", engine, what));
+    if (!can_run_in(engine) && chosen(part.engines, engine))
+      warnings.push_back(fmt::format("engine '{}' is absent{}", engine, what));
   for (const auto* absent : {&bodies.absent(), &bodies.absent_policies()})
     for (const auto& [name, reason] : *absent) warnings.push_back(reason + what);
   if (std::ranges::none_of(suite.engines, can_run_in))
@@ -179,21 +181,24 @@ PlanSummary plan_run(const Suite& suite, const std::string& directory, const Pla
   require_clips(suite);
   refuse_planned(directory);
   PlanSummary summary;
-  const RunIdentity identity = identity_of(suite);
-  Bodies bodies(suite);
-  summary.warnings = lacks(suite, bodies);
-  const KeptSuite kept = kept_suite(suite, directory);
+  check_filters(options.part, suite);
+  Bodies bodies(suite, left_out(options.part.controllers, controller_names_of(suite)),
+                left_out(options.part.policies, policy_names_of(suite)));
+  const RunIdentity identity = identity_of(suite, bodies.read());
+  summary.warnings = lacks(suite, bodies, options.part);
+  for (const std::string& note : bodies.notes()) progress.note(note);
+  const KeptSuite kept = kept_suite(suite, directory, identity.files);
   RunDirectory run =
       RunDirectory::open(directory, new_run_info(suite, kept, identity, options.argv, options.certificate));
   if (run.size() > 0)
     throw InputError(fmt::format("'{}' has {} rows of a `duet run`: plan in another folder", directory, run.size()));
   keep_inputs(kept, directory);
-  std::vector<PairedMotion> clips =
-      prepare_clips(suite, *bodies.nominal(), options.threads, progress, {.keep_in = directory, .stop = &stop});
+  std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress,
+                                                  {.keep_in = directory, .stop = &stop, .files = &identity.files});
   ShardPlan& plan = summary.plan;
   if (suite.references.empty()) plan.clips = keep_clips(clips, directory);
   bodies.take_clips(std::move(clips));
-  Planner planner(suite, directory, bodies, identity);
+  Planner planner(suite, directory, bodies, identity, options.part);
   check_costs(options.costs, planner.cost_names());
   plan.program = program_digests(suite.engines);
   plan.suite_hash = identity.suite_hash;
@@ -202,7 +207,7 @@ PlanSummary plan_run(const Suite& suite, const std::string& directory, const Pla
   planner.measure(plan.costs, stop, progress);
   plan.shards = cut_shards(planner.blocks(plan.costs), options.shards);
   for (Shard& shard : plan.shards) shard.keys = planner.keys(shard);
-  run.ask_for({}, plan.episodes, [&](const std::vector<RunPart>&) { return plan.episodes; });
+  run.ask_for(options.part, plan.episodes, [&](const std::vector<RunPart>&) { return plan.episodes; });
   write_shard_plan(plan, directory);
   planner.keep_pilots(plan);
   summary.pilots = static_cast<std::int64_t>(planner.pilots());

@@ -11,6 +11,7 @@
 #include "duet/bench/progress.h"
 #include "duet/bench/stop_sign.h"
 #include "duet/bench/suite.h"
+#include "duet/results/rows/run_info.h"
 
 namespace duet {
 
@@ -18,6 +19,7 @@ struct PlanOptions {
   std::int64_t shards = 0;              // 0: by their predicted cost
   std::map<std::string, double> costs;  // as in ShardPlan, of engines and controllers that no pilot is to run for
   int threads = 1;                      // that prepare clips
+  RunPart part = {};                    // of the suite that is planned, as `duet run` takes it
   std::vector<std::string> argv;
   nlohmann::json certificate;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <utility>
@@ -22,8 +23,21 @@ ShardPlan checked_plan(const std::string& path, const Suite& suite) {
   return plan;
 }
 
+// That it was planned with.
+RunPart part_of(const Run& head) {
+  return head.info.plan && head.info.plan->parts.size() == 1 ? head.info.plan->parts.front() : RunPart();
+}
+
+// What of a head's suite the plan leaves out need not be on this machine.
+InputPlaces places_of(const Run& head) {
+  const RunPart part = part_of(head);
+  const Suite suite = parse_suite(head.info.suite_yaml, head.path + "/suite.yaml");
+  return {.skipped_policies = left_out(part.policies, policy_names_of(suite)),
+          .skipped_controllers = left_out(part.controllers, controller_names_of(suite))};
+}
+
 Suite suite_of_planned(const Run& head, bool allow_programs) {
-  Suite suite = suite_of_run(head);
+  Suite suite = suite_of_run(head, places_of(head));
   suite.allow_programs = allow_programs;
   return suite;
 }
@@ -44,8 +58,10 @@ Bodies with_outlines(Bodies bodies, const ShardPlan& plan, const Suite& suite) {
 }
 
 void require_same_digests(const char* kind, const std::map<std::string, std::string>& planned,
-                          const std::map<std::string, std::string>& here, const std::string& path) {
+                          const std::map<std::string, std::string>& here, const std::vector<std::string>& skipped,
+                          const std::string& path) {
   for (const auto& [name, digest] : planned) {
+    if (std::ranges::find(skipped, name) != skipped.end()) continue;
     const auto found = here.find(name);
     const std::string other = found == here.end() ? "" : found->second;
     if (other != digest)
@@ -56,12 +72,14 @@ void require_same_digests(const char* kind, const std::map<std::string, std::str
   }
 }
 
-void require_planned_identity(const RunInfo& info, const RunIdentity& here, const std::string& path) {
+void require_planned_identity(const Run& head, const RunIdentity& here, const std::string& path) {
+  const RunInfo& info = head.info;
+  const InputPlaces places = places_of(head);
   if (info.suite_hash != here.suite_hash)
     throw InputError(fmt::format("'{}' was planned with suite {}, which on this machine is {:.12}", path,
                                  suite_label(info), here.suite_hash));
-  require_same_digests("policy", info.policies, here.policies, path);
-  require_same_digests("controller", info.controllers, here.controllers, path);
+  require_same_digests("policy", info.policies, here.policies, places.skipped_policies, path);
+  require_same_digests("controller", info.controllers, here.controllers, places.skipped_controllers, path);
 }
 
 }  // namespace
@@ -70,10 +88,12 @@ PlannedRun::PlannedRun(std::string path, bool allow_programs)
     : head_(load_run_head(path)),
       plan_(checked_plan(path, parse_suite(head_.info.suite_yaml, path + "/suite.yaml"))),
       suite_(suite_of_planned(head_, allow_programs)),
-      identity_(identity_of(suite_)),
-      bodies_(with_outlines(Bodies(suite_), plan_, suite_)),
-      episodes_(suite_, bodies_) {
-  require_planned_identity(head_.info, identity_, path);
+      bodies_(with_outlines(Bodies(suite_, left_out(part_of(head_).controllers, controller_names_of(suite_)),
+                                   left_out(part_of(head_).policies, policy_names_of(suite_))),
+                            plan_, suite_)),
+      identity_(identity_of(suite_, bodies_.read())),
+      episodes_(suite_, bodies_, part_of(head_)) {
+  require_planned_identity(head_, identity_, path);
   if (episodes_.size() != plan_.episodes)
     throw InputError(fmt::format("{}/plan.json: expected {} episodes, as its suite has, found {}", path,
                                  episodes_.size(), plan_.episodes));
@@ -97,10 +117,12 @@ void PlannedRun::load_clips(std::int64_t begin, std::int64_t end) {
   for (const std::size_t i : needed) {
     const PlannedClip& clip = plan_.clips.at(i);
     const std::string file = (std::filesystem::path(path()) / clip.file).string();
-    if (const std::string found = sha256_file(file); found != clip.sha256)
+    FileDigests read;
+    const DigestReads reads(read);
+    clips[i] = load_paired_motion(file);
+    if (const std::string found = read.of(file); found != clip.sha256)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: it is not the clip that was planned with", file,
                                    clip.sha256, found));
-    clips[i] = load_paired_motion(file);
   }
   bodies_.take_clips(std::move(clips));
 }

@@ -39,8 +39,8 @@ class PlannedRun {
   Run head_;
   ShardPlan plan_;
   Suite suite_;
-  RunIdentity identity_;
   Bodies bodies_;
+  RunIdentity identity_;
   EpisodePlan episodes_;
 };
 

@@ -210,6 +210,7 @@ class ShardWorker {
     const std::lock_guard lock(mutex_);
     ++summary_.run;
     ++summary_.outcomes[std::string(to_string(row.outcome))];
+    if (summary_.first_error.empty()) summary_.first_error = error_text(row);
     summary_.poisoned += poisoned ? 1 : 0;
   }
 

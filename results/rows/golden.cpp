@@ -168,7 +168,7 @@ std::string bless(const std::vector<LeaderboardEntry>& entries, const RunInfo& r
   const nlohmann::json json = {
       {"schema", kGoldenSchema},      {"suite", run.suite},           {"suite_version", run.suite_version},
       {"suite_hash", run.suite_hash}, {"suite_yaml", run.suite_yaml}, {"entries", std::move(list)}};
-  return json.dump(2) + "\n";
+  return dumped(json, 2) + "\n";
 }
 
 std::vector<GoldenDifference> check(const std::string& golden_json, const std::vector<LeaderboardEntry>& entries,

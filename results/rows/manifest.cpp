@@ -39,7 +39,7 @@ void write_manifest(const std::string& folder, nlohmann::json about) {
       files[entry.path().lexically_relative(folder).generic_string()] = sha256_file(entry.path().string());
   about["schema"] = kPublishedSchema;
   about["files"] = std::move(files);
-  write_file(file_of(folder, kManifest), about.dump(2) + "\n");
+  write_file(file_of(folder, kManifest), dumped(about, 2) + "\n");
 }
 
 bool is_published(const std::string& folder) { return std::filesystem::exists(file_of(folder, kManifest)); }
@@ -62,7 +62,7 @@ void check_published(const std::string& folder) {
     const std::string found = sha256_file(file_of(folder, name));
     if (digest != found)
       throw InputError(fmt::format("{}: SHA-256 expected {}, found {}: not what was published", file_of(folder, name),
-                                   shown(digest.dump()), found));
+                                   shown(dumped(digest)), found));
   }
 }
 

@@ -49,9 +49,9 @@ nlohmann::json environments_of(const std::vector<Run>& runs) {
     nlohmann::json environment = run.info.environment;
     if (!environment.is_object()) continue;
     if (const auto others = environment.find("others"); others != environment.end() && others->is_array())
-      for (const nlohmann::json& other : *others) distinct[other.dump()] = other;
+      for (const nlohmann::json& other : *others) distinct[dumped(other)] = other;
     environment.erase("others");
-    distinct[environment.dump()] = environment;
+    distinct[dumped(environment)] = environment;
   }
   if (distinct.empty()) return nullptr;
   nlohmann::json first = distinct.begin()->second;
@@ -100,7 +100,7 @@ RunInfo info_of(const std::vector<Run>& runs) {
     add_digests(run.info.controllers, info.controllers);
     const nlohmann::json& certificate = run.info.certificate;
     if (certificate.is_null()) continue;
-    if (info.certificate.is_null() || certificate.dump() < info.certificate.dump()) info.certificate = certificate;
+    if (info.certificate.is_null() || dumped(certificate) < dumped(info.certificate)) info.certificate = certificate;
   }
   return info;
 }

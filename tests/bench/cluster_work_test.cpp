@@ -13,6 +13,7 @@
 #include "duet/bench/cluster/work_shard.h"
 #include "duet/bench/merge.h"
 #include "duet/bench/run_inputs.h"
+#include "duet/bench/runner.h"
 #include "duet/bench/verification.h"
 #include "duet/results/rows/json_fields.h"
 #include "duet/results/rows/row_identity.h"
@@ -69,6 +70,33 @@ class ClusterWork : public testing::Test {
   Progress quiet_{Progress::Style::kQuiet};
   PlanSummary summary_;
 };
+
+TEST_F(ClusterWork, APartOfASuiteIsPlannedAsARunOfThatPartIsRun) {
+  PlanOptions options;
+  options.shards = 1;
+  options.costs = {{"playback/pd", 0.01}};
+  options.part.tasks = {"handshake"};
+  const Suite suite = test::playback_suite();
+  summary_ = plan_run(suite, run_, options, stop_, quiet_);
+  EXPECT_EQ(summary_.plan.episodes, 2);
+  EXPECT_EQ(work(0).run, 2);
+  merge();
+  RunOptions alone;
+  alone.tasks = {"handshake"};
+  run_suite(suite, folder_ / "alone", alone, quiet_);
+  const duet::Run wanted = load_run(folder_ / "alone"), found = load_run(run_);
+  ASSERT_EQ(found.rows.size(), wanted.rows.size());
+  for (std::size_t i = 0; i < found.rows.size(); ++i) {
+    EXPECT_EQ(found.rows[i].key, wanted.rows[i].key);
+    EXPECT_EQ(found.rows[i].state_hash, wanted.rows[i].state_hash);
+  }
+  ASSERT_TRUE(found.info.plan);
+  EXPECT_EQ(found.info.plan->parts, wanted.info.plan->parts);
+  options.part.tasks = {"tango"};
+  EXPECT_THAT(
+      test::thrown_message<std::invalid_argument>([&] { plan_run(suite, folder_ / "b", options, stop_, quiet_); }),
+      HasSubstr("the suite has no task 'tango'; it has: wave, handshake"));
+}
 
 TEST_F(ClusterWork, ShardsTogetherAreTheRunOfOneProcess) {
   plan();

@@ -60,6 +60,20 @@ TEST(CommandLine, UsageErrorsAreTwo) {
   EXPECT_EQ(duet_program("run").code, 2);
 }
 
+// Work that is done is reported: a file's name is bytes, and JSON is UTF-8.
+TEST(CommandLine, JsonIsPrintedWhateverTheNamesOfFilesAre) {
+  const test::ScratchFolder folder;
+  const test::Answer answer = test::duet_program("synth wave --count 1 --json -q -o '" + (folder / "bad\xff") + "'");
+  EXPECT_EQ(answer.code, 0) << answer.err;
+  EXPECT_NE(answer.out.find("\"clips\""), std::string::npos) << answer.out;
+}
+
+TEST(CommandLine, PlanTakesTheFiltersOfRun) {
+  const std::string help = test::duet_program("plan --help").out;
+  for (const char* option : {"--engines", "--controllers", "--policies", "--tasks", "--perturbations"})
+    EXPECT_NE(help.find(option), std::string::npos) << option;
+}
+
 TEST(CommandLine, AMistypedCommandIsAskedAbout) {
   const Answer answer = duet_program("runn suites/demo.yaml");
   EXPECT_EQ(answer.code, 2);

@@ -33,6 +33,25 @@ TEST(HwEpisodes, AnInterruptedEpisodeLeavesNoRow) {
   }
 }
 
+// The folder is a run: its rows can be read, reported and gone on with.
+TEST(HwEpisodes, LeaveARunThatReportReads) {
+  if (!test::is_here("mujoco")) GTEST_SKIP() << "not run: engine mujoco absent";
+  const test::ScratchFolder folder;
+  const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/", out = folder / "out";
+  const std::string command = "hw episodes " + examples + "twin.yaml " + examples +
+                              "episodes.yaml -s 'controllers=[wbc_sim]' -s clips.synth.per_task=1 --clock in-process "
+                              "-n 1 -q -o " +
+                              out;
+  EXPECT_EQ(test::duet_program(command).code, 0);
+  const std::string rows = read_file(out + "/episodes.jsonl");
+  EXPECT_EQ(std::count(rows.begin(), rows.end(), '\n'), 2);
+  for (const char* file : {"run.json", "env.json", "suite.yaml", "inputs/inputs.json"})
+    EXPECT_TRUE(std::filesystem::exists(out + "/" + file)) << file;
+  EXPECT_EQ(test::duet_program("report -q --no-clips " + out + " -o " + (folder / "page")).code, 0);
+  EXPECT_EQ(test::duet_program(command).code, 0);  // again: each episode has its row once
+  EXPECT_EQ(read_file(out + "/episodes.jsonl"), rows);
+}
+
 TEST(HwEpisodes, AClockThatIsNoneIsRefused) {
   const test::ScratchFolder folder;
   const std::string examples = std::string(DUET_SOURCE_DIR) + "/examples/hardware/";

@@ -155,6 +155,7 @@ TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
 
 TEST(LedEpisode, RefusesWhatItCannotLead) {
   LedEpisode episode(led());
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.next(); }), "the episode has not begun: begin one");
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.begin(2); }),
             "episode: expected a number from 0 to 1, found 2");
   EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.answer({}, kAnchors); }),

@@ -7,6 +7,8 @@
 #include <fstream>
 
 #include "duet/backends/factory.h"
+#include "duet/bench/clips.h"
+#include "duet/controllers/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -252,6 +254,115 @@ TEST(Parallel, EveryIndexOnceAndTheFirstExceptionComesBack) {
   parallel_for_each(100, 2, [&](int i) { ++hits[i]; });
   for (const auto& hit : hits) EXPECT_EQ(hit, 1);
   EXPECT_THROW(parallel_for_each(100, 2, [](int i) { require(i != 50, "fifty"); }), std::invalid_argument);
+}
+
+// A network that is replaced in the middle of a run: all rows are of the one that was loaded, and so is the digest.
+TEST(Runner, AllRowsAreOfTheFilesThatWereLoaded) {
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  const test::ScratchFolder folder;
+  const std::string network = folder / "net.safetensors";
+  const auto put = [&](const char* name) {
+    write_file(network, read_file(std::string(DUET_SOURCE_DIR "/controllers/wbc_sim/") + name + ".safetensors"));
+  };
+  const auto rows_of = [&](const std::string& name, const std::string& swapped) {
+    put("braced");
+    const Suite suite = parse_suite(
+        "schema: duet.suite/1\nname: test\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave, bend]\n"
+        "engines: [mujoco]\ncontrollers: [{name: w, use: wbc_sim, options: {network: " +
+            network +
+            "}}]\n"
+            "policies: [replay]\nstart: act\n",
+        "test.yaml");
+    RunOptions options;
+    options.stop_asked = [&] {  // asked after the network was loaded, many times an episode
+      if (!swapped.empty()) put(swapped.c_str());
+      return false;
+    };
+    run(suite, folder / name, options);
+    std::map<std::string, EpisodeRow> rows;
+    for (const EpisodeRow& row : load_run(folder / name).rows) rows[row.key] = row;
+    return rows;
+  };
+  const auto untouched = rows_of("untouched", ""), swapped = rows_of("swapped", "student");
+  ASSERT_EQ(untouched.size(), 4U);
+  ASSERT_EQ(swapped.size(), 4U);
+  for (const auto& [key, row] : untouched) {
+    ASSERT_TRUE(swapped.contains(key)) << "another digest";
+    EXPECT_EQ(swapped.at(key).state_hash, row.state_hash) << row.clip;
+    EXPECT_EQ(row.outcome, Outcome::kOk) << row.message;
+  }
+}
+
+TEST(Runner, AClipThatIsReplacedBetweenItsDigestAndItsUseIsRefused) {
+  const test::ScratchFolder folder;
+  const std::string clip = folder / "wave.npz";
+  save_paired_motion(test::paired(Task::kWave, *test::g1()), clip);
+  Suite suite = test::playback_suite();
+  suite.clips = {.files = {clip}};
+  FileDigests digests;
+  digests.add(clip, sha256_hex("what it was"));
+  Progress quiet(Progress::Style::kQuiet);
+  EXPECT_THAT(
+      test::thrown_message<InputError>([&] { prepare_clips(suite, *test::g1(), 1, quiet, {.files = &digests}); }),
+      HasSubstr("wave.npz' was replaced while it was used: SHA-256 expected"));
+}
+
+// A card without what every episode would ask of it is refused before the first one.
+TEST(Runner, AsksOfTheCardBeforeTheFirstEpisode) {
+  const test::ScratchFolder folder;
+  std::filesystem::copy(DUET_SOURCE_DIR "/robots/t1", folder / "t1");
+  const std::string card = folder / "t1/t1.yaml", text = read_file(card);
+  const auto without = [&](const std::string& begin, const std::string& end) {
+    const std::size_t at = text.find(begin);
+    write_file(card, text.substr(0, at) + text.substr(text.find(end, at)));
+  };
+  Suite clips = test::playback_suite();
+  clips.robot = card;
+  without("tracks:", "# Collision");
+  EXPECT_THAT(test::thrown_message<InputError>([&] { run(clips, folder / "a"); }),
+              HasSubstr("expected what suite 'test' needs of a robot, found no tracks: head, tracks: lhand"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a"));
+  without("keypoints:", "# What the detectors");
+  EXPECT_THAT(test::thrown_message<InputError>([&] { run(clips, folder / "b"); }), HasSubstr("keypoints: left_hand"));
+  Suite walk = parse_suite(
+      "schema: duet.suite/1\nname: walk\nversion: 1.0.0\nengines: [mujoco]\ncontrollers: [pd]\n"
+      "reference: [{velocity: [0, 0, 0], seconds: 0.4}]\n",
+      "walk.yaml");
+  walk.robot = card;
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  without("tracks:", "# Collision");
+  EXPECT_EQ(run(walk, folder / "c").outcomes.count("error"), 0U);  // nobody is there to be followed
+  write_file(card, [&] {
+    std::string soles = text;
+    for (std::size_t at = soles.find(", sole: true"); at != std::string::npos; at = soles.find(", sole: true"))
+      soles.erase(at, 12);
+    return soles;
+  }());
+  EXPECT_THAT(test::thrown_message<InputError>([&] { run(walk, folder / "d"); }),
+              HasSubstr("found no shapes with sole: true"));
+}
+
+TEST(Runner, SaysTheFirstErrorWithItsEpisode) {
+  register_controller({"throws", "a controller that always throws", "", false, {}},
+                      [](const std::shared_ptr<const RobotModel>&, const ControllerOptions&) {
+                        struct Throws final : Controller {
+                          [[nodiscard]] std::string_view name() const override { return "throws"; }
+                          void reset(const RobotState&) override { throw std::runtime_error("no such gain"); }
+                          void act(const RobotState&, const Reference&, JointCommand&) override {}
+                        };
+                        return std::make_unique<Throws>();
+                      });
+  if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
+  const test::ScratchFolder folder;
+  const Suite suite = parse_suite(
+      "schema: duet.suite/1\nname: test\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]\n"
+      "engines: [mujoco]\ncontrollers: [throws]\npolicies: [replay]\nstart: act\n",
+      "test.yaml");
+  const RunSummary summary = run(suite, folder / "run");
+  EXPECT_EQ(summary.outcomes.at("error"), 2);
+  EXPECT_THAT(errors_sentence(2, summary.first_error),
+              testing::AllOf(testing::StartsWith("2 episodes ended with an error; the first, wave"),
+                             HasSubstr("of mujoco/throws/"), HasSubstr(": no such gain")));
 }
 
 }  // namespace
