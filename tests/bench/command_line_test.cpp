@@ -280,7 +280,7 @@ TEST(CommandLine, SynthRetargetScoreRunReportVerify) {
   write_file(folder / "curves.csv", "steps,return\n0,x\n");
   const Answer refused = duet_program(report + " --curves " + (folder / "curves.csv"));
   EXPECT_EQ(refused.code, 2);
-  EXPECT_THAT(refused.err, HasSubstr("curves.csv:2: column 'return': expected a number, found 'x'"));
+  EXPECT_THAT(refused.err, HasSubstr("curves.csv': line 2: column 'return': expected a number, found 'x'"));
 
   ASSERT_EQ(duet_program("bless -q " + (folder / "run") + " -o " + (folder / "golden.json")).code, 0);
   EXPECT_EQ(duet_program("check -q " + (folder / "run") + " -b " + (folder / "golden.json")).code, 0);

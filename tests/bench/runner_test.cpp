@@ -361,7 +361,7 @@ TEST(Runner, SaysTheFirstErrorWithItsEpisode) {
   const RunSummary summary = run(suite, folder / "run");
   EXPECT_EQ(summary.outcomes.at("error"), 2);
   EXPECT_THAT(errors_sentence(2, summary.first_error),
-              testing::AllOf(testing::StartsWith("2 episodes ended with an error; the first, wave"),
+              testing::AllOf(testing::StartsWith("2 episodes ended with an error; the first, synth-wave"),
                              HasSubstr("of mujoco/throws/"), HasSubstr(": no such gain")));
 }
 

@@ -83,12 +83,12 @@ TEST_F(ForgedRun, SuccessFlipped) {
 }
 
 TEST_F(ForgedRun, MetricChangedInItsLastDigit) {
-  forge_main([](EpisodeRow& row) { row.metrics.begin()->second *= 1.0 + 1e-15; });
+  forge_main([](EpisodeRow& row) { row.metrics[row.metrics.begin()->first] *= 1.0 + 1e-15; });
   EXPECT_THAT(objection(run_), StartsWith("differs: metrics."));
 }
 
 TEST_F(ForgedRun, MetricDropped) {
-  forge_main([](EpisodeRow& row) { row.metrics.erase(row.metrics.begin()); });
+  forge_main([](EpisodeRow& row) { row.metrics.erase(std::string(row.metrics.begin()->first)); });
   EXPECT_THAT(objection(run_), AllOf(StartsWith("differs: metrics."), HasSubstr(": nothing, ")));
 }
 
