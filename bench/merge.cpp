@@ -62,7 +62,7 @@ class Merger {
 
   void add(const RunInput& input, const std::string& from) {
     kept_.inputs.push_back(input);
-    if (input.kept) kept_.copies.push_back({in(from, input.file), input.file});
+    if (input.kept) kept_.copies.push_back({in(from, input.file), input.file, input.sha256});
   }
 
   std::string folder_;

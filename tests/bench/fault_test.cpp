@@ -164,7 +164,7 @@ TEST_F(Faults, DoctorNamesABrokenModule) {
   write_file((fs::path(engines()) / "duet_dart.so").string(), "not a shared object");
   const Ended ended = run("doctor --need dart");
   EXPECT_EQ(ended.code, 4);
-  EXPECT_THAT(ended.text, AllOf(HasSubstr("absent engine dart"), HasSubstr("duet_dart.so")));
+  EXPECT_THAT(ended.text, AllOf(HasSubstr("engine 'dart' is absent"), HasSubstr("duet_dart.so")));
 }
 
 TEST_F(Faults, ACertificateEditedByHandIsRefusedAndAGoodOneIsKept) {

@@ -35,7 +35,7 @@ TEST(Score, UndefinedFiguresStayOutOfMeans) {
 TEST(Score, RetargetedClipHasTheEighteenTwoOtherReadingsAndHowItStands) {
   const auto robot = test::g1();
   const ClipScore score = score_clip(test::paired(Task::kHandshake, *robot), robot, {});
-  EXPECT_EQ(score.metrics.size(), 18u + 2u + 13u);
+  EXPECT_EQ(score.metrics.size(), 18u + 2u + 14u);
   EXPECT_LT(score.metrics.at("large_angle_ratio.entry"), score.metrics.at("large_angle_ratio"));
   EXPECT_TRUE(score.source_detected);
   EXPECT_TRUE(score.robot_detected);

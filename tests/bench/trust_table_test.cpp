@@ -5,7 +5,9 @@
 #include <yaml-cpp/yaml.h>
 
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <regex>
 #include <sstream>
@@ -88,6 +90,12 @@ std::vector<std::string> files_below(const std::string& folder) {
   return names;
 }
 
+// A page is no data and refused by read_file; here any file is only bytes.
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 // Runs of every kind, made once by the program.
 class TrustTable : public testing::Test {
  protected:
@@ -135,7 +143,7 @@ class TrustTable : public testing::Test {
   // What is outside, each file with its content.
   [[nodiscard]] std::map<std::string, std::string> outside() const {
     std::map<std::string, std::string> files;
-    for (const std::string& name : files_below(outside_ / ".")) files[name] = read_file(outside_ / name);
+    for (const std::string& name : files_below(outside_ / ".")) files[name] = bytes_of(outside_ / name);
     return files;
   }
   // A copy of one of the runs.
@@ -197,11 +205,11 @@ class TrustTable : public testing::Test {
                const std::function<void(const std::function<void()>&)>& attempt) {
     attempt([&] {
       const duet::Run run = load_run(folder);
-      const RunTables tables = tables_of(run);
+      const RunTables tables = tables_of(run.rows, run);
       const std::vector<Analysis> analyses = run_analyses(tables);
       for (const auto& [name, text] : analysis_files(analyses, "md")) write_file(inside(folder, name), text);
       for (const auto& [name, text] : analysis_files(analyses, "csv")) write_file(out + "/" + name, text);
-      write_file(out + "/report.html", html_report(report_content(run, tables, analyses, episodes, {}, 1, quiet_)));
+      write_file(out + "/report.html", html_report(report_content(run, tables, analyses, {}, episodes, {}, 1, quiet_)));
     });
     attempt([&] { publish_run(folder, out + "/published", published_inputs(folder, false)); });
     attempt([&] { merge_runs({folder}, {.output = out + "/merged"}); });
@@ -214,7 +222,7 @@ class TrustTable : public testing::Test {
     EXPECT_EQ(outside(), before) << what;
     if (fs::exists(scratch_ / "out")) {
       for (const std::string& name : files_below(scratch_ / "out"))
-        EXPECT_EQ(read_file(scratch_ / ("out/" + name)).find("SECRET-4711"), std::string::npos) << what << name;
+        EXPECT_EQ(bytes_of(scratch_ / ("out/" + name)).find("SECRET-4711"), std::string::npos) << what << name;
     }
     fs::remove_all(scratch_ / "out");
   }
@@ -260,7 +268,7 @@ TEST_F(TrustTable, ALinkInThePlaceOfAFileIsNotFollowed) {
   for (const std::string folder : {"run", "published", "planned", "trainings"}) {
     const std::string copy = copy_of(folder);
     for (const std::string& name : files_below(copy)) {
-      const std::string file = copy + "/" + name, kept = read_file(file);
+      const std::string file = copy + "/" + name, kept = bytes_of(file);
       write_file(outside_ / "linked", kept);
       fs::remove(file);
       fs::create_symlink(outside_ / "linked", file);
@@ -333,7 +341,7 @@ TEST_F(TrustTable, AFieldOfAJsonFileMakesNothingRunAndNamesNothingOutside) {
       if (!is_read || (!lines && !name.ends_with(".json"))) continue;
       if (folder == "published" && name != "manifest.json") continue;              // which holds all others
       if (folder == "planned" && fs::exists(*world_ / ("run/" + name))) continue;  // read as there
-      const std::string file = copy + "/" + name, kept = read_file(file);
+      const std::string file = copy + "/" + name, kept = bytes_of(file);
       const std::size_t end = lines ? kept.find('\n') : kept.size();
       const nlohmann::json honest = nlohmann::json::parse(kept.substr(0, end));
       const bool episodes = name == "run.json" || name == "plan.json" || name == "inputs/inputs.json";
@@ -366,7 +374,7 @@ TEST_F(TrustTable, AWordOfAJournalMakesNothingRun) {
   const auto before = outside();
   for (const std::string& name : files_below(copy)) {
     if (!name.ends_with(".log")) continue;
-    const std::string kept = read_file(copy + "/" + name);
+    const std::string kept = bytes_of(copy + "/" + name);
     for (const std::string& plant : plants())
       for (const char* word : {"began", "did", "crashed", "ended"}) {
         write_file(copy + "/" + name, kept + word + " " + plant + "\n" + word + " " + plant + " " + plant + " 1.0\n");
@@ -392,7 +400,7 @@ void each_scalar(YAML::Node node, const std::function<void(YAML::Node)>& visit) 
 TEST_F(TrustTable, AFieldOfASuiteMakesNothingRunAndShowsNothingOutside) {
   int planted = 0;
   for (const std::string folder : {"run", "planned"}) {
-    const std::string copy = copy_of(folder), file = copy + "/suite.yaml", kept = read_file(file);
+    const std::string copy = copy_of(folder), file = copy + "/suite.yaml", kept = bytes_of(file);
     const auto before = outside();
     YAML::Node document = YAML::Load(kept);
     each_scalar(document, [&](YAML::Node node) {

@@ -102,7 +102,7 @@ constexpr const char* kPlan = R"({"schema": "duet.plan/1", "kind": "episodes", "
 )";
 constexpr const char* kTrainingPlan = R"({"schema": "duet.plan/1", "kind": "trainings", "program": {"duet": "aa"},
  "suite_hash": "", "episodes": 1, "costs": {}, "clips": [],
- "shards": [{"name": "plain-1", "begin": 0, "end": 1, "cost_s": 600, "arguments": ["train", "wbc", "--seed", "1"]}]}
+ "shards": [{"name": "plain-1", "begin": 0, "end": 1, "cost_s": 600, "train": "wbc", "arm": "plain", "seed": 1, "options": {}}]}
 )";
 
 std::string plan_sample(unsigned seed) { return seed / 64 % 2 == 0 ? kPlan : kTrainingPlan; }

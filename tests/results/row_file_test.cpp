@@ -66,7 +66,7 @@ class LeanRows : public testing::Test {
     duet::Run run = united({load_run(path_, extent)});
     std::vector<EpisodeRow> rows = std::move(run.rows);
     const RunTables tables = run_tables(std::move(rows), {}, nullptr, run.file);
-    std::string text = run_text(tables, run_analyses(tables));
+    std::string text = run_text(run_analyses(tables));
     for (const Analysis& analysis : run_analyses(tables))
       text += dumped(analysis_json(analysis), 1) + analysis_markdown(analysis);
     for (const LinePlot& plot : foot_plots(tables.rows, tables.file))
