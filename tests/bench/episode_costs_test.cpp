@@ -19,8 +19,8 @@ PairedMotion second_long() {
 TEST(EpisodeCosts, TheWorkLeftIsThatOfEachEngineAtItsOwnCost) {
   const PairedMotion clip = second_long();
   const Suite suite;
-  const EpisodeSpec quick{.clip = &clip, .engine = "playback", .controller = "vmc"};
-  const EpisodeSpec slow{.clip = &clip, .engine = "mujoco", .controller = "vmc"};
+  const EpisodeSpec quick{.clip = &clip, .engine = "playback", .controller = "vmc", .policy = ""};
+  const EpisodeSpec slow{.clip = &clip, .engine = "mujoco", .controller = "vmc", .policy = ""};
   EpisodeCosts costs(suite);
   EXPECT_TRUE(std::isnan(costs.share_done()));
   for (int i = 0; i < 4; ++i) costs.expect(quick);
@@ -35,7 +35,7 @@ TEST(EpisodeCosts, TheWorkLeftIsThatOfEachEngineAtItsOwnCost) {
 }
 
 TEST(EpisodeCosts, AreToldApartByEngineAndController) {
-  EXPECT_EQ(cost_name({.engine = "ode", .controller = "pd"}), "ode/pd");
+  EXPECT_EQ(cost_name({.engine = "ode", .controller = "pd", .policy = ""}), "ode/pd");
 }
 
 }  // namespace

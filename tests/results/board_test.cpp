@@ -184,7 +184,9 @@ TEST(BoardVerdict, EpisodesThatFellAreNoSuccessInAnyColumn) {
   Rows rows;
   add({"a", times(40, '1')}, rows);
   for (EpisodeRow& row : rows) {
-    row.verdicts = {{.version = "paper", .thresholds = "paper", .success = true}};
+    row.verdicts.resize(1);
+    row.verdicts[0].version = row.verdicts[0].thresholds = "paper";
+    row.verdicts[0].success = true;
     row.outcome = Outcome::kFell;
     row.fell = true;
   }

@@ -46,7 +46,9 @@ TEST(NamedValues, AreWhatAMapIs) {
       default:
         EXPECT_EQ(values.contains(name), model.contains(name));
         EXPECT_EQ(values.find(name) == values.end(), model.find(name) == model.end());
-        if (model.contains(name)) EXPECT_EQ(values.find(name)->second, model.at(name));
+        if (model.contains(name)) {
+          EXPECT_EQ(values.find(name)->second, model.at(name));
+        }
         EXPECT_EQ(values.lower_bound(name) == values.end(), model.lower_bound(name) == model.end());
     }
     ASSERT_EQ(values.map(), model);
