@@ -108,7 +108,7 @@ Task task_of(const Recording& recording) {
   return *recording.task;
 }
 
-// Of an episode that the engine ended early, or of a task without a rule, the verdict says no and why.
+// The verdict of the rule; where it cannot judge, a failure whose reason stands in the row's message.
 Verdict interaction_verdict(const Recording& recording, const ActSource& source, const Agent& human,
                             const Agent& machine, EpisodeRow& row) {
   const Task task = task_of(recording);

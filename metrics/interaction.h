@@ -48,7 +48,7 @@ std::optional<int> act_onset(ActOnset onset, const Agent& agent);
 
 // Parts: act, alone, touch, force, reply, stands. Values: touch_s, hands_min [m], settled_ratio, lead_s (by which it
 // begins before its partner), also_<task> (1 where the act of that task was seen, too). Throws as detect_by_rule;
-// `why_not` says why such an episode cannot be judged.
+// `cannot_judge` says why.
 DetectorResult judge_interaction(Task task, const InteractionEvidence& evidence);
 
 // Why the rule cannot judge: a task without a rule, a partner who is absent, a robot without hands; empty: it can.

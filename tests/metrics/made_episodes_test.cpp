@@ -62,7 +62,7 @@ void delay(Agent& agent, int frames) {
 
 void stand_still(InteractionEvidence& e) { delay(e.performer, static_cast<int>(e.performer.root.cols())); }
 
-// Both hands raised to the shoulders' height in the frames [begin, end), with 0.3 s of way to either side.
+// The right hand raised to the shoulders' height in the frames [begin, end), with 0.3 s of way to either side.
 void raise_hand(Agent& agent, int begin, int end) {
   for (int t = std::max(begin - 15, 0); t < std::min<int>(end + 15, static_cast<int>(agent.root.cols())); ++t) {
     const double share = std::clamp(std::min(t - begin + 15, end + 15 - t) / 15.0, 0.0, 1.0);
