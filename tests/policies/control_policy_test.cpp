@@ -86,7 +86,9 @@ TEST(ControlPolicy, AFollowingHandComesToThePartners) {
   const ObservationFrame frame = facing(*robot, 0.8, hand);
   for (const auto& [name, own] : {std::pair{"servo", "rhand"}, {"omni", "lhand"}}) {
     const std::unique_ptr<Policy> policy = control_maker(name, robot)();
-    policy->reset({.start = frame.robot});
+    EpisodeContext context;
+    context.start = frame.robot;
+    policy->reset(context);
     std::vector<Reference> plan;
     for (int call = 0; call < 8; ++call) plan = policy->plan({.history = std::span(&frame, 1), .tick = 0});
     EXPECT_LT((hand_of(*robot, {frame.robot.X_WB, plan.front().q}, own) - hand).norm(), 0.05) << name;

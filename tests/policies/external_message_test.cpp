@@ -115,7 +115,9 @@ TEST(PolicySocket, TimeInWhichTheProcessWasStoppedIsNotWaitedFor) {
   double now = 0.0;
   int looks = 0;
   AwakeDeadline stopped(std::chrono::milliseconds(1), AwakeTime([&] {
-                          if (++looks == 3) EXPECT_EQ(write(pair.theirs, "\0\0\0\0", 4), 4);
+                          if (++looks == 3) {
+                            EXPECT_EQ(write(pair.theirs, "\0\0\0\0", 4), 4);
+                          }
                           return now += 180.0;
                         }));
   std::string message;
