@@ -202,6 +202,8 @@ Interval ClusterBootstrap::percentiles(int clusters, double level, const Statist
     value = statistic(drawn.first(static_cast<std::size_t>(clusters)));
     drawn = drawn.subspan(static_cast<std::size_t>(clusters));
   }
+  std::erase_if(found, [](double value) { return std::isnan(value); });
+  if (found.empty()) return kNoInterval;
   std::ranges::sort(found);
   return {.low = quantile_of_sorted(found, 0.5 - 0.5 * level), .high = quantile_of_sorted(found, 0.5 + 0.5 * level)};
 }
@@ -238,6 +240,19 @@ Interval ClusterBootstrap::weighted_median(std::span<const double> values, std::
     for (const int number : drawn) times[static_cast<std::size_t>(number)] += 1.0;
     for (std::size_t i = 0; i < values.size(); ++i) drawn_weights[i] = times[places.of[i]] * weights[i];
     return duet::weighted_median(values, drawn_weights);
+  });
+}
+
+Interval ClusterBootstrap::weighted(std::span<const int> cluster,
+                                    const std::function<double(std::span<const double>)>& statistic, double level) {
+  const ClusterPlaces places = places_of(cluster);
+  require(places.clusters > 0, "bootstrap: expected at least one value, found none");
+  std::vector<double> times(places.clusters), weights(cluster.size());
+  return percentiles(static_cast<int>(places.clusters), level, [&](std::span<const int> drawn) {
+    std::ranges::fill(times, 0.0);
+    for (const int number : drawn) times[static_cast<std::size_t>(number)] += 1.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) weights[i] = times[places.of[i]];
+    return statistic(weights);
   });
 }
 

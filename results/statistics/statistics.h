@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <span>
@@ -61,6 +62,10 @@ class ClusterBootstrap {
   // Of the weighted median. Throws std::invalid_argument where a weight is not above 0.
   Interval weighted_median(std::span<const double> values, std::span<const double> weights,
                            std::span<const int> cluster, double level = 0.95);
+  // Of any other statistic of the values, given how often each is drawn (its weight, one per value of `cluster`).
+  // Resamples in which it is NaN are left out; kNoInterval where that is all of them.
+  Interval weighted(std::span<const int> cluster, const std::function<double(std::span<const double>)>& statistic,
+                    double level = 0.95);
 
  private:
   const std::vector<int>& draws(int clusters);
