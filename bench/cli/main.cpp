@@ -122,6 +122,8 @@ int main(int argc, char** argv) {
   add_train(app, session);
   add_hardware(app, session);
   add_replay(app, session);
+  add_rate(app, session);
+  add_agree(app, session);
   add_replay_log(app, session);
   add_walk(app, session);
   add_completion(app, session);

@@ -78,7 +78,9 @@ ReplayPage page_of(const ReplayContent& part, const ViewerBundle& viewer) {
 
 }  // namespace
 
-ViewerBundle load_viewer() { return {read_text(viewer_file("replay.js")), read_text(viewer_file("replay.css"))}; }
+ViewerBundle load_viewer(const std::string& page) {
+  return {read_text(viewer_file(page + ".js")), read_text(viewer_file(page + ".css"))};
+}
 
 std::string replay_data(const ReplayContent& content) {
   ReplayColumns columns;
@@ -89,25 +91,32 @@ std::string replay_data(const ReplayContent& content) {
   return size + header + columns.bytes();
 }
 
-std::string replay_page(const ReplayContent& content, const ViewerBundle& viewer) {
-  require_embeddable(viewer.script, "</script", "viewer/replay.js");
-  require_embeddable(viewer.style, "</style", "viewer/replay.css");
-  const std::string title = escape_html(content.title);
+std::string viewer_page(const ViewerPage& page, const ReplayContent& content, const ViewerBundle& viewer) {
+  require_embeddable(viewer.script, "</script", "the viewer's script");
+  require_embeddable(viewer.style, "</style", "the viewer's style sheet");
   return fmt::format(
              "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
              "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
              "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"generator\" content=\"duet\">"
-             "<title>{0} - replay</title>\n<style>{1}</style></head>\n<body>\n<header "
-             "id=\"head\"><h1>{0}</h1></header>\n"
-             "<main id=\"app\"><noscript><p class=\"note\">This page draws its episodes by JavaScript, which is off: "
-             "here is their table.</p></noscript></main>\n<footer>",
-             title, viewer.style) +
-         table_html(content) +
+             "<title>{}</title>\n<style>{}</style></head>\n<body>\n<header "
+             "id=\"head\"><h1>{}</h1></header>\n"
+             "<main id=\"app\"><noscript><p class=\"note\">{}</p></noscript></main>\n<footer>",
+             escape_html(page.title), viewer.style, escape_html(page.heading), escape_html(page.without_script)) +
+         page.footer +
          fmt::format(
              "</footer>\n<script type=\"application/octet-stream\" "
              "id=\"duet-replay\">{}</script>\n<script>{}</script>\n"
              "</body></html>\n",
              base64(deflated(replay_data(content))), viewer.script);
+}
+
+std::string replay_page(const ReplayContent& content, const ViewerBundle& viewer) {
+  return viewer_page(
+      {.title = content.title + " - replay",
+       .heading = content.title,
+       .without_script = "This page draws its episodes by JavaScript, which is off: here is their table.",
+       .footer = table_html(content)},
+      content, viewer);
 }
 
 std::vector<ReplayPage> replay_pages(const ReplayContent& content, const ViewerBundle& viewer, std::size_t most) {

@@ -15,9 +15,16 @@ struct ViewerBundle {
   std::string script, style;
 };
 
-// In viewer/ beside the program, or of the folders of core/share.h. Throws MissingError naming the file, the places
-// looked at and what makes it.
-ViewerBundle load_viewer();
+// Of the page of this name ("replay", "rate"): in viewer/ beside the program, or of the folders of core/share.h. Throws
+// MissingError naming the file, the places looked at and what makes it.
+ViewerBundle load_viewer(const std::string& page = "replay");
+
+// What stands around the data of a page that a viewer draws.
+struct ViewerPage {
+  std::string title, heading, without_script;  // text
+  std::string footer;                          // HTML
+};
+std::string viewer_page(const ViewerPage& page, const ReplayContent& content, const ViewerBundle& viewer);
 
 // "duet.replay/1": the header with its columns, as the page holds them before they are deflated.
 std::string replay_data(const ReplayContent& content);

@@ -81,8 +81,7 @@ std::map<std::string, std::string> repeated_hashes(const Run& run, const ChosenR
   std::vector<std::string> keys;
   for (const ChosenScene& scene : chosen.scenes)
     for (const EpisodeRow* row : scene.rows)
-      if (has_motion(*row) && (choice.run_again || !fs::exists(recording_file(run.path + "/trajectories", *row))))
-        keys.push_back(row->key);
+      if (has_motion(*row) && (choice.run_again || !has_kept_recording(run, *row))) keys.push_back(row->key);
   if (keys.empty()) return {};
   VerifyOptions options;
   options.threads = choice.threads;
@@ -225,6 +224,10 @@ void add_file(const std::string& file, const std::string& card, std::vector<Repl
 
 double ReplayScene::disagreement() const {
   return judged == 0 ? 0.0 : static_cast<double>(std::min(successes, judged - successes)) / judged;
+}
+
+bool has_kept_recording(const Run& run, const EpisodeRow& row) {
+  return has_motion(row) && fs::exists(recording_file(run.path + "/trajectories", row));
 }
 
 ReplayContent replay_of_run(const Run& run, const ReplayChoice& choice, Progress& progress) {

@@ -16,6 +16,9 @@ namespace duet {
 // digest) and as verify_run where episodes have to be run again.
 ReplayContent replay_of_run(const Run& run, const ReplayChoice& choice, Progress& progress);
 
+// Whether the run has a recording of this episode, which replay_of_run then reads and does not run again.
+bool has_kept_recording(const Run& run, const EpisodeRow& row);
+
 // NPZ files of anybody, told apart by their schema. A recording is a track; those of one task, clip and episode are one
 // scene. A clip is a scene of its two people. A paired motion is a scene of two tracks: the robot, played back without
 // physics, with the adapted partner; and the people that it was made from. A paired motion is shown on the robot that

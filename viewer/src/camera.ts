@@ -38,6 +38,15 @@ export class Camera {
     this.distance = Math.min(14, Math.max(0.5, this.distance * factor));
   }
 
+  // The side view of a pair: the robot at `a`, its partner at `b`.
+  frame(a: Vec3, b: Vec3): void {
+    const line = Math.atan2(b[1] - a[1], b[0] - a[0]), gap = Math.hypot(b[0] - a[0], b[1] - a[1]);
+    this.target = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.82];
+    this.yaw = line - Math.PI / 2 + 0.35;
+    this.pitch = 0.2;
+    this.distance = Math.max(2.3, 1.5 + 1.0 * gap);
+  }
+
   view(aspect: number): View {
     const eye = this.eye, t = this.target;
     const f = unit([t[0] - eye[0], t[1] - eye[1], t[2] - eye[2]]);
@@ -57,6 +66,36 @@ export class Camera {
     for (let r = 0; r < 4; ++r) for (let c = 0; c < 4; ++c) matrix[4 * c + r] = rows[r]![c]!;
     return {matrix, eye};
   }
+}
+
+// Lets pointers on the canvas turn (drag), shift (right button, or with Shift) and zoom (wheel, two fingers) the camera.
+export function steer(camera: Camera, canvas: HTMLCanvasElement, moved: () => void, released: () => void = () => {}): void {
+  const down = new Map<number, PointerEvent>();
+  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+  canvas.addEventListener('pointerdown', (event) => {
+    down.set(event.pointerId, event);
+    canvas.setPointerCapture(event.pointerId);
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    const before = down.get(event.pointerId);
+    if (!before) return;
+    const height = canvas.clientHeight, dx = (event.clientX - before.clientX) / height, dy = (event.clientY - before.clientY) / height;
+    if (down.size > 1) {
+      const other = [...down.values()].find((one) => one.pointerId !== event.pointerId)!;
+      const apart = (one: PointerEvent) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
+      camera.zoom(apart(before) / Math.max(apart(event), 1));
+    } else if (before.button === 2 || event.shiftKey) camera.shift(-dx, dy);
+    else camera.turn(4 * dx, 3 * dy);
+    down.set(event.pointerId, Object.assign(event, {}));
+    moved();
+  });
+  for (const name of ['pointerup', 'pointercancel'] as const)
+    canvas.addEventListener(name, (event) => { down.delete(event.pointerId); released(); });
+  canvas.addEventListener('wheel', (event) => {
+    event.preventDefault();
+    camera.zoom(Math.exp(event.deltaY * 0.001));
+    moved();
+  }, {passive: false});
 }
 
 // In parts of the picture, (0, 0) at its top left; null behind the eye.

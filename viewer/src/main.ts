@@ -1,25 +1,19 @@
 // The page: reads its data, puts a picture, strips and panels together, and keeps one clock.
 import './style.css';
-import {Camera, View, project} from './camera';
+import {Camera, View, project, steer} from './camera';
 import {button, el} from './dom';
-import {Vec3} from './kinematics';
 import {episodesPanel, keysPanel, tracksPanel, verdictPanel, wordOf} from './panels';
 import {Replay, Scene, Track, readReplay} from './replay';
-import {Colour, Renderer, Theme} from './renderer';
+import {Renderer, rgb, themeOf} from './renderer';
 import {Actor} from './stage';
 import {readState, writeState} from './state';
 import {Shown, Strips} from './strips';
-import {Happening, baseOf, endOf, frameAt, happeningsOf, phaseAt, rangeOf, secondsAt} from './timeline';
+import {Happening, endOf, frameAt, happeningsOf, pairOf, phaseAt, rangeOf, secondsAt} from './timeline';
 
 const PALETTE = ['#0072b2', '#e07000', '#009e73', '#cc5fa0', '#8a6fd1', '#4fa8dd', '#a88600', '#7a8b2d'];
 const NULL_COLOUR = '#8b9199';
 const SPEEDS = [1, 0.5, 0.2, 0.1];
 const begun = performance.now();
-
-function rgb(hex: string): Colour {
-  const n = parseInt(hex.slice(1), 16);
-  return [(n >> 16) / 255, ((n >> 8) & 255) / 255, (n & 255) / 255];
-}
 
 class Page {
   private scene!: Scene;
@@ -74,7 +68,7 @@ class Page {
     window.addEventListener('hashchange', () => this.restore(location.hash));
     new ResizeObserver(() => { this.dirty = true; }).observe(stage);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.strips.draw(); this.dirty = true; });
-    this.pointers();
+    steer(this.camera, this.canvas, () => this.moved(), () => this.save());
     const hash = location.hash;  // before opening an episode writes its own
     this.open(0);
     this.restore(hash);
@@ -343,59 +337,18 @@ class Page {
     found();
   }
 
-  private pointers(): void {
-    const down = new Map<number, PointerEvent>();
-    this.canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    this.canvas.addEventListener('pointerdown', (event) => {
-      down.set(event.pointerId, event);
-      this.canvas.setPointerCapture(event.pointerId);
-    });
-    this.canvas.addEventListener('pointermove', (event) => {
-      const before = down.get(event.pointerId);
-      if (!before) return;
-      const height = this.canvas.clientHeight, dx = (event.clientX - before.clientX) / height, dy = (event.clientY - before.clientY) / height;
-      if (down.size > 1) {
-        const other = [...down.values()].find((one) => one.pointerId !== event.pointerId)!;
-        const apart = (one: PointerEvent) => Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
-        this.camera.zoom(apart(before) / Math.max(apart(event), 1));
-      } else if (before.button === 2 || event.shiftKey) this.camera.shift(-dx, dy);
-      else this.camera.turn(4 * dx, 3 * dy);
-      down.set(event.pointerId, Object.assign(event, {}));
-      this.moved();
-    });
-    for (const name of ['pointerup', 'pointercancel'] as const)
-      this.canvas.addEventListener(name, (event) => { down.delete(event.pointerId); this.save(); });
-    this.canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      this.camera.zoom(Math.exp(event.deltaY * 0.001));
-      this.moved();
-    }, {passive: false});
-  }
-
   private moved(): void {
     this.cameraMoved = true;
     this.dirty = true;
   }
 
-  // Base of the focus and the partner's at the begin of the act.
-  private pair(): [Vec3, Vec3] {
-    const track = this.scene.tracks[this.focus]!, frame = frameAt(track, 0);
-    const at = (values: Float64Array, rows: number): Vec3 => [0, 1, 2].map((k) => values[k * rows + Math.min(frame, rows - 1)]!) as Vec3;
-    const base = baseOf(track), robot = at(base.values, base.rows);
-    const joints = track.partner?.joints;
-    return [robot, joints && joints.rows > 0 ? at(joints.values, joints.rows) : [robot[0] + 1, robot[1], robot[2]]];
-  }
-
   private frameCamera(): void {
-    const [a, b] = this.pair(), line = Math.atan2(b[1] - a[1], b[0] - a[0]), gap = Math.hypot(b[0] - a[0], b[1] - a[1]);
-    Object.assign(this.camera, {
-      target: [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.82], yaw: line - Math.PI / 2 + 0.35, pitch: 0.2, distance: Math.max(2.3, 1.5 + 1.0 * gap),
-    });
+    this.camera.frame(...pairOf(this.scene.tracks[this.focus]!));
     this.cameraMoved = false;
   }
 
   private preset(i: number): void {
-    const [a, b] = this.pair(), line = Math.atan2(b[1] - a[1], b[0] - a[0]);
+    const [a, b] = pairOf(this.scene.tracks[this.focus]!), line = Math.atan2(b[1] - a[1], b[0] - a[0]);
     this.frameCamera();
     const c = this.camera;
     if (i === 0) Object.assign(c, {yaw: line - Math.PI / 2, pitch: 0.12});
@@ -440,11 +393,6 @@ class Page {
     this.frames = [];
   }
 
-  private theme(): Theme {
-    const css = getComputedStyle(this.app), colour = (name: string) => rgb(css.getPropertyValue(name).trim());
-    return {background: colour('--sky'), floor: colour('--floor'), line: colour('--grid'), shadow: Number(css.getPropertyValue('--shadow'))};
-  }
-
   private draw(): void {
     const labels: [number, number, string, string][] = [];
     for (const i of this.visible) this.actors[i]!.update(this.seconds, rgb(this.colours[i]!), this.hold);
@@ -469,13 +417,13 @@ class Page {
     const view = this.camera.view(width / height), focus = this.actors[this.focus]!;
     const layers = focus.layers(false, this.reference, true);
     for (const i of this.visible) if (i !== this.focus) layers.push(...this.actors[i]!.layers(true, false, false));
-    this.renderer!.draw(0, 0, width, height, view, this.camera.target, layers, this.theme());
+    this.renderer!.draw(0, 0, width, height, view, this.camera.target, layers, themeOf(this.app));
     this.label(focus, view, 0, 0, 1, 1, labels);
   }
 
   private drawGrid(width: number, height: number, labels: [number, number, string, string][]): void {
     const shown = [...this.visible].sort((a, b) => a - b), columns = Math.ceil(Math.sqrt(shown.length * Math.max(1, width / height / 1.2)));
-    const across = Math.min(columns, shown.length), down = Math.ceil(shown.length / across), theme = this.theme();
+    const across = Math.min(columns, shown.length), down = Math.ceil(shown.length / across), theme = themeOf(this.app);
     const w = Math.floor(width / across), h = Math.floor(height / down);
     for (const [k, i] of shown.entries()) {
       const actor = this.actors[i]!, column = k % across, row = Math.floor(k / across), view = this.camera.view(w / h);

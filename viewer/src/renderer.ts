@@ -53,6 +53,17 @@ export interface Theme {
   shadow: number; // how dark
 }
 
+export function rgb(hex: string): Colour {
+  const n = parseInt(hex.slice(1), 16);
+  return [(n >> 16) / 255, ((n >> 8) & 255) / 255, (n & 255) / 255];
+}
+
+// The colours that the style sheet has for the element.
+export function themeOf(element: HTMLElement): Theme {
+  const css = getComputedStyle(element), colour = (name: string) => rgb(css.getPropertyValue(name).trim());
+  return {background: colour('--sky'), floor: colour('--floor'), line: colour('--grid'), shadow: Number(css.getPropertyValue('--shadow'))};
+}
+
 const BODY_VERTEX = `#version 300 es
 layout(location=0) in vec4 corner; // on the unit sphere, and which end
 layout(location=1) in vec3 place;

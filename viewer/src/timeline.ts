@@ -31,6 +31,14 @@ export function baseOf(track: Track): Columns {
   return track.robot ? track.motion.position : (track.other ?? track.partner)!.joints;
 }
 
+// Where the robot's base and its partner are, by default when the act begins; without a partner a place before the robot.
+export function pairOf(track: Track, seconds = 0): [Vec3, Vec3] {
+  const frame = frameAt(track, seconds), base = baseOf(track), joints = track.partner?.joints;
+  const at = (of: Columns): Vec3 => [0, 1, 2].map((k) => of.values[k * of.rows + Math.min(frame, of.rows - 1)]!) as Vec3;
+  const robot = at(base);
+  return [robot, joints && joints.rows > 0 ? at(joints) : [robot[0] + 1, robot[1], robot[2]]];
+}
+
 export function phaseAt(track: Track, frame: number): string {
   return frame < track.act[0] ? 'preparation' : frame < track.act[1] ? 'act' : 'follow-up';
 }
