@@ -1,6 +1,7 @@
 #include "duet/bench/replay/replay_header.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -95,15 +96,28 @@ nlohmann::json trace_json(const DetectorTrace& trace, ReplayColumns& columns) {
           {"margins", columns.add(scaled_margins(trace), kMarginStep)}};
 }
 
+struct TracedDetector {
+  DetectorVersion version;
+  ThresholdSet set;
+};
+
+// The headline and another view of it. The rule `interaction` judges whole episodes: of it the act is traced, and the
+// detector that asks for less.
+std::array<TracedDetector, 2> traced_detectors(const ScoringRules& rules) {
+  if (rules.detector == DetectorVersion::kInteraction)
+    return {{{DetectorVersion::kRobot, ThresholdSet::kAct}, {DetectorVersion::kRobot, ThresholdSet::kPaper}}};
+  const DetectorVersion other =
+      rules.detector == DetectorVersion::kRobot ? DetectorVersion::kPaper : DetectorVersion::kRobot;
+  return {{{rules.detector, rules.thresholds}, {other, rules.thresholds}}};
+}
+
 nlohmann::json detectors_json(const ReplayTrack& track, ReplayColumns& columns) {
   nlohmann::json list = nlohmann::json::array();
   if (!track.recording.task || !track.robot) return list;
   const ScoringRules rules = track.kept ? track.kept->rules : ScoringRules{};
-  const DetectorVersion other =
-      rules.detector == DetectorVersion::kRobot ? DetectorVersion::kPaper : DetectorVersion::kRobot;
-  for (const DetectorVersion version : {rules.detector, other}) {
-    const DetectorTrace trace = detector_trace(track.recording, *track.robot, version, rules.thresholds,
-                                               rules.readings.detectors, kVerdictStride);
+  for (const auto& [version, set] : traced_detectors(rules)) {
+    const DetectorTrace trace =
+        detector_trace(track.recording, *track.robot, version, set, rules.readings.detectors, kVerdictStride);
     if (!trace.frames.empty()) list.push_back(trace_json(trace, columns));
   }
   return list;

@@ -286,6 +286,17 @@ TEST_F(Replay, TheVerdictOfATraceEndsAsTheRowsDoes) {
       detector_trace(diverged, *track.robot, DetectorVersion::kRobot, ThresholdSet::kPaper, {}, 5).frames.empty());
 }
 
+TEST_F(Replay, OfTheRuleInteractionTheActIsTraced) {
+  ReplayContent judged = content(run("all"));
+  for (ReplayTrack& track : judged.scenes[0].tracks) {
+    ASSERT_TRUE(track.kept);
+    track.kept->rules.detector = DetectorVersion::kInteraction;
+  }
+  const std::string data = replay_data(judged);
+  EXPECT_THAT(data, HasSubstr(R"("set":"act")"));
+  EXPECT_THAT(data, HasSubstr(R"("set":"paper")"));
+}
+
 TEST_F(Replay, TheMcapTellsBodiesOnceAndWhereTheyAreAtEachFrame) {
   const ReplayContent content_of_run = content(run("all"));
   write_replay_mcap(content_of_run, folder_ / "replay.mcap");
