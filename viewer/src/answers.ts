@@ -14,6 +14,7 @@ function quoted(field: string): string { return /[",;\t\r\n#]/.test(field) ? `"$
 export class Answers {
   rater = '';
   stored = true; // false: this browser keeps nothing, and what is not exported is lost
+  private exported = true; // since the last answer
   private given = new Map<string, Answer>(); // by the episode's key
   private readonly others = new Map<string, Map<string, Answer>>(); // of raters before, where nothing is stored
   private readonly place: string;
@@ -29,6 +30,11 @@ export class Answers {
     this.rater = name.replace(/[\u0000-\u001f\u007f]/g, ' ').trim();
     this.save('name', this.rater);
     this.given = this.others.get(this.rater) ?? new Map();
+    this.gather();
+  }
+
+  // Takes over what is stored of this rater, by this page or by the same one in another tab.
+  gather(): void {
     try {
       for (const [key, answer] of Object.entries(JSON.parse(this.load(`of/${this.rater}`) ?? '{}')))
         if (ANSWERS.includes(answer as Answer)) this.given.set(key, answer as Answer);
@@ -39,12 +45,19 @@ export class Answers {
   get count(): number { return this.keys.filter((key) => this.given.has(key)).length; }
 
   give(key: string, answer: Answer): void {
+    this.gather();
     this.given.set(key, answer);
+    this.exported = false;
     this.save(`of/${this.rater}`, JSON.stringify(Object.fromEntries(this.given)));
   }
 
+  // Whether an answer is neither stored nor exported.
+  get endangered(): boolean { return !this.stored && !this.exported; }
+
   // In the order of the page; what is not answered is left out.
   csv(): string {
+    this.gather();
+    this.exported = true;
     const lines = this.keys.filter((key) => this.given.has(key)).map((key) => `${key},${quoted(this.rater)},${this.given.get(key)}\n`);
     return `episode,rater,answer\n${lines.join('')}`;
   }

@@ -62,6 +62,8 @@ class Page {
     this.name.addEventListener('input', () => { this.answers.choose(this.name.value); this.show(); });
     this.name.addEventListener('keydown', (event) => { if (event.key === 'Enter') this.question.focus(); });
     window.addEventListener('keydown', (event) => this.key(event));
+    window.addEventListener('storage', () => { this.answers.gather(); this.show(); });  // the same page in another tab
+    window.addEventListener('beforeunload', (event) => { if (this.answers.endangered) event.preventDefault(); });
     new ResizeObserver(() => { this.dirty = true; }).observe(stage);
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => { this.dirty = true; });
     steer(this.camera, this.canvas, () => { this.dirty = true; });
@@ -138,7 +140,8 @@ class Page {
     const link = el('a', {download: `ratings-${this.answers.rater.replace(/[^\p{L}\p{N}_-]+/gu, '-')}.csv`});
     link.href = URL.createObjectURL(new Blob([this.answers.csv()], {type: 'text/csv'}));
     link.click();
-    URL.revokeObjectURL(link.href);
+    setTimeout(() => URL.revokeObjectURL(link.href), 60000);  // some browsers fetch it after the click
+    this.show();
   }
 
   private key(event: KeyboardEvent): void {

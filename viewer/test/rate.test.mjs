@@ -85,6 +85,40 @@ test('answers stay when the page is closed, by the name of the rater', async () 
   assert.match(await again.locator('.place').textContent(), /, 0 answered$/);
 });
 
+test('the same page in two tabs loses no answer of either', async () => {
+  const {page, context} = await ready();
+  await signIn(page, 'anna');
+  const other = await context.newPage();
+  await other.goto(`file://${rating}`);
+  await other.waitForFunction(() => document.getElementById('app')?.dataset.ready !== undefined);
+  await page.keyboard.press('y');
+  await other.locator('h2').focus();
+  await other.keyboard.press('ArrowRight');
+  await other.keyboard.press('n');
+  await page.waitForFunction(() => /, 2 answered$/.test(document.querySelector('.place').textContent));
+  const text = readFileSync(await exported(page, 'tabs'), 'utf8').trim().split('\n').slice(1);
+  assert.deepEqual(text, [`${keys[0]},anna,yes`, `${keys[1]},anna,no`]);
+});
+
+test('where the browser keeps nothing, the page asks before answers are lost', async () => {
+  const {context} = await ready(), page = await context.newPage(), asked = [];
+  await page.addInitScript(() => Object.defineProperty(window, 'localStorage', {get() { throw new Error('denied'); }}));
+  page.on('dialog', (dialog) => { asked.push(dialog.type()); void dialog.accept(); });
+  await page.goto(`file://${rating}`);
+  await page.waitForFunction(() => document.getElementById('app')?.dataset.ready !== undefined);
+  await signIn(page, 'anna');
+  await page.keyboard.press('y');
+  assert.match(await page.locator('[role=status]').textContent(), /keeps no answers: export before/);
+  await page.reload();
+  assert.deepEqual(asked, ['beforeunload']);
+  await page.waitForFunction(() => document.getElementById('app')?.dataset.ready !== undefined);
+  await signIn(page, 'anna');
+  await page.keyboard.press('y');
+  await exported(page, 'denied');
+  await page.reload();
+  assert.deepEqual(asked, ['beforeunload'], 'what is exported may go');
+});
+
 test('three raters export, and duet agree tells how far they agree', async () => {
   const ask = {anna: (i) => (i % 2 ? 'n' : 'y'), 'Ben, B.': (i) => (i === 0 ? 'u' : i % 2 ? 'n' : 'y'), carla: (i) => (i === 1 ? 'y' : i % 2 ? 'n' : 'y')};
   const files = [];
