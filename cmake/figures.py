@@ -31,6 +31,12 @@ POLICIES = {
     "replay": "replay (knows the motion)",
     "null": "null (stands still)",
 }
+CONTROLS = {
+    "canned": "canned (scripted, told the task)",
+    "omni": "omni (scripted, never reads the task)",
+    **{name: f"{name} (scripted)" for name in ("walker", "raised", "forward", "servo")},
+}
+CONDITIONS = ("act", "alone", "touch", "force", "reply", "stands")
 
 
 class Refused(Exception):
@@ -79,7 +85,7 @@ def with_interval(line):
 
 
 def success(folder):
-    """Success of each policy in MuJoCo, by task, and under the detectors as the paper prints them."""
+    """Success of each policy in MuJoCo, by task, under the strict thresholds, and under the detectors as the paper prints them."""
     file = f"{folder}/leaderboard.csv"
     rows = [r for r in rows_of(folder, "leaderboard.csv") if r["engine"] == "mujoco"]
     table = []
@@ -91,11 +97,74 @@ def success(folder):
         n = int(every["n"])
         low, high = wilson(round(printed * n), n)
         table.append([name, str(n), with_interval(every), *[short(value(task)["value"]) for task in TASKS],
-                      value("all", "fell")["value"], f"{percent(printed)} [{low}, {high}]"])
+                      percent(value("all", of="robot/strict")["value"]), value("all", "fell")["value"], f"{percent(printed)} [{low}, {high}]"])
     paper = figure(rows_of(folder, "policies.csv"), f"{folder}/policies.csv", source="paper", policy="D-STAR", task="all", name="paper_success")
-    table.append(["the paper's D-STAR", "126", *["-"] * 8, percent(paper["value"])])
-    header = ["Policy", "n", "Overall", *TASKS.values(), "Fell", "printed detectors"]
-    return markdown(header, [False] + [True] * 10, table)
+    table.append(["the paper's D-STAR", "126", *["-"] * 9, percent(paper["value"])])
+    header = ["Policy", "n", "Overall", *TASKS.values(), "strict", "Fell", "printed detectors"]
+    return markdown(header, [False] + [True] * 11, table)
+
+
+def rule(folder):
+    """Success of policies, then of controls, under the rule `interaction`, by task; beside it the detectors of the robot."""
+    file, rows, table = f"{folder}/leaderboard.csv", rows_of(folder, "leaderboard.csv"), []
+    ran = {r["policy"] for r in rows}
+    for policy, name in {**POLICIES, **CONTROLS}.items():
+        if policy not in ran:
+            continue
+
+        def value(task, name="success", of=""):
+            return figure(rows, file, policy=policy, task=task, name=name, of=of)
+        every = value("all")
+        counts = [f"{value(task)['k']}/{value(task)['n']}" for task in TASKS]
+        others = [percent(value("all", of=f"robot/{thresholds}")["value"]) for thresholds in ("act", "strict", "paper")]
+        table.append([name, every["n"], with_interval(every), *counts, *others, value("all", "fell")["value"]])
+    header = ["Policy", "n", "interaction", *TASKS.values(), "robot/act", "robot/strict", "robot/paper", "Fell"]
+    return markdown(header, [False] + [True] * 12, table)
+
+
+def judged(folder):
+    """Rows of a run with the verdict of the rule `interaction`."""
+    path = ROOT / folder / "episodes.jsonl"
+    if not path.is_file():
+        raise Refused(f"no file {folder}/episodes.jsonl")
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    return [(row, next(v for v in row["verdicts"] if v["version"] == "interaction")) for row in rows]
+
+
+def conditions(folder):
+    """In how many episodes of each policy each condition of the rule failed; one episode may fail in several."""
+    rows, table = judged(folder), []
+    for policy, name in {**POLICIES, **CONTROLS}.items():
+        parts = [verdict["parts"] for row, verdict in rows if row["policy"] == policy]
+        if parts:
+            table.append([name, str(len(parts)), *[str(sum(not part[one] for part in parts)) for one in CONDITIONS]])
+    return markdown(["Policy", "n", *CONDITIONS], [False] + [True] * 7, table)
+
+
+def pictured(file):
+    """Task, side, what the file says of it, row and verdict of each episode that it shows."""
+    chosen = json.loads((ROOT / file).read_text())
+    rows = judged(chosen["run"])
+    for task, pair in chosen["tasks"].items():
+        for side in ("right", "wrong"):
+            one = pair[side]
+            found = [(row, verdict) for row, verdict in rows
+                     if (row["clip"], row["policy"], verdict["success"]) == (one["clip"], one["policy"], side == "right")]
+            if len(found) != 1:
+                raise Refused(f"{file}: {task}, {side}: expected one episode of {one['policy']} with {one['clip']} that is {side}, found {len(found)}")
+            yield task, side, one, *found[0]
+
+
+def pictures(file):
+    """Of each task an episode that is right and one that is wrong: its picture, what is seen, and which conditions fail."""
+    table = []
+    for task, side, one, _, verdict in pictured(file):
+        failed = [f"`{name}`" for name in CONDITIONS if not verdict["parts"][name]]
+        cell = f"![{TASKS[task]}, {side}: {one['alt']}](pictures/{task}-{side}.png)<br>`{one['policy']}`: {one['says']}"
+        if side == "right":
+            table.append([TASKS[task]])
+        table[-1].append(f"{cell} **{'Fails ' + ', '.join(failed) if failed else 'All conditions hold'}.**")
+    return markdown(["", "right", "wrong"], [False] * 3, table)
 
 
 def engines(folder):
@@ -136,10 +205,10 @@ def contents(source, program):
     if words[:1] == ["duet"]:
         lines = output([program, *words[1:]]).rstrip("\n").split("\n")
         return lines if any(line.startswith("|") for line in lines) else ["```", *lines, "```"]
-    tables = {"success": success, "engines": engines}
+    tables = {"success": success, "engines": engines, "rule": rule, "conditions": conditions, "pictures": pictures}
     if len(words) == 2 and words[0] in tables:
         return tables[words[0]](words[1])
-    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, suites, duet ARGUMENT...")
+    raise Refused(f"'{source}' is none of: success FOLDER, engines FOLDER, rule FOLDER, conditions RUN, pictures FILE, suites, duet ARGUMENT...")
 
 
 def refreshed(text, program):
@@ -184,12 +253,18 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 where a region differs")
     parser.add_argument("--long", action="store_true", help="list the figures that are not compared")
+    parser.add_argument("--keys", metavar="FILE", help="print the keys of the episodes that a file of pictures names")
     parser.add_argument("--program", default=str(ROOT / "build/release/duet"))
     parser.add_argument("files", nargs="*", type=pathlib.Path, help="documents (default: all)")
     arguments = parser.parse_args()
     files = [path.resolve() for path in arguments.files] or documents()
     if arguments.long:
         return list_long(files)
+    if arguments.keys:
+        try:
+            return print("\n".join(row["key"] for _, _, _, row, _ in pictured(arguments.keys)))
+        except Refused as refused:
+            sys.exit(f"figures: {refused}")
     count = stale = 0
     for path in files:
         text = path.read_text()

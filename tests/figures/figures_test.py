@@ -1,4 +1,5 @@
 """cmake/figures.py: a table that is not what its source prints is found, and what cannot be made is refused in one sentence."""
+import json
 import pathlib
 import subprocess
 import sys
@@ -47,6 +48,33 @@ class Figures(unittest.TestCase):
     def test_what_is_no_source_is_refused(self):
         self.assertIn("line 1: 'engine x' is none of: success FOLDER", self.refused(f"<!-- figures: engine x -->\n{END}\n"))
         self.assertIn("no file results/none/engines.csv", self.refused(f"<!-- figures: engines results/none -->\n{END}\n"))
+
+    def pictures(self, change):
+        chosen = json.loads((ROOT / "docs/pictures/interaction.json").read_text())
+        change(chosen["tasks"])
+        path = pathlib.Path(self.folder.name) / "chosen.json"
+        path.write_text(json.dumps(chosen))
+        return f"<!-- figures: pictures {path} -->\n{END}\n"
+
+    def test_pictures_say_what_fails_and_hold_against_the_rows(self):
+        self.assertEqual(self.run_on(self.pictures(lambda tasks: None)).returncode, 0)
+        rows = self.page.read_text().splitlines()[4:-2]
+        self.assertEqual(len(rows), 6)
+        for row in rows:
+            self.assertIn("**All conditions hold.**", row.split("|")[2])
+            self.assertRegex(row.split("|")[3], r"\*\*Fails (`\w+`(, )?)+\.\*\*")
+
+    def test_a_picture_of_a_failure_is_none_of_what_is_right(self):
+        def swap(tasks):
+            tasks["hug"]["right"], tasks["hug"]["wrong"] = tasks["hug"]["wrong"], tasks["hug"]["right"]
+        self.assertIn("hug, right: expected one episode of dstar with people-hug-s24000-0005-tracked that is right, found 0",
+                      self.refused(self.pictures(swap)))
+
+    def test_conditions_count_every_policy(self):
+        self.run_on(f"<!-- figures: conditions results/published/interaction -->\n{END}\n")
+        lines = self.page.read_text().splitlines()
+        self.assertEqual(lines[2], "| Policy | n | act | alone | touch | force | reply | stands |")
+        self.assertEqual(len(lines[4:-2]), 10)
 
     def test_a_command_that_fails_is_refused_with_what_it_said(self):
         self.assertIn("ended with 1", self.refused(f"<!-- figures: duet list -->\n{END}\n", "--program", "/bin/false"))
