@@ -45,7 +45,7 @@ details.fold[open]{padding-bottom:14px}
 .e1{fill:var(--t1)}.e2{fill:var(--t2)}.e3{fill:var(--t3)}.e4{fill:var(--t4)}.e5{fill:var(--t5)}.e6{fill:var(--t6)}.e7{fill:var(--t7)}
 .e8{fill:var(--t8)}
 .map thead th:not(:first-child){text-align:center}
-.map td{text-align:center;min-width:74px;font-weight:600}
+.map td{text-align:center;min-width:74px;font-weight:600;color:var(--ink)}
 .map td a{color:inherit;text-decoration:none;display:block}
 .map td a:hover,.map td a:focus{text-decoration:underline}
 .h0{background:#8882}
