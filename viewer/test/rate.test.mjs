@@ -139,6 +139,12 @@ test('three raters export, and duet agree tells how far they agree', async () =>
   assert.deepEqual(answer.disputes.map((one) => one.episode).sort(), [keys[0], keys[1]].sort());
   const agreed = answer.agreement.figures.find((figure) => figure.of === 'anna vs carla' && figure.name === 'agreed');
   assert.equal(agreed.value, (keys.length - 1) / keys.length);
+  const detectors = new Set(rows.flatMap((row) => row.verdicts.map((verdict) => `${verdict.version}/${verdict.thresholds}`)));
+  assert.ok(detectors.has('interaction/act') && detectors.has('robot/paper'));
+  const kappas = answer.agreement.figures.filter((figure) => figure.name === 'kappa');
+  for (const detector of ['headline', ...detectors])
+    for (const who of [...answer.raters, 'majority']) assert.equal(kappas.filter((one) => one.of === `${detector} vs ${who}`).length, 1);
+  for (const one of kappas.filter((figure) => Number.isFinite(figure.value))) assert.ok(one.low <= one.value && one.value <= one.high, one.of);
   const twice = spawnSync(program, ['agree', join(folder, 'run'), files[0], files[0]], {encoding: 'utf8'});
   assert.equal(twice.status, 2);
   assert.match(twice.stderr, /found 'anna' again/);
