@@ -31,11 +31,7 @@ POLICIES = {
     "replay": "replay (knows the motion)",
     "null": "null (stands still)",
 }
-CONTROLS = {
-    "canned": "canned (scripted, told the task)",
-    "omni": "omni (scripted, never reads the task)",
-    **{name: f"{name} (scripted)" for name in ("walker", "raised", "forward", "servo")},
-}
+CONTROLS = {"canned": "canned (scripted, told the task)", "omni": "omni (scripted, never reads the task)"}
 CONDITIONS = ("act", "alone", "touch", "force", "reply", "stands")
 
 
@@ -104,14 +100,16 @@ def success(folder):
     return markdown(header, [False] + [True] * 11, table)
 
 
+def policies_and_controls(ran):
+    """Names of those that ran, with what they are: policies, then controls; one that is not known here is a script."""
+    known = {**POLICIES, **CONTROLS}
+    return {policy: known.get(policy, f"{policy} (scripted)") for policy in [*known, *sorted(ran - set(known))] if policy in ran}
+
+
 def rule(folder):
     """Success of policies, then of controls, under the rule `interaction`, by task; beside it the detectors of the robot."""
     file, rows, table = f"{folder}/leaderboard.csv", rows_of(folder, "leaderboard.csv"), []
-    ran = {r["policy"] for r in rows}
-    for policy, name in {**POLICIES, **CONTROLS}.items():
-        if policy not in ran:
-            continue
-
+    for policy, name in policies_and_controls({r["policy"] for r in rows}).items():
         def value(task, name="success", of=""):
             return figure(rows, file, policy=policy, task=task, name=name, of=of)
         every = value("all")
@@ -134,10 +132,9 @@ def judged(folder):
 def conditions(folder):
     """In how many episodes of each policy each condition of the rule failed; one episode may fail in several."""
     rows, table = judged(folder), []
-    for policy, name in {**POLICIES, **CONTROLS}.items():
+    for policy, name in policies_and_controls({row["policy"] for row, _ in rows}).items():
         parts = [verdict["parts"] for row, verdict in rows if row["policy"] == policy]
-        if parts:
-            table.append([name, str(len(parts)), *[str(sum(not part[one] for part in parts)) for one in CONDITIONS]])
+        table.append([name, str(len(parts)), *[str(sum(not part[one] for part in parts)) for one in CONDITIONS]])
     return markdown(["Policy", "n", *CONDITIONS], [False] + [True] * 7, table)
 
 
