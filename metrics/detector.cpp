@@ -7,6 +7,7 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/tasks/rules/evidence.h"
 
 namespace duet {
 namespace {
@@ -38,6 +39,12 @@ Thresholds completed(Task task, const Thresholds& given, ThresholdSet set = Thre
     known->second = value;
   }
   return complete;
+}
+
+const ActRule& rule_of(Task task) {
+  const ActRule* rule = definition_of(task).rule;
+  require(rule != nullptr, fmt::format("{} detector: the set act has no rule of its own for it", to_string(task)));
+  return *rule;
 }
 
 }  // namespace
@@ -78,10 +85,20 @@ DetectorResult detect_performer(Task task, const Agent& performer, const Agent& 
 }
 
 DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds) {
-  const ActRule* rule = definition_of(task).rule;
-  require(rule != nullptr, fmt::format("{} detector: the set act has no rule of its own for it", to_string(task)));
-  check_tracks(task, rule->tracks(performer, partner));
-  return rule->detect(performer, partner, completed(task, thresholds, ThresholdSet::kAct));
+  const ActRule& rule = rule_of(task);
+  check_tracks(task, rule.tracks(performer, partner));
+  const Thresholds tau = completed(task, thresholds, ThresholdSet::kAct);
+  return rule.detect(rules::smoothed(performer), rules::smoothed(partner), tau);
+}
+
+SmoothedAgents smoothed_for_rules(const Agent& performer, const Agent& partner) {
+  for (const Task task : all_tasks())
+    if (const ActRule* rule = definition_of(task).rule) check_tracks(task, rule->tracks(performer, partner));
+  return {rules::smoothed(performer), rules::smoothed(partner)};
+}
+
+DetectorResult detect_by_rule(Task task, const SmoothedAgents& agents) {
+  return rule_of(task).detect(agents.performer, agents.partner, thresholds(task, ThresholdSet::kAct));
 }
 
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version, ThresholdSet set,

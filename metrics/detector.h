@@ -45,6 +45,15 @@ DetectorResult detect_performer(Task task, const Agent& performer, const Agent& 
 // By the task's rule of the set `act`. Throws std::invalid_argument as above, and for a task that has none.
 DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds);
 
+// Two agents as the rules look at them: smoothed once for all of them.
+struct SmoothedAgents {
+  Agent performer, partner;
+};
+// Throws as detect_performer, for what any rule needs.
+SmoothedAgents smoothed_for_rules(const Agent& performer, const Agent& partner);
+// detect_by_rule with the rule's own thresholds.
+DetectorResult detect_by_rule(Task task, const SmoothedAgents& agents);
+
 // Roles from the version: detect(t, human, robot, kRobot, ...) equals detect(t, robot, human, kPaper, ...).
 DetectorResult detect(Task task, const Agent& human, const Agent& robot, DetectorVersion version,
                       ThresholdSet set = ThresholdSet::kPaper, DetectorReadings readings = {});

@@ -31,6 +31,9 @@ constexpr double kLead = 0.5;
 // Nobody has to wait longer than the person did in whose place the robot is, give or take this. [s]
 constexpr double kModelLead = 0.3;
 
+// The trunks of two people who hug stay so far apart, of their mean breadth: in SBU's 41 hugs at least 0.447. [1]
+constexpr double kApart = 0.44;
+
 bool is_trunk(const std::string& region) {
   return region == "chest" || region == "abdomen" || region == "back" || region == "pelvis";
 }
@@ -56,8 +59,9 @@ double union_of(std::vector<Interval> intervals) {
   return total;
 }
 
-std::optional<int> first_kept(const FrameMask& mask) {
-  const int stay = static_cast<int>(std::lround(kStays * kRateHz));
+// The first frame from which the mask holds for so long.
+std::optional<int> first_kept(const FrameMask& mask, double seconds) {
+  const int stay = static_cast<int>(std::lround(seconds * kRateHz));
   for (const FrameSpan& span : rules::spans_of(mask))
     if (span.frames() >= stay) return span.begin;
   return std::nullopt;
@@ -93,14 +97,28 @@ bool is_included(const InteractionRule& rule, Task other) {
   return std::ranges::find(rule.includes, to_string(other)) != rule.includes.end();
 }
 
+// As act_onset, of smoothed tracks and for so long. [frames]
+std::optional<int> onset_of(ActOnset onset, const Agent& agent, double seconds) {
+  if (onset == ActOnset::kNone) return std::nullopt;
+  if (onset == ActOnset::kTrunkLeans) return first_kept(at_least(inclination(agent), kLeans), seconds);
+  std::optional<int> first;
+  for (const Eigen::Matrix3Xd* hand : {&agent.lhand, &agent.rhand})
+    if (const std::optional<int> found = first_kept(at_least(raised(*hand, agent), kRaised * agent.arm), seconds))
+      first = first ? std::min(*first, *found) : *found;
+  return first;
+}
+
 // By how much the performer begins before it may. [s] Nothing to wait for: minus infinity.
 struct Lead {
   double before_partner = std::numeric_limits<double>::quiet_NaN();
   double over = -std::numeric_limits<double>::infinity();
 };
 
-Lead lead_of(ActOnset onset, const InteractionEvidence& e) {
-  const std::optional<int> own = act_onset(onset, e.performer), partner = act_onset(onset, e.partner);
+// Whoever does the act has begun it: where nothing stays up for kStays, with the first thing that comes up at all.
+Lead lead_of(ActOnset onset, const InteractionEvidence& e, const SmoothedAgents& agents, bool acts) {
+  std::optional<int> own = onset_of(onset, agents.performer, kStays);
+  if (!own && acts) own = onset_of(onset, agents.performer, 0.0);
+  const std::optional<int> partner = onset_of(onset, agents.partner, kStays);
   if (!own || !partner) return {};
   Lead lead{.before_partner = (*partner - *own) / kRateHz};
   double earliest = *partner - kLead * kRateHz;
@@ -109,6 +127,20 @@ Lead lead_of(ActOnset onset, const InteractionEvidence& e) {
       earliest = std::min(earliest, e.model_begin + *model - kModelLead * kRateHz);
   lead.over = (earliest - *own) / kRateHz;
   return lead;
+}
+
+// From shoulder to shoulder. [m]
+double breadth(const Agent& agent) { return (agent.lshoulder - agent.rshoulder).colwise().norm().mean(); }
+
+double least_level_distance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
+  return (a - b).topRows<2>().colwise().norm().minCoeff();
+}
+
+// Least level distance of the two, at the trunk or the root, of their mean breadth. [1]
+double trunks_apart(const SmoothedAgents& agents) {
+  const double least = std::min(least_level_distance(agents.performer.torso, agents.partner.torso),
+                                least_level_distance(agents.performer.root, agents.partner.root));
+  return least / (0.5 * (breadth(agents.performer) + breadth(agents.partner)));
 }
 
 // The touch that the task asks for.
@@ -130,6 +162,14 @@ double hands_min(const InteractionEvidence& e) {
   const int end = std::min(e.window.end, static_cast<int>(e.performer.lhand.cols()));
   if (end <= begin) return std::numeric_limits<double>::quiet_NaN();
   return closest_hands(e.performer, e.partner).distance.segment(begin, end - begin).minCoeff();
+}
+
+// Physics keeps a robot out of a solid partner; a ghost is not walked through either.
+void add_body(const SmoothedAgents& agents, DetectorResult& result) {
+  const double apart = trunks_apart(agents);
+  result.values["trunks_apart"] = apart;
+  result.parts["body"] = apart >= kApart;
+  result.margins["body"] = apart - kApart;
 }
 
 }  // namespace
@@ -157,16 +197,7 @@ PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& 
   return {union_of(std::move(at_hands)), union_of(std::move(at_trunk)), safety.settled_ratio};
 }
 
-std::optional<int> act_onset(ActOnset onset, const Agent& raw) {
-  if (onset == ActOnset::kNone) return std::nullopt;
-  const Agent agent = rules::smoothed(raw);
-  if (onset == ActOnset::kTrunkLeans) return first_kept(at_least(inclination(agent), kLeans));
-  std::optional<int> first;
-  for (const Eigen::Matrix3Xd* hand : {&agent.lhand, &agent.rhand})
-    if (const std::optional<int> found = first_kept(at_least(raised(*hand, agent), kRaised * agent.arm)))
-      first = first ? std::min(*first, *found) : *found;
-  return first;
-}
+std::optional<int> act_onset(ActOnset onset, const Agent& raw) { return onset_of(onset, rules::smoothed(raw), kStays); }
 
 std::string cannot_judge(Task task, const InteractionEvidence& evidence) {
   const TaskDefinition& definition = definition_of(task);
@@ -180,10 +211,11 @@ DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
   const std::string why_not = cannot_judge(task, e);
   require(why_not.empty(), fmt::format("cannot be judged under `interaction`: {}", why_not));
   const InteractionRule& rule = definition_of(task).interaction;
-  const DetectorResult act = detect_by_rule(task, e.performer, e.partner, {});
+  const SmoothedAgents agents = smoothed_for_rules(e.performer, e.partner);
+  const DetectorResult act = detect_by_rule(task, agents);
   const double nearest = hands_min(e);
   const Touched touch = touched(rule, e, nearest);
-  const Lead lead = lead_of(rule.onset, e);
+  const Lead lead = lead_of(rule.onset, e, agents, act.success);
 
   DetectorResult result;
   result.frames = act.frames;
@@ -191,7 +223,7 @@ DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
   int others = 0;
   for (const Task other : all_tasks()) {
     if (other == task || definition_of(other).rule == nullptr || is_included(rule, other)) continue;
-    if (!detect_by_rule(other, e.performer, e.partner, {}).success) continue;
+    if (!detect_by_rule(other, agents).success) continue;
     result.values[fmt::format("also_{}", to_string(other))] = 1.0;
     ++others;
   }
@@ -204,6 +236,7 @@ DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
                   {"reply", lead.over <= 0.0},
                   {"stands", e.stands}};
   result.margins = {{"touch", touch.margin}, {"force", 1.0 - settled}, {"reply", -lead.over}};
+  if (!e.touch) add_body(agents, result);
   for (const auto& [name, margin] : act.margins) result.margins["act." + name] = margin;
   result.success = std::ranges::all_of(result.parts, [](const auto& part) { return part.second; });
   return result;

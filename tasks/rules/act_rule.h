@@ -26,7 +26,8 @@ struct ActRule {
   // The tracks that it looks at.
   Tracks (*tracks)(const Agent& performer, const Agent& partner);
   // Takes checked input of 50 Hz: those tracks are there, equally long and finite, and every threshold is in the map.
-  // Judges by the smoothed tracks; the margins' smallest has the sign of the verdict, where there is an "overall" that.
+  // The tracks are smoothed (tasks/rules/evidence.h), once for all rules. The margins' smallest has the sign of the
+  // verdict, where there is an "overall" that.
   DetectorResult (*detect)(const Agent& performer, const Agent& partner, const Thresholds& tau);
 };
 

@@ -28,8 +28,7 @@ Lean lean_of(const Agent& performer, const Agent& partner) {
   Lean lean{Eigen::ArrayXd(frames), Eigen::ArrayXd(frames)};
   for (Eigen::Index t = 0; t < frames; ++t) {
     const Eigen::Vector3d trunk = performer.head.col(t) - performer.root.col(t);
-    Eigen::Vector2d ahead = (partner.root.col(t) - performer.root.col(t)).head<2>();
-    if (ahead.norm() > 0.0) ahead.normalize();
+    const Eigen::Vector2d ahead = level_direction(performer.root.col(t), partner.root.col(t));
     lean.forward[t] = std::atan2(trunk.head<2>().dot(ahead), trunk.z());
     lean.sideways[t] = std::atan2(std::abs(trunk.x() * ahead.y() - trunk.y() * ahead.x()), trunk.z());
   }
@@ -74,8 +73,7 @@ Bow best_bow(const Lean& lean, const Eigen::ArrayXd& trunks, const Thresholds& t
   return best;
 }
 
-DetectorResult detect_bend_act(const Agent& raw_performer, const Agent& raw_partner, const Thresholds& tau) {
-  const Agent performer = smoothed(raw_performer), partner = smoothed(raw_partner);
+DetectorResult detect_bend_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   const Bow bow = best_bow(lean_of(performer, partner), trunk_distances(performer, partner), tau);
   const BowRoom room = room_of(bow, tau);
   DetectorResult result;

@@ -102,13 +102,17 @@ FrameMask mask_of(const FrameSpan& span, Eigen::Index frames) {
   return mask;
 }
 
+Eigen::Vector2d level_direction(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  Eigen::Vector2d direction = (to - from).head<2>();
+  if (direction.norm() > 0.0) direction.normalize();
+  return direction;
+}
+
 Eigen::Matrix3Xd mouth_of(const Agent& performer, const Agent& partner) {
   constexpr double kBefore = 0.17, kBelow = 0.1;  // of an arm: 10 and 6 cm of a person
   Eigen::Matrix3Xd mouth = performer.head;
   for (Eigen::Index t = 0; t < mouth.cols(); ++t) {
-    Eigen::Vector2d ahead = (partner.root.col(t) - performer.root.col(t)).head<2>();
-    if (ahead.norm() > 0.0) ahead.normalize();
-    mouth.col(t).head<2>() += kBefore * performer.arm * ahead;
+    mouth.col(t).head<2>() += kBefore * performer.arm * level_direction(performer.root.col(t), partner.root.col(t));
     mouth(2, t) -= kBelow * performer.arm;
   }
   return mouth;

@@ -26,6 +26,9 @@ struct FrameSpan {
 std::vector<FrameSpan> spans_of(const FrameMask& mask);
 FrameMask mask_of(const FrameSpan& span, Eigen::Index frames);
 
+// Level unit vector from one place to another; zero where none is level of the other.
+Eigen::Vector2d level_direction(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 // Where the mouth is: before the head, towards the partner, and below its middle; both a share of the arm. (3, T) [m]
 Eigen::Matrix3Xd mouth_of(const Agent& performer, const Agent& partner);
 

@@ -19,7 +19,7 @@ std::vector<MeetingCondition> fist_bump_conditions(const HandMeeting& m, const T
 
 DetectorResult detect_fist_bump_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   const double contact = tau.at("contact");
-  return judge_meetings(smoothed(performer), smoothed(partner), {contact, 0.0, contact}, tau, fist_bump_conditions);
+  return judge_meetings(performer, partner, {contact, 0.0, contact}, tau, fist_bump_conditions);
 }
 
 constexpr auto kFistBumpRule = std::to_array<RuleThreshold>({

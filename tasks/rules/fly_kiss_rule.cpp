@@ -35,8 +35,7 @@ KissHand kiss_hand(const Agent& performer, const Agent& partner, bool right) {
                 distances(hand, partner.lhand).min(distances(hand, partner.rhand)),
                 trunk_distances(performer, partner)};
   for (Eigen::Index t = 0; t < hand.cols(); ++t) {
-    Eigen::Vector2d ahead = (partner.root.col(t) - performer.root.col(t)).head<2>();
-    if (ahead.norm() > 0.0) ahead.normalize();
+    const Eigen::Vector2d ahead = level_direction(performer.root.col(t), partner.root.col(t));
     const Eigen::Vector3d arm = hand.col(t) - shoulder.col(t);
     kiss.out[t] = arm.head<2>().dot(ahead) / performer.arm;
     kiss.height[t] = arm.z() / performer.arm;
@@ -78,8 +77,7 @@ Kiss best_kiss(const KissHand& hand, const Thresholds& tau) {
   return best;
 }
 
-DetectorResult detect_fly_kiss_act(const Agent& raw_performer, const Agent& raw_partner, const Thresholds& tau) {
-  const Agent performer = smoothed(raw_performer), partner = smoothed(raw_partner);
+DetectorResult detect_fly_kiss_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   const Kiss left = best_kiss(kiss_hand(performer, partner, false), tau);
   const Kiss right = best_kiss(kiss_hand(performer, partner, true), tau);
   const bool take_right = is_kiss(left, tau) != is_kiss(right, tau) ? is_kiss(right, tau) : right.out >= left.out;

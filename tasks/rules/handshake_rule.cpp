@@ -23,8 +23,8 @@ std::vector<MeetingCondition> handshake_conditions(const HandMeeting& m, const T
 }
 
 DetectorResult detect_handshake_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
-  return judge_meetings(smoothed(performer), smoothed(partner),
-                        {tau.at("contact"), tau.at("steady"), tau.at("farthest")}, tau, handshake_conditions);
+  return judge_meetings(performer, partner, {tau.at("contact"), tau.at("steady"), tau.at("farthest")}, tau,
+                        handshake_conditions);
 }
 
 constexpr auto kHandshakeRule = std::to_array<RuleThreshold>({

@@ -19,7 +19,7 @@ DetectorResult detect_high_five_act(const Agent& performer, const Agent& partner
   Thresholds metres = tau;
   metres.at("height") *= performer.arm;
   metres.at("height_other") *= partner.arm;
-  return judge_meetings(smoothed(performer), smoothed(partner), {contact, 0.0, contact}, metres, high_five_conditions);
+  return judge_meetings(performer, partner, {contact, 0.0, contact}, metres, high_five_conditions);
 }
 
 constexpr auto kHighFiveRule = std::to_array<RuleThreshold>({

@@ -20,9 +20,8 @@ Tracks hug_rule_tracks(const Agent& performer, const Agent& partner) {
 Eigen::ArrayXd before_trunk(const Eigen::Matrix3Xd& hand, const Agent& performer, const Agent& partner) {
   Eigen::ArrayXd before(hand.cols());
   for (Eigen::Index t = 0; t < hand.cols(); ++t) {
-    const Eigen::Vector2d line = (partner.torso.col(t) - performer.torso.col(t)).head<2>();
     const Eigen::Vector2d to_trunk = (partner.torso.col(t) - hand.col(t)).head<2>();
-    before[t] = line.norm() > 0.0 ? to_trunk.dot(line.normalized()) : 0.0;
+    before[t] = to_trunk.dot(level_direction(performer.torso.col(t), partner.torso.col(t)));
   }
   return before;
 }
@@ -44,8 +43,8 @@ FrameMask hand_round(const HugEvidence& e, int hand, const Thresholds& tau) {
   return both(at_most(e.before[hand], tau.at("before")), at_most(e.reach[hand], tau.at("reach")));
 }
 
-DetectorResult detect_hug_act(const Agent& raw_performer, const Agent& raw_partner, const Thresholds& tau) {
-  const HugEvidence e = evidence_of(smoothed(raw_performer), smoothed(raw_partner));
+DetectorResult detect_hug_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
+  const HugEvidence e = evidence_of(performer, partner);
   const FrameMask close = at_most(e.trunks, tau.at("trunks"));
   const FrameMask round = either(hand_round(e, 0, tau), hand_round(e, 1, tau));
   const double hold = tau.at("hold");

@@ -132,8 +132,7 @@ double highest_hand(const Agent& performer) {
       .maxCoeff();
 }
 
-DetectorResult detect_wave_act(const Agent& raw_performer, const Agent& raw_partner, const Thresholds& tau) {
-  const Agent performer = smoothed(raw_performer), partner = smoothed(raw_partner);
+DetectorResult detect_wave_act(const Agent& performer, const Agent& partner, const Thresholds& tau) {
   const SwingChain chain = best_chain(performer, partner, tau);
   DetectorResult result;
   result.frames = mask_of(chain.span, performer.lhand.cols());

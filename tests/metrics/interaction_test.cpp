@@ -81,6 +81,45 @@ TEST(Interaction, NobodyWaitsLongerThanThePersonInItsPlace) {
   EXPECT_FALSE(replies(e));
 }
 
+// A robot that pecks at the air never keeps a hand up; where that passes for the act, its first peck is the begin.
+TEST(Interaction, WhoeverActsHasBegun) {
+  InteractionEvidence e = answering(150, 100);
+  e.performer = test::standing({0.0, 0.0, 0.9}, 1.0, kFrames);
+  EXPECT_FALSE(act_onset(ActOnset::kHandRises, e.performer));
+  const auto peck = [&](int begin) {
+    for (int t = begin; t < begin + 9; ++t) e.performer.rhand(2, t) += 0.55;
+  };
+  for (const int begin : {20, 60, 110}) peck(begin);
+  EXPECT_FALSE(act_onset(ActOnset::kHandRises, e.performer));
+  const Eigen::Vector3d met = e.performer.rhand.col(115);
+  e.partner = test::standing({0.9, 0.0, 0.9}, -1.0, kFrames);
+  for (int t = 100; t < 140; ++t) e.partner.rhand.col(t) = met;
+  const DetectorResult result = judge_interaction(Task::kHighFive, e);
+  ASSERT_TRUE(result.parts.at("act"));
+  EXPECT_FALSE(result.parts.at("reply"));
+  EXPECT_NEAR(result.values.at("lead_s"), (100 - 20) / 50.0, 0.1);
+}
+
+// Shoulders are 0.34 m apart: a ghost's trunk is passed through below 0.44 of that.
+TEST(Interaction, AGhostIsNotWalkedThrough) {
+  const auto passing = [](double aside) {
+    InteractionEvidence e = answering(150, 120);
+    for (Eigen::Matrix3Xd* track : test::tracks_of(e.performer))
+      for (int t = 0; t < kFrames; ++t) track->col(t) += Eigen::Vector3d(2.0 * t / kFrames, 0.0, 0.0);
+    e.partner = test::transformed(
+        e.partner, [&](const Eigen::Vector3d& p) -> Eigen::Vector3d { return p + Eigen::Vector3d(1.0, aside, 0.0); });
+    return e;
+  };
+  EXPECT_TRUE(judge_interaction(Task::kWave, passing(0.17)).parts.at("body"));
+  const DetectorResult through = judge_interaction(Task::kWave, passing(0.13));
+  EXPECT_FALSE(through.parts.at("body"));
+  EXPECT_NEAR(through.values.at("trunks_apart"), 0.13 / 0.34, 0.02);
+  EXPECT_NEAR(through.margins.at("body"), through.values.at("trunks_apart") - 0.44, 1e-12);
+  InteractionEvidence solid = passing(0.13);
+  solid.touch = PartnerTouch{};
+  EXPECT_FALSE(judge_interaction(Task::kWave, solid).parts.contains("body")) << "physics keeps them apart";
+}
+
 TEST(Interaction, APartnerWhoStandsStillIsNotWaitedFor) {
   InteractionEvidence e = answering(60, 120);
   e.partner = test::standing({1.5, 0.0, 0.9}, -1.0, kFrames);

@@ -72,6 +72,16 @@ void raise_hand(Agent& agent, int begin, int end) {
   }
 }
 
+// The performer walks on through the partner while the act lasts, and back.
+void walk_through(InteractionEvidence& e) {
+  const int begin = e.window.begin + 25, end = e.window.end - 50;
+  for (int t = std::max(begin, 0); t < std::min<int>(end, static_cast<int>(e.performer.root.cols())); ++t) {
+    const double share = std::clamp(std::min(t - begin, end - t) / 15.0, 0.0, 1.0);
+    const Eigen::Vector2d to = (e.partner.root.col(t) - e.performer.root.col(t)).head<2>();
+    for (Eigen::Matrix3Xd* track : test::tracks_of(e.performer)) track->col(t).head<2>() += share * to;
+  }
+}
+
 void move_aside(Agent& agent, const Agent& partner, double metres) {
   for (Eigen::Index t = 0; t < agent.root.cols(); ++t) {
     Eigen::Vector2d away = (agent.root.col(t) - partner.root.col(t)).head<2>();
@@ -142,6 +152,10 @@ std::vector<Wrong> wrong_ones(Task task) {
     all.push_back({"too far by a body", [](auto& e, int) {
                      e.touch.reset();
                      move_aside(e.performer, e.partner, 0.45);
+                   }});
+    all.push_back({"through the body", [](auto& e, int) {
+                     e.touch.reset();
+                     walk_through(e);
                    }});
     all.push_back({"hands held still", [](auto& e, int) {
                      stand_still(e);
