@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -14,10 +15,10 @@
 namespace duet {
 namespace {
 
-using ControlArray = std::array<ControlScript, 6>;
+using ControlArray = std::array<ControlScript, 8>;
 constexpr ControlArray kControls = {
     {{.name = "omni",
-      .about = "Blind to the command: a hand at the partner's nearest hand, and every seven seconds all gestures",
+      .about = "Blind to the command: a hand at the partner's nearest hand, and all gestures in rounds",
       .distance = 0.70,
       .follows = 0,
       .all_gestures = true,
@@ -32,18 +33,40 @@ constexpr ControlArray kControls = {
       .about = "Blind to the command: walks up with both arms held out",
       .distance = 0.45,
       .forward = true},
-     {.name = "forward", .about = "Blind to the command: stands with both arms held out", .forward = true}}};
+     {.name = "forward", .about = "Blind to the command: stands with both arms held out", .forward = true},
+     {.name = "patient",
+      .about = "Blind to the command: waits until the partner raises a hand, then its own follows the nearest",
+      .distance = 0.70,
+      .follows = 1,
+      .waits = true},
+     {.name = "mirror",
+      .about = "Blind to the command: walks up, its arms and trunk do as the partner's",
+      .distance = 0.70,
+      .mirrors = true}}};
+
+const ControlScript& control_named(std::string_view name) {
+  const auto found = std::ranges::find(kControls, name, &ControlScript::name);
+  require(found != kControls.end(), fmt::format("policy '{}' is no control", name));
+  return *found;
+}
 
 // What `canned` does for a task: another control, or a gesture.
 ControlScript told_script(Task task) {
   const std::string_view name = to_string(task);
-  if (name == "hug") return kControls[4];
+  if (name == "hug") return control_named("walker");
   if (name == "bend") return {.gesture = ControlGesture::kBow};
   if (name == "wave") return {.gesture = ControlGesture::kWave};
   if (name == "fly_kiss") return {.gesture = ControlGesture::kKiss};
-  return kControls[2];
+  return control_named("servo");
 }
 
+// One round of `omni`: it bows, from here on it kisses, waves, waves from nearer, begins anew. [s]
+struct Round {
+  double kiss, wave, near, end;
+};
+constexpr Round kRound = {1.6, 3.2, 5.0, 7.0};
+
+constexpr double kRaisedHand = 0.12;               // a hand of the partner that rises so far is raised [m]
 constexpr double kAdvance = 0.45, kRetreat = 0.4;  // [m/s]
 constexpr double kTurn = 0.7;                      // [rad/s]
 constexpr double kWaist = 0.5, kPitch = 0.35;      // of a bow [rad]
@@ -73,9 +96,7 @@ std::vector<std::string> control_names() {
 
 PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
   require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
-  const auto found = std::ranges::find(kControls, name, &ControlScript::name);
-  require(found != kControls.end(), fmt::format("policy '{}' is no control", name));
-  const ControlScript script = *found;
+  const ControlScript script = control_named(name);
   static_cast<void>(ControlPolicy(robot, script));  // a robot that does not fit is found here
   return [robot = std::move(robot), script] { return std::make_unique<ControlPolicy>(robot, script); };
 }
@@ -112,6 +133,9 @@ void ControlPolicy::reset(const EpisodeContext& context) {
   start_ = robot_->standing_state(context.start.X_WB);
   now_ = script_.told ? told_script(context.task) : script_;
   followed_ = robot_->neutral;
+  lowest_hand_.fill(std::numeric_limits<double>::infinity());
+  awake_ = !now_.waits;
+  leaning_ = 0.0;
 }
 
 Anchors ControlPolicy::act(const Observation& observation) {
@@ -125,7 +149,9 @@ Anchors ControlPolicy::act(const Observation& observation) {
 std::vector<Reference> ControlPolicy::plan(const Observation& observation) {
   const ObservationFrame& frame = observation.now();
   const Place where = place(frame);
+  if (!awake_) watch(frame);
   if (now_.follows >= 0) follow(frame);
+  if (now_.mirrors) mirror(frame, where);
   std::vector<Reference> references;
   references.reserve(kPlanned);
   for (int i = 0; i < kPlanned; ++i) references.push_back(reference(where, (observation.tick + i) / 50.0, i / 50.0));
@@ -148,17 +174,39 @@ void ControlPolicy::follow(const ObservationFrame& frame) {
   };
   const int hand = cost(kLeftHand) <= cost(kRightHand) ? kLeftHand : kRightHand;
   const int side = now_.follows;
-  const Eigen::Vector3d from_shoulder = X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - shoulder_B_[side];
-  const double length = std::max(from_shoulder.norm(), 1e-6);
-  Eigen::Vector3d target = shoulder_B_[side] + from_shoulder * std::min(1.0, arm_[side] / length);
-  target.x() = std::max(target.x(), 0.2 * arm_[side]);
-  reach(side, target, 8, followed_);
+  stretch(side, X_WY.inverse() * Eigen::Vector3d(frame.partner.col(hand)) - shoulder_B_[side], true, followed_);
+}
+
+// Arms from the shoulders and the trunk from the root, each in the frame of who faces the other; the robot's own size.
+void ControlPolicy::mirror(const ObservationFrame& frame, const Place& place) {
+  const Eigen::Quaterniond R_PW = yaw_rotation(place.face + std::numbers::pi).conjugate();
+  const auto part = [&](int from, int to) -> Eigen::Vector3d {
+    return R_PW * Eigen::Vector3d(frame.partner.col(to) - frame.partner.col(from));
+  };
+  constexpr std::array<std::array<int, 4>, 2> kArms = {
+      {{kLeftShoulder, kLeftElbow, kLeftWrist, kLeftHand}, {kRightShoulder, kRightElbow, kRightWrist, kRightHand}}};
+  for (const int side : {0, 1}) {
+    const auto& arm = kArms[side];
+    const double length = part(arm[0], arm[1]).norm() + part(arm[1], arm[2]).norm() + part(arm[2], arm[3]).norm();
+    stretch(side, part(arm[0], arm[3]) * (arm_[side] / std::max(length, 1e-6)), false, followed_);
+  }
+  const Eigen::Vector3d trunk = part(0, kHead);
+  leaning_ = std::clamp(std::atan2(trunk.x(), trunk.z()) / (kWaist + kPitch), 0.0, 1.0);
+}
+
+void ControlPolicy::watch(const ObservationFrame& frame) {
+  for (const auto& [side, hand] : {std::pair{0, kLeftHand}, {1, kRightHand}}) {
+    const double height = frame.partner(2, hand) - frame.partner(2, 0);
+    lowest_hand_[side] = std::min(lowest_hand_[side], height);
+    awake_ = awake_ || height >= lowest_hand_[side] + kRaisedHand;
+  }
 }
 
 double ControlPolicy::bow(double seconds) const {
+  if (now_.mirrors) return leaning_;
   if (now_.all_gestures) {
-    const double t = std::fmod(seconds, kAllGestures);
-    return smooth(t / 0.6) * smooth((1.6 - t) / 0.6);
+    const double t = std::fmod(seconds, kRound.end);
+    return smooth(t / 0.6) * smooth((kRound.kiss - t) / 0.6);
   }
   if (now_.gesture != ControlGesture::kBow) return 0.0;
   const double t = std::fmod(seconds, 4.0);
@@ -167,15 +215,18 @@ double ControlPolicy::bow(double seconds) const {
 
 Eigen::VectorXd ControlPolicy::pose(double seconds) const {
   Eigen::VectorXd q = robot_->neutral;
-  const double round = std::fmod(seconds, kAllGestures);
+  const double round = std::fmod(seconds, kRound.end);
   if (now_.forward)
     for (const int side : {0, 1}) copy_arm(side, poses_.forward[side], 1.0, q);
   if (now_.raised) copy_arm(1, poses_.raised, 1.0, q);
-  if (now_.follows >= 0) copy_arm(now_.follows, followed_, 1.0, q);
-  const bool kisses = now_.gesture == ControlGesture::kKiss || (now_.all_gestures && round >= 1.6 && round < 3.2);
-  const bool waves = now_.gesture == ControlGesture::kWave || (now_.all_gestures && round >= 3.2);
+  if (now_.follows >= 0 && awake_) copy_arm(now_.follows, followed_, 1.0, q);
+  if (now_.mirrors)
+    for (const int side : {0, 1}) copy_arm(side, followed_, 1.0, q);
+  const bool in_kiss = now_.all_gestures && round >= kRound.kiss && round < kRound.wave;
+  const bool kisses = now_.gesture == ControlGesture::kKiss || in_kiss;
+  const bool waves = now_.gesture == ControlGesture::kWave || (now_.all_gestures && round >= kRound.wave);
   if (kisses) {
-    const double t = now_.all_gestures ? round - 1.6 : std::fmod(seconds, 4.0);
+    const double t = now_.all_gestures ? round - kRound.kiss : std::fmod(seconds, 4.0);
     const double up = smooth(t / 0.5) * (now_.all_gestures ? 1.0 : 1.0 - smooth((t - 2.4) / 0.6));
     Eigen::VectorXd hand = robot_->neutral;
     copy_arm(1, poses_.mouth, 1.0, hand);
@@ -199,7 +250,7 @@ Reference ControlPolicy::reference(const Place& place, double seconds, double ah
   Reference reference{start_.X_WB, pose(seconds)};
   double yaw = yaw_of(start_.X_WB.R);
   if (now_.distance > 0.0) {
-    const bool near = now_.all_gestures && std::fmod(seconds, kAllGestures) >= 5.0;
+    const bool near = now_.all_gestures && std::fmod(seconds, kRound.end) >= kRound.near;
     const double left = place.distance - (now_.distance - (near ? now_.lean_in : 0.0));
     const double advance = std::clamp(left, -kRetreat * ahead, kAdvance * ahead);
     yaw = place.yaw + std::clamp(wrapped(place.face - place.yaw), -kTurn * ahead, kTurn * ahead);
@@ -214,6 +265,13 @@ Eigen::VectorXd ControlPolicy::reached(int side, const Eigen::Vector3d& p_B) {
   Eigen::VectorXd q = robot_->neutral;
   reach(side, p_B, 80, q);
   return q;
+}
+
+void ControlPolicy::stretch(int side, const Eigen::Vector3d& from_shoulder, bool before, Eigen::VectorXd& q) {
+  const double length = std::max(from_shoulder.norm(), 1e-6);
+  Eigen::Vector3d target = shoulder_B_[side] + from_shoulder * std::min(1.0, arm_[side] / length);
+  if (before) target.x() = std::max(target.x(), 0.2 * arm_[side]);
+  reach(side, target, 8, q);
 }
 
 void ControlPolicy::reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q) {

@@ -1,6 +1,6 @@
 // Controls: scripted policies that no score may reward. Each does something simple (stand with a raised hand, walk up,
-// follow the nearest hand, go through every gesture) and none waits for its partner. A score that one of them wins
-// measures less than its name says. Thread-safe.
+// follow the nearest hand, go through every gesture, copy the partner), and all but one are blind to the command. A
+// score that one of them wins measures less than its name says. Thread-safe.
 #pragma once
 
 #include <array>
@@ -25,15 +25,14 @@ struct ControlScript {
   bool forward = false;                            // both arms are held out
   bool raised = false;                             // the right hand is held up
   ControlGesture gesture = ControlGesture::kNone;  // again and again, with the right hand
-  bool all_gestures = false;                       // one after the other, every kAllGestures seconds
+  bool all_gestures = false;                       // one after the other, in rounds
   double lean_in = 0.0;                            // [m] nearer at the end of each such round
+  bool waits = false;                              // its hand follows once the partner has raised one
+  bool mirrors = false;                            // both arms and the trunk do as the partner's
   bool told = false;                               // does what its task's row in the source says
 };
 
-// One round of `omni`. [s]
-inline constexpr double kAllGestures = 7.0;
-
-// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`.
+// `omni`, `canned`, `servo`, `raised`, `walker`, `forward`, `patient`, `mirror`.
 std::span<const ControlScript> control_scripts();
 
 // Whether a policy of that name is one of them.
@@ -71,6 +70,11 @@ class ControlPolicy final : public Policy {
   [[nodiscard]] double bow(double seconds) const;  // 0 upright to 1
   [[nodiscard]] Reference reference(const Place& place, double seconds, double ahead) const;
   void follow(const ObservationFrame& frame);
+  void mirror(const ObservationFrame& frame, const Place& place);
+  // Looks whether the partner has raised a hand; one that does not wait is awake from the begin.
+  void watch(const ObservationFrame& frame);
+  // As `reach`, of a place seen from the shoulder: at most as far as the arm is long and, where asked for, before it.
+  void stretch(int side, const Eigen::Vector3d& from_shoulder, bool before, Eigen::VectorXd& q);
   // Moves the arm's joints in `q` so that its hand comes to `p_B`, a place in the base's frame. [m]
   void reach(int side, const Eigen::Vector3d& p_B, int steps, Eigen::VectorXd& q);
   [[nodiscard]] Eigen::VectorXd reached(int side, const Eigen::Vector3d& p_B);
@@ -84,7 +88,10 @@ class ControlPolicy final : public Policy {
   std::array<Eigen::Vector3d, 2> shoulder_B_;  // in the neutral pose
   std::array<double, 2> arm_ = {};             // [m]
   Poses poses_;
-  Eigen::VectorXd followed_;  // joints of the arm that follows
+  Eigen::VectorXd followed_;                // joints of the arms that follow or mirror
+  std::array<double, 2> lowest_hand_ = {};  // of the partner over its root so far [m]
+  bool awake_ = false;
+  double leaning_ = 0.0;  // of a mirrored trunk, as bow()
   RobotState start_;
 };
 

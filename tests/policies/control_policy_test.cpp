@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <memory>
 #include <set>
 
@@ -105,6 +106,56 @@ TEST(ControlPolicy, StandsWalksAndRaises) {
   kinematics.update(raised.X_WB, raised.q);
   EXPECT_GT(kinematics.frame_position(robot->track_frame("rhand")).z(),
             kinematics.frame_position(robot->track_frame("rshoulder")).z() + 0.1);
+}
+
+// Its arm hangs until a hand of the partner is raised, and follows that from then on, lowered again or not.
+TEST(ControlPolicy, APatientOneWaitsForARaisedHand) {
+  const auto robot = g1();
+  const ObservationFrame low = facing(*robot, 0.8, {0.35, -0.1, 0.8}), high = facing(*robot, 0.8, {0.35, -0.1, 0.95});
+  const std::unique_ptr<Policy> policy = control_maker("patient", robot)();
+  EpisodeContext context;
+  context.start = low.robot;
+  policy->reset(context);
+  const auto hand_in_plan = [&](const ObservationFrame& frame) {
+    const std::vector<Reference> plan = policy->plan({.history = std::span(&frame, 1), .tick = 0});
+    return hand_of(*robot, {frame.robot.X_WB, plan.front().q}, "rhand");
+  };
+  const Eigen::Vector3d hanging = hand_of(*robot, {low.robot.X_WB, robot->neutral}, "rhand");
+  for (int call = 0; call < 8; ++call) EXPECT_LT((hand_in_plan(low) - hanging).norm(), 1e-9);
+  for (int call = 0; call < 8; ++call) (void)hand_in_plan(high);
+  EXPECT_LT((hand_in_plan(high) - high.partner.col(kRightHand)).norm(), 0.05);
+  for (int call = 0; call < 8; ++call) (void)hand_in_plan(low);
+  EXPECT_GT((hand_in_plan(low) - hanging).norm(), 0.05);
+  policy->reset(context);
+  EXPECT_LT((hand_in_plan(low) - hanging).norm(), 1e-9) << "the next episode begins anew";
+}
+
+// The partner's hand is before its shoulder, a third of its arm's length up; so is the robot's.
+TEST(ControlPolicy, AMirrorDoesAsThePartner) {
+  const auto robot = g1();
+  ObservationFrame frame = facing(*robot, 1.5, {1.2, 0.2, 1.6});
+  const Eigen::Vector3d shoulder(1.5, 0.2, 1.4);
+  frame.partner.col(kRightShoulder) = shoulder;
+  frame.partner.col(kRightElbow) = shoulder + Eigen::Vector3d(-0.2, 0.0, 0.1);
+  frame.partner.col(kRightWrist) = shoulder + Eigen::Vector3d(-0.3, 0.0, 0.2);
+  frame.partner.col(kHead) = Eigen::Vector3d(1.2, 0.0, 1.5);  // bows towards the robot
+  const std::unique_ptr<Policy> policy = control_maker("mirror", robot)();
+  EpisodeContext context;
+  context.start = frame.robot;
+  policy->reset(context);
+  std::vector<Reference> plan;
+  for (int call = 0; call < 20; ++call) plan = policy->plan({.history = std::span(&frame, 1), .tick = 0});
+  const Reference upright{frame.robot.X_WB, [&] {
+                            Eigen::VectorXd q = plan.front().q;
+                            for (const int joint : tilting_waist(*robot)) q[joint] = robot->neutral[joint];
+                            return q;
+                          }()};
+  const Eigen::Vector3d arm = hand_of(*robot, upright, "rhand") - hand_of(*robot, upright, "rshoulder");
+  EXPECT_GT(arm.x(), 0.15);
+  EXPECT_GT(arm.z(), 0.1);
+  EXPECT_NEAR(arm.y(), 0.0, 0.05);
+  const Eigen::Vector3d up = plan.front().X_WB.R * Eigen::Vector3d::UnitZ();
+  EXPECT_GT(std::atan2(up.x(), up.z()), 0.1);
 }
 
 TEST(ControlPolicy, OfAnotherNameIsNone) {

@@ -57,12 +57,13 @@ TEST(ToVector, IsTheSameForBothSignsOfAQuaternion) {
 }
 
 TEST(MakePolicy, KnowsItsNamesAndRefusesOthers) {
-  EXPECT_EQ(policy_names(), (std::vector<std::string>{"replay", "replay_dense", "null", "dstar", "dp", "retrieval",
-                                                      "omni", "canned", "servo", "raised", "walker", "forward"}));
+  EXPECT_EQ(policy_names(),
+            (std::vector<std::string>{"replay", "replay_dense", "null", "dstar", "dp", "retrieval", "omni", "canned",
+                                      "servo", "raised", "walker", "forward", "patient", "mirror"}));
   for (const std::string name : {"replay", "replay_dense", "null"}) EXPECT_EQ(make_policy(name, g1())->name(), name);
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("nul", g1()); }),
             "unknown policy 'nul': did you mean 'null'? Known: replay, replay_dense, null, dstar, dp, retrieval, omni, "
-            "canned, servo, raised, walker, forward");
+            "canned, servo, raised, walker, forward, patient, mirror");
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("null", nullptr); }), "policy 'null' needs a robot");
   EXPECT_EQ(thrown_message<std::invalid_argument>([] { make_policy("replay", nullptr); }),
             "policy 'replay' needs a robot");
