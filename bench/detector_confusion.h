@@ -9,21 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "duet/datasets/clip_labels.h"
+#include "duet/bench/labelled_people.h"
 #include "duet/metrics/detector.h"
-#include "duet/motion/people/people_options.h"
 #include "duet/results/analyses/text_table.h"
 #include "duet/results/statistics/statistics.h"
 
 namespace duet {
-
-struct LabelledClips {
-  std::vector<std::string> paths;  // clips of duet, or motions of others (motion/people/people_formats.h)
-  std::string format = {};         // of people; empty: recognised
-  PeopleOptions people = {};
-  ClipLabels labels = {};  // before the files' own; one of a clip that is not there is refused
-  int threads = 1;
-};
 
 struct LabelledVerdicts {
   std::string clip, label;
@@ -32,8 +23,7 @@ struct LabelledVerdicts {
   std::vector<std::vector<std::array<bool, 2>>> accepted = {};
 };
 
-// In the order of the files. `finished` is called after each clip, from any thread, one at a time. Throws InputError:
-// no clip, a clip without a label anywhere (says how to give one), a label of no clip.
+// In the order of the files. Throws as labelled_sources and for_each_labelled.
 std::vector<LabelledVerdicts> judge_labelled(const LabelledClips& clips,
                                              const std::function<void(int done, int of)>& finished = {});
 

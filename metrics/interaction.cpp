@@ -114,7 +114,7 @@ struct Lead {
   double over = -std::numeric_limits<double>::infinity();
 };
 
-// Whoever does the act has begun it: where nothing stays up for kStays, with the first thing that comes up at all.
+// A performer that does the act has begun it: where nothing stays up for kStays, with the first that comes up at all.
 Lead lead_of(ActOnset onset, const InteractionEvidence& e, const SmoothedAgents& agents, bool acts) {
   std::optional<int> own = onset_of(onset, agents.performer, kStays);
   if (!own && acts) own = onset_of(onset, agents.performer, 0.0);

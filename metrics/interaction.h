@@ -46,8 +46,9 @@ struct InteractionEvidence {
 // far and stays up for 0.3 s, be it withdrawn afterwards; of a bow, that the trunk leans by 10 degrees. [frames]
 std::optional<int> act_onset(ActOnset onset, const Agent& agent);
 
-// Parts: act, alone, touch, force, reply, stands. Values: touch_s, hands_min [m], settled_ratio, lead_s (by which it
-// begins before its partner), also_<task> (1 where the act of that task was seen, too). Throws as detect_by_rule;
+// Parts: act, alone, touch, force, reply, stands and, of a ghost, body. Values: touch_s, hands_min [m], settled_ratio,
+// lead_s (by which it begins before its partner), also_<task> (1 where the act of that task was seen, too) and, of a
+// ghost, trunks_apart (least level distance of trunks and roots, of their mean breadth) [1]. Throws as detect_by_rule;
 // `cannot_judge` says why.
 DetectorResult judge_interaction(Task task, const InteractionEvidence& evidence);
 

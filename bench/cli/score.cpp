@@ -1,12 +1,15 @@
-// duet score: motions and recordings, without physics: the 18 retargeting metrics, diagnostics, detectors.
+// duet score: motions and recordings, without physics: the 18 retargeting metrics, diagnostics, detectors; with
+// --people how many of the people in recordings whose act is known meet the rule `interaction`.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
 
 #include "duet/bench/cli/command.h"
+#include "duet/bench/cli/people_arguments.h"
 #include "duet/bench/clips.h"
 #include "duet/bench/motion_scores.h"
+#include "duet/bench/people_conditions.h"
 #include "duet/bench/recording_scores.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
@@ -18,7 +21,9 @@ namespace {
 struct ScoreArguments {
   std::vector<std::string> inputs, readings;
   std::string card, thresholds = "paper";
-  bool each = false, as_is = false, all_detectors = false, all_readings = false;
+  bool each = false, as_is = false, all_detectors = false, all_readings = false, people = false;
+  std::string labels;
+  PeopleArguments of_people;
   int threads = default_threads();
 };
 
@@ -115,7 +120,28 @@ std::string recordings_text(const std::vector<RecordingScore>& recordings, bool 
   return text;
 }
 
+void score_people(const Session& session, const ScoreArguments& arguments) {
+  LabelledClips clips{
+      .paths = arguments.inputs, .format = arguments.of_people.format, .people = people_options(arguments.of_people)};
+  if (!arguments.labels.empty()) clips.labels = read_clip_labels(arguments.labels);
+  clips.threads = arguments.threads;
+  Progress progress(session.progress());
+  const PeopleVerdicts verdicts = judge_people(clips, [&](int done, int of) {
+    if (done == 1) progress.start("judging", of, "clips");
+    progress.advance();
+  });
+  progress.finish();
+  if (!verdicts.unread.empty())
+    note(session, fmt::format("{} clips cannot be read and count nowhere; --each says why", verdicts.unread.size()));
+  if (verdicts.still > 0) note(session, fmt::format("{} people stand still and count nowhere", verdicts.still));
+  std::string text = markdown_table(people_conditions_table(verdicts));
+  if (arguments.each) text += "\n" + markdown_table(people_failures_table(verdicts));
+  print(session, text, people_conditions_json(verdicts));
+}
+
 void run_score(Session& session, const ScoreArguments& arguments) {
+  require(arguments.people || arguments.labels.empty(), "--labels is for --people");
+  if (arguments.people) return score_people(session, arguments);
   const ScoreOptions options = options_of(arguments);
   const Scores scores = score_files(session, arguments, options);
   const MetricReadings& readings = options.readings.metrics;
@@ -138,7 +164,8 @@ void add_score(CLI::App& app, Session& session) {
                                   "diagnostics, detectors, and of those that a run kept the row again",
                                   "duet score paired --reading metrics.large_angle=entry\n"
                                   "  duet score handshake.npz --thresholds strict --all-detectors\n"
-                                  "  duet score runs/core/trajectories");
+                                  "  duet score runs/core/trajectories\n"
+                                  "  duet score recordings --people --labels labels.csv");
   auto arguments = std::make_shared<ScoreArguments>();
   command
       ->add_option("motions", arguments->inputs,
@@ -154,8 +181,15 @@ void add_score(CLI::App& app, Session& session) {
   command->add_flag("--all-readings", arguments->all_readings, "the retargeting metrics under every reading");
   command->add_option("--card", arguments->card,
                       "robot card (default: the G1 that ships with duet; of a run's recording the run's)");
-  command->add_flag("--each", arguments->each, "a table for each motion too");
+  command->add_flag("--each", arguments->each,
+                    "a table for each motion too; of people each whom the rule judges wrongly");
   command->add_flag("--as-is", arguments->as_is, "take clips however implausible their people are");
+  CLI::App& people =
+      *command->add_option_group("people", "recordings of two people of any format, in the robot's place");
+  people.add_flag("--people", arguments->people,
+                  "of recordings whose act is known: who meets which condition of the rule `interaction`");
+  people.add_option("--labels", arguments->labels, "CSV \"clip,label\" (default: the recordings' own labels)");
+  add_people_options(people, arguments->of_people);
   add_threads(command, arguments->threads);
   command->callback([&session, arguments] { run_score(session, *arguments); });
 }
