@@ -109,15 +109,17 @@ def policies_and_controls(ran):
 def rule(folder):
     """Success of policies, then of controls, under the rule `interaction`, by task; beside it the detectors of the robot."""
     file, rows, table = f"{folder}/leaderboard.csv", rows_of(folder, "leaderboard.csv"), []
+    by_rule = rows_of(folder, "interaction.csv")
     for policy, name in policies_and_controls({r["policy"] for r in rows}).items():
         def value(task, name="success", of=""):
             return figure(rows, file, policy=policy, task=task, name=name, of=of)
         every = value("all")
         counts = [f"{value(task)['k']}/{value(task)['n']}" for task in TASKS]
         others = [percent(value("all", of=f"robot/{thresholds}")["value"]) for thresholds in ("act", "strict", "paper")]
-        table.append([name, every["n"], with_interval(every), *counts, *others, value("all", "fell")["value"]])
-    header = ["Policy", "n", "interaction", *TASKS.values(), "robot/act", "robot/strict", "robot/paper", "Fell"]
-    return markdown(header, [False] + [True] * 12, table)
+        early = figure(by_rule, f"{folder}/interaction.csv", policy=policy, task="all", name="false_starts")
+        table.append([name, every["n"], with_interval(every), *counts, *others, f"{early['value']}/{early['n']}", value("all", "fell")["value"]])
+    header = ["Policy", "n", "interaction", *TASKS.values(), "robot/act", "robot/strict", "robot/paper", "False starts", "Fell"]
+    return markdown(header, [False] + [True] * 13, table)
 
 
 def judged(folder):

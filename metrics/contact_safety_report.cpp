@@ -1,6 +1,8 @@
 // Contact safety as names and numbers for rows, and as text.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "duet/metrics/contact_safety.h"
 
 namespace duet {
@@ -25,12 +27,15 @@ std::map<std::string, double> contact_forces(const ContactSafetyResult& result) 
                                        {"human.limits_verified", result.limits_verified ? 1.0 : 0.0}};
   if (result.worst_ratio) forces["human.worst_ratio"] = *result.worst_ratio;
   if (result.settled_ratio) forces["human.settled_ratio"] = *result.settled_ratio;
+  double& settled = forces["human.settled_n"];
   for (const RegionContact& region : result.regions) {
     if (region.contacts == 0) continue;
+    settled = std::max(settled, region.settled_force);
     const std::string prefix = "human." + region.region + ".";
     forces[prefix + "peak_n"] = region.peak_force;
     forces[prefix + "quasi_static_n"] = region.quasi_static_force;
     forces[prefix + "transient_n"] = region.transient_force;
+    forces[prefix + "settled_n"] = region.settled_force;
     forces[prefix + "impulse_ns"] = region.impulse;
     forces[prefix + "pressure_n_cm2"] = region.pressure_n_cm2;
     if (region.worst_ratio) forces[prefix + "worst_ratio"] = *region.worst_ratio;

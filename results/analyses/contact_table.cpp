@@ -35,6 +35,7 @@ RegionContacts region_forces(const EpisodeRow& row, const std::string& region) {
   forces.peak = force_or_nan(row, prefix + ".peak_n");
   forces.quasi_static = force_or_nan(row, prefix + ".quasi_static_n");
   forces.transient = force_or_nan(row, prefix + ".transient_n");
+  forces.settled = force_or_nan(row, prefix + ".settled_n");
   forces.impulse = force_or_nan(row, prefix + ".impulse_ns");
   forces.pressure_n_cm2 = force_or_nan(row, prefix + ".pressure_n_cm2");
   forces.ratio = force_or_nan(row, prefix + ".worst_ratio");
@@ -46,6 +47,7 @@ void take_largest(const RegionContacts& of, RegionContacts& into) {
   into.peak = std::fmax(into.peak, of.peak);
   into.quasi_static = std::fmax(into.quasi_static, of.quasi_static);
   into.transient = std::fmax(into.transient, of.transient);
+  into.settled = std::fmax(into.settled, of.settled);
   into.impulse = std::fmax(into.impulse, of.impulse);
   into.pressure_n_cm2 = std::fmax(into.pressure_n_cm2, of.pressure_n_cm2);
   into.ratio = std::fmax(into.ratio, of.ratio);
@@ -171,20 +173,21 @@ TitledTable peak_table(const ContactGroup& group) {
 }
 
 TitledTable contact_figures_table(const ContactGroup& group) {
-  TitledTable titled{.title = group.engines.size() > 1 ? "All engines together" : "Other figures",
-                     .caption = fmt::format("{}{}.", contact_group_name(group),
-                                            group.engines.size() > 1 ? "; an episode counts once in each engine" : ""),
-                     .table = {.header = {"Region", "Touched", "Over limit [%]", "Ratio", "Median peak [N]",
-                                          "Quasi-static [N]", "Transient [N]", "Pressure [N/cm^2]", "Impulse [N s]"},
-                               .rows = {},
-                               .label_columns = 1}};
+  TitledTable titled{
+      .title = group.engines.size() > 1 ? "All engines together" : "Other figures",
+      .caption = fmt::format("{}{}.", contact_group_name(group),
+                             group.engines.size() > 1 ? "; an episode counts once in each engine" : ""),
+      .table = {.header = {"Region", "Touched", "Over limit [%]", "Ratio", "Median peak [N]", "After 0.1 s [N]",
+                           "Quasi-static [N]", "Transient [N]", "Pressure [N/cm^2]", "Impulse [N s]"},
+                .rows = {},
+                .label_columns = 1}};
   for (const RegionContacts& contacts : group.all.regions) {
     const long episodes = group.all.episodes;
-    titled.table.rows.push_back({contacts.region, fmt::format("{} of {}", contacts.touched, episodes),
-                                 percent(static_cast<double>(contacts.over) / static_cast<double>(episodes)),
-                                 ratio_cell(contacts.ratio), force_number(contacts.median_peak),
-                                 force_number(contacts.quasi_static), force_number(contacts.transient),
-                                 force_number(contacts.pressure_n_cm2), force_number(contacts.impulse)});
+    titled.table.rows.push_back(
+        {contacts.region, fmt::format("{} of {}", contacts.touched, episodes),
+         percent(static_cast<double>(contacts.over) / static_cast<double>(episodes)), ratio_cell(contacts.ratio),
+         force_number(contacts.median_peak), force_number(contacts.settled), force_number(contacts.quasi_static),
+         force_number(contacts.transient), force_number(contacts.pressure_n_cm2), force_number(contacts.impulse)});
   }
   return titled;
 }
@@ -198,6 +201,7 @@ constexpr ContactFigure kContactFigures[] = {{"peak", "N", &RegionContacts::peak
                                              {"median_peak", "N", &RegionContacts::median_peak},
                                              {"quasi_static", "N", &RegionContacts::quasi_static},
                                              {"transient", "N", &RegionContacts::transient},
+                                             {"settled", "N", &RegionContacts::settled},
                                              {"impulse", "N s", &RegionContacts::impulse},
                                              {"pressure", "N/cm^2", &RegionContacts::pressure_n_cm2},
                                              {"ratio", "1", &RegionContacts::ratio}};

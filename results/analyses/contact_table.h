@@ -25,6 +25,7 @@ struct RegionContacts {
   double median_peak = kNone;     // median of the episodes' peak forces [N]
   double quasi_static = kNone;    // largest force held for more than 0.5 s [N]
   double transient = kNone;       // largest force within the first 0.5 s of a contact [N]
+  double settled = kNone;         // largest later than 0.1 s after a contact's begin [N]; NaN in rows of before
   double impulse = kNone;         // largest; of any region: the regions' sum [N s]
   double pressure_n_cm2 = kNone;  // largest estimate [N/cm^2]
   double ratio = kNone;           // largest of force and pressure over their limits; NaN: no limit is stated

@@ -215,7 +215,8 @@ void add_policy_figures(const PolicyFigures& of, std::vector<Figure>& into) {
   add_difference("lift", of.lift, figures);
   figures.rate("falls", of.falls);
   figures.rate("violations", of.violations);
-  figures.add("dof_jerk", of.success.n, of.dof_jerk, kNoInterval, "rad/s^3");
+  for (const PolicyFigure& figure : kPolicyFigures)
+    if (!figure.share) figures.add(figure.name, of.success.n, figure.value(of), kNoInterval, figure.unit);
 }
 
 // Over physics engines.
@@ -227,13 +228,12 @@ void add_line_figures(const PolicyLine& line, std::vector<Figure>& into) {
   for (const PolicyFigure& figure : kPolicyFigures) {
     const OverEngines over = over_engines(line, figure);
     if (over.engines == 0) continue;
-    const char* unit = figure.share ? "1" : "rad/s^3";
     figures.keys.engine = "all";
-    figures.add(fmt::format("{}_mean", figure.name), over.engines, over.mean, kNoInterval, unit);
-    figures.add(fmt::format("{}_range", figure.name), over.engines, over.range, kNoInterval, unit);
+    figures.add(fmt::format("{}_mean", figure.name), over.engines, over.mean, kNoInterval, figure.unit);
+    figures.add(fmt::format("{}_range", figure.name), over.engines, over.range, kNoInterval, figure.unit);
     figures.keys.engine = over.worst;
     figures.add(fmt::format("{}_worst", figure.name), over.engines, figure.value(*in_engine(line, over.worst)),
-                kNoInterval, unit);
+                kNoInterval, figure.unit);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <optional>
 #include <tuple>
 
+#include "duet/core/order_statistics.h"
 #include "duet/results/analyses/comparison_parts.h"
 #include "duet/results/analyses/contact_table.h"
 #include "duet/results/analyses/leaderboard_rows.h"
@@ -71,6 +72,35 @@ Rate violation_rate(const EpisodeRows& rows, double level) {
   return make_rate(over, solid, level);
 }
 
+// Median over the episodes that have it; NaN where none has.
+template <typename Value>
+double median_of(const EpisodeRows& rows, Value value) {
+  std::vector<double> values;
+  for (const auto& [id, row] : rows)
+    if (const double of = value(*row); std::isfinite(of)) values.push_back(of);
+  return quantile(std::move(values), 0.5);
+}
+
+double force_of(const EpisodeRow& row, const char* name) {
+  const auto found = row.forces.find(name);
+  return found == row.forces.end() ? kNone : found->second;
+}
+
+// The mean force of the ground on a robot that stands is its weight.
+double stamping_of(const EpisodeRow& row) {
+  const double mean = force_of(row, "ground.mean_n");
+  return mean > 0.0 ? force_of(row, "ground.peak_n") / mean : kNone;
+}
+
+void add_forces(const EpisodeRows& rows, PolicyFigures& of) {
+  const auto touching = [](const char* name) {
+    return [name](const EpisodeRow& row) { return force_of(row, "human.peak_n") > 0.0 ? force_of(row, name) : kNone; };
+  };
+  of.contact_peak = median_of(rows, touching("human.peak_n"));
+  of.contact_settled = median_of(rows, touching("human.settled_n"));
+  of.stamping = median_of(rows, stamping_of);
+}
+
 bool is_playback(const PolicyFigures& figures) { return figures.key.engine == kPlaybackEngine; }
 
 // Sets the mean over physics engines of the episodes that all of them ran.
@@ -112,6 +142,7 @@ std::map<LineKey, PolicyLine> lines_of(const std::vector<LeaderboardEntry>& entr
     if (entry.task != "all") continue;
     take_overall(entry, of);
     of.violations = violation_rate(rows->second.find(kClean)->second, level);
+    add_forces(rows->second.find(kClean)->second, of);
   }
   std::map<LineKey, PolicyLine> lines;
   for (auto& [key, of] : figures) {

@@ -25,6 +25,8 @@ struct PolicyFigures {
   PairedDifference lift;                               // over the null arm, as in the leaderboard
   Rate falls;                                          // episodes with a fall
   Rate violations;                                     // over a contact limit, of the episodes with a solid partner
+  double contact_peak = 0.0, contact_settled = 0.0;    // medians of the episodes that touch a solid partner [N]
+  double stamping = 0.0;                               // median of the ground's largest force over its mean [1]
   double dof_jerk = 0.0;                               // mean over episodes [rad/s^3]; NaN: no row has it
   std::map<std::string, Rate> by_task, by_task_paper;  // "all" included
 };
@@ -33,17 +35,23 @@ struct PolicyFigures {
 struct PolicyFigure {
   std::string_view name, title;
   bool share;  // printed in %
+  std::string_view unit;
   bool higher_is_better;
   double (*value)(const PolicyFigures& figures);  // NaN: none
 };
-inline constexpr std::array<PolicyFigure, 6> kPolicyFigures = {{
-    {"success", "Success [%]", true, true, [](const PolicyFigures& f) { return f.success.rate; }},
-    {"paper_success", "Success, paper's detectors [%]", true, true,
+inline constexpr std::array<PolicyFigure, 9> kPolicyFigures = {{
+    {"success", "Success [%]", true, "1", true, [](const PolicyFigures& f) { return f.success.rate; }},
+    {"paper_success", "Success, paper's detectors [%]", true, "1", true,
      [](const PolicyFigures& f) { return f.paper.rate; }},
-    {"lift", "Lift [points]", true, true, [](const PolicyFigures& f) { return f.lift.difference; }},
-    {"falls", "Falls [%]", true, false, [](const PolicyFigures& f) { return f.falls.rate; }},
-    {"violations", "Over a contact limit [%]", true, false, [](const PolicyFigures& f) { return f.violations.rate; }},
-    {"dof_jerk", "DOF jerk [rad/s^3]", false, false, [](const PolicyFigures& f) { return f.dof_jerk; }},
+    {"lift", "Lift [points]", true, "1", true, [](const PolicyFigures& f) { return f.lift.difference; }},
+    {"falls", "Falls [%]", true, "1", false, [](const PolicyFigures& f) { return f.falls.rate; }},
+    {"violations", "Over a contact limit [%]", true, "1", false,
+     [](const PolicyFigures& f) { return f.violations.rate; }},
+    {"contact_peak", "Contact, peak [N]", false, "N", false, [](const PolicyFigures& f) { return f.contact_peak; }},
+    {"contact_settled", "Contact after 0.1 s [N]", false, "N", false,
+     [](const PolicyFigures& f) { return f.contact_settled; }},
+    {"stamping", "Ground force [weight]", false, "1", false, [](const PolicyFigures& f) { return f.stamping; }},
+    {"dof_jerk", "DOF jerk [rad/s^3]", false, "rad/s^3", false, [](const PolicyFigures& f) { return f.dof_jerk; }},
 }};
 
 // One (controller, arm, policy) in all its engines.

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "duet/core/order_statistics.h"
+#include "duet/results/analyses/interaction_table.h"
 #include "duet/results/statistics/row_groups.h"
 
 namespace duet {
@@ -88,6 +89,15 @@ std::vector<double> delays_of(const EpisodeRows& rows) {
   return delays;
 }
 
+void count_false_starts(const PerturbedRows& rows, Reactivity& of) {
+  for (const auto& [perturbation, episodes] : rows)
+    for (const auto& [id, row] : episodes)
+      if (const std::optional<double> lead = lead_of(*row)) {
+        ++of.led;
+        of.false_starts += *lead > kFalseStart ? 1 : 0;
+      }
+}
+
 Reactivity timing_of(const PolicyKey& key, const std::string& task, const PerturbedRows& rows,
                      ClusterBootstrap& bootstrap, double level) {
   const EpisodeRows& clean = rows.find(kClean)->second;
@@ -114,6 +124,7 @@ Reactivity timing_of(const PolicyKey& key, const std::string& task, const Pertur
   of.n_clean = static_cast<long>(delays.size());
   of.delay_clean = quantile(std::move(delays), 0.5);
   of.delay_moved = quantile(std::move(gathered.delays), 0.5);
+  count_false_starts(rows, of);
   return of;
 }
 
@@ -148,15 +159,17 @@ std::string seconds(double value) { return std::isfinite(value) ? fmt::format("{
 
 TitledTable timing_table(const ReactivityTable& table) {
   TitledTable titled = labelled_table("Reactivity: when the robot acts", labels_of(table.timing));
-  titled.table.header.insert(titled.table.header.end(), {"Task", "n", "Did not act", "Slope", "Median slope",
-                                                         "Delay, clean [s]", "Delay, partner moved [s]"});
+  titled.table.header.insert(titled.table.header.end(),
+                             {"Task", "n", "Did not act", "Slope", "Median slope", "Delay, clean [s]",
+                              "Delay, partner moved [s]", "False starts"});
   ++titled.table.label_columns;
   for (std::size_t i = 0; i < table.timing.size(); ++i) {
     const Reactivity& of = table.timing[i];
     titled.table.rows[i].insert(
         titled.table.rows[i].end(),
         {task_title(of.task), count_cell(of.n), count_cell(of.without), decimals(of.slope, of.interval, 2),
-         decimals(of.median_slope, of.median_interval, 2), seconds(of.delay_clean), seconds(of.delay_moved)});
+         decimals(of.median_slope, of.median_interval, 2), seconds(of.delay_clean), seconds(of.delay_moved),
+         of.led > 0 ? fmt::format("{}/{}", of.false_starts, of.led) : "-"});
   }
   titled.notes = {fmt::format(
       "n: perturbed episodes whose partner's onset is {:g} s or more from that of the same episode clean. Slope: of "
@@ -164,8 +177,10 @@ TitledTable timing_table(const ReactivityTable& table) {
       "drawn again; 1 follows its partner, 0 plays its clip. Median slope: the least absolute deviations, what most "
       "episodes do: an arm that swings with the steps can pass for an onset. Delay: median of the robot's onset minus "
       "its partner's; replay's is that of the demonstrations. Did not act: of such episodes, those without an onset of "
-      "the robot, here or clean; they are in no slope.",
-      kPartnerShift, 100.0 * table.level)};
+      "the robot, here or clean; they are in no slope. False starts: the robot begins more than {:g} s before its "
+      "partner, of the episodes, clean too, in which both begin; by the rule interaction, which counts withdrawn "
+      "beginnings, where it judged the run.",
+      kPartnerShift, 100.0 * table.level, kFalseStart)};
   return titled;
 }
 
@@ -221,6 +236,7 @@ void add_timing_figures(const Reactivity& of, std::vector<Figure>& into) {
   figures.count("did_not_act", of.n + of.without, of.without);
   figures.add("delay_clean", of.n_clean, of.delay_clean, kNoInterval, "s");
   figures.add("delay_moved", of.n, of.delay_moved, kNoInterval, "s");
+  figures.count("false_starts", of.led, of.false_starts);
   for (const OnsetShift& shift : of.shifts) {
     figures.keys.perturbation = shift.perturbation;
     figures.add("partner_shift", shift.n, shift.partner, kNoInterval, "s");

@@ -36,6 +36,7 @@ struct Reactivity {
   Interval median_interval;
   double delay_clean = 0.0, delay_moved = 0.0;  // median of robot's minus partner's onset [s]; NaN: none
   long n_clean = 0;                             // clean episodes with both onsets
+  long led = 0, false_starts = 0;               // as in InteractionEntry, clean and perturbed
   std::vector<OnsetShift> shifts;               // by partner's shift
 };
 

@@ -8,6 +8,7 @@
 #include "duet/core/names.h"
 #include "duet/results/analyses/controller_table.h"
 #include "duet/results/analyses/degradation.h"
+#include "duet/results/analyses/interaction_table.h"
 #include "duet/results/analyses/level_table.h"
 #include "duet/results/analyses/people_table.h"
 #include "duet/results/analyses/policy_table.h"
@@ -52,6 +53,8 @@ constexpr ListedAnalysis kAnalyses[] = {
     {kBoardName, [](const RunTables& run) { return board_analysis(run.board); }, Walking::kLeftOut, true},
     {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
      Walking::kWritten, true},
+    {"interaction", [](const RunTables& run) { return interaction_analysis(interaction_table(run.rows)); },
+     Walking::kLeftOut, true},
     {"engines", engines_with_plot, Walking::kWritten, true},
     {"controllers", controllers_with_steps, Walking::kWritten, true},
     {"policies", [](const RunTables& run) { return policy_analysis(policy_table(run.rows)); }, Walking::kLeftOut,

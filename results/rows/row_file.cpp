@@ -48,9 +48,10 @@ void make_lean(EpisodeRow& row, std::int64_t line_at) {
       std::visit([&](auto member) { row.*member = std::remove_cvref_t<decltype(row.*member)>(); }, field.json.member);
   row.feet = std::move(feet);
   for (Verdict& verdict : row.verdicts) {
+    verdict.margins.clear();
+    if (verdict.version == "interaction") continue;  // which condition failed is a table
     verdict.parts.clear();
     verdict.values.clear();
-    verdict.margins.clear();
   }
   row.line_at = line_at;
 }

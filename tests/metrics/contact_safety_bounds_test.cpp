@@ -159,10 +159,11 @@ TEST(ContactForces, NameWhatWasTouched) {
   const std::map<std::string, double> forces = contact_forces(result);
   EXPECT_THAT(forces,
               UnorderedElementsAre(
-                  Key("human.peak_n"), Key("human.impulse_ns"), Key("human.worst_ratio"), Key("human.settled_ratio"),
-                  Key("human.limits_verified"), Key("human.chest.peak_n"), Key("human.chest.quasi_static_n"),
-                  Key("human.chest.transient_n"), Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"),
-                  Key("human.chest.worst_ratio"), Key("human.foot.peak_n"), Key("human.foot.quasi_static_n"),
+                  Key("human.peak_n"), Key("human.settled_n"), Key("human.impulse_ns"), Key("human.worst_ratio"),
+                  Key("human.settled_ratio"), Key("human.limits_verified"), Key("human.chest.peak_n"),
+                  Key("human.chest.settled_n"), Key("human.chest.quasi_static_n"), Key("human.chest.transient_n"),
+                  Key("human.chest.impulse_ns"), Key("human.chest.pressure_n_cm2"), Key("human.chest.worst_ratio"),
+                  Key("human.foot.peak_n"), Key("human.foot.settled_n"), Key("human.foot.quasi_static_n"),
                   Key("human.foot.transient_n"), Key("human.foot.impulse_ns"), Key("human.foot.pressure_n_cm2")));
   EXPECT_EQ(forces.at("human.peak_n"), 50.0);
   EXPECT_NEAR(forces.at("human.impulse_ns"), 80.0, kRounding);

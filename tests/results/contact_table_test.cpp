@@ -34,6 +34,7 @@ EpisodeRow touched(const std::string& engine, const std::string& policy, int num
     row.forces[prefix + ".peak_n"] = touch.peak;
     row.forces[prefix + ".quasi_static_n"] = touch.quasi_static;
     row.forces[prefix + ".transient_n"] = touch.transient;
+    row.forces[prefix + ".settled_n"] = 0.5 * touch.peak;
     row.forces[prefix + ".impulse_ns"] = touch.impulse;
     row.forces[prefix + ".pressure_n_cm2"] = touch.pressure;
     if (std::isfinite(touch.ratio)) row.forces[prefix + ".worst_ratio"] = touch.ratio;
@@ -205,12 +206,12 @@ Controller vmc, policy replay; 4 episodes in each engine.
 
 Controller vmc, policy replay; an episode counts once in each engine.
 
-| Region   | Touched | Over limit [%] | Ratio | Median peak [N] | Quasi-static [N] | Transient [N] | Pressure [N/cm^2] | Impulse [N s] |
-| :------- | ------: | -------------: | ----: | --------------: | ---------------: | ------------: | ----------------: | ------------: |
-| chest    |  1 of 8 |           12.5 | 1.25* |             150 |             90.0 |           140 |              80.0 |          30.0 |
-| hand     |  4 of 8 |            0.0 |  0.75 |            27.5 |             40.0 |          60.0 |              30.0 |          8.00 |
-| shoulder |  1 of 8 |            0.0 |     - |            8.00 |             0.00 |          8.00 |              4.00 |          0.50 |
-| any      |  5 of 8 |           12.5 | 1.25* |            25.0 |             90.0 |           140 |              80.0 |          38.0 |
+| Region   | Touched | Over limit [%] | Ratio | Median peak [N] | After 0.1 s [N] | Quasi-static [N] | Transient [N] | Pressure [N/cm^2] | Impulse [N s] |
+| :------- | ------: | -------------: | ----: | --------------: | --------------: | ---------------: | ------------: | ----------------: | ------------: |
+| chest    |  1 of 8 |           12.5 | 1.25* |             150 |            75.0 |             90.0 |           140 |              80.0 |          30.0 |
+| hand     |  4 of 8 |            0.0 |  0.75 |            27.5 |            30.0 |             40.0 |          60.0 |              30.0 |          8.00 |
+| shoulder |  1 of 8 |            0.0 |     - |            8.00 |            4.00 |             0.00 |          8.00 |              4.00 |          0.50 |
+| any      |  5 of 8 |           12.5 | 1.25* |            25.0 |            75.0 |             90.0 |           140 |              80.0 |          38.0 |
 )md");
 }
 

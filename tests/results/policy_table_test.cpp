@@ -169,6 +169,25 @@ TEST(PolicyTable, ReplayAloneIsNoExperimentOnPolicies) {
   EXPECT_TRUE(policy_table({}).lines.empty());
 }
 
+// Forces are of the episodes that touch; the ground's force on a robot that stands is its weight, on average.
+TEST(PolicyTable, HasContactForcesAndStamping) {
+  std::vector<EpisodeRow> rows = two_policies();
+  for (int i = 0; i < 3; ++i)
+    rows[i].forces = {{"human.peak_n", 100.0 * i},
+                      {"human.settled_n", 10.0 * i},
+                      {"ground.peak_n", 600.0 + 300.0 * i},
+                      {"ground.mean_n", 300.0}};
+  const Analysis analysis = policy_analysis(policy_table(rows));
+  const auto of = [&](const char* name) {
+    return figure(analysis, {.engine = "mujoco", .policy = "dstar", .task = "all", .name = name});
+  };
+  EXPECT_EQ(of("contact_peak").value, 150.0);  // one of the three touches nothing
+  EXPECT_EQ(of("contact_peak").unit, "N");
+  EXPECT_EQ(of("contact_settled").value, 15.0);
+  EXPECT_EQ(of("stamping").value, 3.0);
+  EXPECT_THAT(text_of(policy_table(rows)), HasSubstr("Ground force [weight]"));
+}
+
 TEST(PolicyTable, FiguresAreOfEnginesOfAllOfThemAndOfPairs) {
   std::vector<EpisodeRow> rows = two_policies();
   for (const EpisodeRow& row : two_policies("bullet")) rows.push_back(row);

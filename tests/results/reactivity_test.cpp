@@ -41,6 +41,23 @@ std::vector<EpisodeRow> shifted(const std::string& policy, double follows) {
   return rows;
 }
 
+// An onset more than 0.3 s before the partner's; the rule's own verdict, which counts withdrawn ones, comes first.
+TEST(Reactivity, FalseStartsAreCounted) {
+  std::vector<EpisodeRow> rows = shifted("dstar", 1.0);
+  EXPECT_EQ(reactivity_table(rows).timing.at(0).false_starts, 0);
+  EXPECT_EQ(reactivity_table(rows).timing.at(0).led, 24);
+  rows[0].metrics["onset_s"] = rows[0].metrics.at("partner_onset_s") - 0.31;
+  rows[1].metrics["onset_s"] = rows[1].metrics.at("partner_onset_s") - 0.29;
+  for (const int i : {2, 3}) rows[i].verdicts.emplace_back().version = "interaction";
+  rows[2].verdicts.back().values = {{"lead_s", 0.4}};  // the other never begins
+  const ReactivityTable table = reactivity_table(rows);
+  EXPECT_EQ(table.timing.at(0).false_starts, 2);
+  EXPECT_EQ(table.timing.at(0).led, 23);
+  const Analysis analysis = reactivity_analysis(table);
+  EXPECT_EQ(figure(analysis, {.name = "false_starts"}).value, 2.0);
+  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("2/23"));
+}
+
 std::string text_of(const ReactivityTable& table) { return analysis_markdown(reactivity_analysis(table)); }
 
 TEST(Reactivity, AFollowerHasSlopeOneAndAReplayNone) {

@@ -78,15 +78,27 @@ class LeanRows : public testing::Test {
   std::string path_ = folder_ / "run";
 };
 
+// As the rule interaction judges: which condition failed is a table.
+void judge_by_rule(EpisodeRow& row) {
+  Verdict& rule = row.verdicts.emplace_back();
+  rule.version = "interaction";
+  rule.thresholds = "act";
+  rule.success = row.success.value_or(false);
+  rule.parts = {{"act", true}, {"reply", rule.success}};
+  rule.values = {{"lead_s", 0.1 * row.episode}};
+}
+
 TEST_F(LeanRows, MakeTheTablesOfWholeRows) {
   std::vector<EpisodeRow> rows;
   for (int i = 0; i < 12; ++i)
     for (const char* engine : {"mujoco", "ode"}) rows.push_back(real_row(engine, i));
   rows[3].feet = {};
+  for (EpisodeRow& row : rows) judge_by_rule(row);
   write(rows);
   const std::string whole = report(RowExtent::kWhole);
   EXPECT_EQ(report(RowExtent::kLean), whole);
   EXPECT_THAT(whole, HasSubstr("ode"));
+  EXPECT_THAT(whole, HasSubstr("What failed episodes lack"));
   EXPECT_EQ(load_run(path_, RowExtent::kLean).rows[0].trace.mm.size(), 0U);
 }
 
