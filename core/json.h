@@ -1,4 +1,4 @@
-// The one door through which JSON comes in. Thread-safe.
+// The one door through which JSON comes in and goes out. Thread-safe.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -15,5 +15,10 @@ inline constexpr int kMostJsonDepth = 64;
 // deeper than kMostJsonDepth, that holds a number which no double is, or an object with a key twice (two readers could
 // take one and the other).
 nlohmann::json parse_json(std::string_view text, const std::string& what);
+
+// As text, the only door out: json::dump() throws for bytes that are no valid UTF-8 (a file's name, an engine's
+// message), which become one replacement character here. `indent`: -1 for one line.
+std::string dumped(const nlohmann::json& json, int indent = -1);
+std::string dumped(const nlohmann::ordered_json& json, int indent = -1);
 
 }  // namespace duet

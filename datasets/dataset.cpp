@@ -10,6 +10,7 @@
 #include <set>
 
 #include "duet/core/digest.h"
+#include "duet/core/json.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/plain_name.h"
@@ -363,7 +364,7 @@ class DatasetWork {
     } catch (const InputError&) {
       entry.sources.clear();  // the reader says what is wrong with it
     }
-    entry.key = key_of(settings_.dump(), entry.sources, place, plan_.annotations, source_);
+    entry.key = key_of(dumped(settings_), entry.sources, place, plan_.annotations, source_);
     if (const std::optional<DatasetEntry> before = folder_.find(place.id, entry.key))
       return finish(*before, true, seconds);
     entry = ClipWork(plan_, format_, source_, folder_.path(), place, seconds).run(std::move(entry));

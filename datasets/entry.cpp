@@ -112,25 +112,25 @@ std::string_view to_string(ClipStatus status) {
 std::string entry_line(const DatasetEntry& entry) {
   json metrics = json::object();
   for (const auto& [robot, values] : entry.metrics) metrics[robot] = json_of(values);
-  return dumped({{"clip", entry.clip},
-                 {"key", entry.key},
-                 {"status", to_string(entry.status)},
-                 {"gates", entry.gates},
-                 {"reasons", entry.reasons},
-                 {"format", entry.format},
-                 {"licence", entry.licence},
-                 {"label", entry.label},
-                 {"sources", json_of(entry.sources)},
-                 {"evidence", entry.evidence},
-                 {"provenance", entry.provenance},
-                 {"task", entry.task},
-                 {"reactor", entry.reactor},
-                 {"frames", entry.frames},
-                 {"act", {{"begin_s", entry.act_begin}, {"end_s", entry.act_end}}},
-                 {"statistics", json_of(entry.statistics)},
-                 {"criteria", json_of(entry.criteria)},
-                 {"outputs", json_of(entry.outputs)},
-                 {"metrics", metrics}});
+  return dumped(nlohmann::json({{"clip", entry.clip},
+                                {"key", entry.key},
+                                {"status", to_string(entry.status)},
+                                {"gates", entry.gates},
+                                {"reasons", entry.reasons},
+                                {"format", entry.format},
+                                {"licence", entry.licence},
+                                {"label", entry.label},
+                                {"sources", json_of(entry.sources)},
+                                {"evidence", entry.evidence},
+                                {"provenance", entry.provenance},
+                                {"task", entry.task},
+                                {"reactor", entry.reactor},
+                                {"frames", entry.frames},
+                                {"act", {{"begin_s", entry.act_begin}, {"end_s", entry.act_end}}},
+                                {"statistics", json_of(entry.statistics)},
+                                {"criteria", json_of(entry.criteria)},
+                                {"outputs", json_of(entry.outputs)},
+                                {"metrics", metrics}}));
 }
 
 DatasetEntry parse_entry(std::string_view line, const std::string& name) {

@@ -239,7 +239,7 @@ void append_tensor(std::string& bytes, const std::string& name, const Tensor& te
 
 std::string header_text(const Json& header) {
   try {
-    std::string text = header.dump();
+    std::string text = dumped(header);
     text.append((kAlignment - text.size() % kAlignment) % kAlignment, ' ');
     return text;
   } catch (const Json::type_error&) {

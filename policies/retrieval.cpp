@@ -8,6 +8,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "duet/core/json.h"
 #include "duet/core/option.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
@@ -73,7 +74,7 @@ class RetrievalPolicy final : public Policy {
 void check_metadata(const SafeTensors& file, const RobotModel& robot, const std::string& path) {
   expect_text(file, "format", kFormat, path);
   require_made_for(text_of(file, "robot", path), robot, path);
-  expect_text(file, "joints", nlohmann::json(robot.joint_names()).dump(), path);
+  expect_text(file, "joints", dumped(nlohmann::json(robot.joint_names())), path);
 }
 
 std::vector<int> tasks_of(const SafeTensors& file, const std::string& path) {
@@ -122,7 +123,7 @@ int nearest_window(const RetrievalLibrary& library, int task, const Eigen::Ref<c
 
 void save_retrieval_library(const std::string& path, const RetrievalLibrary& library) {
   SafeTensors file;
-  file.metadata = {{"format", kFormat}, {"robot", library.robot}, {"joints", nlohmann::json(library.joints).dump()}};
+  file.metadata = {{"format", kFormat}, {"robot", library.robot}, {"joints", dumped(nlohmann::json(library.joints))}};
   file.tensors["keys"] = columns_tensor(library.keys);
   file.tensors["plans"] = columns_tensor(library.plans);
   file.tensors["mean"] = columns_tensor(library.mean);

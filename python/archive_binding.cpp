@@ -184,11 +184,11 @@ std::string detect_in(const Archive& archive, const std::string& task, const std
   nlohmann::json values = nlohmann::json::object(), margins = nlohmann::json::object();
   for (const auto& [name, value] : result.values) values[name] = number_or_null(value);
   for (const auto& [name, value] : result.margins) margins[name] = number_or_null(value);
-  return dumped({{"success", result.success},
-                 {"parts", result.parts},
-                 {"values", values},
-                 {"margins", margins},
-                 {"frames", result.frames}});
+  return dumped(nlohmann::json({{"success", result.success},
+                                {"parts", result.parts},
+                                {"values", values},
+                                {"margins", margins},
+                                {"frames", result.frames}}));
 }
 
 // Clips of others below some paths, one read at a time.

@@ -221,15 +221,15 @@ std::string rows_json(const Run& run) {
 }
 
 std::string info_json(const Run& run) {
-  return dumped({{"suite", run.info.suite},
-                 {"suite_version", run.info.suite_version},
-                 {"suite_hash", run.info.suite_hash},
-                 {"policies", run.info.policies},
-                 {"controllers", run.info.controllers},
-                 {"created_at", run.info.created_at},
-                 {"completeness", completeness(run)},
-                 {"partial", is_partial(run)},
-                 {"policy_faults", policy_fault_notes(leaderboard(run.rows))}});
+  return dumped(nlohmann::json({{"suite", run.info.suite},
+                                {"suite_version", run.info.suite_version},
+                                {"suite_hash", run.info.suite_hash},
+                                {"policies", run.info.policies},
+                                {"controllers", run.info.controllers},
+                                {"created_at", run.info.created_at},
+                                {"completeness", completeness(run)},
+                                {"partial", is_partial(run)},
+                                {"policy_faults", policy_fault_notes(leaderboard(run.rows))}}));
 }
 
 void add_runs(py::module_& module) {

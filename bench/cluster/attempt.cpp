@@ -43,13 +43,13 @@ std::string plain(const std::string& name) {
 }
 
 std::string header_line(const AttemptHeader& header) {
-  return dumped({{"schema", kAttemptSchema},
-                 {"shard", header.shard},
-                 {"node", header.node},
-                 {"pid", header.pid},
-                 {"plan", header.plan},
-                 {"started_at", header.started_at},
-                 {"environment", header.environment}});
+  return dumped(nlohmann::json({{"schema", kAttemptSchema},
+                                {"shard", header.shard},
+                                {"node", header.node},
+                                {"pid", header.pid},
+                                {"plan", header.plan},
+                                {"started_at", header.started_at},
+                                {"environment", header.environment}}));
 }
 
 AttemptHeader read_header(std::string_view line, const std::string& path) {

@@ -97,7 +97,7 @@ void check_joints(const NetworkReader& reader, const RobotModel& robot, const st
     throw InputError(
         fmt::format("{}: made for {} joints, robot '{}' has {}", file, joints.size(), robot.name, robot.dof()));
   for (int i = 0; i < robot.dof(); ++i) {
-    const std::string found = joints[i].is_string() ? joints[i].get<std::string>() : joints[i].dump();
+    const std::string found = joints[i].is_string() ? joints[i].get<std::string>() : dumped(joints[i]);
     reader.expect(fmt::format("joint {}", i), robot.joints[i].name, found);
   }
 }
@@ -105,8 +105,8 @@ void check_joints(const NetworkReader& reader, const RobotModel& robot, const st
 void check_channels(const NetworkReader& reader, WbcKind kind, int joints, const std::string& file) {
   const nlohmann::json found = parse_list(reader, "observation", file), expected = channels_of(kind, joints);
   for (size_t i = 0; i < std::max(found.size(), expected.size()); ++i)
-    reader.expect(fmt::format("observation channel {}", i), i < expected.size() ? expected[i].dump() : "nothing",
-                  i < found.size() ? found[i].dump() : "nothing");
+    reader.expect(fmt::format("observation channel {}", i), i < expected.size() ? dumped(expected[i]) : "nothing",
+                  i < found.size() ? dumped(found[i]) : "nothing");
 }
 
 void check_golden(const NetworkReader& reader, const WbcNetwork& network, const std::string& file) {
@@ -136,7 +136,7 @@ constexpr GaitNumber kGaitNumbers[] = {
 std::string text_of(const GaitOptions& gait) {
   nlohmann::json json;
   for (const GaitNumber& number : kGaitNumbers) json[number.name] = gait.*number.value;
-  return json.dump();
+  return dumped(json);
 }
 
 // Networks of before there was a choice do not say.
@@ -204,8 +204,8 @@ void save_wbc_network(const std::string& path, const WbcNetwork& network, Tensor
   tensors.metadata = {{"format", kFormat},
                       {"kind", name_of(network.kind)},
                       {"robot", network.robot},
-                      {"joints", nlohmann::json(network.joints).dump()},
-                      {"observation", channels_of(network.kind, network.mlp.outputs()).dump()},
+                      {"joints", dumped(nlohmann::json(network.joints))},
+                      {"observation", dumped(channels_of(network.kind, network.mlp.outputs()))},
                       {"rate_hz", kRate},
                       {"action", kAction},
                       {"gait", text_of(network.gait)},

@@ -62,7 +62,7 @@ std::vector<Eigen::Vector3d> vertices_of_obj(std::string_view text, const std::s
 
 Eigen::Vector3d vector_of(const nlohmann::json& value, const std::string& where) {
   if (!value.is_array() || value.size() != 3 || !value[0].is_number() || !value[1].is_number() || !value[2].is_number())
-    throw InputError(fmt::format("{}: expected three numbers, found {}", where, shown(value.dump())));
+    throw InputError(fmt::format("{}: expected three numbers, found {}", where, shown(dumped(value))));
   const Eigen::Vector3d vector(value[0].get<double>(), value[1].get<double>(), value[2].get<double>());
   check_point(vector, where);
   return vector;

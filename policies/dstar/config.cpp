@@ -103,14 +103,14 @@ int parse_size(const OrderedJson& json, const Size& size, const std::string& fil
   const bool fits = value.is_number_integer() && value >= size.least && value <= size.most;
   if (!fits)
     refuse(file, fmt::format("'{}': expected a whole number from {} to {}, found {}", size.name, size.least, size.most,
-                             shown(value.dump())));
+                             shown(dumped(value))));
   return value.get<int>();
 }
 
 bool parse_switch(const OrderedJson& json, const Switch& one, const std::string& file) {
   const OrderedJson& value = json_field(json, one.name, file);
   if (!value.is_boolean())
-    refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, shown(value.dump())));
+    refuse(file, fmt::format("'{}': expected true or false, found {}", one.name, shown(dumped(value))));
   return value.get<bool>();
 }
 
@@ -137,7 +137,7 @@ std::string to_json_text(const DstarConfig& config) {
   OrderedJson json = OrderedJson::object();
   for (const Size& size : kSizes) json[size.name] = config.*size.value;
   for (const Switch& one : kSwitches) json[one.name] = config.*one.value;
-  return json.dump();
+  return dumped(json);
 }
 
 DstarConfig parse_dstar_config(const std::string& text, const std::string& file) {

@@ -199,10 +199,10 @@ SafeTensors content_of(const DstarNetwork& network) {
   content.metadata = {{"format", kFormat},
                       {"config", to_json_text(network.config)},
                       {"robot", network.robot},
-                      {"joints", nlohmann::json(network.joints).dump()},
-                      {"channels", nlohmann::json(network.channels).dump()},
+                      {"joints", dumped(nlohmann::json(network.joints))},
+                      {"channels", dumped(nlohmann::json(network.channels))},
                       {"language", network.language},
-                      {"notes", nlohmann::json(network.notes).dump()}};
+                      {"notes", dumped(nlohmann::json(network.notes))}};
   return content;
 }
 

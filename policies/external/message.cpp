@@ -46,7 +46,7 @@ const Json& member(const Json& json, const char* key) {
 int whole_number(const Json& json, const char* key) {
   const Json& value = member(json, key);
   if (!value.is_number_integer() || value < 0 || value > 1000000000)
-    refuse(fmt::format("'{}': expected a whole number, found {}", key, excerpt(value.dump())));
+    refuse(fmt::format("'{}': expected a whole number, found {}", key, excerpt(dumped(value))));
   return value.get<int>();
 }
 
@@ -162,7 +162,7 @@ std::string hello_message(const PolicyDescriptor& descriptor, const RobotModel& 
                      {"anchor_size", kPlanNumbersBeforeJoints + static_cast<int>(joints.size())},
                      {"anchor_frame", to_string(output.frame)},
                      {"deadline_ms", descriptor.deadline_ms > 0 ? Json(descriptor.deadline_ms) : Json()}};
-  return json.dump();
+  return dumped(json);
 }
 
 std::string reset_message(const EpisodeContext& context) {
@@ -173,7 +173,7 @@ std::string reset_message(const EpisodeContext& context) {
       {"prompt", context.prompt},
       {"seed", context.seed},
       {"start", {start.p.x(), start.p.y(), start.p.z(), start.R.w(), start.R.x(), start.R.y(), start.R.z()}}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);  // a prompt need not be UTF-8
+  return dumped(json);  // a prompt need not be UTF-8
 }
 
 // Written by hand: the shortest decimals of a float are half as long as those of the same double.

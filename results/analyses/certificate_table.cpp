@@ -20,7 +20,7 @@ std::string text_of(const nlohmann::json& object, const char* key) {
 std::string count_of(const nlohmann::json& object, const char* key) {
   const auto found = object.find(key);
   if (found == object.end()) return "-";
-  if (found->is_number_integer()) return found->dump();
+  if (found->is_number_integer()) return dumped(*found);
   return found->is_structured() ? fmt::format("{}", found->size()) : "-";
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "duet/core/json.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -24,10 +25,6 @@ nlohmann::json numbers_or_null(const std::map<std::string, double>& values) {
 
 nlohmann::json json_of(const Interval& interval) {
   return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
-}
-
-std::string dumped(const nlohmann::json& json, int indent) {
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 JsonFields::JsonFields(const nlohmann::json& json, std::string what) : json_(json), what_(std::move(what)) {
@@ -120,7 +117,7 @@ void JsonFields::refuse_unknown() const {
 void JsonFields::wrong_type(const std::string& key, std::string_view expected, const nlohmann::json& found) const {
   constexpr std::size_t kShownValue = 40;
   throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, shown(key), expected,
-                               shown(found.dump(), kShownValue)));
+                               shown(dumped(found), kShownValue)));
 }
 
 double JsonFields::number_of(const std::string& key, const nlohmann::json& value, bool null_is_nan) const {

@@ -19,9 +19,6 @@ nlohmann::json number_or_null(double value);
 nlohmann::json numbers_or_null(const std::map<std::string, double>& values);  // an object, likewise
 nlohmann::json json_of(const Interval& interval);                             // [low, high]
 
-// As text. Bytes that are no valid UTF-8 (a file's name, an engine's message) become one replacement character.
-std::string dumped(const nlohmann::json& json, int indent = -1);
-
 class JsonFields {
  public:
   // `what` names the object in messages ("episode row", "run.json"). Throws InputError where `json` is no object.

@@ -319,13 +319,13 @@ TEST_F(ClusterWork, CostsOfWhatTheSuiteDoesNotRunAreRefused) {
 // Journals as workers leave them that were killed.
 std::string open_journal(const std::string& key, std::int64_t pid, const std::string& more = "") {
   AttemptHeader header = new_attempt(0, "");
-  return dumped({{"schema", "duet.attempt/1"},
-                 {"shard", 0},
-                 {"node", header.node},
-                 {"pid", pid},
-                 {"plan", ""},
-                 {"started_at", "2026-01-02T03:04:05Z"},
-                 {"environment", nullptr}}) +
+  return dumped(nlohmann::json({{"schema", "duet.attempt/1"},
+                                {"shard", 0},
+                                {"node", header.node},
+                                {"pid", pid},
+                                {"plan", ""},
+                                {"started_at", "2026-01-02T03:04:05Z"},
+                                {"environment", nullptr}})) +
          "\nbegan " + key + "\n" + more;
 }
 

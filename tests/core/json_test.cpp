@@ -59,6 +59,12 @@ TEST(ParseJson, AFaultIsOneSentenceThatBeginsWithTheDocument) {
   EXPECT_THAT(refusal("\"\xff\""), HasSubstr("ill-formed UTF-8 byte"));
 }
 
+TEST(Dumped, WritesBytesThatAreNoUtf8AsAReplacementCharacterAndKeepsOrder) {
+  EXPECT_EQ(dumped(nlohmann::json("bad\xff name")), "\"bad\ufffd name\"");
+  EXPECT_EQ(dumped(nlohmann::json{{"b", 1}, {"a", 2}}), R"({"a":2,"b":1})");
+  EXPECT_EQ(dumped(nlohmann::ordered_json{{"b", 1}, {"a", 2}}), R"({"b":1,"a":2})");
+}
+
 TEST(ParseJson, AFaultDoesNotRepeatTheDocument) {
   EXPECT_LT(refusal("\"" + std::string(400'000, 'x')).size(), 300u);
   EXPECT_LT(refusal(std::string(400'000, '9')).size(), 300u);

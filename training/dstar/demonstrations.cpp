@@ -149,8 +149,10 @@ void save_demonstrations(const DemonstrationSet& set, const std::string& path) {
   for (const Demonstration& entry : set.list) list.push_back(json_of(entry));
   const int used = set.list.empty() ? 0 : set.list.back().end();
   SafeTensors file;
-  file.metadata = {
-      {"format", kFormat}, {"robot_digest", set.robot_digest}, {"origin", set.origin}, {"demonstrations", list.dump()}};
+  file.metadata = {{"format", kFormat},
+                   {"robot_digest", set.robot_digest},
+                   {"origin", set.origin},
+                   {"demonstrations", dumped(list)}};
   file.tensors["observed"] = columns_tensor(set.observed.leftCols(used));
   file.tensors["wanted"] = columns_tensor(set.wanted.leftCols(used));
   file.tensors["partner"] = columns_tensor(set.partner.leftCols(used));
