@@ -24,6 +24,7 @@ struct OdometrySample {
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  // measured, not differenced here [m/s]
   double at = kNever;                              // reception, by this program's clock [s]
   bool valid = false;                              // the source says so
+  long sender_restarts = 0;                        // of the source, by its sequence numbers
 };
 
 }  // namespace duet

@@ -70,12 +70,9 @@ bool ExternalOdometry::take(OdometrySample& sample) {
       ++refused_;
       continue;
     }
-    if (any_ && pose.sequence <= last_) {
-      ++old_;
-      continue;
-    }
-    any_ = took = true;
-    last_ = pose.sequence;
+    if (!order_.takes(pose.sequence, clock_())) continue;
+    took = true;
+    sample.sender_restarts = order_.restarts();
     sample.X_WB = pose.X_WB;
     sample.v_WB = pose.v_WB;
     sample.valid = pose.valid;

@@ -2,10 +2,14 @@
 // local socket, the robot's own legs (hardware/leg_odometry.h). docs/hardware.md, "Odometry". One owner, one thread.
 #pragma once
 
+#include <functional>
+
+#include "duet/core/awake_time.h"
 #include "duet/hardware/datagram_socket.h"
 #include "duet/hardware/low_level_frame.h"
 #include "duet/hardware/odometry.h"
 #include "duet/hardware/robot_wire.h"
+#include "duet/hardware/stream_order.h"
 
 namespace duet {
 
@@ -29,7 +33,7 @@ class WireOdometry final : public OdometryReader {
 
 // What a tracker sends: the pose of the base in the frame that it measures in, and its velocity in that frame.
 struct ExternalPose {
-  std::uint64_t sequence = 0;  // rises; an older or repeated one is dropped
+  std::uint64_t sequence = 0;  // rises (hardware/stream_order.h)
   Pose X_WB;
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  // [m/s]
   bool valid = false;                              // it sees the robot
@@ -42,16 +46,18 @@ bool decode(std::span<const std::byte> datagram, ExternalPose& pose);
 
 class ExternalOdometry final : public OdometryReader {
  public:
-  explicit ExternalOdometry(DatagramSocket socket) : socket_(std::move(socket)) {}
+  // `clock` [s]: of reception.
+  explicit ExternalOdometry(DatagramSocket socket, std::function<double()> clock = monotonic_seconds)
+      : socket_(std::move(socket)), clock_(std::move(clock)) {}
   bool take(OdometrySample& sample) override;
   [[nodiscard]] long refused() const { return refused_; }
-  [[nodiscard]] long old() const { return old_; }
+  [[nodiscard]] long old() const { return order_.old(); }
 
  private:
   DatagramSocket socket_;
-  std::uint64_t last_ = 0;
-  bool any_ = false;
-  long refused_ = 0, old_ = 0;
+  std::function<double()> clock_;
+  StreamOrder order_;
+  long refused_ = 0;
 };
 
 }  // namespace duet

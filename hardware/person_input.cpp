@@ -12,8 +12,7 @@ namespace {
 
 constexpr std::uint32_t kPersonVersion = 0x314A5044;         // "DPJ1"
 constexpr double kFarthestJoint = 20.0, kLongestBone = 1.0;  // [m]
-constexpr double kRestartsAfter = 1.0;  // of silence: an estimator that was started anew counts from 0 [s]
-constexpr int kMostEstimates = 16;      // of a tick
+constexpr int kMostEstimates = 16;                           // of a tick
 
 struct PersonWire {
   std::uint32_t version, seen;
@@ -54,10 +53,8 @@ PersonFault decode(std::span<const std::byte> datagram, PersonEstimate& estimate
 }
 
 PersonFault PersonTrack::receive(const PersonEstimate& estimate, const Pose& X_WB, double now) {
-  const bool begins = now - newest_at() > kRestartsAfter;
-  if (!begins && estimate.sequence <= last_) return PersonFault::kOld;
+  if (!order_.takes(estimate.sequence, now)) return PersonFault::kOld;
   if (!estimate.seen) return PersonFault::kUnseen;
-  last_ = estimate.sequence;
   const Pose X_WC = X_WB * X_BC_;
   newest_ = (newest_ + 1) % kKept;
   Kept& kept = kept_[newest_];
@@ -97,6 +94,7 @@ void PersonInput::poll(double now, RobotGuard& guard) {
     ++used_;
     ++message_.sequence;
     message_.joints = track_.newest();
+    message_.sender_restarts = track_.restarts();
     guard.receive(message_, now);
   }
 }

@@ -30,7 +30,7 @@ enum class PersonFault {
   kFinite,  // a number that is not finite
   kFar,     // a joint further than 20 m from the camera
   kBody,    // a bone longer than 1 m
-  kOld,     // a sequence number that does not rise
+  kOld,     // a sequence number that does not rise (hardware/stream_order.h)
   kUnseen,  // nobody in the picture
 };
 inline constexpr std::size_t kPersonFaults = 7;
@@ -50,6 +50,7 @@ class PersonTrack {
   PersonFault receive(const PersonEstimate& estimate, const Pose& X_WB, double now);
   [[nodiscard]] const HumanJoints& newest() const { return kept_[newest_].joints; }  // frame W
   [[nodiscard]] double newest_at() const { return kept_[newest_].at; }               // kNever: nothing has come
+  [[nodiscard]] long restarts() const { return order_.restarts(); }                  // of who estimates
   // At `now` - delay: linear between two estimates, the newest one beyond it. Null where the newest is older than
   // `most_age` [s].
   const HumanJoints* at(double now, double most_age = SafetyRules{}.person.hold);
@@ -65,7 +66,7 @@ class PersonTrack {
   double delay_;
   std::array<Kept, kKept> kept_{};
   std::size_t newest_ = 0;
-  std::uint64_t last_ = 0;
+  StreamOrder order_;
   HumanJoints between_;
 };
 

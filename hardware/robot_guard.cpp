@@ -68,36 +68,35 @@ RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, Veloc
 }
 
 void RobotGuard::receive(const PlannerMessage& message, double now) {
-  if (any_planner_ && message.sequence <= planner_.sequence) {
-    ++status_.old_messages;
-    return;
-  }
   if (message.command.q.size() != kG1Motors) {
     count(status_.clamps, ClampReason::kSize);
     return;
   }
+  const bool taken = planner_order_.takes(message.sequence, now);
+  count_streams();
+  if (!taken) return;
   // What the limiter refuses does not keep the planner alive: the last good command grows old.
   if (!limiter_.refusal(message.command, limiter_state_)) next_.planner_at = now;
   planner_ = message;
-  any_planner_ = planner_is_new_ = true;
+  planner_is_new_ = true;
 }
 
 // A pose that is not finite, or in which somebody jumped, is dropped: the one before grows old.
 void RobotGuard::receive(const PersonMessage& message, double now) {
   const bool first = next_.person_at == kNever;
-  if (!first && message.sequence <= person_.sequence) {
-    ++status_.old_messages;
-    return;
-  }
   const double passed = std::max(now - next_.person_at, setup_.limiter.dt);
   const double moved = first ? 0.0 : (message.joints - person_.joints).colwise().norm().maxCoeff();
   if (!message.joints.allFinite() || moved > 0.1 + kPersonJump * passed) {
     ++status_.bad_messages;
     return;
   }
+  const bool taken = person_order_.takes(message.sequence, now);
+  count_streams();
+  if (!taken) return;
   person_speed_ = first ? 0.0 : (message.joints.col(0) - person_.joints.col(0)).norm() / passed;
   person_ = message;
   next_.person_at = now;
+  count_streams();
 }
 
 void RobotGuard::receive(const OdometrySample& sample) {
@@ -109,6 +108,13 @@ void RobotGuard::receive(const OdometrySample& sample) {
   }
   odometry_ = sample;
   next_.odometry_at = sample.at;
+  count_streams();
+}
+
+void RobotGuard::count_streams() {
+  status_.old_messages = planner_order_.old() + person_order_.old();
+  status_.restarts =
+      planner_order_.restarts() + person_order_.restarts() + person_.sender_restarts + odometry_.sender_restarts;
 }
 
 void RobotGuard::receive(const BatteryReading& battery, double now) {

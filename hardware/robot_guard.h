@@ -14,6 +14,7 @@
 #include "duet/hardware/limiter.h"
 #include "duet/hardware/odometry.h"
 #include "duet/hardware/safety_machine.h"
+#include "duet/hardware/stream_order.h"
 #include "duet/hardware/walker.h"
 
 namespace duet {
@@ -29,7 +30,7 @@ struct GuardSetup {
   bool has_battery = false;                         // its charge is reported, and an unknown one holds
 };
 
-// What a planner sends. `sequence` rises; an older or repeated message is dropped.
+// What a planner sends. `sequence` rises (hardware/stream_order.h).
 struct PlannerMessage {
   std::uint64_t sequence = 0;
   MotionCommand command;
@@ -41,6 +42,7 @@ struct PlannerMessage {
 struct PersonMessage {
   std::uint64_t sequence = 0;
   HumanJoints joints = HumanJoints::Zero();  // [m]
+  long sender_restarts = 0;                  // of who estimates, that whoever took the estimates noticed
 };
 
 // Of the last tick, for logs and displays.
@@ -53,6 +55,7 @@ struct GuardStatus {
   ContactReading contact;
   long ticks = 0, states = 0, checksum_faults = 0, tick_faults = 0, number_faults = 0;
   long old_messages = 0;   // of planner or perception, dropped
+  long restarts = 0;       // of planner, perception and odometry: streams that were taken again after a pause
   long bad_messages = 0;   // of perception: not finite, or a person who jumped
   bool received = false;   // a planner's command was handed to the limiter
   bool restarted = false;  // the limiter began anew, from
@@ -100,6 +103,7 @@ class RobotGuard {
   [[nodiscard]] const GuardSetup& setup() const { return setup_; }
 
  private:
+  void count_streams();
   void read_states(double now);
   void read_operator(double now);
   void check_robot();
@@ -119,7 +123,8 @@ class RobotGuard {
   LimiterState limiter_state_;
   LimiterInput input_;
   PlannerMessage planner_;
-  bool planner_is_new_ = false, any_planner_ = false;
+  bool planner_is_new_ = false;
+  StreamOrder planner_order_, person_order_;
   PersonMessage person_;
   double person_speed_ = 0.0;
   OdometrySample odometry_;

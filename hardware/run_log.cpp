@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "duet/core/file.h"
+#include "duet/core/json.h"
 #include "duet/core/require.h"
 #include "duet/core/version.h"
 #include "duet/hardware/limiter_setup_json.h"
@@ -165,7 +166,7 @@ RunLog::RunLog(const std::string& path, const GuardSetup& setup)
       {"odometry", kOdometryNames[static_cast<std::size_t>(setup.odometry)]},
       {"executor", executed_channels_json(executed_channels(setup.executor, *limiter.robot, limiter.executed.joints),
                                           *limiter.robot)}};
-  const std::string text = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = dumped(json);
   if (!writer_.write(kSetupChannel, 0, 0, bytes_of_text(text)) || !writer_.flush())
     throw StorageError(fmt::format("cannot write '{}'", path));
   thread_ = std::thread([this] { write_slots(); });
@@ -195,6 +196,8 @@ void RunLog::add(const RobotGuard& guard) {
   last_state_ = slot.state;
   slot.dropped = dropped_ - told_;
   told_ += slot.dropped;
+  slot.restarts = status.restarts - told_restarts_;
+  told_restarts_ += slot.restarts;
   added_.store(added + 1, std::memory_order_release);
 }
 
@@ -210,26 +213,28 @@ void RunLog::write_slots() {
     if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   if (const long rest = dropped_ - told_; rest > 0)
-    write_event(nanoseconds(last_.tick.now), last_.state, last_.cause, rest);
+    write_event(nanoseconds(last_.tick.now), last_.state, last_.cause, "dropped", rest);
   good_ = writer_.finish();
 }
 
 void RunLog::write_slot(const Slot& slot) {
   const std::uint64_t time = nanoseconds(slot.tick.now);
   ++sequence_;
-  if (slot.dropped > 0) write_event(time, last_.state, last_.cause, slot.dropped);
+  if (slot.dropped > 0) write_event(time, last_.state, last_.cause, "dropped", slot.dropped);
   last_ = slot;
   writer_.write(kTickChannel, sequence_, time, std::as_bytes(std::span(&slot.tick, 1)));
   if (slot.took) write_frame(kStateChannel, time, std::as_bytes(std::span(&slot.received, 1)));
   if (slot.sent) write_frame(kFrameChannel, time, std::as_bytes(std::span(&slot.frame, 1)));
-  if (slot.changed) write_event(time, slot.state, slot.cause, 0);
+  if (slot.changed) write_event(time, slot.state, slot.cause);
+  if (slot.restarts > 0) write_event(time, slot.state, slot.cause, "restarts", slot.restarts);
 }
 
-// A change of state, or, with `dropped`, that so many ticks are not in the log here.
-void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, long dropped) {
+// A change of state, or that `n` ticks are not in the log here ("dropped"), or `n` streams were taken again after a
+// pause ("restarts").
+void RunLog::write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted, long n) {
   nlohmann::json event = {{"state", safety_state_name(state)}, {"cause", stop_cause_name(cause)}};
-  if (dropped > 0) event["dropped"] = dropped;
-  writer_.write(kEventChannel, sequence_, time, bytes_of_text(event.dump()));
+  if (counted != nullptr) event[counted] = n;
+  writer_.write(kEventChannel, sequence_, time, bytes_of_text(dumped(event)));
 }
 
 void RunLog::write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame) {

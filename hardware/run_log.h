@@ -63,13 +63,14 @@ class RunLog {
     LowStateFrame received;
     LowCommandFrame frame;
     bool took = false, sent = false, changed = false;
-    long dropped = 0;  // ticks before it that found no room
+    long dropped = 0;   // ticks before it that found no room
+    long restarts = 0;  // streams that were taken again since the slot before it
     SafetyState state = SafetyState::kOffline;
     StopCause cause = StopCause::kNone;
   };
   void write_slots();
   void write_slot(const Slot& slot);
-  void write_event(std::uint64_t time, SafetyState state, StopCause cause, long dropped);
+  void write_event(std::uint64_t time, SafetyState state, StopCause cause, const char* counted = nullptr, long n = 0);
   void write_frame(std::uint16_t channel, std::uint64_t time, std::span<const std::byte> frame);
 
   McapWriter writer_;
@@ -78,8 +79,8 @@ class RunLog {
   std::atomic<bool> ends_ = false, good_ = true;
   SafetyState last_state_ = SafetyState::kOffline;
   std::atomic<long> dropped_ = 0;
-  long told_ = 0;   // of them, by a slot
-  Slot last_ = {};  // that was written
+  long told_ = 0, told_restarts_ = 0;  // by a slot
+  Slot last_ = {};                     // that was written
   std::uint32_t sequence_ = 0;
   std::thread thread_;
 };

@@ -226,8 +226,9 @@ void run_arm(Session& session, const HardwareArguments& arguments) {
     });
   if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
   print(session,
-        fmt::format("{}; log '{}', {} ticks left out", safety_state_name(guard.status().safety.state), arguments.log,
-                    log.dropped()),
+        fmt::format("{}; log '{}', {} ticks left out; {} messages were old, {} streams began anew",
+                    safety_state_name(guard.status().safety.state), arguments.log, log.dropped(),
+                    guard.status().old_messages, guard.status().restarts),
         status_json(guard));
   if (guard.status().safety.state == SafetyState::kFault) session.exit_code = kExitGate;
 }

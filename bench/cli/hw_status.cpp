@@ -70,6 +70,8 @@ nlohmann::json status_json(const RobotGuard& guard) {
           {"checksum_faults", status.checksum_faults},
           {"tick_faults", status.tick_faults},
           {"number_faults", status.number_faults},
+          {"old_messages", status.old_messages},
+          {"restarts", status.restarts},
           {"clamps", clamps}};
 }
 

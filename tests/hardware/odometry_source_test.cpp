@@ -76,6 +76,29 @@ TEST(ExternalOdometry, TheNewestOfTheSocketCountsAndOldOnesDoNot) {
   EXPECT_FALSE(odometry.take(sample));
 }
 
+TEST(ExternalOdometry, ATrackerThatWasStartedAnewIsHeardAgainAfterAPause) {
+  const test::ScratchFolder folder;
+  double now = 100.0;
+  ExternalOdometry odometry(DatagramSocket::at_path(folder / "pose"), [&] { return now; });
+  DatagramSocket tracker = DatagramSocket::to_path(folder / "pose");
+  OdometrySample sample;
+  const auto takes = [&](std::uint64_t sequence) {
+    ExternalPoseBuffer buffer;
+    encode(some_pose(sequence), buffer);
+    tracker.send(buffer);
+    return odometry.take(sample);
+  };
+  EXPECT_TRUE(takes(5000));
+  now += 0.9;
+  EXPECT_FALSE(takes(1));
+  EXPECT_FALSE(takes(2));
+  now += 0.2;
+  EXPECT_TRUE(takes(3));
+  EXPECT_TRUE(takes(4));
+  EXPECT_EQ(sample.sender_restarts, 1);
+  EXPECT_EQ(odometry.old(), 2);
+}
+
 TEST(ExternalOdometry, ATrackerThatLostTheRobotSaysSo) {
   const test::ScratchFolder folder;
   ExternalOdometry odometry(DatagramSocket::at_path(folder / "pose"));

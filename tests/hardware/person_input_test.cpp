@@ -97,7 +97,9 @@ TEST(PersonTrack, OldRepeatedAndUnseenEstimatesAreLeftOut) {
   nobody.seen = false;
   EXPECT_EQ(track.receive(nobody, {}, 10.06), PersonFault::kUnseen);
   EXPECT_EQ(track.newest_at(), 10.0);
-  EXPECT_EQ(track.receive(someone(1), {}, 11.5), PersonFault::kNone);  // an estimator that was started anew
+  EXPECT_EQ(track.receive(someone(1), {}, 11.5), PersonFault::kOld);
+  EXPECT_EQ(track.receive(someone(2), {}, 11.53), PersonFault::kNone);  // an estimator that was started anew
+  EXPECT_EQ(track.restarts(), 1);
 }
 
 // Thirty a second, ragged by up to 10 ms: at 50 Hz somebody who walks evenly is seen to walk evenly.

@@ -118,6 +118,43 @@ TEST(RobotGuard, OldAndRepeatedMessagesAreDropped) {
   EXPECT_EQ(robot.guard.status().limited.root.forward, 0.0);
 }
 
+TEST(StreamOrder, ARepeatedNumberIsNeverTakenAndAStreamThatBeginsAnewAfterAPauseIs) {
+  StreamOrder order;
+  EXPECT_TRUE(order.takes(7, 0.0));
+  for (int k = 1; k < 500; ++k) EXPECT_FALSE(order.takes(7, 0.02 * k)) << "a planner that hangs";
+  EXPECT_EQ(order.old(), 499);
+  EXPECT_TRUE(order.takes(8, 10.0));
+  EXPECT_FALSE(order.takes(1, 10.5)) << "no pause";
+  EXPECT_FALSE(order.takes(2, 10.9));
+  EXPECT_TRUE(order.takes(3, 11.1));
+  EXPECT_EQ(order.restarts(), 1);
+  EXPECT_FALSE(order.takes(3, 11.2));
+  EXPECT_TRUE(order.takes(4, 11.2));
+}
+
+TEST(RobotGuard, APlannerAndAPerceptionThatWereStartedAnewAreHeardAgain) {
+  GuardedTwin robot(test::twin_guard(true));
+  robot.sees = robot.plans = false;
+  PlannerMessage planner = robot.message;
+  PersonMessage person = robot.person;
+  const auto tell = [&](std::uint64_t sequence) {
+    planner.sequence = person.sequence = sequence;
+    planner.command.stamp = robot.now;
+    robot.guard.receive(planner, robot.now);
+    robot.guard.receive(person, robot.now);
+  };
+  tell(1'000'000);
+  robot.run_for(1.1);
+  tell(1);
+  EXPECT_EQ(robot.guard.planner().sequence, 1'000'000U);
+  tell(2);
+  robot.tick();
+  EXPECT_EQ(robot.guard.planner().sequence, 2U);
+  EXPECT_GT(robot.guard.status().input.person_at, 1.0);
+  EXPECT_EQ(robot.guard.status().restarts, 2);
+  EXPECT_EQ(robot.guard.status().old_messages, 2);
+}
+
 TEST(RobotGuard, OldAndRepeatedMessagesOfPerceptionAreDropped) {
   GuardedTwin robot(test::twin_guard(true));
   robot.sees = false;
