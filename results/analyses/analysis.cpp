@@ -44,7 +44,7 @@ std::string analysis_markdown(const Analysis& analysis) { return markdown_text(a
 std::string terminal_text(const Analysis& analysis) { return markdown_text(analysis, true); }
 
 std::string analysis_latex(const Analysis& analysis) {
-  std::string text = analysis.tables.empty() ? "" : "% \\usepackage{booktabs}\n";
+  std::string text = analysis.tables.empty() ? "" : "% \\usepackage{booktabs, graphicx}\n";
   for (const std::string& note : lead_of(analysis)) text += latex_comment(note);
   for (const TitledTable& titled : analysis.tables) text.append("\n").append(latex_of(titled));
   return text;

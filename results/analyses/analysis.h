@@ -40,7 +40,7 @@ struct Analysis {
 std::string analysis_markdown(const Analysis& analysis);
 // Without the tables that are too long for it.
 std::string terminal_text(const Analysis& analysis);
-std::string analysis_latex(const Analysis& analysis);  // a tabular per table, the rest as comments
+std::string analysis_latex(const Analysis& analysis);  // a table environment per table, the rest as comments
 std::string analysis_csv(const Analysis& analysis);
 // duet.analysis/1: `analysis`, `title`, `level`, `notes` (each that stands with a table), `figures`.
 nlohmann::json analysis_json(const Analysis& analysis);

@@ -202,11 +202,38 @@ std::string markdown_of(const TitledTable& titled) {
 
 std::string latex_of(const TitledTable& titled) {
   std::string text;
-  for (const std::string* line : {&titled.title, &titled.caption})
-    if (!line->empty()) text += latex_comment(*line);
-  for (const std::string& note : titled.notes) text += latex_comment(note);
-  if (!titled.table.rows.empty()) text += latex_table(titled.table);
-  return text;
+  if (titled.table.rows.empty()) {
+    for (const std::string* line : {&titled.title, &titled.caption})
+      if (!line->empty()) text += latex_comment(*line);
+    for (const std::string& note : titled.notes) text += latex_comment(note);
+    return text;
+  }
+  std::string caption = titled.title;
+  if (!titled.title.empty() && !titled.caption.empty()) caption += titled.title.ends_with('.') ? " " : ". ";
+  caption += titled.caption;
+  text = "\\begin{table}\n\\centering\\small\n";
+  if (!caption.empty()) text += fmt::format("\\caption{{{}}}\n", escape_latex(caption));
+  text +=
+      "\\resizebox{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}{!}{%\n" + latex_table(titled.table) + "}\n";
+  for (const std::string& note : titled.notes)
+    text += fmt::format("\\par\\smallskip\\parbox{{\\linewidth}}{{\\footnotesize {}}}\n", escape_latex(note));
+  return text + "\\end{table}\n";
+}
+
+TitledTable with_columns(TitledTable titled, const std::vector<std::string>& columns) {
+  TextTable& table = titled.table;
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < table.header.size(); ++i)
+    if (i < table.label_columns || std::ranges::find(columns, table.header[i]) != columns.end()) kept.push_back(i);
+  if (kept.size() == table.label_columns) return titled;
+  const auto cut = [&](const std::vector<std::string>& cells) {
+    std::vector<std::string> some;
+    for (const std::size_t i : kept) some.push_back(cells[i]);
+    return some;
+  };
+  table.header = cut(table.header);
+  for (std::vector<std::string>& row : table.rows) row = cut(row);
+  return titled;
 }
 
 void add_column(const std::string& header, TitledTable& titled, const std::function<std::string(std::size_t)>& cell) {

@@ -49,8 +49,11 @@ TitledTable labelled_table(const std::string& title, const RowLabels& labels);
 
 // "### title", caption, table, notes.
 std::string markdown_of(const TitledTable& titled);
-// The title, caption and notes as comments, then the tabular.
+// A table environment that fits the text of any class (booktabs, graphicx): title and caption as its caption, the
+// tabular, set smaller where it is wider than the lines, and the notes below it. Without rows the notes as comments.
 std::string latex_of(const TitledTable& titled);
+// Its labels and those of these columns that it has, in its own order; all where it has none of them.
+TitledTable with_columns(TitledTable titled, const std::vector<std::string>& columns);
 // Appends a column; `cell` makes that of the row with a number.
 void add_column(const std::string& header, TitledTable& titled, const std::function<std::string(std::size_t)>& cell);
 

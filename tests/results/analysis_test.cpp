@@ -62,8 +62,9 @@ TEST(Analysis, NotesOfAllTablesStandUnderTheTitleAndTheTablesBelow) {
   noted.notes = {"How to read them."};
   EXPECT_THAT(analysis_markdown(noted),
               testing::StartsWith("### Two tables\n\nBeware.\n\nHow to read them.\n\n#### First\n"));
-  EXPECT_THAT(analysis_latex(noted),
-              testing::StartsWith("% \\usepackage{booktabs}\n% Beware.\n% How to read them.\n\n% First\n"));
+  EXPECT_THAT(
+      analysis_latex(noted),
+      testing::StartsWith("% \\usepackage{booktabs, graphicx}\n% Beware.\n% How to read them.\n\n\\begin{table}\n"));
 }
 
 TEST(Analysis, WithoutTablesItIsItsNote) {
@@ -81,11 +82,41 @@ TEST(Analysis, ATerminalDoesWithoutLongTables) {
   EXPECT_THAT(analysis_markdown(analysis), HasSubstr("### Second"));
 }
 
-TEST(Analysis, LatexIsABooktabsTabularPerTableWithEscapedNames) {
-  const std::string text = analysis_latex(example());
-  EXPECT_THAT(text, AllOf(testing::StartsWith("% \\usepackage{booktabs}\n\n% First\n% Of <b>all</b>.\n% A note.\n"),
-                          HasSubstr("\\begin{tabular}{lr}\n\\toprule\nPolicy & n \\\\\n\\midrule\n"),
-                          HasSubstr("{}d\\_star & 1.5 [1.0, 2.0] \\\\\n\\bottomrule"), HasSubstr("% Second\n")));
+TEST(Analysis, LatexIsATableThatFitsTheLinePerTableWithCaptionAndNotesAsText) {
+  Analysis two = example();
+  two.tables[0].notes = {"50 % of a_b."};
+  EXPECT_THAT(analysis_latex(two), testing::StartsWith(R"(% \usepackage{booktabs, graphicx}
+
+\begin{table}
+\centering\small
+\caption{First. Of <b>all</b>.}
+\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%
+\begin{tabular}{lr}
+\toprule
+Policy & n \\
+\midrule
+{}d\_star & 1.5 [1.0, 2.0] \\
+\bottomrule
+\end{tabular}
+}
+\par\smallskip\parbox{\linewidth}{\footnotesize 50 \% of a\_b.}
+\end{table}
+
+\begin{table}
+\centering\small
+\caption{Second. Of <b>all</b>.}
+)"));
+  two.tables.resize(1);
+  two.tables[0].table.rows.clear();
+  EXPECT_THAT(analysis_latex(two), HasSubstr("\n% First\n% Of <b>all</b>.\n% 50 % of a_b.\n"));
+}
+
+TEST(Analysis, ATableOfFewerColumnsKeepsItsLabels) {
+  const TitledTable whole{.table = {.header = {"Policy", "n", "Success", "Lift"}, .rows = {{"a", "3", "1", "2"}}}};
+  const TitledTable some = with_columns(whole, {"Lift", "n", "Speed"});
+  EXPECT_THAT(some.table.header, ElementsAre("Policy", "n", "Lift"));
+  EXPECT_THAT(some.table.rows, ElementsAre(ElementsAre("a", "3", "2")));
+  EXPECT_EQ(with_columns(whole, {"Speed"}).table.header.size(), 4U) << "it has none of them";
 }
 
 TEST(Analysis, CsvIsAFigureALineNotRounded) {

@@ -251,7 +251,7 @@ TEST(Leaderboard, PlansThatWereLostStandInEveryTable) {
           "Policy 'evil' lost plans (in 2 episodes: 3 invalid, dead in 2, which are errors and count as failures). "
           "The first fault: policy 'evil': it ended\n"));
   EXPECT_THAT(text, HasSubstr("The first fault: no plan for tick 0\\x1b[31m\n"));
-  EXPECT_THAT(latex_of(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("% Policy 'late' lost plans")));
+  EXPECT_THAT(latex_of(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("{\\footnotesize Policy 'late' lost plans")));
   const Analysis analysis = leaderboard_analysis(entries);
   const auto evil = [&](const char* name) { return figure(analysis, {.policy = "evil", .task = "all", .name = name}); };
   EXPECT_EQ(evil("policy_dead").value, 2.0);
