@@ -1,9 +1,5 @@
 #include "duet/bench/suite_names.h"
 
-#include <fmt/format.h>
-
-#include <stdexcept>
-
 namespace duet {
 
 bool is_path_option(std::string_view option) {
@@ -38,12 +34,6 @@ const NameTable<ClipRoles>& role_names() {
 const NameTable<Likeness>& likeness_names() {
   static const NameTable<Likeness> names = {{"rehearsed", Likeness::kRehearsed}, {"people", Likeness::kPeople}};
   return names;
-}
-
-Likeness likeness_of(std::string_view option, const std::string& name) {
-  for (const auto& [known, value] : likeness_names())
-    if (known == name) return value;
-  throw std::invalid_argument(fmt::format("{}: expected rehearsed or people, found '{}'", option, name));
 }
 
 const NameTable<PartnerMode>& partner_names() {

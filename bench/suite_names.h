@@ -29,8 +29,6 @@ const NameTable<Side>& side_names();
 const NameTable<ActOutcome>& act_outcome_names();
 const NameTable<ClipRoles>& role_names();
 const NameTable<Likeness>& likeness_names();  // "rehearsed", "people"
-// Throws std::invalid_argument that begins with `option` and lists the names.
-Likeness likeness_of(std::string_view option, const std::string& name);
 const NameTable<PartnerMode>& partner_names();
 const NameTable<RecordTrajectories>& record_names();
 const NameTable<DetectorVersion>& version_names();

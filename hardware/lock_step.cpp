@@ -102,7 +102,6 @@ bool LockStepTwin::await(const LowStateFrame& state, const std::function<void(co
       locked_ = wire_.command_writers() > 0 && now - begin < kGiveUpAfter;
       wire_.write(state);
       sent_at = now;
-      ++resent_;
     }
   } while (locked_);
   return false;

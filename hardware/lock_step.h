@@ -55,12 +55,10 @@ class LockStepTwin {
   // twin is on its own, at the wall's pace.
   // False where nobody answers in lock-step (yet, or any more).
   bool await(const LowStateFrame& state, const std::function<void(const LowCommandFrame&)>& obey);
-  [[nodiscard]] long resent() const { return resent_; }
 
  private:
   TwinWire& wire_;
   bool locked_ = false;
-  long resent_ = 0;
 };
 
 }  // namespace duet

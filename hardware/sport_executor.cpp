@@ -37,7 +37,6 @@ void SportExecutor::poll(double now) {
 
 void SportExecutor::hear(const RpcResponse& response, double now) {
   if (response.code != 0) {
-    ++refused_;
     last_refusal_ = response.code;
     return;
   }

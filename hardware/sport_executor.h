@@ -43,7 +43,6 @@ class SportExecutor final : public Executor {
   void enter(SafetyState state) override;
 
   [[nodiscard]] double arm_weight() const { return weight_; }  // 0 to 1
-  [[nodiscard]] long refused_calls() const { return refused_; }
 
  private:
   void hear(const RpcResponse& response, double now);
@@ -59,7 +58,7 @@ class SportExecutor final : public Executor {
   double weight_ = 0.0, heard_at_ = kNever, asked_at_ = kNever;
   int fsm_ = -1;  // -1: not known
   std::int32_t last_refusal_ = 0;
-  long ticks_ = 0, refused_ = 0;
+  long ticks_ = 0;
 };
 
 }  // namespace duet

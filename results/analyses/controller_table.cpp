@@ -22,6 +22,13 @@ struct ControllerKey {
 
 using RowList = std::vector<const EpisodeRow*>;
 
+// A row of Table S4 as the supplement prints it; `values` as in kControllerFigures, `before` its first three.
+struct PaperController {
+  std::string_view policy, controller;
+  std::array<double, 7> values;
+  std::array<double, 3> before;
+};
+
 // Source: supplement A.4.6, Table S4.
 constexpr std::array<double, 3> kBeforeDstar = {0.162, 286.2, 115.6};
 constexpr std::array<double, 3> kBeforeDiffusion = {0.165, 180.0, 119.3};
@@ -227,8 +234,6 @@ void add_controller_figures(const PaperController& paper, std::vector<Figure>& i
 }
 
 }  // namespace
-
-std::span<const PaperController> paper_controllers() { return kPaperControllers; }
 
 ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options,
                                  const std::string& arm) {

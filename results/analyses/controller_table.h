@@ -6,7 +6,6 @@
 #include <array>
 #include <limits>
 #include <map>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,14 +56,6 @@ struct ControllerTable {
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 ControllerTable controller_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {},
                                  const std::string& arm = "main");
-
-// A row of Table S4 as the supplement prints it; `values` as in kControllerFigures, `before` its first three.
-struct PaperController {
-  std::string_view policy, controller;
-  std::array<double, 7> values;
-  std::array<double, 3> before;
-};
-std::span<const PaperController> paper_controllers();
 
 // Jitter before and after the controller; tracking, survival and faults. Each with the paper's rows at its end.
 Analysis controller_analysis(const ControllerTable& table);
