@@ -1,6 +1,7 @@
 // Whose fault it is: what is found to be wrong with a file only after it was read still names the file. Thread-safe.
 #pragma once
 
+#include <new>
 #include <string>
 #include <utility>
 
@@ -11,7 +12,8 @@ namespace duet {
 // "FILE: MESSAGE", or the message alone where it names the file already.
 std::string naming_file_message(const std::string& path, const std::string& message);
 
-// What `work` gives. Its InputError and std::invalid_argument become an InputError that names the file.
+// The result of `work`. Its InputError, std::invalid_argument and std::bad_alloc become an InputError that names the
+// file.
 template <typename Work>
 decltype(auto) naming_file(const std::string& path, Work&& work) {
   try {
@@ -22,6 +24,8 @@ decltype(auto) naming_file(const std::string& path, Work&& work) {
     throw InputError(naming_file_message(path, error.what()));
   } catch (const std::invalid_argument& error) {
     throw InputError(naming_file_message(path, error.what()));
+  } catch (const std::bad_alloc&) {
+    throw InputError(naming_file_message(path, "there is not enough memory for it"));
   }
 }
 

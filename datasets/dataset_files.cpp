@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/json.h"
 #include "duet/datasets/annotations.h"
 #include "duet/datasets/dataset_card.h"
@@ -47,7 +47,8 @@ std::string rejected_file(const std::string& clip) { return "rejected/" + clip +
 
 void write_derived_files(const std::string& folder, const std::vector<DatasetEntry>& entries) {
   const nlohmann::json settings = read_dataset_settings(folder);
-  const auto write = [&](const std::string& name, const std::string& text) { write_file(inside(folder, name), text); };
+  FileBatch batch;
+  const auto write = [&](const std::string& name, const std::string& text) { batch.write(inside(folder, name), text); };
   write("manifest.json", manifest_of(entries));
   write("annotations.csv", annotations_of(entries));
   write("tables/curation.csv", csv_table(curation_table(entries)));
@@ -57,6 +58,7 @@ void write_derived_files(const std::string& folder, const std::vector<DatasetEnt
   write("tables/retargeting.csv", csv_table(retargeting_table(entries)));
   write("card.md", dataset_card_markdown(entries, settings));
   write("card.html", dataset_card_html(entries, settings));
+  batch.put_in_place();
 }
 
 }  // namespace duet

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/formats/pickle_formats.h"
@@ -129,7 +129,10 @@ MotionFiles robot_motion_files(const RobotMotion& motion, const RobotModel& robo
 void write_robot_motion(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format,
                         const std::string& path, const RobotMotionWriting& writing) {
   const MotionFiles files = robot_motion_files(motion, robot, format, writing);
-  for (const auto& [name, content] : files) write_file(name.empty() ? path : fmt::format("{}/{}", path, name), content);
+  FileBatch batch;
+  for (const auto& [name, content] : files)
+    batch.write(name.empty() ? path : fmt::format("{}/{}", path, name), content);
+  batch.put_in_place();
 }
 
 std::string robot_motion_table() {

@@ -198,7 +198,7 @@ McapWriter::~McapWriter() {
 
 void McapWriter::put(std::span<const std::byte> bytes) {
   checksum_ = more_checksum(checksum_, bytes);
-  good_ = good_ && std::fwrite(bytes.data(), 1, bytes.size(), file_) == bytes.size();
+  if (error_ == 0 && std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) error_ = errno;
 }
 
 void McapWriter::put_record(std::uint8_t kind, std::string_view content) {
@@ -265,16 +265,16 @@ bool McapWriter::write(std::uint16_t channel, std::uint32_t sequence, std::uint6
   if (chunks_ == McapChunks::kOneMessage) put_chunk_head(time, head, data);
   gather(head);
   gather(data);
-  if (chunks_ != McapChunks::kZstd) return good_;
+  if (chunks_ != McapChunks::kZstd) return good();
   chunk_begin_ = chunk_end_ == 0 ? time : std::min(chunk_begin_, time);
   chunk_end_ = std::max(chunk_end_, time);
   if (chunk_.size() >= kChunkBytes) end_chunk();
-  return good_;
+  return good();
 }
 
 bool McapWriter::flush() {
-  good_ = good_ && std::fflush(file_) == 0;
-  return good_;
+  if (error_ == 0 && std::fflush(file_) != 0) error_ = errno;
+  return good();
 }
 
 bool McapWriter::finish() {

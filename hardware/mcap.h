@@ -26,7 +26,7 @@ struct McapChannel {
 // zstd.
 enum class McapChunks { kNone, kOneMessage, kZstd };
 
-// One owner, one thread.
+// One owner, one thread. What write(), flush() and finish() say once they go on saying; error() is the system's reason.
 class McapWriter {
  public:
   // Makes `path`; throws StorageError where it is there already or cannot be made.
@@ -42,7 +42,8 @@ class McapWriter {
   bool flush();  // of chunks the whole ones
   // The end of the data with its checksum; nothing may follow. False as above.
   bool finish();
-  [[nodiscard]] bool good() const { return good_; }
+  [[nodiscard]] bool good() const { return error_ == 0; }
+  [[nodiscard]] int error() const { return error_; }  // of errno, the first; 0: none
 
  private:
   void put(std::span<const std::byte> bytes);
@@ -58,7 +59,8 @@ class McapWriter {
   std::string chunk_;                              // records that are not in the file yet
   std::uint64_t chunk_begin_ = 0, chunk_end_ = 0;  // times of its messages [ns]; 0, 0: it has none
   std::uint32_t checksum_ = 0;
-  bool good_ = true, finished_ = false;
+  int error_ = 0;
+  bool finished_ = false;
 };
 
 struct McapMessage {

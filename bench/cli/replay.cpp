@@ -8,7 +8,7 @@
 #include "duet/bench/replay/replay_mcap.h"
 #include "duet/bench/replay/replay_page.h"
 #include "duet/bench/replay/replay_source.h"
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -81,11 +81,13 @@ struct Written {
 Written write_pages(const ReplayContent& content, const ViewerBundle& viewer, const std::string& output) {
   Written written;
   const std::vector<ReplayPage> pages = replay_pages(content, viewer);
+  FileBatch batch;
   for (std::size_t i = 0; i < pages.size(); ++i) {
     const std::string path = part_name(output, i);
-    write_file(path, pages[i].html);
+    batch.write(path, pages[i].html);
     written.add(path, pages[i].html.size(), pages[i].scenes);
   }
+  batch.put_in_place();
   if (pages.size() > 1)
     written.text += fmt::format("split into {} pages: one of them all would be above {:.0f} MB\n", pages.size(),
                                 static_cast<double>(kMostPageBytes) / 1e6);

@@ -11,7 +11,7 @@
 #include "duet/bench/replay/report_replays.h"
 #include "duet/bench/shell_word.h"
 #include "duet/bench/story.h"
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
@@ -26,7 +26,7 @@ namespace duet::cli {
 namespace {
 
 struct ReportArguments {
-  std::vector<std::string> runs, formats = {"md", "html"}, curves;
+  std::vector<std::string> runs, formats = {"md", "html"}, curves, columns;
   std::string output;
   bool no_clips = false;
   ReplayChoice replays{.episodes = {},
@@ -70,6 +70,21 @@ void check_formats(const std::vector<std::string>& formats) {
             unknown_name_message("format", format, known));
 }
 
+// The columns asked for, of the tables that LaTeX gets. Throws where no table has one of them.
+std::vector<Analysis> with_columns_of_latex(std::vector<Analysis> analyses, const std::vector<std::string>& columns) {
+  std::vector<std::string> known;
+  for (Analysis& analysis : analyses)
+    for (TitledTable& titled : analysis.tables) {
+      const std::vector<std::string>& header = titled.table.header;
+      for (std::size_t i = titled.table.label_columns; i < header.size(); ++i)
+        if (std::ranges::find(known, header[i]) == known.end()) known.push_back(header[i]);
+      if (!columns.empty()) titled = with_columns(std::move(titled), columns);
+    }
+  for (const std::string& column : columns)
+    require(std::ranges::find(known, column) != known.end(), unknown_name_message("column", column, known));
+  return analyses;
+}
+
 // Writes a file of a format into the folder, with what has to be said of the runs.
 using Writer = std::function<void(const std::string& name, const std::string& text, const std::string& format)>;
 
@@ -111,7 +126,8 @@ void run_report(const Session& session, const ReportArguments& arguments) {
   add_row_notes(run.rows, notes);
   const bool replays = arguments.replays.scenes > 0;
   const RunTables tables = tables_of(replays ? run.rows : std::exchange(run.rows, {}), run);
-  const std::vector<Analysis> analyses = run_analyses(tables);
+  const std::vector<Analysis> analyses = run_analyses(tables),
+                              latex = with_columns_of_latex(analyses, arguments.columns);
   const std::string folder = arguments.output.empty() ? arguments.runs.front() : arguments.output;
   notes = with_suite(tables.board.suite, std::move(notes));
   if (arguments.min_effect > 0.0)
@@ -123,10 +139,11 @@ void run_report(const Session& session, const ReportArguments& arguments) {
     json["files"].push_back(path);
     note(session, "wrote " + path);
   };
+  FileBatch batch;  // a disk that fills up leaves no new table among old ones
+  std::vector<std::string> written;
   const Writer write = [&](const std::string& name, const std::string& text, const std::string& format) {
-    const std::string path = inside(folder, name);
-    write_file(path, format == "html" ? text : with_notes(format, text, notes));
-    wrote(path);
+    written.push_back(inside(folder, name));
+    batch.write(written.back(), format == "html" ? text : with_notes(format, text, notes));
   };
   for (const std::string& format : arguments.formats) {
     if (format == "html") {
@@ -135,12 +152,15 @@ void run_report(const Session& session, const ReportArguments& arguments) {
       write("report.html", html_text(run, tables, analyses, own, std::move(replays), arguments, progress), format);
       if (tables.engines.engines.size() > 1) write("engines.svg", engine_plot_svg(tables.engines), "svg");
     }
-    if (format == "sqlite") {
-      write_database(tables.rows, inside(folder, "results.sqlite"), notes);
-      wrote(inside(folder, "results.sqlite"));
-    }
-    for (const auto& [file, text] : analysis_files(analyses, format)) write(file, text, format);
+    for (const auto& [file, text] : analysis_files(format == "tex" ? latex : analyses, format))
+      write(file, text, format);
   }
+  if (std::ranges::find(arguments.formats, "sqlite") != arguments.formats.end()) {  // the last that may find no room
+    written.push_back(inside(folder, "results.sqlite"));
+    write_database(tables.rows, written.back(), notes);
+  }
+  batch.put_in_place();
+  for (const std::string& path : written) wrote(path);
   add_analyses(analyses, json);
   print(session, with_notes("md", run_text(analyses), notes), json);
   if (arguments.replays.scenes == 0)
@@ -158,6 +178,10 @@ void add_report(CLI::App& app, Session& session) {
   command->add_option("-f,--format", arguments->formats, "md, csv, json, tex, html, sqlite (default: md,html)")
       ->delimiter(',');
   command->add_option("-o,--output", arguments->output, "folder (default: the first run directory)");
+  command
+      ->add_option("--columns", arguments->columns,
+                   "columns of the LaTeX tables, beside what tells their rows apart; a table without any stays whole")
+      ->delimiter(',');
   command->add_option("--curves", arguments->curves,
                       "training curves to show in the HTML (CSV; the first column is the axis)");
   command

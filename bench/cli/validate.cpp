@@ -10,7 +10,7 @@
 #include "duet/bench/cli/command.h"
 #include "duet/bench/parity_page.h"
 #include "duet/bench/profile.h"
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/require.h"
 #include "duet/results/analyses/text_table.h"
 #include "duet/results/rows/json_fields.h"
@@ -122,10 +122,12 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
       note(session, stale);
   if (!arguments.output.empty()) {
     const std::filesystem::path folder = arguments.output;
-    write_file(folder / "certificate.json", dumped(json, 1) + "\n");
-    write_file(folder / "parity.html", parity_page(certificate));
+    FileBatch batch;
+    batch.write(folder / "certificate.json", dumped(json, 1) + "\n");
+    batch.write(folder / "parity.html", parity_page(certificate));
     if (const std::string picture = parity_svg(certificate); !picture.empty())
-      write_file(folder / "parity.svg", picture);
+      batch.write(folder / "parity.svg", picture);
+    batch.put_in_place();
     note(session, fmt::format("wrote {0}/certificate.json and {0}/parity.html", arguments.output));
   }
   print(session, text, json);

@@ -12,7 +12,7 @@
 #include <memory>
 
 #include "duet/bench/shell_word.h"
-#include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 
@@ -173,8 +173,10 @@ SlurmJobs slurm_jobs(const RunStatus& status, const std::string& run, const Slur
 }
 
 void write_slurm_scripts(const SlurmJobs& jobs, const std::string& run) {
-  write_file(inside(run, "slurm/array.sh"), jobs.array_script);
-  write_file(inside(run, "slurm/merge.sh"), jobs.merge_script);
+  FileBatch batch;
+  batch.write(inside(run, "slurm/array.sh"), jobs.array_script);
+  batch.write(inside(run, "slurm/merge.sh"), jobs.merge_script);
+  batch.put_in_place();
 }
 
 bool has_sbatch() { return std::system("command -v sbatch >/dev/null 2>&1") == 0; }

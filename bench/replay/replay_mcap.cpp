@@ -1,11 +1,13 @@
 #include "duet/bench/replay/replay_mcap.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include "duet/core/file.h"
@@ -92,7 +94,8 @@ nlohmann::json transform_json(const std::string& frame, const Eigen::Vector3d& p
 // Topics of one file, which may be added at any time.
 class ReplayTopics {
  public:
-  explicit ReplayTopics(const std::string& path) : file_(path, McapChunks::kZstd) {}
+  // Writes `part`; messages name `path`, the file that it becomes.
+  ReplayTopics(std::string path, const std::string& part) : path_(std::move(path)), file_(part, McapChunks::kZstd) {}
 
   std::uint16_t add(const std::string& topic, const char* schema_name, const char* schema) {
     require(topics_ < std::numeric_limits<std::uint16_t>::max(), "an MCAP file has at most 65535 topics");
@@ -105,15 +108,21 @@ class ReplayTopics {
   }
   void put(std::uint16_t topic, int t, std::uint64_t time, const nlohmann::json& json) {
     const std::string text = dumped(json);
-    if (!file_.write(topic, static_cast<std::uint32_t>(t), time, std::as_bytes(std::span(text))))
-      throw StorageError("the MCAP file cannot be written");
+    if (!file_.write(topic, static_cast<std::uint32_t>(t), time, std::as_bytes(std::span(text)))) fail_to_write();
   }
   void put_entities(std::uint16_t topic, int t, std::uint64_t time, nlohmann::json entities) {
     put(topic, t, time, {{"deletions", nlohmann::json::array()}, {"entities", std::move(entities)}});
   }
-  bool finish() { return file_.finish(); }
+  void finish() {
+    if (!file_.finish()) fail_to_write();
+  }
 
  private:
+  [[noreturn]] void fail_to_write() const {
+    throw StorageError(fmt::format("cannot write '{}': {}", path_, std::generic_category().message(file_.error())));
+  }
+
+  std::string path_;
   McapWriter file_;
   std::uint16_t topics_ = 0;
 };
@@ -278,10 +287,21 @@ void write_scene(const ReplayScene& scene, ReplayTopics& topics) {
 }  // namespace
 
 void write_replay_mcap(const ReplayContent& content, const std::string& path) {
-  std::filesystem::remove(path);
-  ReplayTopics topics(path);
-  for (const ReplayScene& scene : content.scenes) write_scene(scene, topics);
-  if (!topics.finish()) throw StorageError(fmt::format("'{}' cannot be written", path));
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored))
+    throw StorageError(fmt::format("cannot write '{}': expected a file, found a folder, a device or a pipe", path));
+  const std::string part = fmt::format("{}.part-{}", path, ::getpid());
+  try {
+    fs::remove(part, ignored);
+    ReplayTopics topics(path, part);
+    for (const ReplayScene& scene : content.scenes) write_scene(scene, topics);
+    topics.finish();
+    fs::rename(part, path);
+  } catch (...) {
+    fs::remove(part, ignored);
+    throw;
+  }
 }
 
 }  // namespace duet

@@ -26,6 +26,7 @@
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"
 #include "tests/bench/verified_run.h"
+#include "tests/file_size_limit.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -295,6 +296,22 @@ TEST_F(Replay, OfTheRuleInteractionTheActIsTraced) {
   const std::string data = replay_data(judged);
   EXPECT_THAT(data, HasSubstr(R"("set":"act")"));
   EXPECT_THAT(data, HasSubstr(R"("set":"paper")"));
+}
+
+TEST_F(Replay, AFullDiskLeavesTheOldMcapAndNoHalfOne) {
+  const ReplayContent content_of_run = content(run("all"));
+  const std::string path = folder_ / "films/replay.mcap";
+  write_file(path, "old");
+  {
+    const test::FileSizeLimit full(2000);
+    EXPECT_EQ(test::thrown_message<StorageError>([&] { write_replay_mcap(content_of_run, path); }),
+              "cannot write '" + path + "': File too large");
+  }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_ / "films"), {}), 1);
+  std::filesystem::create_directory(folder_ / "films/folder");
+  EXPECT_THAT(test::thrown_message<StorageError>([&] { write_replay_mcap(content_of_run, folder_ / "films/folder"); }),
+              HasSubstr("expected a file, found a folder, a device or a pipe"));
 }
 
 TEST_F(Replay, TheMcapTellsBodiesOnceAndWhereTheyAreAtEachFrame) {

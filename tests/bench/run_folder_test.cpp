@@ -139,6 +139,17 @@ TEST_F(RunFolder, AnErrorOfStorageStopsTheRunAndNoEpisodeFailsByIt) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "run/trajectories"), fs::directory_iterator()), 4);
 }
 
+TEST_F(RunFolder, AReportThatTheDiskDoesNotTakeLeavesNoNewTableAmongOldOnes) {
+  write_suite();
+  ASSERT_EQ(bash("$D run $o/suite.yaml -o $o/run -q").code, 0);
+  write_file(folder_ / "report/leaderboard.md", "old");
+  const Ended full = bash("ulimit -f 24; $D report $o/run -q --no-clips -f md,csv,html -o $o/report");
+  EXPECT_EQ(full.code, 2) << full.text;
+  EXPECT_THAT(full.text, AllOf(HasSubstr("cannot write '"), HasSubstr("/report/"), HasSubstr("File too large")));
+  EXPECT_EQ(read_file(folder_ / "report/leaderboard.md"), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "report"), fs::directory_iterator()), 1);
+}
+
 TEST_F(RunFolder, RetryErrorsRunsThemAgainAndNothingElse) {
   write_suite();
   ASSERT_EQ(bash("$D run $o/suite.yaml -o $o/run -q").code, 0);

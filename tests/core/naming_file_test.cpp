@@ -18,6 +18,11 @@ TEST(NamingFile, PutsTheFileBeforeWhatDoesNotNameIt) {
   EXPECT_EQ(told<InputError>("'a.npz': key 'b'"), "'a.npz': key 'b'");
 }
 
+TEST(NamingFile, SaysThatThereIsNotEnoughMemoryForAFile) {
+  EXPECT_EQ(thrown_message<InputError>([] { naming_file("a.npz", [] { throw std::bad_alloc(); }); }),
+            "a.npz: there is not enough memory for it");
+}
+
 TEST(NamingFile, LetsValuesAndOtherExceptionsThrough) {
   int value = 3;
   EXPECT_EQ(&naming_file("a.npz", [&]() -> int& { return value; }), &value);
