@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <new>
 
 #include "duet/bench/scoring.h"
 #include "duet/core/file.h"
@@ -79,6 +80,8 @@ GuardedRun run_guarded_episode(const EpisodeSpec& spec, const Suite& suite, cons
     run_in_world(spec, suite, robot, policy, link, options, run);
   } catch (const StorageError&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;  // the machine's fault, not the policy's: no row says it
   } catch (const MissingError& error) {
     run.row.outcome = Outcome::kUnsupported;
     run.row.message = error.what();

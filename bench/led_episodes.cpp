@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <utility>
 
 #include "duet/backends/factory.h"
@@ -17,6 +18,13 @@
 
 namespace duet {
 namespace {
+
+EpisodeRow failed_row(const std::string& message) {
+  EpisodeRow row;
+  row.outcome = Outcome::kError;
+  row.message = message;
+  return row;
+}
 
 constexpr double kWhile = 1.0;  // [s] between two looks at whether the episode is over
 
@@ -112,10 +120,10 @@ void LedEpisode::start(int episode) {
     try {
       row_ = suite_->run(episode, lead);
     } catch (const EpisodeInterrupted&) {  // it leaves no row
+    } catch (const std::bad_alloc&) {
+      row_ = failed_row("there is not enough memory for the episode");
     } catch (const std::exception& error) {
-      row_ = EpisodeRow{};
-      row_->outcome = Outcome::kError;
-      row_->message = error.what();
+      row_ = failed_row(error.what());
     }
     queue->close("the episode is over");
   });

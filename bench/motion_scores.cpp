@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "duet/core/memory_left.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/grounding.h"
@@ -122,6 +123,8 @@ std::vector<DetectorView> views_of(const PairedMotion& motion, const std::shared
 
 ClipScore score_clip(const PairedMotion& motion, const std::shared_ptr<const RobotModel>& robot,
                      const ScoreOptions& options) {
+  constexpr double kBytesOfFrame = 10.0e3;  // measured with a motion of 4 minutes
+  require_memory(fmt::format("clip '{}': {} frames", motion.clip_id, motion.frames()), motion.frames() * kBytesOfFrame);
   const Readings& readings = options.readings;
   ClipScore score;
   score.clip = motion.clip_id;

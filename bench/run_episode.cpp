@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <new>
 #include <utility>
 
 #include "duet/backends/factory.h"
@@ -170,6 +171,8 @@ EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIde
     simulate(spec, suite, robot, trajectory_folder, lead, row);
   } catch (const StorageError&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw;  // the machine's fault, not the policy's: no row says it
   } catch (const MissingError& error) {
     row.outcome = Outcome::kUnsupported;
     row.message = error.what();

@@ -27,7 +27,7 @@ struct EpisodeLead {
 };
 
 // One episode, the setup of it, and what it left. Exceptions become rows with outcome `error`, but StorageError (a full
-// disk): it says nothing of the episode.
+// disk) and std::bad_alloc: they say nothing of the episode.
 RolloutSetup episode_setup(const EpisodeSpec& spec, const Suite& suite, const RobotModel& robot);
 EpisodeRow run_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
                        const std::shared_ptr<const RobotModel>& robot, const std::string& trajectory_folder = "",

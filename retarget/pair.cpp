@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "duet/core/clock.h"
+#include "duet/core/memory_left.h"
 #include "duet/core/skeleton.h"
 #include "duet/retarget/gaussian_filter.h"
 #include "duet/retarget/joint_speeds.h"
@@ -19,6 +20,16 @@ namespace {
 
 int scaled_frame(int frame, double ratio, int frames) {
   return std::clamp(static_cast<int>(std::lround(frame * ratio)), 0, frames);
+}
+
+// All frames are solved for at once, and what the solver keeps of them grows with them.
+constexpr double kBytesOfFrame = 24.0e3;  // measured with clips of 1 and 4 minutes
+
+void require_memory_for(const InteractionClip& clip) {
+  const double frames = clip.frames() * kTickRate / clip.rate_hz();
+  require_memory(fmt::format("clip '{}': {:.0f} frames at {} Hz ({:.0f} minutes, which are retargeted at once)",
+                             clip.id, frames, kTickRate, frames / kTickRate / 60.0),
+                 frames * kBytesOfFrame);
 }
 
 // Phases and contact windows keep their instants.
@@ -158,6 +169,7 @@ std::map<std::string, std::string> describe(const InteractionClip& clip, const R
 PairedMotion retarget(const InteractionClip& clip, const RobotModel& robot, const PairOptions& options) {
   validate(clip);
   validate(options);
+  require_memory_for(clip);
   const InteractionClip resampled = at_50_hz(clip);
   const PairProblem problem = make_pair_problem(resampled, robot, options);
   const PairSolution solution = solve_pair(problem, options);

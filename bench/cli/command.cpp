@@ -9,6 +9,7 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/short_names.h"
 #include "duet/core/text.h"
 #include "duet/results/rows/json_fields.h"
 
@@ -96,14 +97,16 @@ void print(const Session& session, const std::string& text, const nlohmann::json
 }
 
 void note(const Session& session, const std::string& text) {
-  if (!session.quiet) print_error(printable(text) + "\n");
+  if (!session.quiet) print_error(printable(with_short_names(text)) + "\n");
 }
 
 void suggest_next(const Session& session, const std::string& command) {
   if (!session.json && isatty(STDERR_FILENO) != 0) note(session, "next: " + command);
 }
 
-void warn(const std::string& text) { print_error(fmt::format("duet: warning: {}\n", printable(text))); }
+void warn(const std::string& text) {
+  print_error(fmt::format("duet: warning: {}\n", printable(with_short_names(text))));
+}
 
 void add_threads(CLI::App* command, int& threads, const std::string& what) {
   command->add_option("-j,--threads", threads, what)->capture_default_str()->check(CLI::Range(1, 1024));

@@ -1,9 +1,11 @@
 // The `duet` program: parses the command line, runs one command, turns exceptions into one sentence and an exit code.
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,12 +14,15 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <new>
+#include <system_error>
 
 #include "duet/bench/cli/command.h"
 #include "duet/bench/cli/hw.h"
 #include "duet/bench/version.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/short_names.h"
 #include "duet/core/text.h"
 
 namespace {
@@ -28,8 +33,34 @@ namespace cli = duet::cli;
 constexpr std::size_t kLongestMessage = 4000;
 
 int fail(int code, const std::string& message) {
-  duet::print_error(fmt::format("duet: {}\n", duet::shown(message, kLongestMessage)));
+  duet::print_error(fmt::format("duet: {}\n", duet::shown(duet::with_short_names(message), kLongestMessage)));
   return code;
+}
+
+// "duet retarget hour.npz -o out", for faults that know nothing of what was being done.
+std::string command_text(const cli::Session& session) {
+  constexpr std::size_t kWords = 5;
+  const std::size_t words = std::min(session.argv.size(), kWords);
+  return fmt::format("duet {}{}", fmt::join(session.argv.begin() + 1, session.argv.begin() + words, " "),
+                     session.argv.size() > words ? " ..." : "");
+}
+
+std::string memory_limit_text() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return "";
+  return fmt::format(" ({} MB are allowed: ulimit -v)", limit.rlim_cur >> 20U);
+}
+
+int fail_for_memory(const cli::Session& session) {
+  return fail(cli::kExitUsage, fmt::format("not enough memory for `{}`{}: fewer threads (-j) and smaller inputs need "
+                                           "less",
+                                           command_text(session), memory_limit_text()));
+}
+
+int fail_for_system(const cli::Session& session, const std::system_error& error) {
+  if (error.code() != std::errc::resource_unavailable_try_again) return fail(cli::kExitUsage, error.what());
+  return fail(cli::kExitUsage, fmt::format("cannot start a thread for `{}`{}: {}; fewer threads (-j) need less memory",
+                                           command_text(session), memory_limit_text(), error.code().message()));
 }
 
 // A standard stream that is closed would be the number of the next file that is opened, and a file that grows past the
@@ -73,6 +104,10 @@ int run_command(CLI::App& app, int argc, char** argv, cli::Session& session) {
     return fail(cli::kExitMissing, error.what());
   } catch (const std::filesystem::filesystem_error& error) {
     return fail(cli::kExitUsage, fmt::format("cannot use '{}': {}", error.path1().string(), error.code().message()));
+  } catch (const std::bad_alloc&) {
+    return fail_for_memory(session);
+  } catch (const std::system_error& error) {
+    return fail_for_system(session, error);
   } catch (const std::exception& error) {
     return fail(cli::kExitUsage, error.what());
   }

@@ -8,6 +8,8 @@
 #include "duet/backends/factory.h"
 #include "duet/core/file.h"
 #include "duet/core/npz.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/motion/synthesis.h"
 #include "duet/robots/robot_model.h"
 #include "duet/training/dstar/trainer.h"
 #include "tests/bench/program.h"
@@ -385,6 +387,59 @@ TEST(CommandLine, FullDiskLosesNothingThatWasThere) {
     EXPECT_EQ(entry.path().extension(), ".npz");
   }
   EXPECT_EQ(files, 1);
+}
+
+// Somebody who goes through the act 25 times, slowly: 500 s at 5 Hz.
+InteractionClip long_clip() {
+  InteractionClip clip = synthesize(Task::kHandshake, SynthesisOptions());
+  for (HumanMotion* motion : {&clip.a, &clip.b}) {
+    PointTracks joints(25 * motion->frames(), kSmplJoints);
+    for (int t = 0; t < joints.frames(); ++t) joints.frame(t) = motion->joints.frame(t % motion->frames());
+    motion->joints = joints;
+    motion->rotations.clear();
+    motion->rate_hz = 5.0;
+  }
+  return clip;
+}
+
+#ifndef DUET_SANITIZED  // it needs terabytes of addresses
+TEST(CommandLine, AClipTooLongForTheMemoryIsRefusedByNameBeforeTheWork) {
+  const test::ScratchFolder folder;
+  const std::string file = folder / "long.npz";
+  save_clip(long_clip(), file);
+  for (const std::string& command : {"retarget " + file + " -o " + (folder / "out"), "score " + file}) {
+    const Answer answer = duet_program(command + " -q", "ulimit -v 500000;");
+    EXPECT_EQ(answer.code, 2);
+    EXPECT_THAT(answer.err, AllOf(HasSubstr(file), HasSubstr("frames at 50 Hz ("), HasSubstr("GB of memory, and ")));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+TEST(CommandLine, WithoutMemoryItSaysWhatThereIsNotEnoughFor) {
+  const test::ScratchFolder folder;
+  ASSERT_EQ(duet_program("synth wave -n 1 -q -o " + (folder / "clips")).code, 0);
+  int told = 0;
+  for (int kilobytes = 40000; kilobytes <= 240000; kilobytes += 10000) {
+    const Answer answer =
+        duet_program("score -q -j4 " + (folder / "clips"), "ulimit -v " + std::to_string(kilobytes) + ";");
+    if (answer.code == 0 || answer.code == 127) continue;  // 127: the libraries find no room
+    EXPECT_EQ(answer.code, 2) << kilobytes << ": " << answer.err;
+    EXPECT_THAT(answer.err, AllOf(Not(HasSubstr("bad_alloc")), Not(HasSubstr("terminate")))) << kilobytes;
+    told += answer.err.find("not enough memory for") != std::string::npos ? 1 : 0;
+  }
+  EXPECT_GT(told, 0);
+}
+#endif
+
+TEST(CommandLine, LongNamesAreCutInMessages) {
+  const std::string name(4400, 'a');
+  for (const std::string& command : {"retarget " + name + " -o x", "report " + name, "run " + name, "list " + name,
+                                     "run demo -o x --controllers " + name}) {
+    const Answer answer = duet_program(command);
+    EXPECT_EQ(answer.code, 2) << command.substr(0, 12);
+    EXPECT_LT(answer.err.size(), 1800U) << answer.err;
+    EXPECT_THAT(answer.err, HasSubstr("aaa...")) << command.substr(0, 12);
+  }
 }
 
 // A suite under the name of one that ships, its oracle under a name of its own.
