@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <map>
 #include <optional>
+#include <span>
 #include <variant>
 
 #include "duet/bench/prepared_clips.h"
@@ -19,6 +21,7 @@
 #include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
+#include "duet/motion/npz_fields.h"
 #include "duet/motion/synthesis.h"
 #include "duet/motion/tracked_clip.h"
 #include "duet/retarget/pair.h"
@@ -41,6 +44,40 @@ struct ClipSource {
   std::variant<std::string, SyntheticClip> from;  // a file, or what is synthesised
   bool other_role = false;
 };
+
+// What a suite's own clip is made with, as its rows say it.
+Tags tags_of(const SyntheticClip& clip) {
+  Tags tags = {{std::string(kPeopleTag), std::string(kSyntheticPeople)}};
+  if (clip.variant != nullptr) tags.merge(tags_of(*clip.variant));
+  return tags;
+}
+
+// Who the people of a file are, by what its clip says that made it. A paired motion has tags of its own.
+void add_people(const Npz& npz, PairedMotion& motion) {
+  if (kind_of(npz) != MotionFile::kClip) return;
+  const bool synthetic = is_synthesised(get_texts(npz, "source"));
+  motion.tags.insert_or_assign(std::string(kPeopleTag), synthetic ? kSyntheticPeople : kRecordedPeople);
+}
+
+// Of the people, whoever of the two the robot replaces.
+std::string people_digest(const PairedMotion& clip) {
+  const auto digest = [](const HumanMotion& motion) {
+    Sha256 sha256;
+    sha256.update(std::span<const double>(motion.joints.data()));
+    return sha256.hex();
+  };
+  const std::string partner = digest(clip.source_partner), reactor = digest(clip.source_reactor);
+  return partner < reactor ? partner + reactor : reactor + partner;
+}
+
+// Clips that show one recording, as in the other role, name the first of them.
+void note_recordings(std::vector<PairedMotion>& clips) {
+  std::map<std::pair<std::string_view, std::string>, std::string> recordings;
+  for (PairedMotion& clip : clips) {
+    const auto [first, is_new] = recordings.try_emplace({to_string(clip.task), people_digest(clip)}, clip.clip_id);
+    if (!is_new) clip.tags.insert_or_assign(std::string(kRecordingTag), first->second);
+  }
+}
 
 // Each of `sources` in the roles that the suite asks for, the other one after its own.
 std::vector<ClipSource> in_roles(const std::vector<ClipSource>& sources, ClipRoles roles) {
@@ -184,7 +221,9 @@ LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const 
       return load_or_retarget(npz, robot, options, Implausible::kRefused, pad, source.other_role);
     };
     const bool keep = prepared.keeps() && kind_of(npz) == MotionFile::kClip;
-    return keep ? find_or_make(prepared, sha256 + role, read) : read();
+    LoadedMotion made = keep ? find_or_make(prepared, sha256 + role, read) : read();
+    add_people(npz, made.motion);
+    return made;
   }
   const auto& clip = std::get<SyntheticClip>(source.from);
   const auto make = [&] {
@@ -192,7 +231,9 @@ LoadedMotion make_clip(const ClipSource& source, const RobotModel& robot, const 
     if (source.other_role) made = in_other_role(std::move(made));
     return LoadedMotion{retarget(made, robot, options), {}};
   };
-  return prepared.keeps() ? find_or_make(prepared, label_of(clip) + role, make) : make();
+  LoadedMotion made = prepared.keeps() ? find_or_make(prepared, label_of(clip) + role, make) : make();
+  made.motion.tags = tags_of(clip);
+  return made;
 }
 
 // A folder of clips that all lack phases is one matter, not a thousand lines.
@@ -333,6 +374,7 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
   if (clips.empty()) throw InputError(fmt::format("{}: no clip is left for the tasks of the suite", suite.file));
   for (const PairedMotion& clip : clips) check_robot(clip, robot);
   check_ids(clips);
+  note_recordings(clips);
   return clips;
 }
 

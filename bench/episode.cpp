@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "duet/bench/episode_tags.h"
 #include "duet/bench/suite_names.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
@@ -54,6 +55,7 @@ std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
       if (playback) continue;
       for (const Perturbation& perturbation : suite.perturbations) {
         combination.perturbation = perturbation.name;
+        combination.perturbation_tags = RowTags(tags_of(perturbation));
         combinations.push_back(combination);
       }
     }
@@ -240,6 +242,10 @@ EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentit
   row.perturbation = spec.perturbation;
   row.arm = spec.arm;
   row.robot_digest = robot.digest;
+  const bool known = spec.perturbation == kCleanName || !spec.perturbation_tags.empty();
+  row.tags =
+      RowTags(episode_tags(known ? spec.perturbation_tags.map() : tags_of(perturbation_of(suite, spec.perturbation)),
+                           suite, *spec.clip, spec.policy));
   row.key = episode_key(row);
   return row;
 }

@@ -24,6 +24,7 @@ struct EpisodeSpec {
   int episode = 0;
   std::uint64_t seed = 0;  // of the episode, the same for every engine, controller and policy
   std::string perturbation = kCleanName;
+  RowTags perturbation_tags = {};       // of a plan's episodes, which share them; none: looked up where a row is made
   std::uint64_t perturbation_seed = 0;  // likewise
   const PairedMotion* seen = nullptr;   // whose partner the policy sees in the place of this clip's; null: this one's
   const Bodies* bodies = nullptr;       // with what was loaded for all episodes; null: this one loads it itself

@@ -70,6 +70,7 @@ std::string hash_of(const Suite& suite, FileDigests& files) {
   Suite said = suite;
   said.policies.clear();
   said.engines.clear();
+  clear_tags(said);
   said.robot.clear();  // robots_text
   for (std::string& file : said.clips.files) file = files.of(file);
   said.contact_limits = limits_digest(suite, files);

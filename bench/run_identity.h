@@ -32,9 +32,9 @@ ActorIdentity identity_of(const SuiteController& controller, FileDigests& files)
 ActorIdentity identity_of(const SuitePolicy& policy);
 ActorIdentity identity_of(const SuiteController& controller);
 
-// SHA-256 of what the suite and its profile say: all but the list of policies, the list of engines and the places of
-// files. In the place of clips, limits, cards and descriptors stand their contents; the version of the detectors is in
-// it. Policies, engines and what a controller loads are told by each row.
+// SHA-256 of what the suite and its profile say: all but the list of policies, the list of engines, tags and the places
+// of files. In the place of clips, limits, cards and descriptors stand their contents; the version of the detectors is
+// in it. Policies, engines and what a controller loads are told by each row.
 std::string suite_hash(const Suite& suite, FileDigests files = {});
 
 struct RunIdentity {

@@ -48,6 +48,7 @@ std::optional<Suite> suite_that_ships(const std::string& name) {
 std::map<std::string, std::string> hashed_keys(Suite suite) {
   suite.policies.clear();
   suite.engines.clear();
+  clear_tags(suite);
   std::map<std::string, std::string> keys;
   for (const auto& entry : parse_yaml(resolved_yaml(suite), "suite.yaml")) {
     const auto name = entry.first.as<std::string>();
@@ -102,6 +103,12 @@ std::string suite_file(const std::string& suite) {
   if (std::ranges::find(names, suite) == names.end())
     throw std::invalid_argument(unknown_name_message("suite", suite, names) + "; or the path of a file");
   return path_of(suite);
+}
+
+std::optional<Suite> shipped_suite_of(const RunInfo& info) {
+  std::optional<Suite> shipped = suite_that_ships(info.suite);
+  const bool same = shipped && !shipped->clips.given && suite_hash(*shipped) == info.suite_hash;
+  return same ? std::move(shipped) : std::nullopt;
 }
 
 std::string shipped_suite_note(const RunInfo& info) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,8 @@ std::string suite_file(const std::string& suite);
 //   "NOT the suite of that name that ships with this program: it differs in clips, start (0123456789ab)"
 // Empty for a name that no suite has that ships, and where those that ship are not on this machine.
 std::string shipped_suite_note(const RunInfo& info);
+// The suite that ships, where the run's has its name and its hash. Throws what load_suite and suite_hash throw.
+std::optional<Suite> shipped_suite_of(const RunInfo& info);
 
 // The first sentence of the comment that begins a YAML file; empty where it begins with none.
 std::string first_sentence(const std::string& yaml);

@@ -39,6 +39,13 @@ void vary(const ClipVariant& variant, SynthesisOptions& options) {
   if (variant.outcome) options.outcome = variant.outcome;
 }
 
+Tags tags_of(const ClipVariant& variant) {
+  Tags tags;
+  if (variant.side) tags.emplace(kSideTag, name_of(side_names(), *variant.side));
+  if (variant.target_height) tags.emplace(kHeightTag, fmt::format("{}", *variant.target_height));
+  return tags;
+}
+
 const SuiteController& controller_of(const Suite& suite, const std::string& name) {
   return find_named(suite.controllers, "controller", name);
 }
@@ -52,6 +59,12 @@ Perturbation perturbation_of(const Suite& suite, const std::string& name) {
 std::vector<std::string> controller_names_of(const Suite& suite) { return names_of(suite.controllers); }
 std::vector<std::string> policy_names_of(const Suite& suite) { return names_of(suite.policies); }
 std::vector<std::string> perturbation_names_of(const Suite& suite) { return names_of(suite.perturbations); }
+
+void clear_tags(Suite& suite) {
+  for (SuiteReference& reference : suite.references) reference.tags.clear();
+  for (SuitePolicy& policy : suite.policies) policy.tags.clear();
+  for (Perturbation& perturbation : suite.perturbations) perturbation.tags.clear();
+}
 
 void require_clips(const Suite& suite) {
   if (!suite.clips.given) return;

@@ -14,6 +14,7 @@
 #include "duet/bench/suite_names.h"
 #include "duet/bench/suite_reference.h"
 #include "duet/controllers/controller.h"
+#include "duet/core/episode_tags.h"
 #include "duet/core/task.h"
 #include "duet/metrics/detector.h"
 #include "duet/motion/synthesis.h"
@@ -35,6 +36,8 @@ struct ClipVariant {
 
 // Gives what the variant asks for to the options of its clip.
 void vary(const ClipVariant& variant, SynthesisOptions& options);
+// What rows hold of it: side and height.
+Tags tags_of(const ClipVariant& variant);
 
 // How long both people stand as in the first and the last frame of each clip around it.
 struct ClipPadding {
@@ -74,6 +77,7 @@ struct SuitePolicy {
   PolicyOptions options = {};
   std::string prompt = {};        // the language command; empty: the task's own (task_prompt)
   bool shuffled_partner = false;  // sees the partner of another clip of the task: whether it looks at its partner
+  Tags tags = {};                 // of its rows (core/episode_tags.h); no part of what it is
 };
 
 struct Suite {
@@ -122,6 +126,9 @@ Perturbation perturbation_of(const Suite& suite, const std::string& name);
 std::vector<std::string> controller_names_of(const Suite& suite);
 std::vector<std::string> policy_names_of(const Suite& suite);
 std::vector<std::string> perturbation_names_of(const Suite& suite);
+
+// Takes the tags from all that has some; they are no part of what the suite runs.
+void clear_tags(Suite& suite);
 
 // Throws InputError where the suite's clips are still to be given, saying how.
 void require_clips(const Suite& suite);

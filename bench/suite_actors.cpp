@@ -14,6 +14,7 @@
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
 #include "duet/policies/registry.h"
+#include "duet/robots/yaml_tags.h"
 
 namespace duet {
 namespace {
@@ -91,7 +92,8 @@ SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
   } else if (node.IsScalar()) {
     policy.name = policy.use = node.Scalar();
   } else {
-    const YamlSection item(suite.file, node, "policy", {"name", "use", "options", "network", "prompt", "partner"});
+    const YamlSection item(suite.file, node, "policy",
+                           {"name", "use", "options", "network", "prompt", "partner", kTagsKey});
     policy.name = item.text("name");
     policy.use = item.has("use") ? item.text("use") : policy.name;
     policy.options = read_options(item, suite);
@@ -101,6 +103,7 @@ SuitePolicy read_policy(const YAML::Node& node, const Suite& suite) {
     }
     if (item.has("prompt")) policy.prompt = item.text("prompt");
     policy.shuffled_partner = reads_shuffled(item);
+    policy.tags = read_tags(item, kOfPolicy);
   }
   finish_names(suite, policy);
   return policy;
@@ -143,12 +146,12 @@ std::string to_yaml(const SuiteController& controller) {
 }
 
 std::string to_yaml(const SuitePolicy& policy) {
-  const bool plain = policy.options.empty() && policy.prompt.empty() && !policy.shuffled_partner;
+  const bool plain = policy.options.empty() && policy.prompt.empty() && !policy.shuffled_partner && policy.tags.empty();
   if (policy.use == policy.name && plain) return policy.name;
-  return fmt::format("{{name: {}, use: {}{}{}{}}}", policy.name, yaml_quoted(policy.use),
+  return fmt::format("{{name: {}, use: {}{}{}{}{}}}", policy.name, yaml_quoted(policy.use),
                      policy.options.empty() ? "" : options_yaml(policy.options),
                      policy.prompt.empty() ? "" : ", prompt: " + yaml_quoted(policy.prompt),
-                     policy.shuffled_partner ? ", partner: shuffled" : "");
+                     policy.shuffled_partner ? ", partner: shuffled" : "", tags_yaml(policy.tags));
 }
 
 template <typename Item>

@@ -168,7 +168,7 @@ void add_lists(Keys& keys) {
   keys.push_back({"policies",
                   {{"policies", "a list", "required",
                     "each a name (`duet list policies`), the path of a policy descriptor, or `{name, use, options, "
-                    "prompt, partner}`"}},
+                    "prompt, partner, tags}`"}},
                   With::kClips,
                   read_policies,
                   [](const Suite& suite) { return policies_yaml(suite); }});

@@ -9,6 +9,7 @@
 #include "duet/core/names.h"
 #include "duet/core/plain_name.h"
 #include "duet/robots/yaml_range.h"
+#include "duet/robots/yaml_tags.h"
 
 namespace duet {
 namespace {
@@ -39,7 +40,7 @@ UpperBody read_upper_body(const YamlSection& item) {
 
 SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
   const YamlSection item(file, node, "reference",
-                         {"name", "velocity", "seconds", "begin", "end", "pause", "upper_body"});
+                         {"name", "velocity", "seconds", "begin", "end", "pause", "upper_body", kTagsKey});
   SuiteReference reference;
   reference.velocity = item.vector3("velocity");
   if (reference.velocity.cwiseAbs().maxCoeff() > 10.0)
@@ -49,6 +50,7 @@ SuiteReference read_reference(const YAML::Node& node, const std::string& file) {
   reference.end = in_range(item, "end", reference.seconds, {reference.begin, reference.seconds, true});
   reference.pause = in_range(item, "pause", 0.0, {0.0, 600.0, true});
   reference.upper_body = read_upper_body(item);
+  reference.tags = read_tags(item, kOfClip);
   reference.name = item.has("name") ? item.text("name") : default_name(reference.velocity);
   if (!is_plain_name(reference.name))
     item.fail(item.line("name"), fmt::format("name: {}", plain_name_message(reference.name)));
@@ -79,9 +81,9 @@ std::string references_yaml(const std::vector<SuiteReference>& references) {
   for (const SuiteReference& reference : references) {
     const Eigen::Vector3d& v = reference.velocity;
     text += fmt::format(
-        "  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}}}\n",
+        "  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}}}\n",
         reference.name, v.x(), v.y(), v.z(), reference.seconds, reference.begin, reference.end, reference.pause,
-        kUpperBodies.at(static_cast<std::size_t>(reference.upper_body)));
+        kUpperBodies.at(static_cast<std::size_t>(reference.upper_body)), tags_yaml(reference.tags));
   }
   return text;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "duet/controllers/controller.h"
+#include "duet/core/episode_tags.h"
 #include "duet/robots/yaml_section.h"
 #include "duet/rollout/reference_stream.h"
 
@@ -25,6 +26,7 @@ struct SuiteReference {
   double begin = 0.0, end = 14.0;                      // when the command holds; else the root stands [s]
   double pause = 0.0;                                  // above 0: on and off in turn, each for so long [s]
   UpperBody upper_body = UpperBody::kStill;
+  Tags tags = {};  // of its rows (core/episode_tags.h); they change nothing of an episode
 
   // Whether the command holds from the first tick to the last.
   [[nodiscard]] bool constant() const { return begin <= 0.0 && end >= seconds && pause <= 0.0; }

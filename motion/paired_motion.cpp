@@ -84,6 +84,8 @@ PairedMotion read_paired_motion(const Npz& npz) {
                 "reshaped",
                 "settings_names",
                 "settings_values",
+                "tags_names",
+                "tags_values",
                 "object_position",
                 "object_quat_wxyz",
                 "object_keypoints"},
@@ -102,6 +104,7 @@ PairedMotion read_paired_motion(const Npz& npz) {
                       .loss = {},
                       .settings = get_texts(npz, "settings"),
                       .object = get_object(npz)};
+  for (auto& [name, value] : get_texts(npz, "tags")) motion.tags.emplace(name, value);
   if (npz.contains("reshaped")) motion.reshaped = npz.tracks("reshaped", -1);
   for (const std::string& key : npz.keys())
     if (key.starts_with(kLossPrefix)) motion.loss[key.substr(std::string(kLossPrefix).size())] = npz.numbers(key, {-1});
@@ -132,6 +135,7 @@ std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method) {
   if (!motion.reshaped.empty()) npz.set("reshaped", motion.reshaped);
   for (const auto& [term, values] : motion.loss) npz.set(kLossPrefix + term, values, {values.size()});
   put_texts(npz, "settings", motion.settings);
+  put_texts(npz, "tags", {motion.tags.begin(), motion.tags.end()});
   put_object(npz, motion.object);
   return npz.bytes(method);
 }

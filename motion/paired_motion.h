@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/episode_tags.h"
 #include "duet/core/robot_motion.h"
 #include "duet/core/zip.h"
 #include "duet/motion/interaction_clip.h"
@@ -27,6 +28,7 @@ struct PairedMotion {
       loss;  // per term ("total", "kin", "con", "hum", "temp", "pose"), one per iteration
   std::map<std::string, std::string> settings;  // every option of the solver, kernel and robot, as text
   CarriedObject object = {};                    // of the clip, where it was there; empty: none
+  Tags tags = {};                               // of a suite's clip, for its rows (core/episode_tags.h)
 
   [[nodiscard]] int frames() const { return robot.frames(); }
 };

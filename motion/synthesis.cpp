@@ -21,6 +21,9 @@ using synthesis::Draws;
 using synthesis::Scene;
 using synthesis::Staged;
 
+constexpr const char* kGenerator = "generator";  // of a clip's source
+constexpr const char* kSynthesis = "synthesis";
+
 void check(const char* name, std::optional<double> value, double low, double high, const char* unit) {
   if (!value) return;
   require(*value >= low && *value <= high,
@@ -100,7 +103,7 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   clip.phases = phases_of(staged, options.rate_hz);
   clip.contacts = windows(staged, options.rate_hz);
   clip.source = draws.recorded();
-  clip.source["generator"] = "synthesis";
+  clip.source[kGenerator] = kSynthesis;
   clip.source["seed"] = std::to_string(options.seed);
   clip.source["index"] = std::to_string(options.index);
   if (people) {
@@ -109,6 +112,11 @@ InteractionClip synthesize(Task task, const SynthesisOptions& options) {
   }
   clip.source["side"] = staged.scene.cast.side == 0 ? "left" : "right";
   return clip;
+}
+
+bool is_synthesised(const std::map<std::string, std::string>& source) {
+  const auto generator = source.find(kGenerator);
+  return generator != source.end() && generator->second == kSynthesis;
 }
 
 }  // namespace duet

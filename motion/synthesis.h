@@ -2,6 +2,9 @@
 // exact by construction. The same arguments give the same bytes on every run.
 #pragma once
 
+#include <map>
+#include <string>
+
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/synthesis_options.h"
 
@@ -11,5 +14,8 @@ namespace duet {
 void check_synthesis_options(Task task, const SynthesisOptions& options);
 // Checks them.
 InteractionClip synthesize(Task task, const SynthesisOptions& options);
+
+// Whether a clip's `source` says that synthesize() made it.
+bool is_synthesised(const std::map<std::string, std::string>& source);
 
 }  // namespace duet

@@ -15,6 +15,7 @@
 
 #include "duet/backends/factory.h"
 #include "duet/bench/clips.h"
+#include "duet/bench/missing_tags.h"
 #include "duet/bench/run_identity.h"
 #include "duet/bench/runner.h"
 #include "duet/bench/shipped_suites.h"
@@ -237,8 +238,12 @@ void add_runs(py::module_& module) {
       .def_readonly("markdown", &TablePair::markdown)
       .def_readonly("json", &TablePair::json);
   py::class_<Run>(module, "RunFolder", "A run directory as it was when it was read.")
-      .def(py::init([](const std::string& path) { return load_run(path); }), py::arg("path"),
-           py::call_guard<py::gil_scoped_release>())
+      .def(py::init([](const std::string& path) {
+             Run run = load_run(path);
+             add_missing_tags(run);
+             return run;
+           }),
+           py::arg("path"), py::call_guard<py::gil_scoped_release>())
       .def_readonly("path", &Run::path)
       .def_readonly("warnings", &Run::warnings)
       .def_property_readonly("rows", &rows_json, "JSON: a list of rows.")

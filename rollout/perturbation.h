@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "duet/core/episode_tags.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/yaml_section.h"
 #include "duet/rollout/partner_variation.h"
@@ -27,7 +28,15 @@ struct Perturbation {
   PerceptionPlan perception;
   double plan_latency_ms = 0.0;  // from what a policy saw to its plan in the scheduler, to the nearest tick
   std::optional<PartnerVariation> partner;
+  Tags tags = {};  // that the suite gives it; they change nothing of an episode
 };
+
+// How large it is, by what it does. None for the clean arm, for several kinds or values, and where the value is
+// not 0 in a clean episode (a friction, a scale).
+std::optional<PerturbationSize> size_of(const Perturbation& perturbation);
+
+// What rows hold of it: its tags, its kinds and its size. Of the clean arm nothing but its tags.
+Tags tags_of(const Perturbation& perturbation);
 
 // The kinds that may be named alone, with their defaults: one table (rollout/perturbation_kinds.h).
 const std::vector<std::string>& perturbation_kinds();

@@ -14,6 +14,7 @@ PerturbationKind valued_kind(const std::string& name, std::string meaning, const
     const std::string text = value.text(of);
     return text == value.text(Perturbation()) ? "" : '{' + value.name + ": " + text + '}';
   };
+  kind.values = [value](const Perturbation& of) { return FieldTexts{{value.name, value.text(of)}}; };
   return kind;
 }
 

@@ -14,13 +14,31 @@
 
 namespace duet {
 
+// A value of a kind that is 0 in a clean episode, with its unit in tables and how many of them its own unit is.
+struct PerturbationAxis {
+  std::string field, unit;
+  double factor = 1.0;
+};
+
+using FieldTexts = std::vector<std::pair<std::string, std::string>>;  // name and text, as flow_mapping has them
+
+template <typename Owner>
+FieldTexts field_texts(const FieldTable<Owner>& table, const Owner& owner) {
+  FieldTexts texts;
+  for (const Field<Owner>& known : table)
+    if (std::string text = known.text(owner); !text.empty()) texts.emplace_back(known.name, std::move(text));
+  return texts;
+}
+
 struct PerturbationKind {
   std::string name, meaning;
   std::vector<FieldRow> rows;  // of its mapping; of a kind that is one value, that value
   // From the mapping of a perturbation, which has the key. Throws InputError: file, line, expected, found.
   std::function<void(const YamlSection& item, const std::string& file, Perturbation& into)> read;
-  std::function<std::string(const Perturbation& of)> write;  // "" where there is none of it
-  std::string fallback = "{}";                               // what the name alone stands for
+  std::function<std::string(const Perturbation& of)> write;       // "" where there is none of it
+  std::string fallback = "{}";                                    // what the name alone stands for
+  std::function<FieldTexts(const Perturbation& of)> values = {};  // of its mapping, where there is some of it
+  std::vector<PerturbationAxis> axes = {};                        // none: no value of it is a size
 };
 
 inline constexpr FieldRange kEpisodeTime = {0.0, 600.0};  // [s]
@@ -52,6 +70,9 @@ PerturbationKind planned_kind(std::string name, std::string meaning, FieldTable<
     slot(into) = read_plan(item, file, name, table, named);
   };
   kind.write = [table, slot](const Perturbation& of) { return slot(of) ? flow_mapping(table, *slot(of)) : ""; };
+  kind.values = [table, slot](const Perturbation& of) {
+    return slot(of) ? field_texts(table, *slot(of)) : FieldTexts();
+  };
   return kind;
 }
 
@@ -73,6 +94,10 @@ PerturbationKind robot_kind(std::string name, std::string meaning, FieldTable<Pl
   kind.write = [table](const Perturbation& of) {
     const Plan* plan = robot_plan<Plan>(of);
     return plan ? flow_mapping(table, *plan) : "";
+  };
+  kind.values = [table](const Perturbation& of) {
+    const Plan* plan = robot_plan<Plan>(of);
+    return plan ? field_texts(table, *plan) : FieldTexts();
   };
   return kind;
 }

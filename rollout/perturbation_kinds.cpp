@@ -1,5 +1,12 @@
 #include "duet/rollout/perturbation_kinds.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "duet/core/number.h"
 #include "duet/rollout/kinds/kick.h"
 #include "duet/rollout/kinds/mass.h"
 #include "duet/rollout/kinds/noise.h"
@@ -134,6 +141,23 @@ void add_perception_kinds(Kinds& list) {
       [](auto& p) -> auto& { return p.perception.jump; }));
 }
 
+// The values that are 0 in a clean episode, with the unit that tables give them and how many of it one is.
+struct KindAxis {
+  std::string_view kind;
+  PerturbationAxis axis;
+};
+const std::vector<KindAxis>& kind_axes() {
+  static const std::vector<KindAxis> axes = {
+      {"delay", {"ticks", "ticks"}},    {"latency", {"ms", "s", 1e-3}},   {"noise", {"q", "rad"}},
+      {"noise", {"v", "rad/s"}},        {"noise", {"w", "rad/s"}},        {"noise", {"gravity", "rad"}},
+      {"push", {"force", "N"}},         {"kick", {"speed", "m/s"}},       {"mass", {"add", "kg"}},
+      {"jitter", {"sigma", "m"}},       {"dropout", {"p", ""}},           {"perception_latency", {"ms", "s", 1e-3}},
+      {"freeze", {"for", "s"}},         {"jump", {"metres", "m"}},        {"plan_latency", {"ms", "s", 1e-3}},
+      {"partner", {"shift_s", "s"}},    {"partner", {"hesitate_s", "s"}}, {"partner", {"comes_m", "m"}},
+      {"partner", {"moves_on_m", "m"}}, {"partner", {"aside_m", "m"}}};
+  return axes;
+}
+
 Kinds make_kinds() {
   Kinds list;
   list.reserve(15);
@@ -145,6 +169,9 @@ Kinds make_kinds() {
   list.push_back(planned_kind(
       "partner", "the partner moves otherwise than in the clip", partner_fields(),
       [](auto& p) -> auto& { return p.partner; }));
+  for (PerturbationKind& kind : list)
+    for (const KindAxis& known : kind_axes())
+      if (known.kind == kind.name) kind.axes.push_back(known.axis);
   return list;
 }
 
@@ -153,6 +180,68 @@ Kinds make_kinds() {
 const Kinds& perturbation_kind_table() {
   static const Kinds table = make_kinds();
   return table;
+}
+
+namespace {
+
+// Whether a value is what it is in a clean episode.
+bool is_default(const PerturbationKind& kind, const std::string& name, const std::string& text) {
+  const auto row = std::ranges::find(kind.rows, name, &FieldRow::name);
+  return row != kind.rows.end() && row->fallback == text;
+}
+
+// Of a kind with several such values one alone may differ from a clean episode, and no other value.
+std::optional<PerturbationSize> size_in(const PerturbationKind& kind, const Perturbation& of) {
+  const bool several = kind.axes.size() > 1;
+  std::optional<PerturbationSize> size;
+  std::vector<std::string> beside;
+  for (const auto& [name, text] : kind.values ? kind.values(of) : FieldTexts()) {
+    const auto axis = std::ranges::find(kind.axes, name, &PerturbationAxis::field);
+    if (axis == kind.axes.end()) {
+      if (several && !is_default(kind, name, text)) return std::nullopt;
+      if (!several) beside.push_back(fmt::format("{}: {}", name, text));
+      continue;
+    }
+    const double value = parse_number(text).value_or(0.0);
+    if (value == 0.0) continue;
+    if (size) return std::nullopt;
+    size = {.family = several ? fmt::format("{}.{}", kind.name, name) : kind.name,
+            .x = value * axis->factor,
+            .unit = axis->unit,
+            .beside = {}};
+  }
+  if (size) size->beside = fmt::format("{}", fmt::join(beside, ", "));
+  return size;
+}
+
+std::vector<const PerturbationKind*> kinds_in(const Perturbation& perturbation) {
+  std::vector<const PerturbationKind*> kinds;
+  for (const PerturbationKind& known : perturbation_kind_table())
+    if (!known.write(perturbation).empty()) kinds.push_back(&known);
+  return kinds;
+}
+
+}  // namespace
+
+std::optional<PerturbationSize> size_of(const Perturbation& perturbation) {
+  const std::vector<const PerturbationKind*> kinds = kinds_in(perturbation);
+  return kinds.size() == 1 ? size_in(*kinds.front(), perturbation) : std::nullopt;
+}
+
+Tags tags_of(const Perturbation& perturbation) {
+  Tags tags;
+  for (const auto& [name, value] : perturbation.tags) tags.emplace(row_tag(kOfPerturbation, name), value);
+  std::string kinds;
+  for (const PerturbationKind* kind : kinds_in(perturbation)) kinds += (kinds.empty() ? "" : "+") + kind->name;
+  if (kinds.empty()) return tags;
+  tags.emplace(kKindsTag, kinds);
+  const std::optional<PerturbationSize> size = size_of(perturbation);
+  if (!size) return tags;
+  tags.emplace(kFamilyTag, size->family);
+  tags.emplace(kSizeTag, fmt::format("{}", size->x));
+  tags.emplace(kUnitTag, size->unit);
+  tags.emplace(kBesideTag, size->beside);
+  return tags;
 }
 
 }  // namespace duet

@@ -7,6 +7,7 @@
 #include "duet/core/names.h"
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
+#include "duet/robots/yaml_tags.h"
 #include "duet/rollout/perturbation.h"
 #include "duet/rollout/perturbation_kinds.h"
 
@@ -28,7 +29,7 @@ Perturbation read_kinds(const YamlSection& item, const std::string& file) {
 }
 
 std::vector<const char*> keys_of_item() {
-  std::vector<const char*> keys = {"name"};
+  std::vector<const char*> keys = {"name", kTagsKey};
   for (const PerturbationKind& known : perturbation_kind_table()) keys.push_back(known.name.c_str());
   return keys;
 }
@@ -47,6 +48,7 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
   if (named.empty())
     item.fail(line, fmt::format("expected at least one of {}, found none", fmt::join(perturbation_kinds(), ", ")));
   Perturbation perturbation = read_kinds(item, file);
+  perturbation.tags = read_tags(item, kOfPerturbation);
   perturbation.name = item.has("name") ? item.text("name") : fmt::format("{}", fmt::join(named, "+"));
   if (perturbation.name == kCleanName) item.fail(item.line("name"), "name: 'clean' is the arm without a perturbation");
   if (!is_plain_name(perturbation.name))
@@ -98,7 +100,8 @@ std::string to_yaml(const Perturbation& perturbation) {
   for (const PerturbationKind& known : perturbation_kind_table())
     if (const std::string value = known.write(perturbation); !value.empty())
       parts.push_back(fmt::format("{}: {}", known.name, value));
-  return parts.size() == 1 ? perturbation.name : fmt::format("{{{}}}", fmt::join(parts, ", "));
+  return parts.size() == 1 ? perturbation.name
+                           : fmt::format("{{{}{}}}", fmt::join(parts, ", "), tags_yaml(perturbation.tags));
 }
 
 }  // namespace duet

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "duet/bench/missing_tags.h"
 #include "duet/core/require.h"
 #include "duet/policies/densify.h"
 #include "duet/results/rows/distinct_episodes.h"
@@ -63,6 +64,7 @@ void warn_of_timeouts(const std::map<std::string, int>& outcomes) {
 
 Run open_run(const std::string& path, RowExtent extent) {
   Run run = load_run(path, extent);
+  add_missing_tags(run);
   for (const std::string& warning : run.warnings) warn(warning);
   return run;
 }

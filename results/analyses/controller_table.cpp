@@ -48,7 +48,7 @@ Estimate estimate(const RowList& rows, const std::string& metric, ClusterBootstr
     const auto found = row->metrics.find(metric);
     if (found == row->metrics.end()) continue;
     values.push_back(found->second);
-    clips.push_back(numbers.of(row->task, row->clip));
+    clips.push_back(numbers.of(episode_id(*row)));
   }
   Estimate result;
   if (values.empty()) return result;

@@ -13,46 +13,24 @@
 namespace duet {
 namespace {
 
-struct Unit {
-  std::string_view name, si;
-  double factor;
-};
-constexpr std::array<Unit, 6> kUnits = {{{"mm", "m", 1e-3},
-                                         {"cm", "m", 1e-2},
-                                         {"ms", "s", 1e-3},
-                                         {"deg", "rad", 0.017453292519943295},
-                                         {"n", "N", 1.0},
-                                         {"kg", "kg", 1.0}}};
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-
-// Length of what precedes the last run of characters for which `holds`.
-template <typename Holds>
-std::size_t strip(std::string_view text, const Holds& holds) {
-  std::size_t end = text.size();
-  while (end > 0 && holds(text[end - 1])) --end;
-  return end;
+// As the rows' suite says it; none where it says no size.
+std::optional<PerturbationSize> size_of_rows(const EpisodeRows& rows) {
+  for (const auto& [id, row] : rows) {
+    const double x = row->tags.number(kSizeTag);
+    if (!std::isnan(x))
+      return PerturbationSize{.family = row->tags.text(kFamilyTag),
+                              .x = x,
+                              .unit = row->tags.text(kUnitTag),
+                              .beside = row->tags.text(kBesideTag)};
+  }
+  return std::nullopt;
 }
 
-PerturbationSize in_si(std::string_view family, double value, std::string_view unit) {
-  for (const Unit& known : kUnits)
-    if (known.name == unit) return {std::string(family), value * known.factor, std::string(known.si)};
-  return {std::string(family), value, std::string(unit)};
-}
-
-// Place of a perturbation among others: clean, then by family and size, those without a size last by name.
-auto place(const std::string& name) {
-  const std::optional<PerturbationSize> size = perturbation_size(name);
-  return std::make_tuple(name != kClean, !size.has_value(), size ? size->family : "", size ? size->x : 0.0, name);
-}
-
-std::vector<std::string> perturbations_of(const PerturbedRows& rows) {
-  std::vector<std::string> names;
-  names.reserve(rows.size());
-  for (const auto& [name, episodes] : rows) names.push_back(name);
-  std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) { return place(a) < place(b); });
-  return names;
+// Clean, then by family and size, those without a size last by name.
+auto place(const PerturbedSuccess& of) {
+  const std::optional<PerturbationSize>& size = of.size;
+  return std::make_tuple(of.perturbation != kClean, !size.has_value(), size ? size->family : "",
+                         size ? size->beside : "", size ? size->x : 0.0, of.perturbation);
 }
 
 void finish(DegradationCurve& curve) {
@@ -73,11 +51,13 @@ void finish(DegradationCurve& curve) {
 
 // Families of the perturbations of one policy, each with its clean point.
 std::vector<DegradationCurve> curves_of(const PolicyKey& key, const std::vector<PerturbedSuccess>& success) {
-  std::map<std::pair<std::string, std::string>, DegradationCurve> curves;
+  std::map<std::array<std::string, 3>, DegradationCurve> curves;  // by family, unit and what stands beside the size
+  std::map<std::string, std::set<std::string>> besides;
   for (const PerturbedSuccess& entry : success) {
-    const std::optional<PerturbationSize> size = perturbation_size(entry.perturbation);
+    const std::optional<PerturbationSize>& size = entry.size;
     if (!size || size->x == 0.0 || entry.success.n == 0) continue;
-    DegradationCurve& curve = curves[{size->family, size->unit}];
+    besides[size->family].insert(size->beside);
+    DegradationCurve& curve = curves[{size->family, size->unit, size->beside}];
     if (curve.points.empty()) curve.points.push_back({0.0, success.front().success.rate});
     curve.points.push_back({size->x, entry.success.rate});
     if (std::abs(size->x) < std::abs(curve.largest)) continue;
@@ -86,8 +66,10 @@ std::vector<DegradationCurve> curves_of(const PolicyKey& key, const std::vector<
   }
   std::vector<DegradationCurve> list;
   for (auto& [name, curve] : curves) {
+    const auto& [family, unit, beside] = name;
     curve.key = key;
-    std::tie(curve.family, curve.unit) = name;
+    curve.family = besides.at(family).size() == 1 ? family : fmt::format("{} ({})", family, beside);
+    curve.unit = unit;
     finish(curve);
     list.push_back(std::move(curve));
   }
@@ -97,15 +79,16 @@ std::vector<DegradationCurve> curves_of(const PolicyKey& key, const std::vector<
 std::vector<PerturbedSuccess> success_of(const PolicyKey& key, const PerturbedRows& rows, double level) {
   const EpisodeRows& clean = rows.find(kClean)->second;
   std::vector<PerturbedSuccess> success;
-  for (const std::string& perturbation : perturbations_of(rows)) {
-    const EpisodeRows& episodes = rows.find(perturbation)->second;
+  for (const auto& [perturbation, episodes] : rows) {
     success.push_back({.key = key,
                        .perturbation = perturbation,
+                       .size = size_of_rows(episodes),
                        .success = headline_rate(episodes, level),
                        .paper = verdict_rate(episodes, "paper", "paper", level),
                        .difference = {}});
     if (perturbation != kClean) success.back().difference = paired_difference(episodes, clean, level);
   }
+  std::ranges::sort(success, {}, place);
   return success;
 }
 
@@ -179,7 +162,7 @@ TitledTable curve_table(const Degradation& result) {
   ++titled.table.label_columns;
   titled.notes = {
       "Area: under success over the size of the perturbation, from the clean episodes to the largest, over "
-      "that of clean throughout; 1 is no loss."};
+      "that of clean throughout; 1 is no loss. Sizes are what the suite runs, in SI units, whatever names say."};
   if (!result.paper.empty()) titled.notes.push_back(paper_curves_sentence(result));
   return titled;
 }
@@ -220,10 +203,9 @@ void add_success_figures(const PerturbedSuccess& entry, std::vector<Figure>& int
   figures.rate("success", entry.success);
   if (entry.paper.n > 0) figures.rate("paper_success", entry.paper);
   if (entry.difference.pairs > 0) add_difference("against_clean", entry.difference, figures);
-  const std::optional<PerturbationSize> size = perturbation_size(entry.perturbation);
-  if (!size) return;
-  figures.keys.of = size->family;
-  figures.add("size", {}, size->x, kNoInterval, size->unit);
+  if (!entry.size) return;
+  figures.keys.of = entry.size->family;
+  figures.add("size", {}, entry.size->x, kNoInterval, entry.size->unit);
 }
 
 void add_curve_figures(const DegradationCurve& curve, FiguresOf figures) {
@@ -233,7 +215,7 @@ void add_curve_figures(const DegradationCurve& curve, FiguresOf figures) {
   add_difference("loss_at_largest", curve.difference, figures);
 }
 
-// The paper's perturbations are called as ours would be: "jitter_0.01m".
+// The paper's perturbations are called after family and size: "jitter_0.01m".
 void add_paper_figures(const DegradationCurve& curve, std::vector<Figure>& into) {
   FiguresOf figures = paper_figures_of(curve.key.policy, into);
   add_curve_figures(curve, figures);
@@ -246,23 +228,6 @@ void add_paper_figures(const DegradationCurve& curve, std::vector<Figure>& into)
 }
 
 }  // namespace
-
-std::optional<PerturbationSize> perturbation_size(std::string_view name) {
-  const std::size_t number_end = strip(name, is_letter);
-  std::size_t begin = strip(name.substr(0, number_end), [](char c) { return is_digit(c) || c == '.'; });
-  const std::size_t digits = begin;
-  const bool is_signed = begin > 1 && (name[begin - 1] == '-' || name[begin - 1] == '+') && name[begin - 2] == '_';
-  if (is_signed) --begin;
-  const std::string number(name.substr(begin, number_end - begin));
-  std::size_t family_end = begin;
-  if (family_end > 0 && name[family_end - 1] == '_') --family_end;
-  if (digits == number_end ||
-      !std::any_of(name.begin(), name.begin() + static_cast<std::ptrdiff_t>(family_end), is_letter) ||
-      !is_digit(name[digits]) || number.back() == '.' || std::count(number.begin(), number.end(), '.') > 1)
-    return std::nullopt;
-  const std::size_t sign = is_signed && number.front() == '+' ? 1 : 0;
-  return in_si(name.substr(0, family_end), std::stod(number.substr(sign)), name.substr(number_end));
-}
 
 Degradation degradation(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   Degradation result{.level = options.level, .success = {}, .curves = {}, .paper = {}};

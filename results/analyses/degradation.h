@@ -1,31 +1,23 @@
 // What perturbations cost a policy: success under each beside the clean episodes of the same run, paired episode by
-// episode, and as curves where perturbations of one name differ in size ("jitter_1cm", "jitter_5cm"), with the
-// supplement's Table S9 beside them. Every engine alone, playback too; the null arm is left out.
+// episode, and as curves over the sizes that rows' tags say (core/episode_tags.h), with the supplement's Table S9
+// beside them. Every engine alone, playback too; the null arm is left out.
 #pragma once
 
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "duet/core/episode_tags.h"
 #include "duet/results/analyses/analysis.h"
 #include "duet/results/analyses/policy_groups.h"
 
 namespace duet {
 
-// A perturbation's name as family and size.
-struct PerturbationSize {
-  std::string family;  // "jitter"
-  double x = 0.0;      // in SI units
-  std::string unit;    // "m", "s", ...; as written where it is no known one; "" for none
-};
-// "jitter_1cm": jitter, 0.01 m; "dropout_0.05"; "shift_-0.5s"; "push60". Empty for a name that ends otherwise.
-std::optional<PerturbationSize> perturbation_size(std::string_view name);
-
 struct PerturbedSuccess {
   PolicyKey key;
-  std::string perturbation;     // clean first, then by family, size and name
+  std::string perturbation;  // clean first, then by family, size and name
+  std::optional<PerturbationSize> size = {};
   Rate success, paper;          // headline; detector paper/paper, n = 0 where no row has it
   PairedDifference difference;  // to the clean episodes; no pairs for clean itself
 };
@@ -34,7 +26,8 @@ struct CurvePoint {
   double x = 0.0, success = 0.0;
 };
 
-// One family in one (engine, controller, arm, policy); clean is the point at 0.
+// One family in one (engine, controller, arm, policy); clean is the point at 0. Perturbations of one kind that differ
+// in other values, too, are families of their own: "push (duration: 1, every: 4)".
 struct DegradationCurve {
   PolicyKey key;
   std::string family, unit;

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <cmath>
 #include <map>
 
+#include "duet/core/episode_tags.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -23,9 +24,17 @@ bool passes(const EpisodeRow& row) {
   return headline_success(row) && (command <= 0.0 || metric("speed_forward") >= 0.5 * command);
 }
 
+// Of the row's perturbation or clip.
+std::optional<LevelName> level_of(std::string_view word, std::string_view part, const EpisodeRow& row) {
+  const double level = row.tags.number(row_tag(part, word));
+  constexpr double kHighest = 999'999.0;  // kWholeTags
+  if (!(level >= 0.0 && level <= kHighest) || level != std::floor(level)) return std::nullopt;
+  return LevelName{static_cast<int>(level), row.tags.text(row_tag(part, std::string(word) + "_name"))};
+}
+
 // Of its perturbation or of its clip, whichever is higher.
 std::optional<LevelName> level_of_row(std::string_view word, const EpisodeRow& row) {
-  const std::optional<LevelName> perturbed = level_of(word, row.perturbation), clip = level_of(word, row.clip);
+  const std::optional<LevelName> perturbed = level_of(word, kOfPerturbation, row), clip = level_of(word, kOfClip, row);
   if (perturbed && clip) return std::max(*perturbed, *clip);
   if (perturbed || (clip && row.perturbation == kClean)) return perturbed ? perturbed : clip;
   return row.perturbation == kClean ? std::optional(LevelName{0, std::string(kClean)}) : std::nullopt;
@@ -100,7 +109,7 @@ TitledTable titled_ladder(const LevelTable& table) {
   return titled;
 }
 
-// "level_3_walks_up", as perturbations and clips are called.
+// "level_3_walks_up".
 std::string level_key(const Ladder& ladder, const LevelName& level) {
   return fmt::format("{}_{}{}{}", ladder.word, level.level, level.name.empty() ? "" : "_", level.name);
 }
@@ -121,19 +130,6 @@ void add_level_figures(const LevelTable& table, std::vector<Figure>& into) {
 }
 
 }  // namespace
-
-std::optional<LevelName> level_of(std::string_view word, std::string_view name) {
-  if (!name.starts_with(word) || name.size() <= word.size() || name[word.size()] != '_') return std::nullopt;
-  name.remove_prefix(word.size() + 1);
-  name = name.substr(0, name.find('-'));
-  LevelName found;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), found.level);
-  if (error != std::errc() || found.level < 0) return std::nullopt;
-  name.remove_prefix(static_cast<std::size_t>(end - name.data()));
-  if (!name.empty() && name.front() != '_') return std::nullopt;
-  if (!name.empty()) found.name = name.substr(1);
-  return found;
-}
 
 std::vector<LevelTable> level_tables(const std::vector<EpisodeRow>& rows, double level) {
   const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);

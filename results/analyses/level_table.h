@@ -1,7 +1,7 @@
-// How far a policy or a controller comes on a ladder of difficulty: success at each level, from rows whose perturbation
-// or clip is named after one ("level_3_walks_up", "stage_2_held-forward"). A row is of the higher of the two; a clean
-// one without a level in its clip's name is of level 0. A command to walk forward is passed at half of its speed or
-// more. The null arm is left out. Nothing depends on the order of rows.
+// How far a policy or a controller comes on a ladder of difficulty: success at each level, from rows whose suite gives
+// their perturbation or clip the tag `level` or `stage`, and with `level_name` or `stage_name` a name. A row is of the
+// higher of the two; a clean one whose clip has no level is of level 0. A command to walk forward is passed at half of
+// its speed or more. The null arm is left out. Nothing depends on the order of rows.
 #pragma once
 
 #include <optional>
@@ -26,11 +26,9 @@ inline constexpr std::array<Ladder, 2> kLadders = {{
 
 struct LevelName {
   int level = 0;
-  std::string name;  // "walks_up"; what follows a hyphen tells rows of one level apart and is left out
+  std::string name;  // "walks_up"
   auto operator<=>(const LevelName&) const = default;
 };
-// "level_3_walks_up" on the ladder "level": 3, "walks_up". Empty for a name that is none of it.
-std::optional<LevelName> level_of(std::string_view word, std::string_view name);
 
 struct LevelEntry {
   PolicyKey key;

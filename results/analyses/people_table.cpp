@@ -5,7 +5,7 @@
 #include <map>
 #include <tuple>
 
-#include "duet/core/synthetic_id.h"
+#include "duet/core/episode_tags.h"
 #include "duet/results/rows/distinct_episodes.h"
 
 namespace duet {
@@ -98,9 +98,11 @@ PeopleTable people_table(const std::vector<EpisodeRow>& rows, double level) {
   std::map<PolicyKey, PeopleByTask> policies;
   for (const EpisodeRow* row : distinct_episodes(rows)) {
     if (row->perturbation != kClean || row->outcome == Outcome::kUnsupported) continue;
+    const std::string& people = row->tags.text(kPeopleTag);
+    if (people != kSyntheticPeople && people != kRecordedPeople) continue;
     BothPeople& both =
         policies[{row->engine, row->controller, row->arm, row->policy}][{task_rank(row->task), row->task}];
-    (is_synthetic_clip(row->clip) ? both.synthetic : both.recorded)
+    (people == kSyntheticPeople ? both.synthetic : both.recorded)
         .add({1, headline_success(*row) ? 1L : 0L, row->fell ? 1L : 0L});
   }
   PeopleTable table{.level = level, .entries = {}};

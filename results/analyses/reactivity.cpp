@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 
+#include "duet/core/episode_tags.h"
 #include "duet/core/order_statistics.h"
 #include "duet/results/analyses/interaction_table.h"
 #include "duet/results/statistics/row_groups.h"
@@ -140,10 +142,28 @@ std::vector<std::pair<std::string, PerturbedRows>> with_tasks(const PerturbedRow
   return parts;
 }
 
-std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& rows, double level) {
+// None unless the variants of clips have two heights.
+std::optional<OfferedHeights> offered_heights(const std::vector<EpisodeRow>& rows) {
+  std::set<double> heights;
+  for (const EpisodeRow& row : rows)
+    if (const double height = row.tags.number(kHeightTag); std::isfinite(height)) heights.insert(height);
+  if (heights.size() != 2) return std::nullopt;
+  return OfferedHeights{.low = *heights.begin(), .high = *heights.rbegin()};
+}
+
+// Place in kSpatialCells; -1 for none.
+int spatial_cell(const EpisodeRow& row, const OfferedHeights& heights) {
+  const std::string& side = row.tags.text(kSideTag);
+  const double height = row.tags.number(kHeightTag);
+  if ((side != "left" && side != "right") || !std::isfinite(height)) return -1;
+  return (height == heights.high ? 0 : 2) + (side == "left" ? 0 : 1);
+}
+
+std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& rows, const OfferedHeights& heights,
+                                     double level) {
   std::map<std::pair<int, std::string>, std::array<EpisodeRows, 4>> tasks;
   for (const auto& [id, row] : rows) {
-    const int cell = spatial_cell(id.clip);
+    const int cell = spatial_cell(*row, heights);
     if (cell >= 0) tasks[{task_rank(id.task), id.task}][static_cast<std::size_t>(cell)].emplace(id, row);
   }
   std::vector<SpatialCells> spatial;
@@ -201,9 +221,9 @@ TitledTable spatial_table(const ReactivityTable& table) {
   for (const SpatialCell& cell : kSpatialCells) paper.push_back(percent(cell.paper));
   titled.notes = {fmt::format(
       "Success in % of clean episodes under the headline detector with {:g} % Wilson intervals, by the hand "
-      "and height that the partner offers. The paper's row is Table S10 as printed: handshakes with a real "
-      "robot, its number of trials not stated.",
-      100.0 * table.level)};
+      "and height that the partner offers: {:g} m is low, {:g} m high. The paper's row is Table S10 as printed: "
+      "handshakes with a real robot, its number of trials not stated.",
+      100.0 * table.level, table.heights.low, table.heights.high)};
   return titled;
 }
 
@@ -264,20 +284,11 @@ void add_spatial_figures(const std::vector<SpatialCells>& spatial, std::vector<F
 
 }  // namespace
 
-int spatial_cell(std::string_view clip) {
-  while (!clip.empty()) {
-    const std::size_t hyphen = std::min(clip.find('-'), clip.size());
-    const std::string_view word = clip.substr(0, hyphen);
-    for (std::size_t i = 0; i < kSpatialCells.size(); ++i)
-      if (kSpatialCells[i].variant == word) return static_cast<int>(i);
-    clip.remove_prefix(std::min(hyphen + 1, clip.size()));
-  }
-  return -1;
-}
-
 ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
   ReactivityTable table{.level = options.level, .timing = {}, .spatial = {}};
   ClusterBootstrap bootstrap(options.resamples, options.seed);
+  const std::optional<OfferedHeights> heights = offered_heights(rows);
+  table.heights = heights.value_or(OfferedHeights());
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
     const auto clean = perturbed.find(kClean);
     if (clean == perturbed.end()) continue;
@@ -285,14 +296,17 @@ ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const Inte
       Reactivity timing = timing_of(key, task, of, bootstrap, options.level);
       if (timing.n + timing.without > 0) table.timing.push_back(std::move(timing));
     }
-    for (SpatialCells& cells : spatial_of(key, clean->second, options.level)) table.spatial.push_back(std::move(cells));
+    if (!heights) continue;
+    for (SpatialCells& cells : spatial_of(key, clean->second, *heights, options.level))
+      table.spatial.push_back(std::move(cells));
   }
   return table;
 }
 
 Analysis reactivity_analysis(const ReactivityTable& table) {
   Analysis analysis{.name = "reactivity", .title = "Reactivity", .level = table.level};
-  if (table.empty()) analysis.notes = {"No perturbation moved a partner's onset, and no clip names a spatial variant."};
+  if (table.empty())
+    analysis.notes = {"No perturbation moved a partner's onset, and no variants of clips offer hands at two heights."};
   if (!table.timing.empty()) analysis.tables.push_back(timing_table(table));
   if (!table.spatial.empty()) analysis.tables.push_back(spatial_table(table));
   analysis.plots = {{.plots = reactivity_plots(table)}};

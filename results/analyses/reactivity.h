@@ -50,23 +50,26 @@ struct SpatialCell {
   std::string_view variant, title;
   double paper;  // Table S10, handshake
 };
+// In the order (high, low) by (left, right).
 inline constexpr std::array<SpatialCell, 4> kSpatialCells = {{{"left_high", "Left, high", 0.8},
                                                               {"right_high", "Right, high", 1.0},
                                                               {"left_low", "Left, low", 0.4},
                                                               {"right_low", "Right, low", 0.6}}};
 
+// The two heights at which clips offer hands. [m]
+struct OfferedHeights {
+  double low = 0.0, high = 0.0;
+};
+
 struct ReactivityTable {
   double level = 0.95;
   // Of each policy all tasks and, where there are several, each. Empty: no perturbation moved a partner's onset.
   std::vector<Reactivity> timing;
-  std::vector<SpatialCells> spatial;  // empty: no clip names a variant
+  std::vector<SpatialCells> spatial;  // empty: the rows' tags name no two heights and hands
+  OfferedHeights heights = {};        // of `spatial`
 
   [[nodiscard]] bool empty() const { return timing.empty() && spatial.empty(); }
 };
-
-// Place in kSpatialCells of the variant that a clip's id names between hyphens or at its end
-// ("handshake-0003-left_high"); -1 for none.
-int spatial_cell(std::string_view clip);
 
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.
 ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});

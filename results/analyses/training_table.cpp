@@ -10,14 +10,13 @@
 #include <set>
 #include <tuple>
 
-#include "duet/core/synthetic_id.h"
+#include "duet/core/episode_tags.h"
+#include "duet/core/require.h"
 #include "duet/results/analyses/cells.h"
 #include "duet/results/statistics/resolution.h"
 
 namespace duet {
 namespace {
-
-constexpr std::string_view kSeed = "-seed";
 
 // One episode under one perturbation.
 using EpisodeKey = std::pair<std::string, EpisodeId>;
@@ -25,14 +24,25 @@ using Episodes = std::map<EpisodeKey, const EpisodeRow*>;
 // By the seed's number and text.
 using Trainings = std::map<std::pair<unsigned long long, std::string>, Episodes>;
 
+bool is_seed(std::string_view text) {
+  constexpr std::size_t kMostDigits = 18;  // kWholeTags
+  return !text.empty() && text.size() <= kMostDigits && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
 std::map<PolicyKey, Trainings> trainings_of(const std::vector<EpisodeRow>& rows) {
   std::map<PolicyKey, Trainings> methods;
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
-    const auto [method, seed] = training_of(key.policy);
-    if (method.empty() || key.arm != "main") continue;
+    const RowTags& tags = perturbed.begin()->second.begin()->second->tags;
+    const std::string &method = tags.text(kMethodTag), &seed = tags.text(kTrainingSeedTag);
+    if (method.empty() || !is_seed(seed) || key.arm != "main") continue;
     PolicyKey of = key;
     of.policy = method;
     Episodes& episodes = methods[of][{std::stoull(seed), seed}];
+    if (!episodes.empty())
+      throw InputError(
+          fmt::format("two policies are the training of '{}' with seed {}, '{}' and '{}': their tags in the "
+                      "suite have to differ",
+                      method, seed, episodes.begin()->second->policy, key.policy));
     for (const auto& [perturbation, of_it] : perturbed)
       for (const auto& [id, row] : of_it) episodes[{perturbation, id}] = row;
   }
@@ -133,10 +143,11 @@ void add_differences(const Pair& pair, TrainingTable& table) {
   const std::vector<EpisodeKey> keys = in_all({&pair.a, &pair.b});
   if (keys.empty()) return;
   table.differences.push_back(difference_of(pair, std::string(kEpisodes), keys));
-  for (const bool synthetic : {false, true})
+  const Episodes& episodes = pair.a.begin()->second;
+  for (const std::string_view people : {kRecordedPeople, kSyntheticPeople})
     add_part(
-        pair, synthetic ? "synthetic" : "recorded", keys,
-        [&](const EpisodeKey& key) { return is_synthetic_clip(key.second.clip) == synthetic; }, table.differences);
+        pair, std::string(people), keys,
+        [&](const EpisodeKey& key) { return episodes.at(key)->tags.text(kPeopleTag) == people; }, table.differences);
   std::set<std::pair<int, std::string>> tasks;
   std::set<std::string> perturbations;
   for (const auto& [perturbation, id] : keys) {
@@ -185,8 +196,7 @@ TitledTable method_rows(const TrainingTable& table) {
       cells.push_back(std::move(cell));
   }
   titled.notes = {
-      "Policies named METHOD-seedNUMBER are trainings of one method. n: the episodes that all of its trainings "
-      "have. "
+      "Policies to which the suite gives one tag `method` are its trainings. n: the episodes that all of them have. "
       "SD: between trainings."};
   return titled;
 }
@@ -249,16 +259,6 @@ void add_difference_figures(const MethodDifference& each, std::vector<Figure>& i
 
 }  // namespace
 
-std::pair<std::string, std::string> training_of(std::string_view policy) {
-  const auto at = policy.rfind(kSeed);
-  if (at == std::string_view::npos || at == 0) return {};
-  const std::string_view number = policy.substr(at + kSeed.size());
-  constexpr std::size_t kMostDigits = 18;
-  if (number.empty() || number.size() > kMostDigits || number.find_first_not_of("0123456789") != std::string_view::npos)
-    return {};
-  return {std::string(policy.substr(0, at)), std::string(number)};
-}
-
 TrainingTable training_table(const std::vector<EpisodeRow>& rows, double level, double margin) {
   TrainingTable table{.level = level, .margin = margin, .methods = {}, .differences = {}, .parts = {}};
   const std::map<PolicyKey, Trainings> methods = trainings_of(rows);
@@ -280,7 +280,8 @@ TrainingTable training_table(const std::vector<EpisodeRow>& rows, double level, 
 Analysis training_analysis(const TrainingTable& table) {
   Analysis analysis{.name = "trainings", .title = "Several trainings of one policy", .level = table.level};
   if (table.methods.empty()) {
-    analysis.notes = {"No policy is named after a training, as dstar-seed101 is."};
+    analysis.notes = {
+        "The suite gives no policy the tags `method` and `seed`, which say that it is a training of several."};
     return analysis;
   }
   analysis.tables = {method_rows(table)};

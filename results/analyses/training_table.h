@@ -1,12 +1,11 @@
-// One method, several trainings: policies named "<method>-seed<number>" ("dstar-seed101") are networks of one method
-// that learnt with other seeds. What each training achieves, their mean and spread, and every method against every
-// other where both trainings and clips are random effects (results/statistics/crossed_effects.h): a difference that
-// another seed would turn round is none. The main arm only; nothing depends on the order of rows.
+// One method, several trainings: policies to which the suite gives one tag `method` and different tags `seed` are
+// networks of one method that learnt with other seeds. What each training achieves, their mean and spread, and every
+// method against every other where both trainings and clips are random effects (results/statistics/crossed_effects.h):
+// a difference that another seed would turn round is none. The main arm only; nothing depends on the order of rows.
 #pragma once
 
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "duet/results/analyses/analysis.h"
@@ -15,9 +14,6 @@
 #include "duet/results/statistics/sequential_test.h"
 
 namespace duet {
-
-// "dstar" and "101" of "dstar-seed101"; both empty for a name that is none of a training.
-std::pair<std::string, std::string> training_of(std::string_view policy);
 
 struct MethodTrainings {
   PolicyKey key;                               // its policy is the method
@@ -47,7 +43,8 @@ struct TrainingTable {
   std::vector<MethodDifference> parts;        // of tasks and perturbations; p_holm over these
 };
 
-// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
+// Throws InputError: rows of two suites or suite versions, an episode that is there twice, two policies that are the
+// same training.
 TrainingTable training_table(const std::vector<EpisodeRow>& rows, double level = 0.95, double margin = 0.05);
 
 Analysis training_analysis(const TrainingTable& table);

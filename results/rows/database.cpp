@@ -22,6 +22,8 @@ namespace {
 constexpr const char* kTables = R"sql(
 CREATE TABLE metrics (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
+CREATE TABLE tags (
+  key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value TEXT NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE forces (
   key TEXT NOT NULL REFERENCES episodes(key), name TEXT NOT NULL, value REAL NOT NULL, PRIMARY KEY (key, name));
 CREATE TABLE contacts (
@@ -203,6 +205,7 @@ class RowWriter {
         episode_(database.insertion("episodes")),
         metric_(database.insertion("metrics")),
         force_(database.insertion("forces")),
+        tag_(database.insertion("tags")),
         contact_(database.insertion("contacts")),
         verdict_(database.insertion("verdicts")),
         value_(database.insertion("verdict_values")) {}
@@ -211,6 +214,10 @@ class RowWriter {
     write_episode(row);
     write_finite(row.key, row.metrics, metric_.get());
     write_finite(row.key, row.forces, force_.get());
+    for (const auto& [name, value] : row.tags.map()) {
+      Parameters(tag_.get()).add(row.key).add(name).add(value);
+      database_.step(tag_.get());
+    }
     write_contacts(row);
     for (const Verdict& verdict : row.verdicts) write_verdict(row.key, verdict);
   }
@@ -260,7 +267,7 @@ class RowWriter {
   }
 
   Database& database_;
-  StatementHandle episode_, metric_, force_, contact_, verdict_, value_;
+  StatementHandle episode_, metric_, force_, tag_, contact_, verdict_, value_;
 };
 
 void write_notes(const std::vector<std::string>& notes, Database& database) {

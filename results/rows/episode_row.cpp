@@ -61,6 +61,12 @@ constexpr auto kRowFields = std::to_array<RowField>({
      {.scanned = true, .check = check_arm}},
     {{"outcome", &Row::outcome, "`ok`, `fell`, `diverged`, `timeout`, `unsupported`, `error`"}, {.scanned = true}},
     {{"message", &Row::message, "why, where the outcome is not `ok`; else empty"}},
+    {{.name = "tags",
+      .member = &Row::tags,
+      .meaning = "what the suite says of the episode beside names, by name; absent where it says nothing "
+                 "([Tags](../file-formats.md#tags))",
+      .optional = true},
+     {}},
     {{"detectors", &Row::detectors, "version of the detectors' code"}, {.scanned = true}},
     {{"success", &Row::success,
       "headline verdict; `null`: no detector ruled. Counted as success only where the outcome is `ok`"}},

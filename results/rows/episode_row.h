@@ -36,6 +36,7 @@ struct EpisodeRow {
   std::string arm = "main";  // core/arm_role.h: kEpisodeArms
   Outcome outcome = Outcome::kOk;
   std::string message;          // why, where outcome is not ok
+  RowTags tags;                 // what tables know beside names; none in rows from before there were any
   std::string detectors;        // version of the detectors' code (metrics/detector.h)
   std::optional<bool> success;  // headline: the suite's detector; false for any outcome but ok
   std::vector<Verdict> verdicts;
@@ -74,7 +75,7 @@ struct RowFieldUse {
 };
 
 struct RowField {
-  JsonMember<EpisodeRow, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace, RowFaults,
+  JsonMember<EpisodeRow, RowTags, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace, RowFaults,
              RowPolicyFaults, RowPolicyTime>
       json;
   RowFieldUse use = {};

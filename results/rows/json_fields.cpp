@@ -106,6 +106,17 @@ std::map<std::string, bool> JsonFields::booleans(const std::string& key) {
   return booleans;
 }
 
+std::map<std::string, std::string, std::less<>> JsonFields::texts(const std::string& key) {
+  const nlohmann::json& object = at(key);
+  if (!object.is_object()) wrong_type(key, "an object", object);
+  std::map<std::string, std::string, std::less<>> texts;
+  for (const auto& [name, value] : object.items()) {
+    if (!value.is_string()) wrong_type(fmt::format("{}.{}", key, name), "a text", value);
+    texts.emplace(name, value.get<std::string>());
+  }
+  return texts;
+}
+
 void JsonFields::refuse_unknown() const {
   for (const auto& [key, value] : json_.items()) {
     if (asked_.contains(key)) continue;

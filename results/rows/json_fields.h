@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -36,6 +37,7 @@ class JsonFields {
   const nlohmann::json& list(const std::string& key);
   std::map<std::string, double> numbers(const std::string& key, bool null_is_nan);
   std::map<std::string, bool> booleans(const std::string& key);
+  std::map<std::string, std::string, std::less<>> texts(const std::string& key);
 
   // Throws InputError for a key that nobody asked for, with the nearest known one.
   void refuse_unknown() const;

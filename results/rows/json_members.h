@@ -31,6 +31,7 @@ struct JsonMember {
   // Of numbers: null is no value. A mapping leaves those out that are not finite; any other number is written as null
   // where it is not, and null is read as NaN.
   bool finite = false;
+  bool optional = false;  // of a mapping: an empty one is not written, and a key that is absent is an empty one
 };
 
 nlohmann::json json_value(const std::string& value, bool finite);
@@ -82,12 +83,17 @@ std::string_view value_words(ValueType<std::vector<std::vector<int>>>, bool fini
 
 template <typename Owner, typename... More>
 void write_member(const JsonMember<Owner, More...>& known, const Owner& owner, nlohmann::json& json) {
-  std::visit([&](auto member) { json[std::string(known.name)] = json_value(owner.*member, known.finite); },
-             known.member);
+  std::visit(
+      [&](auto member) {
+        nlohmann::json value = json_value(owner.*member, known.finite);
+        if (!known.optional || !value.empty()) json[std::string(known.name)] = std::move(value);
+      },
+      known.member);
 }
 
 template <typename Owner, typename... More>
 void read_member(const JsonMember<Owner, More...>& known, JsonFields& fields, Owner& owner) {
+  if (known.optional && !fields.has(std::string(known.name))) return;
   std::visit([&](auto member) { read_value(fields, std::string(known.name), known.finite, owner.*member); },
              known.member);
 }

@@ -17,22 +17,29 @@
 #include <utility>
 #include <vector>
 
+#include "duet/core/episode_tags.h"
+
 namespace duet {
 
 using SortedNames = std::vector<std::string>;
 // shared_ptr: nobody knows which of the objects that share names lives longest.
 using SharedNames = std::shared_ptr<const SortedNames>;
 
-// Lists of names that were met so far, each once.
+// Lists of names, and tags, that were met so far, each once.
 class NamePool {
  public:
   SharedNames shared(const SharedNames& names) { return *known_.insert(names).first; }
+  std::shared_ptr<const Tags> shared(const std::shared_ptr<const Tags>& tags) { return *tags_.insert(tags).first; }
 
  private:
   struct IsBefore {
-    bool operator()(const SharedNames& a, const SharedNames& b) const { return *a < *b; }
+    template <typename Shared>
+    bool operator()(const Shared& a, const Shared& b) const {
+      return *a < *b;
+    }
   };
   std::set<SharedNames, IsBefore> known_;
+  std::set<std::shared_ptr<const Tags>, IsBefore> tags_;
 };
 
 template <typename T>

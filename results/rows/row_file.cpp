@@ -59,6 +59,7 @@ void make_lean(EpisodeRow& row, std::int64_t line_at) {
 void share_names(EpisodeRow& row, NamePool& pool) {
   row.metrics.share_names(pool);
   row.forces.share_names(pool);
+  row.tags.share(pool);
   for (Verdict& verdict : row.verdicts) {
     verdict.parts.share_names(pool);
     verdict.values.share_names(pool);

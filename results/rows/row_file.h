@@ -16,7 +16,7 @@ namespace duet {
 EpisodeRow row_without_traces(std::string_view line);
 // Gives up what no table reads; the line begins at `line_at`.
 void make_lean(EpisodeRow& row, std::int64_t line_at);
-// A row's names of metrics, forces and of what verdicts are of become those of the pool.
+// A row's tags, and its names of metrics, forces and of what verdicts are of, become those of the pool.
 void share_names(EpisodeRow& row, NamePool& pool);
 
 // Where rows that were held lean stand.

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "duet/core/number.h"
 #include "duet/core/require.h"
 
 namespace duet {
@@ -129,6 +130,25 @@ template <>
 std::span<const JsonMember<RowContact>> part_members<RowContact>() {
   return kContactMembers;
 }
+
+const Tags& RowTags::map() const {
+  static const Tags none;
+  return tags_ ? *tags_ : none;
+}
+
+const std::string& RowTags::text(std::string_view name) const {
+  static const std::string none;
+  const auto found = map().find(name);
+  return found == map().end() ? none : found->second;
+}
+
+double RowTags::number(std::string_view name) const {
+  return parse_number(text(name)).value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+nlohmann::json json_value(const RowTags& tags, bool) { return tags.map(); }
+void read_value(JsonFields& fields, const std::string& key, bool, RowTags& tags) { tags = RowTags(fields.texts(key)); }
+std::string_view value_words(ValueType<RowTags>, bool) { return "name: text"; }
 
 nlohmann::json json_value(const StateTrace& trace, bool) {
   const std::string fault = fault_of(trace);

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "duet/core/episode_tags.h"
 #include "duet/results/rows/json_members.h"
 
 namespace duet {
@@ -19,6 +21,28 @@ struct Verdict {           // of one detector
   NamedNumbers values;   // NaN where undefined (null in JSON, as for any other that is not finite)
   NamedNumbers margins;  // likewise
   int frames = 0;        // number of evidence frames
+};
+
+// Tags of an episode (core/episode_tags.h). Rows that have the same share them.
+class RowTags {
+ public:
+  RowTags() = default;
+  explicit RowTags(Tags tags) : tags_(tags.empty() ? nullptr : std::make_shared<const Tags>(std::move(tags))) {}
+
+  [[nodiscard]] bool empty() const { return tags_ == nullptr; }
+  [[nodiscard]] const Tags& map() const;
+  // "" where there is no such tag.
+  [[nodiscard]] const std::string& text(std::string_view name) const;
+  // NaN where there is no such tag, or it is no number.
+  [[nodiscard]] double number(std::string_view name) const;
+  // Takes the pool's map in the place of its own, which is the same.
+  void share(NamePool& pool) {
+    if (tags_) tags_ = pool.shared(tags_);
+  }
+  bool operator==(const RowTags& other) const { return map() == other.map(); }
+
+ private:
+  std::shared_ptr<const Tags> tags_;  // shared: nobody knows which of the rows lives longest; null: none
 };
 
 // Where a few points were, to tell when two engines part on one episode.
@@ -94,10 +118,13 @@ concept RowPart = requires {
 
 // A trace without frames is null. Throw std::invalid_argument for a trace whose frames do not fit its points, and for
 // feet of different lengths.
+nlohmann::json json_value(const RowTags& tags, bool finite);
 nlohmann::json json_value(const StateTrace& trace, bool finite);
 nlohmann::json json_value(const FootTrace& feet, bool finite);
+void read_value(JsonFields& fields, const std::string& key, bool finite, RowTags& tags);
 void read_value(JsonFields& fields, const std::string& key, bool finite, StateTrace& trace);
 void read_value(JsonFields& fields, const std::string& key, bool finite, FootTrace& feet);
+std::string_view value_words(ValueType<RowTags>, bool finite);
 std::string_view value_words(ValueType<StateTrace>, bool finite);
 std::string_view value_words(ValueType<FootTrace>, bool finite);
 

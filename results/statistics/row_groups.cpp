@@ -25,7 +25,9 @@ int clip_number(const EpisodeId& id, ClipNumbers& numbers) {
 
 }  // namespace
 
-EpisodeId episode_id(const EpisodeRow& row) { return {.task = row.task, .clip = row.clip, .episode = row.episode}; }
+EpisodeId episode_id(const EpisodeRow& row) {
+  return {.task = row.task, .clip = row.clip, .episode = row.episode, .recording = row.tags.text(kRecordingTag)};
+}
 
 bool verdict_success(const EpisodeRow& row, const Verdict& verdict) {
   return row.outcome == Outcome::kOk && verdict.success;

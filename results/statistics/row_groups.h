@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -21,7 +22,12 @@ inline constexpr std::string_view kWalkRows = "walk";
 struct EpisodeId {
   std::string task, clip;
   int episode = 0;
-  auto operator<=>(const EpisodeId&) const = default;
+  std::string recording = {};  // kRecordingTag of its rows; no two ids differ by it alone
+
+  auto operator<=>(const EpisodeId& other) const {
+    return std::tie(task, clip, episode) <=> std::tie(other.task, other.clip, other.episode);
+  }
+  bool operator==(const EpisodeId& other) const { return (*this <=> other) == 0; }
 };
 EpisodeId episode_id(const EpisodeRow& row);
 
@@ -42,15 +48,14 @@ void require_one_suite(const std::vector<EpisodeRow>& rows);
 // Throws InputError where two rows of one group are the same episode.
 void require_distinct(const EpisodeRow& a, const EpisodeRow& b);
 
-// Numbers for clips in the order in which they come, the clusters of every bootstrap over clips. A clip in either role
-// is one clip: "-A" and "-B" (motion/interaction_clip.h, set_reactor) are left out.
+// Numbers for clips in the order in which they come, the clusters of every bootstrap over clips. A recording in either
+// role is one clip, as its rows' tags say.
 class ClipNumbers {
  public:
-  int of(const std::string& task, std::string clip) {
-    if (clip.ends_with("-A") || clip.ends_with("-B")) clip.resize(clip.size() - 2);
-    return numbers_.try_emplace({task, std::move(clip)}, static_cast<int>(numbers_.size())).first->second;
+  int of(const std::string& task, const std::string& clip) {
+    return numbers_.try_emplace({task, clip}, static_cast<int>(numbers_.size())).first->second;
   }
-  int of(const EpisodeId& id) { return of(id.task, id.clip); }
+  int of(const EpisodeId& id) { return of(id.task, id.recording.empty() ? id.clip : id.recording); }
   [[nodiscard]] std::size_t size() const { return numbers_.size(); }
 
  private:

@@ -23,6 +23,8 @@ TEST(ClipVariants, EveryClipIsMadeInEachAndSaysSo) {
   ASSERT_EQ(clips.size(), 2U);
   EXPECT_EQ(clips[0].clip_id, "synth-handshake-s42-0000-left_low");
   EXPECT_EQ(clips[1].clip_id, "synth-handshake-s42-0000-right_high");
+  EXPECT_EQ(clips[0].tags, (Tags{{"clip.people", "synthetic"}, {"clip.side", "left"}, {"clip.target_height", "0.9"}}));
+  EXPECT_EQ(clips[1].tags.at("clip.side"), "right");
   const auto highest = [](const PairedMotion& clip, int joint) {
     double z = 0.0;
     for (int t = clip.phases.act_begin; t < clip.phases.act_end; ++t)

@@ -9,7 +9,6 @@
 #include "duet/bench/runner.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/synthetic_id.h"
 #include "tests/bench/fixtures.h"
 #include "tests/bench/program.h"
 #include "tests/support.h"
@@ -60,6 +59,7 @@ class GivenClips : public ::testing::Test {
     options.outcome = ActOutcome::kComplete;
     InteractionClip clip = synthesize(task, options);
     clip.id = id;
+    clip.source.clear();
     save_clip(clip, folder_ / (id + ".npz"));
     return folder_ / (id + ".npz");
   }
@@ -114,7 +114,11 @@ TEST_F(GivenClips, BothRolesAreTwoClips) {
   EXPECT_THAT(ids_of(both), ElementsAre("one", "one-A", "people-wave-s5-0000", "people-wave-s5-0000-A"));
   EXPECT_EQ(both[0].source_partner.joints, both[1].source_reactor.joints);
   EXPECT_EQ(both[0].source_reactor.joints, both[1].source_partner.joints);
-  for (const std::size_t i : {2, 3}) EXPECT_TRUE(is_synthetic_clip(both[i].clip_id));
+  for (const std::size_t i : {0, 1, 2, 3}) EXPECT_EQ(both[i].tags.at("clip.people"), i < 2 ? "recorded" : "synthetic");
+  for (const std::size_t i : {0, 2}) {
+    EXPECT_FALSE(both[i].tags.contains(kRecordingTag));
+    EXPECT_EQ(both[i + 1].tags.at("clip.recording"), both[i].clip_id);
+  }
   EXPECT_THAT(resolved_yaml(suite_of(files + "}")), Not(HasSubstr("roles")));
   EXPECT_NE(suite_hash(suite_of(files + ", roles: both}")), suite_hash(suite_of(files + "}")));
 }

@@ -133,8 +133,9 @@ TEST(WalkSuite, TheShippedNetworksStandAndWalk) {
 TEST(WalkSuite, PrintsTheStagesThatItNames) {
   const ScratchFolder folder;
   write_file(folder / "w.yaml",
-             yaml("[{name: stage_1_own, velocity: [0, 0, 0], seconds: 2}, "
-                  "{name: stage_2_held-forward, velocity: [0.2, 0, 0], seconds: 2, upper_body: held}]"));
+             yaml("[{name: own, tags: {stage: 1, stage_name: own}, velocity: [0, 0, 0], seconds: 2}, "
+                  "{name: stage_7_lies, tags: {stage: 2, stage_name: held}, velocity: [0.2, 0, 0], seconds: 2, "
+                  "upper_body: held}]"));
   const test::Answer ended = test::duet_program("run '" + (folder / "w.yaml") + "' -o '" + (folder / "run") + "'");
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_THAT(ended.out, ::testing::AllOf(HasSubstr("### Stages"), HasSubstr("2 held"), HasSubstr("95 % or more")));

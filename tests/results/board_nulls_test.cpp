@@ -43,7 +43,8 @@ std::vector<EpisodeRow> rows_of(const NullExperiment& of, Random& random) {
       for (int role = 0; role < of.roles; ++role) {
         for (int engine = 0; engine < of.engines; ++engine) {
           row.policy = kPolicies[policy];
-          row.clip = "hug_" + std::to_string(clip) + (role == 0 ? "-A" : "-B");
+          row.clip = "hug_" + std::to_string(clip) + (role == 0 ? "" : "-A");
+          row.tags = role == 0 ? RowTags() : RowTags(Tags{{std::string(kRecordingTag), "hug_" + std::to_string(clip)}});
           row.engine = kEngines[engine];
           row.success = random.chance(0.8) ? usual : random.chance(rate);
           rows.push_back(row);

@@ -14,47 +14,51 @@ namespace {
 
 using test::add_episodes;
 using test::figure;
+using test::size_tags;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
 
-void expect_size(std::string_view name, const std::string& family, double x, const std::string& unit) {
-  const auto size = perturbation_size(name);
-  ASSERT_TRUE(size.has_value()) << name;
-  EXPECT_EQ(size->family, family) << name;
-  EXPECT_NEAR(size->x, x, 1e-15) << name;
-  EXPECT_EQ(size->unit, unit) << name;
-}
-
-TEST(PerturbationSize, IsReadFromTheEndOfTheName) {
-  expect_size("jitter_1cm", "jitter", 0.01, "m");
-  expect_size("dropout_0.05", "dropout", 0.05, "");
-  expect_size("shift_-0.5s", "shift", -0.5, "s");
-  expect_size("shift_+1.5s", "shift", 1.5, "s");
-  expect_size("latency_200ms", "latency", 0.2, "s");
-  expect_size("push60", "push", 60.0, "");
-  expect_size("a_1_2", "a_1", 2.0, "");
-  expect_size("wind_3knots", "wind", 3.0, "knots");
-}
-
-TEST(PerturbationSize, OtherNamesHaveNone) {
-  for (const char* name :
-       {"clean", "push", "", "60", "_60", "jitter_", "jitter_1.", "jitter_.5", "x_1.2.3", "1cm", "-5"})
-    EXPECT_FALSE(perturbation_size(name).has_value()) << name;
-}
-
 // Clean 4 of 4, jitter 1 cm 3 of 4, 2 cm 2 of 4, 5 cm 2 of 4.
 std::vector<EpisodeRow> jittered() {
   std::vector<EpisodeRow> rows;
-  add_episodes({.perturbation = "jitter_5cm", .successes = "0011"}, rows);
+  add_episodes({.perturbation = "jitter_5cm", .successes = "0011", .tags = size_tags("jitter", 0.05, "m")}, rows);
   add_episodes({.perturbation = "clean", .successes = "1111"}, rows);
-  add_episodes({.perturbation = "jitter_2cm", .successes = "0101"}, rows);
-  add_episodes({.perturbation = "jitter_1cm", .successes = "1101"}, rows);
+  add_episodes({.perturbation = "jitter_2cm", .successes = "0101", .tags = size_tags("jitter", 0.02, "m")}, rows);
+  add_episodes({.perturbation = "jitter_1cm", .successes = "1101", .tags = size_tags("jitter", 0.01, "m")}, rows);
   add_episodes({.perturbation = "vanish", .successes = "0000"}, rows);
   return rows;
 }
 
 std::string text_of(const Degradation& result) { return analysis_markdown(degradation_analysis(result)); }
+
+TEST(Degradation, ANameThatSaysAnotherSizeIsNotBelieved) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.successes = "1111"}, rows);
+  add_episodes({.perturbation = "push_60n", .successes = "0111", .tags = size_tags("push", 5.0, "N")}, rows);
+  add_episodes({.perturbation = "jitter_1cm", .successes = "0111"}, rows);  // its suite says no size
+  const Degradation result = degradation(rows);
+  ASSERT_EQ(result.curves.size(), 1U);
+  EXPECT_EQ(result.curves[0].family, "push");
+  EXPECT_EQ(result.curves[0].largest, 5.0);
+  const Figure size = figure(degradation_analysis(result), {.perturbation = "push_60n", .of = "push", .name = "size"});
+  EXPECT_EQ(size.value, 5.0);
+  EXPECT_EQ(size.unit, "N");
+}
+
+TEST(Degradation, SizesOfOneKindThatDifferInMoreAreTwoCurves) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.successes = "1111"}, rows);
+  add_episodes({.perturbation = "a", .successes = "0111", .tags = size_tags("push", 20.0, "N", "duration: 1")}, rows);
+  add_episodes({.perturbation = "b", .successes = "0011", .tags = size_tags("push", 40.0, "N", "duration: 1")}, rows);
+  add_episodes({.perturbation = "c", .successes = "0001", .tags = size_tags("push", 30.0, "N", "duration: 9")}, rows);
+  const Degradation result = degradation(rows);
+  ASSERT_EQ(result.curves.size(), 2U);
+  EXPECT_EQ(result.curves[0].family, "push (duration: 1)");
+  EXPECT_EQ(result.curves[0].points.size(), 3U);
+  EXPECT_EQ(result.curves[1].family, "push (duration: 9)");
+  EXPECT_EQ(result.curves[1].largest, 30.0);
+}
 
 TEST(Degradation, LossIsPairedWithTheCleanEpisodes) {
   const Degradation result = degradation(jittered());
@@ -99,8 +103,8 @@ TEST(Degradation, AreaOfACurveIsByTrapezia) {
 TEST(Degradation, SizesOnBothSidesOfZeroAreOneCurve) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "1100"}, rows);
-  add_episodes({.perturbation = "shift_-1s", .successes = "0000"}, rows);
-  add_episodes({.perturbation = "shift_0.5s", .successes = "1100"}, rows);
+  add_episodes({.perturbation = "early", .successes = "0000", .tags = size_tags("partner.shift_s", -1.0, "s")}, rows);
+  add_episodes({.perturbation = "late", .successes = "1100", .tags = size_tags("partner.shift_s", 0.5, "s")}, rows);
   const Degradation result = degradation(rows);
   ASSERT_EQ(result.curves.size(), 1U);
   EXPECT_DOUBLE_EQ(result.curves[0].points[0].x, -1.0);
@@ -111,7 +115,7 @@ TEST(Degradation, SizesOnBothSidesOfZeroAreOneCurve) {
 TEST(Degradation, ACurveThatNeverSucceedsHasNoArea) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "00"}, rows);
-  add_episodes({.perturbation = "jitter_1cm", .successes = "00"}, rows);
+  add_episodes({.perturbation = "jitter_1cm", .successes = "00", .tags = size_tags("jitter", 0.01, "m")}, rows);
   EXPECT_TRUE(std::isnan(degradation(rows).curves.at(0).normalised_area));
 }
 

@@ -81,9 +81,13 @@ TEST(EpisodeRow, OlderSchemasAreNotRead) {
   }
 }
 
-TEST(EpisodeRow, NoFieldMayBeAbsent) {
+TEST(EpisodeRow, NoFieldMayBeAbsentButTags) {
   const nlohmann::json whole = to_json(full_row());
-  for (const auto& [key, value] : whole.items()) {
+  nlohmann::json old = whole;
+  old.erase("tags");
+  EXPECT_TRUE(row_from_json(old).tags.empty());
+  EXPECT_EQ(to_json(row_from_json(old)), old);  // a row from before there were any stays as it is
+  for (const auto& [key, value] : old.items()) {
     nlohmann::json json = whole;
     json.erase(key);
     EXPECT_THAT(refusal(json), HasSubstr("key '" + key + "' is missing"));
@@ -213,10 +217,10 @@ TEST(EpisodeRow, NumbersThatAreNotFiniteAreNeverWritten) {
   EXPECT_TRUE(std::isnan(back.contacts[0].peak_n));
 }
 
-TEST(EpisodeRow, EveryKeyButContactsIsNeeded) {
+TEST(EpisodeRow, EveryKeyButContactsAndTagsIsNeeded) {
   const nlohmann::json whole = to_json(full_row());
   for (const auto& [key, value] : whole.items()) {
-    if (key.starts_with("contacts")) continue;
+    if (key.starts_with("contacts") || key == "tags") continue;
     nlohmann::json json = whole;
     json.erase(key);
     EXPECT_EQ(refusal(json), "episode row: key '" + key + "' is missing");

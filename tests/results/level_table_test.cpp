@@ -16,29 +16,24 @@ using test::figures_like;
 using testing::AllOf;
 using testing::HasSubstr;
 
-TEST(LevelName, IsANumberAndWords) {
-  EXPECT_EQ(level_of("level", "level_3_walks_up"), (LevelName{3, "walks_up"}));
-  EXPECT_EQ(level_of("level", "level_12"), (LevelName{12, ""}));
-  EXPECT_EQ(level_of("stage", "stage_2_held-forward_0.3"), (LevelName{2, "held"}));
+// Of a perturbation or a clip.
+Tags rung(std::string_view of, const std::string& word, int number, const std::string& name) {
+  return {{row_tag(of, word), std::to_string(number)}, {row_tag(of, word + "_name"), name}};
 }
 
-TEST(LevelName, OtherNamesHaveNone) {
-  for (const char* name : {"clean", "level", "level_", "level_x", "level3", "levels_3", "level_3x", "level_-1",
-                           "push_3", "stage_3", "level_99999999999"})
-    EXPECT_FALSE(level_of("level", name).has_value()) << name;
-}
+Tags level(int number, const std::string& name) { return rung(kOfPerturbation, "level", number, name); }
 
 // dstar passes 0 and 1, not 2, and 3 again; replay not even 0.
 std::vector<EpisodeRow> ladder() {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "1111"}, rows);
-  add_episodes({.perturbation = "level_1_waits", .successes = "0011"}, rows);
-  add_episodes({.perturbation = "level_2_moves", .successes = "0001"}, rows);
-  add_episodes({.perturbation = "level_3_pushed", .successes = "1110"}, rows);
+  add_episodes({.perturbation = "one", .successes = "0011", .tags = level(1, "waits")}, rows);
+  add_episodes({.perturbation = "level_9_lies", .successes = "0001", .tags = level(2, "moves")}, rows);
+  add_episodes({.perturbation = "three", .successes = "1110", .tags = level(3, "pushed")}, rows);
   add_episodes({.policy = "replay", .successes = "0001"}, rows);
-  add_episodes({.policy = "replay", .perturbation = "level_1_waits", .successes = "1111"}, rows);
+  add_episodes({.policy = "replay", .perturbation = "one", .successes = "1111", .tags = level(1, "waits")}, rows);
   add_episodes({.policy = "null", .arm = "null", .successes = "0000"}, rows);
-  add_episodes({.perturbation = "push", .successes = "0000"}, rows);  // on no level
+  add_episodes({.perturbation = "level_4_push", .successes = "0000"}, rows);  // on no level, whatever it is called
   return rows;
 }
 
@@ -62,20 +57,23 @@ TEST(LevelTable, AScoreSaysWhereItEnds) {
 // A push while the arms move is of the push's stage, whatever the arms do.
 TEST(LevelTable, ARowIsOfTheHigherOfItsPerturbationAndItsClip) {
   std::vector<EpisodeRow> rows;
-  const auto add = [&](const std::string& clip, const std::string& perturbation, const std::string& successes) {
+  const auto add = [&](const std::string& clip, int stage_of_clip, const std::string& perturbation, int stage,
+                       const std::string& successes) {
     const std::size_t first = rows.size();
-    add_episodes({.policy = "velocity", .perturbation = perturbation, .successes = successes}, rows);
+    Tags tags = rung(kOfClip, "stage", stage_of_clip, stage_of_clip == 1 ? "own" : "moving");
+    if (stage > 0) tags.merge(rung(kOfPerturbation, "stage", stage, "pushed"));
+    add_episodes({.policy = "velocity", .perturbation = perturbation, .successes = successes, .tags = tags}, rows);
     for (std::size_t i = first; i < rows.size(); ++i) {
       rows[i].clip = clip;
       rows[i].key = episode_key(rows[i]);
     }
   };
-  add("stage_1_own-stand", "clean", "11");
-  add("stage_1_own-forward", "clean", "10");
-  add("stage_2_moving-stand", "clean", "11");
-  add("stage_1_own-stand", "stage_3_pushed", "01");
-  add("stage_2_moving-stand", "stage_3_pushed", "00");
-  add("stage_2_moving-stand", "kick", "11");  // on no stage
+  add("own-stand", 1, "clean", 0, "11");
+  add("own-forward", 1, "clean", 0, "10");
+  add("moving-stand", 2, "clean", 0, "11");
+  add("own-stand", 1, "pushed", 3, "01");
+  add("moving-stand", 2, "pushed", 3, "00");
+  add("moving-stand", 2, "kick", 0, "11");  // on no stage
   const std::vector<LevelTable> tables = level_tables(rows);
   ASSERT_EQ(tables.size(), 1U);
   EXPECT_EQ(tables[0].ladder.word, "stage");
@@ -91,8 +89,16 @@ TEST(LevelTable, ARowIsOfTheHigherOfItsPerturbationAndItsClip) {
 
 TEST(LevelTable, WhoStandsWhereItShouldWalkDoesNotPass) {
   std::vector<EpisodeRow> rows;
-  add_episodes({.policy = "velocity", .perturbation = "stage_1_own", .successes = "1110"}, rows);
-  add_episodes({.policy = "velocity", .perturbation = "stage_2_held", .successes = "1"}, rows);
+  add_episodes({.policy = "velocity",
+                .perturbation = "own",
+                .successes = "1110",
+                .tags = rung(kOfPerturbation, "stage", 1, "own")},
+               rows);
+  add_episodes({.policy = "velocity",
+                .perturbation = "held",
+                .successes = "1",
+                .tags = rung(kOfPerturbation, "stage", 2, "held")},
+               rows);
   rows[4].metrics = {{"command_forward", 0.0}, {"speed_forward", -0.001}};  // nobody asked it to walk
   for (const auto& [row, speed] : {std::pair(0, 0.3), std::pair(1, 0.15), std::pair(2, 0.14), std::pair(3, 0.3)}) {
     rows[row].metrics["command_forward"] = 0.3;
@@ -113,7 +119,7 @@ TEST(LevelTable, RowsWithoutLevelsAreNoTable) {
 
 TEST(LevelTable, TwoNamesOfOneLevelAreRefused) {
   std::vector<EpisodeRow> rows = ladder();
-  add_episodes({.perturbation = "level_1_hurries", .successes = "1"}, rows);
+  add_episodes({.perturbation = "hurries", .successes = "1", .tags = level(1, "hurries")}, rows);
   EXPECT_THAT(test::thrown_message<InputError>([&] { level_tables(rows); }),
               AllOf(HasSubstr("two names of level 1"), HasSubstr("hurries"), HasSubstr("waits")));
 }

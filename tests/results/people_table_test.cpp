@@ -20,8 +20,10 @@ void add_people(const std::string& kind, const std::string& task, const std::str
                 std::vector<EpisodeRow>& rows, const std::string& policy = "dstar") {
   for (std::size_t i = 0; i < successes.size(); ++i) {
     EpisodeRow row = test::episode(policy, task, static_cast<int>(i), successes[i] == '1');
-    row.clip = kind == "recorded" ? "sbu-" + task + "-" + std::to_string(i)
-                                  : "people-" + task + "-s20000-000" + std::to_string(i) + "-tracked";
+    // Each is called as the other kind is.
+    row.clip = kind == "synthetic" ? "sbu-" + task + "-" + std::to_string(i)
+                                   : "people-" + task + "-s20000-000" + std::to_string(i) + "-tracked";
+    test::set_tag(row, kPeopleTag, kind);
     row.fell = successes[i] == '0' && kind == "recorded";
     row.key = episode_key(row);
     rows.push_back(row);

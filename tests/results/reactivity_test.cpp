@@ -148,21 +148,36 @@ TEST(Reactivity, WithoutAMovedPartnerOrVariantsThereIsNothing) {
   EXPECT_TRUE(reactivity_analysis(table).empty());
 }
 
-TEST(SpatialCell, IsAWordOfTheClipsId) {
-  EXPECT_EQ(spatial_cell("handshake-0003-left_high"), 0);
-  EXPECT_EQ(spatial_cell("handshake-right_low-0003"), 3);
-  EXPECT_EQ(spatial_cell("handshake-0003"), -1);
-  EXPECT_EQ(spatial_cell("left_higher"), -1);
-  EXPECT_EQ(spatial_cell("-"), -1);
-  EXPECT_EQ(spatial_cell(""), -1);
+void offer(const std::string& side, const std::string& height, EpisodeRow& row) {
+  test::set_tag(row, kSideTag, side);
+  test::set_tag(row, kHeightTag, height);
+}
+
+TEST(Reactivity, VariantsOfOneHeightOrOfThreeAreNoTable) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({.task = "handshake", .successes = "110"}, rows);
+  for (EpisodeRow& row : rows) row.clip = "handshake-0-left_high";
+  EXPECT_TRUE(reactivity_table(rows).spatial.empty());  // names say nothing
+  for (EpisodeRow& row : rows) offer("left", "0.9", row);
+  EXPECT_TRUE(reactivity_table(rows).spatial.empty());
+  offer("left", "1", rows[0]);
+  EXPECT_EQ(reactivity_table(rows).spatial.size(), 1U);
+  offer("left", "1.15", rows[1]);
+  EXPECT_TRUE(reactivity_table(rows).spatial.empty());
 }
 
 TEST(Reactivity, CellsAreSuccessByVariantBesideThePapers) {
   std::vector<EpisodeRow> rows;
   add_episodes({.task = "handshake", .successes = "1101"}, rows);
-  for (EpisodeRow& row : rows) row.clip = "handshake-0-left_high";
+  for (EpisodeRow& row : rows) {
+    row.clip = "handshake-0-right_low";
+    offer("left", "1.15", row);
+  }
   add_episodes({.task = "handshake", .successes = "0100"}, rows);
-  for (std::size_t i = 4; i < 8; ++i) rows[i].clip = "handshake-0-right_low";
+  for (std::size_t i = 4; i < 8; ++i) {
+    rows[i].clip = "handshake-0-left_high";
+    offer("right", "0.9", rows[i]);
+  }
   const ReactivityTable table = reactivity_table(rows);
   ASSERT_EQ(table.spatial.size(), 1U);
   EXPECT_EQ(table.spatial[0].cells[0].k, 3);
@@ -173,7 +188,8 @@ TEST(Reactivity, CellsAreSuccessByVariantBesideThePapers) {
   ASSERT_EQ(tables.size(), 1U);
   EXPECT_EQ(tables[0].table.rows.at(1),
             (std::vector<std::string>{"D-STAR (the paper's)", "Handshake", "80.0", "100.0", "40.0", "60.0"}));
-  EXPECT_THAT(text_of(table), AllOf(HasSubstr("75.0 ["), HasSubstr("real robot"), Not(HasSubstr("Slope"))));
+  EXPECT_THAT(text_of(table), AllOf(HasSubstr("75.0 ["), HasSubstr("0.9 m is low, 1.15 m high"),
+                                    HasSubstr("real robot"), Not(HasSubstr("Slope"))));
   EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "handshake", .of = "left_high", .name = "success"}).k, 3);
   EXPECT_EQ(figure(analysis, {.source = "paper", .task = "handshake", .of = "left_low", .name = "success"}).value, 0.4);
 }

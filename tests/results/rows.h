@@ -50,6 +50,7 @@ inline EpisodeRow full_row() {
   row.robot_digest = std::string(64, 'b');
   row.arm = "shuffled";
   row.outcome = Outcome::kFell;
+  row.tags = RowTags({{std::string(kKindsTag), "jitter"}, {std::string(kSizeTag), "0.05"}});
   row.message = "pelvis below 0.3 m at 2.1 s, \"sideways\"\nμ = 0.8";
   row.success = true;
   row.verdicts = {{.version = "paper",
@@ -125,6 +126,12 @@ inline EpisodeRow traced(const std::string& engine, int number, const std::vecto
   row.trace.points = {"root", "left_hand"};
   for (const int x : x_mm) row.trace.mm.push_back({x, 0, 0, 0, 300, 900});
   return row;
+}
+
+inline void set_tag(EpisodeRow& row, std::string_view name, const std::string& value) {
+  Tags tags = row.tags.map();
+  tags.insert_or_assign(std::string(name), value);
+  row.tags = RowTags(std::move(tags));
 }
 
 }  // namespace duet::test

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "duet/core/require.h"
 #include "tests/results/figures.h"
 #include "tests/results/policy_rows.h"
+#include "tests/support.h"
 
 namespace duet {
 namespace {
@@ -18,9 +20,15 @@ using testing::HasSubstr;
 void add_training(const std::string& policy, const std::string& successes, std::vector<EpisodeRow>& rows,
                   const std::string& task = "hug", const std::string& perturbation = "clean") {
   const std::size_t before = rows.size();
+  const std::size_t cut = policy.find("-seed");  // the names of these trainings say the same
+  Tags tags = {{std::string(kPeopleTag), std::string(kRecordedPeople)}};
+  if (cut != std::string::npos)
+    tags.insert(
+        {{std::string(kMethodTag), policy.substr(0, cut)}, {std::string(kTrainingSeedTag), policy.substr(cut + 5)}});
   test::add_episodes({.policy = policy, .perturbation = perturbation, .task = task, .successes = successes}, rows);
   for (std::size_t i = before; i < rows.size(); ++i) {
     rows[i].clip = "sbu-" + task + "-" + std::to_string(rows[i].episode);
+    rows[i].tags = RowTags(tags);
     rows[i].key = episode_key(rows[i]);
   }
 }
@@ -34,12 +42,25 @@ std::vector<EpisodeRow> two_methods() {
   return rows;
 }
 
-TEST(TrainingOf, IsWhatANameEndsIn) {
-  EXPECT_EQ(training_of("dstar-seed101"), std::pair(std::string("dstar"), std::string("101")));
-  EXPECT_EQ(training_of("a-seed1-seed2").first, "a-seed1");
-  for (const char* name :
-       {"dstar", "dstar-seed", "-seed1", "dstar-seed1a", "dstar-seed-1", "seed1", "dstar-seed1234567890123456789"})
-    EXPECT_EQ(training_of(name).first, "") << name;
+TEST(TrainingTable, NamesMakeNoTraining) {
+  std::vector<EpisodeRow> rows;
+  add_training("dp-seed2", "10000000", rows);
+  for (EpisodeRow& row : rows) row.tags = {};
+  EXPECT_TRUE(training_table(rows).methods.empty());
+  for (const char* seed : {"", "x", "-1", "1234567890123456789"}) {
+    for (EpisodeRow& row : rows)
+      row.tags = RowTags(Tags{{std::string(kMethodTag), "dp"}, {std::string(kTrainingSeedTag), seed}});
+    EXPECT_TRUE(training_table(rows).methods.empty()) << seed;
+  }
+}
+
+TEST(TrainingTable, TwoPoliciesOfOneTrainingAreRefused) {
+  std::vector<EpisodeRow> rows = two_methods();
+  for (EpisodeRow& row : rows)
+    if (row.policy == "dp-seed10")
+      row.tags = RowTags(Tags{{std::string(kMethodTag), "dp"}, {std::string(kTrainingSeedTag), "2"}});
+  EXPECT_THAT(test::thrown_message<InputError>([&] { training_table(rows); }),
+              testing::AllOf(HasSubstr("'dp' with seed 2"), HasSubstr("'dp-seed10'"), HasSubstr("'dp-seed2'")));
 }
 
 TEST(TrainingTable, ATrainingIsOneOfItsMethod) {
@@ -101,7 +122,7 @@ TEST(TrainingTable, PartsAreTasksAndPerturbations) {
 TEST(TrainingTable, RecordedPeopleAreApartFromSyntheticOnes) {
   std::vector<EpisodeRow> rows = two_methods();
   for (EpisodeRow& row : rows) {
-    if (row.episode >= 4) row.clip = "people-hug-s20000-000" + std::to_string(row.episode) + "-tracked";
+    if (row.episode >= 4) test::set_tag(row, kPeopleTag, std::string(kSyntheticPeople));
     row.key = episode_key(row);
   }
   const TrainingTable table = training_table(rows);
@@ -115,7 +136,9 @@ TEST(TrainingTable, RecordedPeopleAreApartFromSyntheticOnes) {
 TEST(TrainingTable, AClipInBothRolesIsOneClip) {
   std::vector<EpisodeRow> rows = two_methods();
   for (EpisodeRow& row : rows) {
-    row.clip = "sbu-hug-" + std::to_string(row.episode / 2) + (row.episode % 2 == 0 ? "" : "-A");
+    const std::string recording = "sbu-hug-" + std::to_string(row.episode / 2);
+    row.clip = recording + (row.episode % 2 == 0 ? "" : "-in-the-other-role");
+    if (row.clip != recording) test::set_tag(row, kRecordingTag, recording);
     row.key = episode_key(row);
   }
   const MethodDifference found = training_table(rows).differences.front();

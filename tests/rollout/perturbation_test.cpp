@@ -1,6 +1,9 @@
 #include "duet/rollout/perturbation.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
+
+#include <optional>
 
 #include "duet/core/require.h"
 #include "tests/bench/fixtures.h"
@@ -155,6 +158,63 @@ TEST(Perturbation, AddedMassIsOfItsLinkAlone) {
   for (size_t i = 0; i < robot->links.size(); ++i)
     EXPECT_NEAR(heavier->links[i].mass - robot->links[i].mass, robot->links[i].name == "torso_link" ? 3.0 : 0.0, 1e-12);
   EXPECT_EQ(perturbed_robot(default_perturbation("push"), robot), robot);
+}
+
+std::string size_text(const std::string& item) {
+  const std::optional<PerturbationSize> size = size_of(read("[" + item + "]").front());
+  return size ? fmt::format("{} {} {} ({})", size->family, size->x, size->unit, size->beside) : "none";
+}
+
+// What it does is its size, whatever it is called.
+TEST(PerturbationSize, IsItsOneValueThatACleanEpisodeLacks) {
+  EXPECT_EQ(size_text("{name: push_60n, push: {force: 5}}"), "push 5 N (duration: 1, every: 4)");
+  EXPECT_EQ(size_text("{name: jitter_9m, jitter: {sigma: 0.01}}"), "jitter 0.01 m ()");
+  EXPECT_EQ(size_text("{name: a, dropout: {p: 0.2}}"), "dropout 0.2  ()");
+  EXPECT_EQ(size_text("{name: a, perception_latency: {ms: 250}}"), "perception_latency 0.25 s ()");
+  EXPECT_EQ(size_text("{name: a, latency: {ms: 20}}"), "latency 0.02 s ()");
+  EXPECT_EQ(size_text("delay"), "delay 2 ticks ()");
+  EXPECT_EQ(size_text("{name: a, kick: {speed: 0.5}}"), "kick 0.5 m/s (first: 2, from: 3, to: 6)");
+  EXPECT_EQ(size_text("{name: a, mass: {add: -1.5}}"), "mass -1.5 kg ()");
+  EXPECT_EQ(size_text("{name: a, freeze: {at: 4, for: 1}}"), "freeze 1 s (at: 4)");
+  EXPECT_EQ(size_text("{name: a, partner: {shift_s: -0.5}}"), "partner.shift_s -0.5 s ()");
+  EXPECT_EQ(size_text("{name: a, partner: {comes_m: 1}}"), "partner.comes_m 1 m ()");
+  EXPECT_EQ(size_text("{name: a, noise: {q: 0.02}}"), "noise.q 0.02 rad ()");
+}
+
+TEST(PerturbationSize, SeveralKindsOrValuesAndThoseWithoutAZeroHaveNone) {
+  for (const char* item :
+       {"clean", "noise", "friction", "{name: push_60n, vanish: {at: 4}}",
+        "{name: jitter_1cm, jitter: {sigma: 0.01}, dropout: {p: 0.1}}", "{name: a, partner: {scale: 0.9}}",
+        "{name: a, partner: {shift_s: 1, scale: 0.9}}", "{name: a, partner: {shift_s: 1, comes_m: 1}}",
+        "{name: a, partner: {hesitate_s: 1, other_hand: true}}", "{name: a, partner: {abort: true}}"})
+    EXPECT_EQ(size_text(item), "none") << item;
+}
+
+TEST(PerturbationTags, AreItsOwnAndWhatItDoes) {
+  const Perturbation push = read("[{name: a, tags: {level: 3, level_name: walks_up}, push: {force: 5}}]").front();
+  EXPECT_THAT(tags_of(push),
+              ::testing::ElementsAre(
+                  ::testing::Pair("perturbation.beside", "duration: 1, every: 4"),
+                  ::testing::Pair("perturbation.family", "push"), ::testing::Pair("perturbation.kinds", "push"),
+                  ::testing::Pair("perturbation.level", "3"), ::testing::Pair("perturbation.level_name", "walks_up"),
+                  ::testing::Pair("perturbation.size", "5"), ::testing::Pair("perturbation.unit", "N")));
+  EXPECT_TRUE(tags_of(Perturbation{}).empty());
+  EXPECT_EQ(to_yaml(push),
+            "{name: a, push: {force: 5, duration: 1, every: 4}, tags: {level: 3, level_name: walks_up}}");
+  EXPECT_EQ(to_yaml(read("[" + to_yaml(push) + "]").front()), to_yaml(push));
+}
+
+TEST(PerturbationTags, AreRefusedWhereNoTableCanReadThem) {
+  const auto tagged = [](const std::string& tags) {
+    return refusal("[{name: a, push: {force: 5}, tags: " + tags + "}]");
+  };
+  EXPECT_THAT(tagged("[level]"), HasSubstr("tags: expected a mapping"));
+  EXPECT_THAT(tagged("{size: 60}"), HasSubstr("found 'size', which follows from what the suite runs"));
+  EXPECT_THAT(tagged("{level: high}"), HasSubstr("level: expected a whole number of at most 6 digits, found 'high'"));
+  EXPECT_THAT(tagged("{level: -1}"), HasSubstr("level: expected one word or number"));
+  EXPECT_THAT(tagged("{level: 1234567}"), HasSubstr("at most 6 digits"));
+  EXPECT_THAT(tagged("{\"a b\": 1}"), HasSubstr("tags: "));
+  EXPECT_THAT(tagged("{a: [1]}"), HasSubstr("a: expected one word or number"));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "duet/bench/missing_tags.h"
 #include "duet/core/file.h"
 #include "duet/core/split.h"
 #include "duet/results/report/run_analyses.h"
@@ -51,9 +52,10 @@ class PublishedTables : public testing::TestWithParam<const char*> {};
 
 TEST_P(PublishedTables, AreWhatTheRowsSay) {
   const std::string folder = in(std::string("tables/") + GetParam() + "/");
-  const std::vector<EpisodeRow> rows = load_run(in(std::string("published/") + GetParam())).rows;
-  const RunTables tables = run_tables(rows, {.all = units_in(folder + "leaderboard.csv"), .drifting = {}}, nullptr, {},
-                                      suite_in(folder + "board.csv"));
+  duet::Run run = load_run(in(std::string("published/") + GetParam()));
+  add_missing_tags(run);
+  const RunTables tables = run_tables(run.rows, {.all = units_in(folder + "leaderboard.csv"), .drifting = {}}, nullptr,
+                                      {}, suite_in(folder + "board.csv"));
   std::set<std::string> written;
   for (const auto& [file, text] : analysis_files(run_analyses(tables), "csv")) {
     written.insert(file);
