@@ -56,7 +56,8 @@ void compare(const std::string& field, const nlohmann::json* first, const nlohma
   found.push_back({field, shown_field(first), shown_field(second)});
 }
 
-nlohmann::json repeatable(const EpisodeRow& row) {
+nlohmann::json repeatable(EpisodeRow row, bool with_tags) {
+  if (!with_tags) row.tags = {};
   nlohmann::json json = to_json(row);
   for (const RowField& field : row_fields())
     if (!field.use.repeats) json.erase(std::string(field.json.name));
@@ -68,9 +69,14 @@ nlohmann::json repeatable(const EpisodeRow& row) {
 bool has_ended(Outcome outcome) { return outcome != Outcome::kError && outcome != Outcome::kTimedOut; }
 
 Stands which_stands(Outcome first, Outcome second) {
-  const auto weight = [](Outcome outcome) { return has_ended(outcome) ? 2 : outcome == Outcome::kTimedOut ? 1 : 0; };
+  constexpr int kRan = 3;
+  const auto weight = [](Outcome outcome) {
+    if (outcome == Outcome::kError) return 0;
+    if (outcome == Outcome::kTimedOut) return 1;
+    return outcome == Outcome::kUnsupported ? 2 : kRan;
+  };
   if (weight(first) != weight(second)) return weight(first) > weight(second) ? Stands::kFirst : Stands::kSecond;
-  return has_ended(first) ? Stands::kBothAgreed : Stands::kEither;
+  return weight(first) == kRan ? Stands::kBothAgreed : Stands::kEither;
 }
 
 void note_outcome(const std::string& key, Outcome outcome, std::map<std::string, Outcome>& outcomes) {
@@ -79,7 +85,8 @@ void note_outcome(const std::string& key, Outcome outcome, std::map<std::string,
 }
 
 std::vector<FieldDifference> row_differences(const EpisodeRow& first, const EpisodeRow& second) {
-  const nlohmann::json left = repeatable(first), right = repeatable(second);
+  const bool tagged = !first.tags.empty() && !second.tags.empty();
+  const nlohmann::json left = repeatable(first, tagged), right = repeatable(second, tagged);
   Differences found;
   compare("", &left, &right, found);
   return found;

@@ -17,10 +17,11 @@ bool has_ended(Outcome outcome);
 
 // Which of two rows of one episode stands, in a folder, in a union and in a merge alike.
 enum class Stands {
-  kFirst,  // the other one gives way: an error to any other row, a time-out to one of an episode that has ended
+  kFirst,  // the other one gives way: an error to any other row, a time-out to all but an error, and one of a machine
+           // that could not run the episode to one that has
   kSecond,
-  kEither,      // two errors or two time-outs: they need not agree
-  kBothAgreed,  // both have ended: rows that differ in a field that repeats are a fault
+  kEither,      // two errors, two time-outs or two unsupported: they need not agree
+  kBothAgreed,  // both ran to an end: rows that differ in a field that repeats are a fault
 };
 Stands which_stands(Outcome first, Outcome second);
 // Of many rows: notes the outcome of the one that stands, by key.
@@ -32,7 +33,8 @@ struct FieldDifference {
 };
 
 // Of all fields that repeat (episode_row.h); the others tell when and how fast an episode ran. NaN equals NaN; two
-// values of numbers are equal where they are the same number.
+// values of numbers are equal where they are the same number. Tags are compared where both rows have some: rows from
+// before there were any have none.
 std::vector<FieldDifference> row_differences(const EpisodeRow& first, const EpisodeRow& second);
 
 // Their names alone; none: the rows are equal.

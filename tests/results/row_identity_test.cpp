@@ -14,18 +14,29 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 TEST(RowIdentity, MishapsGiveWayToWhatEnded) {
-  constexpr Outcome kEnded[] = {Outcome::kOk, Outcome::kFell, Outcome::kDiverged, Outcome::kUnsupported};
+  constexpr Outcome kEnded[] = {Outcome::kOk, Outcome::kFell, Outcome::kDiverged};
   for (const Outcome ended : kEnded) {
     for (const Outcome other : kEnded) EXPECT_EQ(which_stands(ended, other), Stands::kBothAgreed);
-    for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut}) {
+    for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut, Outcome::kUnsupported}) {
       EXPECT_EQ(which_stands(ended, mishap), Stands::kFirst);
       EXPECT_EQ(which_stands(mishap, ended), Stands::kSecond);
     }
   }
   EXPECT_EQ(which_stands(Outcome::kError, Outcome::kTimedOut), Stands::kSecond);
   EXPECT_EQ(which_stands(Outcome::kTimedOut, Outcome::kError), Stands::kFirst);
-  for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut})
+  for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut}) {
+    EXPECT_EQ(which_stands(Outcome::kUnsupported, mishap), Stands::kFirst);
+    EXPECT_EQ(which_stands(mishap, Outcome::kUnsupported), Stands::kSecond);
+  }
+  for (const Outcome mishap : {Outcome::kError, Outcome::kTimedOut, Outcome::kUnsupported})
     EXPECT_EQ(which_stands(mishap, mishap), Stands::kEither);
+}
+
+TEST(RowIdentity, RowsFromBeforeTagsEqualThoseWithThem) {
+  EpisodeRow row = full_row();
+  row.tags = {};
+  EXPECT_THAT(differing_fields(full_row(), row), IsEmpty());
+  EXPECT_THAT(differing_fields(row, full_row()), IsEmpty());
 }
 
 TEST(RowIdentity, WallTimesAreNoDifference) {
@@ -47,6 +58,7 @@ TEST(RowIdentity, EveryOtherFieldIsCompared) {
     if (value.is_number_float()) forged[key] = 0.5;
     if (value.is_array()) forged[key] = nlohmann::json::array();
     if (key == "metrics" || key == "forces") forged[key] = nlohmann::json::object();
+    if (key == "tags") forged[key] = {{"perturbation.size", "60"}};
     if (key == "trace" || key == "feet") forged[key] = nullptr;
     if (key == "faults") forged[key]["actions"] = 7;
     if (key == "policy_faults") forged[key]["late"] = 7;

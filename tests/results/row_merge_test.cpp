@@ -112,6 +112,30 @@ TEST_F(RowMerge, HasEachEpisodeOnceAndAMishapOnlyWhereNothingElseIs) {
   }
 }
 
+// Two attempts at one shard: a node without the engine, and one that has it.
+TEST_F(RowMerge, ARowOfANodeWithoutTheEngineGivesWayToOneThatRan) {
+  const EpisodeRow ran = row_number(3);
+  EpisodeRow lacking = row_number(3), elsewhere = row_number(3);
+  for (EpisodeRow* row : {&lacking, &elsewhere}) {
+    row->outcome = Outcome::kUnsupported;
+    row->success = false;
+    row->metrics.clear();
+  }
+  lacking.message = "this machine has no ode";
+  elsewhere.message = "libode.so.8: cannot open shared object file";
+  const RowSource one = source("one", {lacking, row_number(4)}, "n1"), two = source("two", {ran}, "n2");
+  const RowSource three = source("three", {elsewhere}, "n3");
+  const std::string alone = merged({two, source("four", {row_number(4)})});
+  for (const std::vector<RowSource>& order : {std::vector{one, two, three}, std::vector{three, two, one}}) {
+    EXPECT_EQ(merged(order), alone);
+    EXPECT_EQ(result_.violations, 0);
+    EXPECT_EQ(result_.superseded, 2);
+  }
+  merged({one, three});  // nobody has it: their words for it need not agree
+  EXPECT_EQ(result_.violations, 0);
+  EXPECT_EQ(result_.rows, 2);
+}
+
 TEST_F(RowMerge, RowsThatDifferAreToldNodeByNodeAndNothingIsWritten) {
   EpisodeRow changed = row_number(2);
   changed.fell = true;
