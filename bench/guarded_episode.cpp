@@ -10,6 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/hardware/guard_loop.h"
 #include "duet/results/rows/json_fields.h"
+#include "duet/results/statistics/row_groups.h"
 #include "duet/robots/robot_cards.h"
 
 namespace duet {
@@ -101,7 +102,9 @@ PairedSuccess paired_success(const PairedEpisodes& episodes) {
                       episodes.guarded.size()));
   PairedSuccess result;
   result.n = static_cast<long>(episodes.simulated.size());
+  EpisodePairs pairs;
   for (std::size_t i = 0; i < episodes.simulated.size(); ++i) {
+    pairs.add(episodes.guarded[i], episodes.simulated[i]);
     const bool a = episodes.simulated[i].success.value_or(false), b = episodes.guarded[i].success.value_or(false);
     result.simulated += a ? 1 : 0;
     result.guarded += b ? 1 : 0;
@@ -110,7 +113,8 @@ PairedSuccess paired_success(const PairedEpisodes& episodes) {
   result.simulated_95 = wilson(result.simulated, result.n);
   result.guarded_95 = wilson(result.guarded, result.n);
   result.difference_95 = newcombe_paired(result.both, result.only_guarded, result.only_simulated, result.neither);
-  result.p = mcnemar_exact(result.only_guarded, result.only_simulated);
+  if (result.n > 0) result.p = pairs.p();
+  result.clips = pairs.clips();
   const double share = result.n > 0 ? static_cast<double>(result.guarded) / static_cast<double>(result.n) : 0.0;
   result.inside = share >= result.simulated_95.low && share <= result.simulated_95.high;
   return result;
@@ -119,12 +123,12 @@ PairedSuccess paired_success(const PairedEpisodes& episodes) {
 std::string paired_text(const PairedSuccess& success, const std::string& simulated, const std::string& guarded) {
   return fmt::format(
       "{:<24} {}\n{:<24} {}\nthe same episodes: both {}, only {} {}, only {} {}, neither {}\ndifference {:+.1f} points "
-      "[{:.1f}, {:.1f}] (Newcombe, paired), McNemar p = {:.3f}; {} lies {} the interval of {}",
+      "[{:.1f}, {:.1f}] (Newcombe, paired), exact test by clip over {} clips p = {:.3f}; {} lies {} the interval of {}",
       simulated, share_text(success.simulated, success.n, success.simulated_95), guarded,
       share_text(success.guarded, success.n, success.guarded_95), success.both, simulated, success.only_simulated,
       guarded, success.only_guarded, success.neither,
       success.n > 0 ? 100.0 * static_cast<double>(success.guarded - success.simulated) / success.n : 0.0,
-      100.0 * success.difference_95.low, 100.0 * success.difference_95.high, success.p, guarded,
+      100.0 * success.difference_95.low, 100.0 * success.difference_95.high, success.clips, success.p, guarded,
       success.inside ? "inside" : "outside", simulated);
 }
 
@@ -140,6 +144,7 @@ nlohmann::json paired_json(const PairedSuccess& success) {
           {"simulated_95", interval(success.simulated_95)},
           {"guarded_95", interval(success.guarded_95)},
           {"difference_95", interval(success.difference_95)},
+          {"clips", success.clips},
           {"p", success.p},
           {"inside", success.inside}};
 }

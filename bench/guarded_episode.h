@@ -51,8 +51,9 @@ struct PairedSuccess {
   long both = 0, only_simulated = 0, only_guarded = 0, neither = 0;
   Interval simulated_95, guarded_95;  // Wilson
   Interval difference_95;             // guarded - simulated, Newcombe, paired
-  double p = 1.0;                     // McNemar, exact
-  bool inside = false;                // the guarded share lies in the simulator's interval
+  long clips = 0;
+  double p = 1.0;       // sign_flip_exact by clip, as on the board
+  bool inside = false;  // the guarded share lies in the simulator's interval
 };
 // Throws std::invalid_argument for lists of different lengths.
 PairedSuccess paired_success(const PairedEpisodes& episodes);

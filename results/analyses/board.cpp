@@ -196,7 +196,9 @@ std::string BoardRow::name() const {
 
 Told told(const BoardDifference& difference, double level) {
   if (difference.clips < kFewestClips) return Told::kTooFewClips;
-  return difference.p <= 1.0 - level && difference.interval.low > 0.0 ? Told::kAhead : Told::kApart;
+  const bool test = difference.p <= 1.0 - level, interval = difference.interval.low > 0.0;
+  if (difference.difference <= 0.0 || (!test && !interval)) return Told::kApart;
+  return test && interval ? Told::kAhead : test ? Told::kTestAlone : Told::kIntervalAlone;
 }
 
 Board board(const std::vector<EpisodeRow>& rows, const ContactTable& contacts, const BoardSuite& suite, double level) {

@@ -40,6 +40,19 @@ std::string too_few(const BoardDifference& of) {
                      kFewestClips);
 }
 
+// What a reader may take for a lead where there is none, as the end of a sentence.
+std::string why_no_lead(const BoardDifference& of, double level) {
+  const Told word = told(of, level);
+  if (word == Told::kTestAlone)
+    return "; the exact test alone would, but the interval, which is as wide as so many clips make it, holds 0, and "
+           "both "
+           "are asked for";
+  if (word == Told::kIntervalAlone)
+    return "; the interval alone would, but it is an approximation, and the exact test, which is none, is asked for, "
+           "too";
+  return "";
+}
+
 std::string first_sentence(const Board& board) {
   const BoardRow& first = board.rows.front();
   const std::string success = success_text(first);
@@ -54,6 +67,8 @@ std::string first_sentence(const Board& board) {
     case Told::kTooFewClips:
       return fmt::format("Too few clips to rank {}: {} has {}.", kind_of(board), first.name(), success);
     case Told::kApart:
+    case Told::kTestAlone:
+    case Told::kIntervalAlone:
       break;
   }
   return fmt::format("{} {} of {}, {}, and cannot be told apart from {}.", first.name(),
@@ -69,10 +84,12 @@ std::string lead_sentence(const Board& board) {
     case Told::kTooFewClips:
       return fmt::format("The difference to {} is {}: {}.", lead.other, difference_text(lead), too_few(lead));
     case Told::kApart:
+    case Told::kTestAlone:
+    case Told::kIntervalAlone:
       break;
   }
-  return fmt::format("The difference to {} is {}: these clips do not decide between the two.", lead.other,
-                     difference_text(lead));
+  return fmt::format("The difference to {} is {}: these clips do not decide between the two{}.", lead.other,
+                     difference_text(lead), why_no_lead(lead, board.level));
 }
 
 std::string lift_sentence(const Board& board) {
@@ -86,9 +103,12 @@ std::string lift_sentence(const Board& board) {
       return fmt::format("Its lift over the best control, {}, is {}: {}.", lift.other, difference_text(lift),
                          too_few(lift));
     case Told::kApart:
+    case Told::kTestAlone:
+    case Told::kIntervalAlone:
       break;
   }
-  return fmt::format("It does not win against the best control, {}: {}.", lift.other, difference_text(lift));
+  return fmt::format("It does not win against the best control, {}: {}{}.", lift.other, difference_text(lift),
+                     why_no_lead(lift, board.level));
 }
 
 // Of the first row's controller, the best one that knows the motion.
@@ -156,7 +176,7 @@ TitledTable ranked_table(const Board& board) {
       fmt::format("Equal means have one rank; \"-\" is an arm of reference, no competitor. Intervals of {:g} %: of a "
                   "mean over engines Wilson's over clips, of one engine Wilson's over episodes, by clip where a clip "
                   "has several draws. A lead or a lift is claimed where the exact paired test by clip has p of at most "
-                  "{:.2g} over {} clips or more.",
+                  "{:.2g} over {} clips or more, and its interval leaves 0 out.",
                   100.0 * board.level, 1.0 - board.level, kFewestClips)};
   return titled;
 }

@@ -164,7 +164,9 @@ Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options) 
   result.difference = table.difference();
   result.interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, options.level);
   result.cluster_interval = gathered.pairs.bootstrap(options);
-  result.p = mcnemar_exact(table.only_a, table.only_b);
+  result.clips = gathered.pairs.clips();
+  result.p = gathered.pairs.p();
+  result.p_episodes = mcnemar_exact(table.only_a, table.only_b);
   const double discordance = static_cast<double>(table.only_a + table.only_b) / static_cast<double>(result.pairs);
   result.minimum_detectable = minimum_detectable_difference_paired(discordance, result.pairs, 1.0 - options.level);
   result.level = options.level;

@@ -22,6 +22,7 @@ double share_of(long episodes, const Comparison& comparison) {
 std::vector<std::string> comparison_cells(const Comparison& comparison, double margin) {
   return {comparison.group,
           count_cell(comparison.pairs),
+          count_cell(comparison.clips),
           percent(share_of(comparison.both + comparison.only_a, comparison)),
           percent(share_of(comparison.both + comparison.only_b, comparison)),
           points(comparison.difference, comparison.interval),
@@ -30,6 +31,7 @@ std::vector<std::string> comparison_cells(const Comparison& comparison, double m
           count_cell(comparison.only_b),
           p_cell(comparison.p),
           p_cell(comparison.p_holm),
+          p_cell(comparison.p_episodes),
           percent(comparison.minimum_detectable),
           std::string(to_string(verdict_of(comparison, margin)))};
 }
@@ -44,17 +46,17 @@ std::vector<std::string> comparison_notes(const std::vector<Comparison>& compari
   const double level = 100.0 * comparisons.front().level;
   std::vector<std::string> notes = {fmt::format(
       "Same episodes in both runs. A, B: success in %. A - B: points with Newcombe's paired {:g} % interval; by clip: "
-      "bootstrap over clips, nowhere narrower than Newcombe's over so many clips. p: exact McNemar, p (Holm): "
+      "bootstrap over clips, nowhere narrower than Newcombe's over so many clips. {} p (Holm): "
       "corrected for the {} comparisons here. MDE: the smallest "
       "difference, in points, that so many pairs with so much disagreement show in 80 % of runs. Verdict: of A; the "
-      "same within the margin where the paired "
-      "interval lies within {:g} points, else better or worse where p (Holm) is at most {:.2g}.",
-      level, comparisons.size(), 100.0 * margin, 1.0 - comparisons.front().level)};
+      "same within the margin where the "
+      "interval by clip lies within {:g} points, else better or worse where p (Holm) is at most {:.2g}.",
+      level, kPairedTests, comparisons.size(), 100.0 * margin, 1.0 - comparisons.front().level)};
   std::string small;
   for (const Comparison& comparison : comparisons)
-    if (comparison.pairs < kFewestClips) small.append(small.empty() ? "" : "; ").append(comparison.group);
+    if (comparison.clips < kFewestClips) small.append(small.empty() ? "" : "; ").append(comparison.group);
   if (!small.empty())
-    notes.push_back(fmt::format("Warning: fewer than {} pairs in {}. A difference there is no finding by itself.",
+    notes.push_back(fmt::format("Warning: fewer than {} clips in {}. A difference there is no finding by itself.",
                                 kFewestClips, small));
   const long only_a = largest(comparisons, &Comparison::unpaired_a);
   const long only_b = largest(comparisons, &Comparison::unpaired_b);
@@ -69,8 +71,8 @@ std::vector<std::string> comparison_notes(const std::vector<Comparison>& compari
 }  // namespace
 
 TitledTable comparison_table(const std::vector<Comparison>& comparisons, double margin) {
-  TitledTable titled{.table = {.header = {"Comparison", "Pairs", "A", "B", "A - B", "by clip", "only A", "only B", "p",
-                                          "p (Holm)", "MDE", "Verdict"}}};
+  TitledTable titled{.table = {.header = {"Comparison", "Pairs", "Clips", "A", "B", "A - B", "by clip", "only A",
+                                          "only B", "p", "p (Holm)", "McNemar p", "MDE", "Verdict"}}};
   for (const Comparison& comparison : comparisons) titled.table.rows.push_back(comparison_cells(comparison, margin));
   return titled;
 }
@@ -93,6 +95,8 @@ void add_comparison_figures(const Comparison& of, double margin, std::vector<Fig
     figures.count(name, of.pairs, count);
   figures.add("p", of.pairs, of.p);
   figures.add("p_holm", of.pairs, of.p_holm);
+  figures.add("p_episodes", of.pairs, of.p_episodes);
+  figures.count("clips", of.pairs, of.clips);
   figures.add("minimum_detectable", of.pairs, of.minimum_detectable);
   figures.count("unpaired_a", {}, of.unpaired_a);
   figures.count("unpaired_b", {}, of.unpaired_b);

@@ -17,6 +17,13 @@ struct PairedRows {
   long unpaired_a = 0, unpaired_b = 0;
 };
 
+// Which p is which.
+inline constexpr const char* kPairedTests =
+    "p: exact test of the clips' signs, as on the board (all episodes of a clip are one observation; where each clip "
+    "has "
+    "one pair it is McNemar's). McNemar p: over episodes, for comparison with others' tables; too small where clips "
+    "repeat.";
+
 // Needs a pair; p_holm is left at 1, and so are the names.
 Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options);
 

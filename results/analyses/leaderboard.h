@@ -52,7 +52,9 @@ struct Comparison {
   double difference = 0.0;       // success of A minus success of B
   Interval interval;             // paired Newcombe
   Interval cluster_interval;     // bootstrap over clips, nowhere narrower than newcombe_by_clip
-  double p = 1.0, p_holm = 1.0;  // exact McNemar
+  long clips = 0;                // of the pairs
+  double p = 1.0, p_holm = 1.0;  // sign_flip_exact by clip, as on the board
+  double p_episodes = 1.0;       // exact McNemar, which takes episodes of one clip for independent
   double minimum_detectable = 0.0;
   double level = 0.95;                  // of both intervals
   long unpaired_a = 0, unpaired_b = 0;  // episodes of the group that the other run lacks; left out

@@ -193,10 +193,10 @@ TitledTable pairs_table(const PolicyTable& table) {
   titled.notes = {fmt::format(
       "The same episodes of one engine and controller under two policies, headline detector. A - B: points "
       "with Newcombe's paired {:g} % interval; by clip: bootstrap over clips, nowhere narrower than Newcombe's over "
-      "so many clips. p: exact McNemar; p (Holm): "
+      "so many clips. {} p (Holm): "
       "corrected for the {} comparisons here. MDE: the smallest difference, in points, that so many pairs with "
       "so much disagreement show in 80 % of runs.",
-      100.0 * table.level, table.pairs.size())};
+      100.0 * table.level, kPairedTests, table.pairs.size())};
   return titled;
 }
 

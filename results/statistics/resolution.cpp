@@ -35,7 +35,7 @@ double discordance_of(const Comparison& comparison) {
 }  // namespace
 
 PairVerdict verdict_of(const Comparison& comparison, double margin) {
-  return verdict_of(comparison.difference, comparison.interval, comparison.p_holm, comparison.level, margin);
+  return verdict_of(comparison.difference, comparison.cluster_interval, comparison.p_holm, comparison.level, margin);
 }
 
 PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin) {

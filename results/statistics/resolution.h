@@ -12,7 +12,7 @@ namespace duet {
 
 inline constexpr double kFivePoints = 0.05;  // the margin where nobody names one
 
-// The same where Newcombe's interval lies inside (-margin, margin); else better or worse where p (Holm) is at most
+// The same where the interval by clip lies inside (-margin, margin); else better or worse where p (Holm) is at most
 // 1 - level; else undecided.
 PairVerdict verdict_of(const Comparison& comparison, double margin);
 // The same of a difference that another test has judged, with that test's interval.

@@ -137,17 +137,45 @@ TEST(BoardVerdict, ALeadThatTheExactTestDoesNotSeeIsNone) {
                                       HasSubstr("these clips do not decide between the two")));
 }
 
+// The test and the interval are two approximations of one truth: where they differ, nobody reads "p = .03" beside "not
+// decided" without the reason.
+TEST(BoardVerdict, WhereTestAndIntervalDifferASentenceSaysWhich) {
+  BoardDifference of{.other = "b", .difference = 0.1, .interval = {0.02, 0.2}, .clips = 40, .p = 0.03};
+  EXPECT_EQ(told(of, 0.95), Told::kAhead);
+  of.interval.low = -0.01;
+  EXPECT_EQ(told(of, 0.95), Told::kTestAlone);
+  Board made = board_of({{"a", times(36, '1') + times(4, '0')}, {"b", times(30, '1') + times(6, '0') + "1110"}});
+  made.lead = of;
+  made.lift = of;
+  EXPECT_THAT(verdict_of(made), AllOf(HasSubstr("do not decide between the two; the exact test alone would"),
+                                      HasSubstr("holds 0, and both are asked for"), HasSubstr("p = 0.03")));
+  of.interval.low = 0.02;
+  of.p = 0.06;
+  made.lead = of;
+  EXPECT_EQ(told(of, 0.95), Told::kIntervalAlone);
+  EXPECT_THAT(verdict_of(made), HasSubstr("do not decide between the two; the interval alone would"));
+  of.interval.low = -0.01;
+  made.lead = made.lift = of;
+  EXPECT_THAT(verdict_of(made), Not(HasSubstr("alone would")));
+  of.clips = 29;
+  of.p = 0.001;
+  EXPECT_EQ(told(of, 0.95), Told::kTooFewClips);
+}
+
 TEST(BoardVerdict, EnginesAndRolesOfAClipAreOneClip) {
   Rows rows;
   for (const char* engine : {"bullet", "dart", "mujoco", "ode", "simbody"}) {
-    for (const char* role : {"-A", "-B"}) {
+    for (const char* role : {"", "-A"}) {
       for (const bool first : {true, false}) {
         Rows some;
         add({.policy = first ? "a" : "b",
              .successes = (first ? "111111" : "000111") + times(29, '1'),
              .engine = engine},
             some);
-        for (EpisodeRow& row : some) row.clip += role;
+        for (EpisodeRow& row : some) {
+          test::set_tag(row, kRecordingTag, row.clip);
+          row.clip += role;
+        }
         rows.insert(rows.end(), some.begin(), some.end());
       }
     }

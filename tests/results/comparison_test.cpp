@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "duet/core/require.h"
+#include "duet/results/statistics/by_clip.h"
 #include "duet/results/statistics/resolution.h"
 #include "tests/results/figures.h"
 #include "tests/results/rows.h"
@@ -38,7 +39,11 @@ TEST(CompareRuns, BuildsThePairedTableOfTwoPolicies) {
   EXPECT_EQ(hug.neither, 2);
   EXPECT_DOUBLE_EQ(hug.difference, 17.0 / 40.0);
   EXPECT_EQ(hug.interval.low, newcombe_paired(5, 25, 8, 2).low);
-  EXPECT_EQ(hug.p, mcnemar_exact(25, 8));
+  EXPECT_EQ(hug.clips, 14);  // three draws of each
+  EXPECT_EQ(hug.p_episodes, mcnemar_exact(25, 8));
+  // Sums of successes of A less those of B: clips 0 to 7 go A's way whole, in the ninth one draw, then B's.
+  EXPECT_EQ(hug.p, sign_flip_exact(std::vector<long>{3, 3, 3, 3, 3, 3, 3, 3, 1, 0, -3, -3, -2, 0}));
+  EXPECT_GT(hug.p, hug.p_episodes);
   EXPECT_EQ(hug.p_holm, std::min(1.0, 2.0 * hug.p));
   EXPECT_EQ(hug.minimum_detectable, minimum_detectable_difference_paired(33.0 / 40.0, 40));
   EXPECT_LT(hug.cluster_interval.low, hug.difference);
@@ -51,7 +56,8 @@ TEST(CompareRuns, ClustersTheTwoRolesOfAClipTogether) {
     std::vector<EpisodeRow> a = hugs("dstar", 20, 0, 15), b = hugs("replay", 20, 10, 20);
     for (std::vector<EpisodeRow>* rows : {&a, &b}) {
       for (EpisodeRow row : std::vector<EpisodeRow>(*rows)) {
-        row.clip += other_role ? "-A" : "-of-another-take";
+        if (other_role) test::set_tag(row, kRecordingTag, row.clip);
+        row.clip += "-again";
         rows->push_back(row);
       }
     }
@@ -133,7 +139,7 @@ TEST(CompareRuns, FiguresSayWhatIsComparedWithWhat) {
   EXPECT_DOUBLE_EQ(named("difference").value, 1.0 / 3.0);
   EXPECT_EQ(named("only_b").value, 0.0);
   EXPECT_LE(named("p_holm").value, 1.0);
-  EXPECT_EQ(named("verdict").text, "better");
+  EXPECT_EQ(named("verdict").text, "undecided");  // ten episodes, but of four clips
   EXPECT_EQ(figure(analysis, {.name = "margin"}).value, 0.1);
 }
 
@@ -176,10 +182,10 @@ TEST(CompareRuns, RefusesAnEpisodeThatIsThereTwice) {
 TEST(ComparisonMarkdown, WarnsOfSmallSamples) {
   const std::string small =
       analysis_markdown(comparison_analysis(compare_runs(hugs("a", 10, 0, 9), hugs("b", 10, 0, 3))));
-  EXPECT_THAT(small, HasSubstr("Warning: fewer than 30 pairs in mujoco/vmc/a vs b hug"));
+  EXPECT_THAT(small, HasSubstr("Warning: fewer than 30 clips in mujoco/vmc/a vs b hug"));
   EXPECT_THAT(small, HasSubstr("+60.0 ["));
   const std::string large =
-      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 60, 0, 50), hugs("b", 60, 0, 20))));
+      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 120, 0, 100), hugs("b", 120, 0, 40))));
   EXPECT_THAT(large,
               AllOf(Not(HasSubstr("Warning")), HasSubstr("<0.001"), HasSubstr("corrected for the 2 comparisons")));
   EXPECT_EQ(analysis_markdown(comparison_analysis({})), "Nothing to compare.\n");

@@ -98,6 +98,9 @@ TEST(PolicyTable, EveryPolicyMeetsEveryOtherInsideOneEngineAndController) {
   std::vector<EpisodeRow> rows = two_policies();
   add_episodes({.policy = "shown_another", .arm = "shuffled", .successes = "0000"}, rows);
   add_episodes({.controller = "wbc_sim", .policy = "dstar", .successes = "1111"}, rows);
+  EXPECT_EQ(policy_table(rows).pairs.at(2).p, 1.0);  // three episodes of one clip are one observation
+  EXPECT_DOUBLE_EQ(policy_table(rows).pairs.at(2).p_episodes, 0.25);
+  for (EpisodeRow& row : rows) row.clip = "hug-" + std::to_string(row.episode);
   const PolicyTable table = policy_table(rows);
   ASSERT_EQ(table.pairs.size(), 3U);  // of three; the other controller has one policy
   const Comparison& first = table.pairs[0];

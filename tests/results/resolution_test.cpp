@@ -23,7 +23,8 @@ Comparison compared(long both, long only_a, long only_b, double p_holm) {
   comparison.pairs = both + only_a + only_b;
   const double pairs = static_cast<double>(comparison.pairs);
   comparison.difference = static_cast<double>(only_a - only_b) / pairs;
-  comparison.interval = newcombe_paired(both, only_a, only_b, 0);
+  comparison.interval = comparison.cluster_interval = newcombe_paired(both, only_a, only_b, 0);
+  comparison.clips = comparison.pairs;
   comparison.p_holm = p_holm;
   comparison.minimum_detectable =
       minimum_detectable_difference_paired(static_cast<double>(only_a + only_b) / pairs, comparison.pairs);
