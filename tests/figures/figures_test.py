@@ -67,14 +67,15 @@ class Figures(unittest.TestCase):
     def test_a_picture_of_a_failure_is_none_of_what_is_right(self):
         def swap(tasks):
             tasks["hug"]["right"], tasks["hug"]["wrong"] = tasks["hug"]["wrong"], tasks["hug"]["right"]
-        self.assertIn("hug, right: expected one episode of dstar with people-hug-s24000-0005-tracked that is right, found 0",
+        wrong = json.loads((ROOT / "docs/pictures/interaction.json").read_text())["tasks"]["hug"]["wrong"]
+        self.assertIn(f"hug, right: expected one episode of {wrong['policy']} with {wrong['clip']} that is right, found 0",
                       self.refused(self.pictures(swap)))
 
     def test_conditions_count_every_policy(self):
         self.run_on(f"<!-- figures: conditions results/published/interaction -->\n{END}\n")
         lines = self.page.read_text().splitlines()
         self.assertEqual(lines[2], "| Policy | n | act | alone | touch | force | reply | stands |")
-        self.assertEqual(len(lines[4:-2]), 10)
+        self.assertEqual(len(lines[4:-2]), 12)
 
     def test_a_command_that_fails_is_refused_with_what_it_said(self):
         self.assertIn("ended with 1", self.refused(f"<!-- figures: duet list -->\n{END}\n", "--program", "/bin/false"))
