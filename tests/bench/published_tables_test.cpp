@@ -1,5 +1,6 @@
 // The tables of the published rows, figure by figure: results/tables. Where a figure changes on purpose,
 // `duet report results/published/NAME --format csv -o results/tables/NAME` writes them anew.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -15,7 +16,7 @@
 namespace duet {
 namespace {
 
-std::string in(const std::string& path) { return std::string(DUET_SOURCE_DIR) + "/results/" + path; }
+std::string in(const std::string& path) { return fmt::format("{}/results/{}", DUET_SOURCE_DIR, path); }
 
 // Without the note on the run with which the file may begin.
 std::vector<std::string> lines_of(const std::string& text) {

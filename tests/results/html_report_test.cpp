@@ -294,6 +294,8 @@ TEST(HtmlReport, ShowsPoliciesPerturbationsAndReactivity) {
     for (int i = 0; i < 6; ++i) {
       EpisodeRow row = test::engine_episode("mujoco", "<dstar>", i, i < 4);
       row.perturbation = perturbation;
+      if (row.perturbation != "clean")
+        row.tags = RowTags(Tags{{std::string(kFamilyTag), "later"}, {std::string(kSizeTag), "1"}});
       row.metrics = {{"partner_onset_s", row.perturbation == "clean" ? 2.0 : 3.0}, {"onset_s", 4.0}};
       rows.push_back(row);
     }
