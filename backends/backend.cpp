@@ -13,18 +13,17 @@ namespace {
 constexpr double kUnitTolerance = 1e-6;
 
 void check_link(const RobotLink& link) {
-  require(std::isfinite(link.mass) && link.mass > 0.0,
-          fmt::format("Scene: link '{}' has mass {} kg, expected more than 0", link.name, link.mass));
+  require(std::isfinite(link.mass) && link.mass > 0.0, "Scene: link '{}' has mass {} kg, expected more than 0",
+          link.name, link.mass);
   require(link.inertia.allFinite() && link.inertia.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff() > 0.0,
-          fmt::format("Scene: the inertia of link '{}' is not positive definite", link.name));
+          "Scene: the inertia of link '{}' is not positive definite", link.name);
 }
 
 Scene checked(Scene scene) {
   require(scene.robot != nullptr, "Scene: no robot");
-  require(scene.dt > 0.0 && scene.dt <= 0.02, fmt::format("Scene: dt is {} s, expected in (0, 0.02]", scene.dt));
+  require(scene.dt > 0.0 && scene.dt <= 0.02, "Scene: dt is {} s, expected in (0, 0.02]", scene.dt);
   const auto not_negative = [](double value, const char* name) {
-    require(std::isfinite(value) && value >= 0.0,
-            fmt::format("Scene: {} is {}, expected finite and >= 0", name, value));
+    require(std::isfinite(value) && value >= 0.0, "Scene: {} is {}, expected finite and >= 0", name, value);
   };
   not_negative(scene.friction.robot_ground, "friction robot_ground");
   not_negative(scene.friction.robot_human, "friction robot_human");
@@ -151,8 +150,8 @@ Snapshot Backend::snapshot() const {
 void Backend::restore(const Snapshot& snapshot) {
   const size_t expected = this->snapshot().values.size();
   require(snapshot.values.size() == expected,
-          fmt::format("Backend::restore: the snapshot has {} values, expected {} for this scene in {}",
-                      snapshot.values.size(), expected, name()));
+          "Backend::restore: the snapshot has {} values, expected {} for this scene in {}", snapshot.values.size(),
+          expected, name());
   const double* from = snapshot.values.data();
   steps_ = static_cast<long>(from[0]);
   diverged_ = from[1] != 0.0;

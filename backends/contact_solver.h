@@ -17,12 +17,12 @@
 
 namespace duet {
 
-// Of a row: the share of the depth that one step removes, and the compliance [m/(N s)].
+// The softness of a row: the share of the depth that one step removes, and the compliance [m/(N s)].
 struct Softness {
   double erp = 1.0;
   double cfm = 0.0;
 };
-// Of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt. Both 0: no force.
+// The softness of a spring [N/m] and a damper [N s/m] in parallel, taken implicitly over dt. Both 0: no force.
 Softness spring_damper(double stiffness, double damping, double dt);
 
 class ContactSolver {
@@ -79,7 +79,7 @@ class ContactSolver {
   int sweeps_;
   std::size_t used_ = 0;
   std::vector<Row> rows_;
-  // Of all rows, where they are few: the inverse inertia, a system in some of them, its solution, all impulses.
+  // Over all rows, where they are few: the inverse inertia, a system in some of them, its solution, all impulses.
   Eigen::MatrixXd G_, system_;
   Eigen::VectorXd unknowns_, p_, missing_, change_of_rows_;
   Eigen::VectorXd half_, generalized_, change_;  // L^-T J^T p, J^T p, A^-1 J^T p

@@ -43,7 +43,7 @@ class Digest {
   }
 
  public:
-  // Of a pointer to a member: its offset, or of a virtual function its place in the table (Itanium C++ ABI).
+  // The first word of a pointer to a member: its offset, or a virtual function's place in the table (Itanium C++ ABI).
   template <typename Pointer>
   static std::uint64_t first_word(Pointer pointer) {
     std::uint64_t word = 0;

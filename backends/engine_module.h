@@ -1,5 +1,5 @@
 // An engine is a shared object beside the program, duet_<name>.so, loaded when it is first asked for: a machine that
-// lacks one engine's library still runs the others, and a new engine needs no change to duet. docs/adding-a-backend.md.
+// lacks one engine's library still runs the others, and a new engine needs no change to duet. docs/extending.md.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct EngineModule {
   // Throws std::invalid_argument (scene, options) and std::runtime_error with the engine's message where it refuses.
   std::unique_ptr<Backend> (*make)(const Scene& scene) = nullptr;
   std::span<const EngineOption> options;  // what a profile may set
-  // What the engine itself costs, against which the overhead of Backend::step is measured: CPU seconds for `steps`
+  // The cost of the engine itself, against which the overhead of Backend::step is measured: CPU seconds for `steps`
   // steps from `state` under `command`, by the least code that makes the same engine calls under the same torque law
   // and reads the state back. Throws std::invalid_argument for steps < 1.
   double (*bare_step_seconds)(const Scene& scene, const RobotState& state, const JointCommand& command,

@@ -26,15 +26,14 @@ std::string value_of(const EngineOptions& options, const EngineOption& option) {
 
 void check_value(std::string_view engine, const EngineOption& option, const std::string& text) {
   if (!option.choices.empty()) {
-    require(
-        std::find(option.choices.begin(), option.choices.end(), text) != option.choices.end(),
-        fmt::format("{}: {} is '{}', expected one of {}", engine, option.name, text, fmt::join(option.choices, ", ")));
+    require(std::find(option.choices.begin(), option.choices.end(), text) != option.choices.end(),
+            "{}: {} is '{}', expected one of {}", engine, option.name, text, fmt::join(option.choices, ", "));
     return;
   }
   const double value = parse_number(text).value_or(std::nan(""));
   const bool fits = value >= option.low && value <= option.high && (!option.whole || value == std::floor(value));
-  require(fits, fmt::format("{}: {} is '{}', expected a {}number from {} to {}", engine, option.name, text,
-                            option.whole ? "whole " : "", option.low, option.high));
+  require(fits, "{}: {} is '{}', expected a {}number from {} to {}", engine, option.name, text,
+          option.whole ? "whole " : "", option.low, option.high);
 }
 
 }  // namespace

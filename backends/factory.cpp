@@ -35,7 +35,7 @@ std::vector<fs::path> folders_of(std::string_view list) {
   return folders;
 }
 
-// Of the folders of duet's own modules the first that is there: a program that is installed looks into no other.
+// The first folder of duet's own modules that is there: an installed program looks into no other.
 std::vector<fs::path> module_folders() {
   if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0') return folders_of(set);
   std::error_code error;

@@ -1,7 +1,7 @@
-// Engines by name: the modules duet_<engine>.so that are found (backends/engine_module.h) in the folders
-// $DUET_ENGINES ("mine:/usr/lib/duet/engines") if it is set, else in the first of these that is there: `engines` beside
-// the program, lib/duet/engines of an installed duet (core/share.h), where it was built. What is missing is listed
-// with its reason and refused by name (MissingError). Thread-safe; a module is loaded once and stays.
+// Engines by name: the modules duet_<engine>.so that are found (backends/engine_module.h) in the folders $DUET_ENGINES
+// ("mine:/usr/lib/duet/engines") if it is set, else in the first of these that is there: `engines` beside the program,
+// lib/duet/engines of an installed duet (core/share.h), where it was built. Missing engines are listed with their
+// reason and refused by name (MissingError). Thread-safe; a module is loaded once and stays.
 #pragma once
 
 #include <memory>

@@ -38,7 +38,7 @@ class ImplicitLaw {
   [[nodiscard]] const Eigen::VectorXd& acceleration() const { return a_; }  // of solve(), (6 + dof)
   // Q + t0 - b, the right-hand side for a force Q.
   void forces(const Eigen::VectorXd& Q, Eigen::VectorXd& out) const;
-  // What an engine that knows only M must apply so that it reaches the acceleration `a`: t0 - s a. [N m]
+  // The torques by which an engine that knows only M reaches the acceleration `a`: t0 - s a. [N m]
   void equivalent_torques(const Eigen::VectorXd& a, Eigen::VectorXd& out) const;
   // The law's torque u, armature apart: what Backend::torques() reports. [N m]
   void torques(const Eigen::VectorXd& a, Eigen::VectorXd& out) const;

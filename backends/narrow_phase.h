@@ -65,7 +65,7 @@ class NarrowPhase {
   std::vector<ContactPoint> points_;
 };
 
-// Nearest points of segments a1 b1 and a2 b2. Of parallel ones: the middle of where they run side by side.
+// Nearest points of segments a1 b1 and a2 b2. For parallel ones: the middle of where they run side by side.
 struct NearestPoints {
   Eigen::Vector3d p1, p2;
 };

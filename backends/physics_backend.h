@@ -1,5 +1,5 @@
-// What the adapters of physics engines share: the moving partner, pushes, the points where the robot touches, and the
-// order of a snapshot. An engine adds how it is placed, advanced and stored.
+// The common part of the adapters of physics engines: the moving partner, pushes, the points where the robot touches,
+// and the order of a snapshot. An engine adds how it is placed, advanced and stored.
 #pragma once
 
 #include "duet/backends/backend.h"

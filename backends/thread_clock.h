@@ -1,4 +1,4 @@
-// What a step costs: the CPU clock of the calling thread.
+// The CPU clock of the calling thread, which times a step.
 #pragma once
 
 namespace duet {

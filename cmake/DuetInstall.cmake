@@ -1,10 +1,10 @@
 # What `cmake --install` puts below a prefix: headers, the libraries duet::<room> and duet::duet, engines, shipped files, the
-# program, and the packages that CMake and pkg-config find (docs/using-the-library.md).
+# program, and the packages that CMake and pkg-config find (docs/using-duet.md).
 include(CMakePackageConfigHelpers)
 
-# Rooms that others may link; training and bench are the program's own.
+# Rooms that others may link; app is the program's own.
 set(rooms ${DUET_ROOMS})
-list(REMOVE_ITEM rooms training bench)
+list(REMOVE_ITEM rooms app)
 set(libraries ${rooms})
 list(TRANSFORM libraries PREPEND duet_)
 
@@ -19,7 +19,7 @@ set(package ${CMAKE_INSTALL_LIBDIR}/cmake/duet)
 install(EXPORT duetTargets NAMESPACE duet:: DESTINATION ${package} COMPONENT library)
 
 # Headers that only files of their own room include: an engine's adapter, kernels, steps of one implementation.
-set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|hardware/dds|motion/synthesis)/|_parts\\.h$|kernels?_body\\.h$|/(kernel_(types|frame|ground|object)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
+set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|hardware/dds)/|motion/synthesis/(people_stage|render|stage)\\.h$|_parts\\.h$|kernels?_body\\.h$|/(kernel_(types|frame|ground|object)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
 foreach(room IN LISTS rooms)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${room}/*.h)
   list(FILTER headers EXCLUDE REGEX "${internal}")

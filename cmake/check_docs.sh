@@ -4,7 +4,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-folders=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench tests docs suites profiles examples cmake)
+mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt)
+folders=("${rooms[@]}" tests docs suites profiles examples cmake)
 bad=0
 missing() { echo "$1: cites '$2', which is not there"; bad=1; }
 

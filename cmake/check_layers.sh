@@ -1,32 +1,17 @@
 #!/usr/bin/env bash
 # The include order of the rooms (docs/architecture.md, "Rooms") and of the units. Prints each include that breaks the
 # order of the rooms and each circle of units; exit 1.
-#   core < tasks < motion, robots, nn < io, formats, retarget, backends, controllers, policies, metrics < rollout < hardware, training < bench
-#   results uses core only; metrics, policies and controllers never include backends; a vendor's header stays in its engine.
+# cmake/rooms.txt has that order; a vendor's header stays in its engine, and the folders of a room have no circle either.
 # A unit is a header with the .cpp file of its name; a .cpp file without such a header is a unit of its own. No two units
 # include each other, directly or through others.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-declare -A may=(
-  [core]="core"
-  [tasks]="core tasks"
-  [motion]="core tasks motion"
-  [robots]="core robots"
-  [nn]="core nn"
-  [io]="core robots nn io"
-  [formats]="core robots formats"
-  [retarget]="core motion robots retarget"
-  [backends]="core robots backends"
-  [controllers]="core robots nn io controllers"
-  [policies]="core tasks robots nn io policies"
-  [metrics]="core tasks motion robots metrics"
-  [rollout]="core tasks motion robots backends controllers policies metrics rollout"
-  [hardware]="core tasks motion robots backends controllers policies metrics rollout hardware"
-  [training]="core tasks motion robots nn io backends controllers policies metrics rollout training"
-  [results]="core results"
-  [datasets]="core tasks motion robots formats retarget metrics results datasets"
-)
+declare -A may
+rooms=()
+while IFS=': ' read -r room others; do
+  case $room in [a-z]*) rooms+=("$room"); may[$room]="$room $others" ;; esac
+done <cmake/rooms.txt
 bad=0
 for room in "${!may[@]}"; do
   [ -d "$room" ] || continue
@@ -38,7 +23,6 @@ for room in "${!may[@]}"; do
     esac
   done < <(grep -rnE '^#include "duet/[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
 done
-rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench)
 vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
   hits=$(grep -rnE "^#include [<\"]($2)" "${rooms[@]}" --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)
@@ -49,7 +33,7 @@ vendor backends/bullet 'bt[A-Z]|Bullet'
 vendor backends/ode 'ode/'
 vendor backends/simbody 'Simbody|SimTK|simbody'
 vendor backends/dart 'dart/'
-vendor results 'sqlite3\.h'
+vendor rows 'sqlite3\.h'
 vendor robots 'urdf_'
 vendor nn 'onnx/|google/protobuf'
 vendor hardware/dds 'dds/'
@@ -69,7 +53,19 @@ unit_includes() {
       if (included != unit) print unit, included
     }'
 }
+# "FOLDER INCLUDED-FOLDER" for each include between two folders that hold files.
+folder_includes() {
+  grep -rE '^#include "duet/' "${rooms[@]}" --include='*.h' --include='*.cpp' | awk -F: '
+    {
+      split($2, quoted, "\"")
+      from = $1; to = quoted[2]
+      sub(/^duet\//, "", to); sub(/\/[^\/]*$/, "", from); sub(/\/[^\/]*$/, "", to)
+      if (from != to) print from, to
+    }' | sort -u
+}
+circles=$(folder_includes | tsort 2>&1 >/dev/null | sed -E 's/^tsort: //; s/^-: input contains a loop:$/folders that include each other in a circle:/; /circle:$/!s/^/  /' || true)
+if [ -n "$circles" ]; then echo "$circles"; bad=1; fi
 circles=$(unit_includes | tsort 2>&1 >/dev/null | sed -E 's/^tsort: //; s/^-: input contains a loop:$/units that include each other in a circle:/; /circle:$/!s/^/  /' || true)
 if [ -n "$circles" ]; then echo "$circles"; bad=1; fi
-[ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms, and no units include each other in a circle"
+[ "$bad" -eq 0 ] && echo "layers: every include respects the order of the rooms, and neither folders nor units include each other in a circle"
 exit "$bad"

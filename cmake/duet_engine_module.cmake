@@ -1,5 +1,5 @@
 # duet_add_engine_module(<name> SOURCES ... INCLUDE <folders> LINK ...): the target duet_engine_<name>, an engine of duet as
-# a module duet_<name>.so (docs/adding-a-backend.md). The engine's own headers, in the folders INCLUDE, are seen here only.
+# a module duet_<name>.so (docs/extending.md). The engine's own headers, in the folders INCLUDE, are seen here only.
 function(duet_add_engine_module name)
   cmake_parse_arguments(ARG "" "" "SOURCES;INCLUDE;LINK" ${ARGN})
   add_library(duet_engine_${name} MODULE ${ARG_SOURCES})

@@ -62,7 +62,7 @@ def markdown(header, right, rows):
 
 
 def wilson(k, n):
-    """The interval that the program gives a rate (results/statistics/statistics.h)."""
+    """The interval that the program gives a rate (statistics/statistics.h)."""
     z, p = 1.959963984540054, k / n
     middle, spread = p + z * z / (2 * n), z * ((p * (1 - p) + z * z / (4 * n)) / n) ** 0.5
     return [f"{100 * x / (1 + z * z / n):.1f}" for x in (max(middle - spread, 0.0), min(middle + spread, 1 + z * z / n))]

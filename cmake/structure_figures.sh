@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-rooms=(core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench)
+mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt)
 sources() { find "${rooms[@]}" \( -name '*.h' -o -name '*.cpp' \) -print; }
 # Product files in which a text stands, by a pattern; the file that others are counted from is left to the reader.
 files_with() { sources | xargs grep -lE "$1" | sort; }
@@ -15,7 +15,7 @@ echo "circles of units: $circles"
 
 # Where a controller's act() is called: controllers wrap one another, hardware/walker commands over the wire and steps
 # no engine, benchmarks time it alone.
-loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers|bench/benchmarks)/|^hardware/walker\.cpp$')
+loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers|app/benchmarks)/|^hardware/walker\.cpp$')
 echo "places that step a robot under a controller: $(wc -l <<<"$loops")"
 indented <<<"$loops"
 
@@ -29,8 +29,8 @@ touched() {  # touched WHAT PATTERN
 echo "  robot 't1': the folder robots/t1, and $(sources | xargs grep -lE '"t1"' | wc -l) source files"
 touched "task 'fist_bump' (and a row of tasks/list.cmake)" 'fist_bump'
 touched "metric 'jerk'" '"jerk"'
-touched "perturbation 'kick' (and a row of rollout/perturbation_kinds.cpp)" 'kick_kind|\bKick\b|"kick"'
-touched "row field 'policy_ms' (bench/scoring gives it its value)" '\bpolicy_ms\b'
+touched "perturbation 'kick' (and a row of rollout/perturbations/perturbation_kinds.cpp)" 'kick_kind|\bKick\b|"kick"'
+touched "row field 'policy_ms' (scoring/scoring gives it its value)" '\bpolicy_ms\b'
 
 lines_now() { find "$1" \( -name '*.h' -o -name '*.cpp' \) -exec cat {} + 2>/dev/null | wc -l; }
 lines_then() { { git grep -c "" "$1" -- "$2/*.h" "$2/*.cpp" || true; } | awk -F: '{ sum += $NF } END { print sum + 0 }'; }

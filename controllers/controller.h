@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// What a suite may set of one controller, by name ("network", "waist", ...); values as written there.
+// The options that a suite may set of one controller, by name ("network", "waist", ...); values as written there.
 using ControllerOptions = std::map<std::string, std::string>;
 
 // How often a controller met a number that is not finite, and what it did (controllers/guard.h).

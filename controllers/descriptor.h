@@ -1,5 +1,5 @@
 // An IO descriptor: what a controller's network is shown and what its output means, as data. A tracker is added by
-// writing one (docs/adding-a-controller.md). Format: docs/file-formats.md, "IO descriptor". Joints are named, not yet
+// writing one (docs/extending.md). Format: docs/file-formats.md, "IO descriptor". Joints are named, not yet
 // bound to a robot.
 #pragma once
 
@@ -32,7 +32,7 @@ struct OtherJoint {
   double kp = 0.0, kd = 0.0;
 };
 
-// What may be commanded of one direction.
+// The range of commands in one direction.
 struct CommandRange {
   double lower = 0.0, upper = 0.0;
   double steps_from = 0.0;  // the smallest command that is answered by steps

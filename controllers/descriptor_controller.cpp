@@ -49,7 +49,7 @@ void set_yaw_scale(Channel& channel, double scale) {
 
 enum class WaistMode { kFree, kLocked };
 
-// What a suite may set of a descriptor's controller; the network's file is found by find_network (published.h).
+// The options of a descriptor's controller; the network's file is found by find_network (published.h).
 struct DescriptorOptions {
   std::string network, engine = "duet";
   WaistMode waist = WaistMode::kFree;
@@ -218,7 +218,7 @@ class DescriptorController final : public Controller {
     return joints;
   }
 
-  // Those that the network does not see; `left`: the robot's joints that are not the network's.
+  // Adds the joints that the network does not see; `left`: the robot's joints that are not the network's.
   static void add_other_joints(const Descriptor& descriptor, const RobotModel& robot, std::vector<std::string> left,
                                std::vector<BoundJoint>& joints) {
     const JointBinding bound = bind_by_name(names_of(descriptor.other_joints), robot);
@@ -300,11 +300,11 @@ ControllerInfo descriptor_info(const Descriptor& descriptor) {
 std::unique_ptr<Controller> make_descriptor_controller(
     const Descriptor& descriptor, std::shared_ptr<const RobotModel> robot, std::unique_ptr<Network> network,
     const std::string& network_path, const ControllerOptions& options, std::shared_ptr<const VelocityCommand> told) {
-  require(robot != nullptr && network != nullptr,
-          fmt::format("controller '{}': expected a robot and a network, found none", descriptor.name));
+  require(robot != nullptr && network != nullptr, "controller '{}': expected a robot and a network, found none",
+          descriptor.name);
   require(told == nullptr || descriptor.command.has_value(),
-          fmt::format("{}: controller '{}': expected a descriptor with a 'command' to be told a velocity, found none",
-                      descriptor.file, descriptor.name));
+          "{}: controller '{}': expected a descriptor with a 'command' to be told a velocity, found none",
+          descriptor.file, descriptor.name);
   const DescriptorOptions read =
       read_options("controller", descriptor.name, option_table(descriptor), options, defaults_of(descriptor));
   return std::make_unique<DescriptorController>(descriptor, std::move(robot), std::move(network), network_path, read,

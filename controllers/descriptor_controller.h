@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// What `duet list controllers` says of it, with the options that it takes.
+// The entry of `duet list controllers` for it, with the options that it takes.
 ControllerInfo descriptor_info(const Descriptor& descriptor);
 
 // `network_path` names the network in messages. The options `network` and `engine` are the loader's and not looked at.

@@ -259,7 +259,7 @@ class Reader {
     return gait;
   }
 
-  // What is shown of a command to stand needs to be told which command is one.
+  // Channels that show a command to stand need to be told which command is one.
   void check_stand_channels() const {
     if (out_.command && out_.command->stands_below) return;
     for (const ChannelGroup& group : out_.observation.groups)

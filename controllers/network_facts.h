@@ -1,5 +1,5 @@
-// What the file of a network says of the robot that it was trained with, held against the descriptor that uses it: the
-// metadata that IsaacLab (BeyondMimic), mjlab and holosoma write into ONNX files.
+// The facts that a network's file states of the robot that it was trained with, held against the descriptor that uses
+// it: the metadata that IsaacLab (BeyondMimic), mjlab and holosoma write into ONNX files.
 #pragma once
 
 #include <map>

@@ -23,7 +23,7 @@ void write_waves(const Channel& channel, const Senses& senses, double (*wave)(do
     out(wave(gait_angle(channel.gait, i, senses.tick, senses.gate)));
 }
 
-// Of a point fixed to the base, in its axes.
+// The velocity of a point fixed to the base, in the base's axes.
 Eigen::Vector3d point_velocity(const RobotState& state, const Eigen::Vector3d& p_BF) {
   return state.X_WB.R.conjugate() * state.v_WB + state.w_WB_B.cross(p_BF);
 }

@@ -1,7 +1,5 @@
 #include "duet/controllers/root_conversion.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -30,15 +28,14 @@ double wrapped(double angle) { return std::remainder(angle, 2.0 * std::numbers::
 
 double within(double value, const CommandRange& range) { return std::clamp(value, range.lower, range.upper); }
 
-// Of the smallest size that the controller answers by steps.
+// The size of `value` as a share of the smallest one that the controller answers by steps.
 double share_of(double value, double steps_from) {
   return steps_from > 0.0 ? std::abs(value) / steps_from : (value == 0.0 ? 0.0 : 1.0);
 }
 
 double number_of(const std::string& text, const std::string& whole) {
   const std::optional<double> value = parse_number(text);
-  require(value.has_value(),
-          fmt::format("option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", whole));
+  require(value.has_value(), "option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", whole);
   return *value;
 }
 
@@ -67,7 +64,7 @@ RootConversionLaw root_conversion_law(const std::string& name) {
 VelocityCommand parse_velocity_command(const std::string& text, double standing) {
   const std::vector<std::string> parts = split(text);
   require(parts.size() == 3 || parts.size() == 4,
-          fmt::format("option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", text));
+          "option 'command': expected \"vx,vy,wz\" or \"vx,vy,wz,height\", found '{}'", text);
   return {number_of(parts[0], text), number_of(parts[1], text), number_of(parts[2], text),
           parts.size() == 4 ? number_of(parts[3], text) : standing};
 }

@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// What a velocity-commanded controller is told: in the robot's heading frame. [m/s, m/s, rad/s, m]
+// The command to a velocity-commanded controller: in the robot's heading frame. [m/s, m/s, rad/s, m]
 struct VelocityCommand {
   double forward = 0.0, lateral = 0.0, yaw_rate = 0.0;
   double height = 0.0;

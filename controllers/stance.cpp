@@ -1,7 +1,5 @@
 #include "duet/controllers/stance.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "duet/core/require.h"
@@ -18,12 +16,12 @@ Leg leg_to(const RobotModel& robot, int link) {
 }  // namespace
 
 Stance::Stance(const RobotModel& robot) : feet_(robot.feet) {
-  require(!feet_.empty(), fmt::format("robot '{}' has no soles in its card: it cannot be kept upright", robot.name));
+  require(!feet_.empty(), "robot '{}' has no soles in its card: it cannot be kept upright", robot.name);
   std::vector<bool> carries(robot.joints.size(), false);
   for (const int shape : feet_) {
     const int link = robot.shapes[shape].link;
-    require(link > 0, fmt::format("robot '{}' has soles at its base '{}', expected at the ends of legs", robot.name,
-                                  robot.links[0].name));
+    require(link > 0, "robot '{}' has soles at its base '{}', expected at the ends of legs", robot.name,
+            robot.links[0].name);
     if (std::ranges::any_of(legs_, [link](const Leg& leg) { return leg.link == link; })) continue;
     legs_.push_back(leg_to(robot, link));
     for (const int joint : legs_.back().joints) carries[joint] = true;

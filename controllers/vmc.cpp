@@ -107,7 +107,7 @@ class Vmc final : public Controller {
     center_ = points_.rowwise().mean();
   }
 
-  // What the planned forces do not explain of the momentum's change over the last tick is a push from outside.
+  // The part of the momentum's change over the last tick that the planned forces do not explain is a push from outside.
   void feel_push() {
     const Eigen::Vector2d momentum = weight_ / kGravity * (J_com_.topRows<2>() * velocity_);
     if (!first_tick_) {
@@ -181,7 +181,7 @@ class Vmc final : public Controller {
     return std::min(1.0, kLeanRange / std::max(lean.norm(), 1e-9)) * lean;
   }
 
-  // What of the root's place against the resting one is followed.
+  // The part of the root's way from its resting place that is followed.
   [[nodiscard]] Eigen::Vector2d shift(const Reference& reference) const {
     const Eigen::Rotation2Dd stance(stance_yaw_);
     const Eigen::Vector2d asked = stance.inverse() * Eigen::Vector2d(reference.X_WB.p.head<2>() - root_rest_);
@@ -286,7 +286,7 @@ class Vmc final : public Controller {
   Eigen::Vector2d planned_ = Eigen::Vector2d::Zero();    // sum of the contact forces planned then [N]
   bool first_tick_ = true;
 
-  // Of this tick.
+  // Values of this tick.
   Eigen::Vector2d shift_ = Eigen::Vector2d::Zero();
   Eigen::VectorXd velocity_, bias_, t_, a_, effort_, f_rest_, upper_pull_;
   Eigen::MatrixXd mass_, J_, J_com_, upper_mass_;

@@ -1,9 +1,9 @@
 // A balance controller in the manner of virtual model control: it stands on both feet, keeps the centre of mass over
-// them and tracks the reference's upper body. It does not step. What it does with the reference: joints that lead to no
+// them and tracks the reference's upper body. It does not step. It takes from the reference: joints that lead to no
 // foot follow it; of the root it follows yaw and the place in the ground plane as far as the feet allow, at the
-// standing height; the legs' angles follow from the feet and the pelvis and are not tracked.
-// Source of the scheme: Pratt et al., "Virtual Model Control", IJRR 20 (2001); here the virtual forces become
-// accelerations of a full inverse dynamics, and contact forces that cannot be had change the motion, not the feet.
+// standing height; the legs' angles follow from the feet and the pelvis and are not tracked. Source of the scheme:
+// Pratt et al., "Virtual Model Control", IJRR 20 (2001); here the virtual forces become accelerations of a full inverse
+// dynamics, and contact forces that cannot be had change the motion, not the feet.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// What an arm of a benchmark is there for. Tables rank competitors; controls and oracles stand beside them as lines of
-// reference. An arm says its role here, a policy where it is registered (policies/registry.h).
+// The role of an arm of a benchmark. Tables rank competitors; controls and oracles stand beside them as lines of
+// reference. An arm says its role here, a policy where it is registered (policies/catalogue/registry.h).
 #pragma once
 
 #include <array>
@@ -20,7 +20,7 @@ struct PolicyRole {
   std::string_view word = "";  // of a reference, as it stands in brackets after its name: "knows the motion"
 };
 
-// By the name that the suite gives a policy; one that is not there competes.
+// Roles by the name that the suite gives a policy; one that is not there competes.
 using PolicyRoles = std::map<std::string, PolicyRole>;
 
 // The values of EpisodeRow::arm.
@@ -34,7 +34,7 @@ inline constexpr std::array<EpisodeArmInfo, 4> kEpisodeArms = {
      {"control", {ArmRole::kControl, "scripted"}},
      {"shuffled", {ArmRole::kControl, "sees the partner of another clip"}}}};
 
-// Of an episode's arm and policy.
+// The role of an episode's arm and policy.
 inline PolicyRole role_of(std::string_view arm, const std::string& policy, const PolicyRoles& policies) {
   for (const EpisodeArmInfo& known : kEpisodeArms)
     if (known.name == arm && known.role.role != ArmRole::kCompetitor) return known.role;

@@ -22,7 +22,7 @@ class AwakeTime {
 
   // A look: since the object was made [s], without long gaps between two looks and without what was skipped.
   double look();
-  // What passed since the last look is left out.
+  // Leaves out the time that passed since the last look.
   void skip() { last_ = clock_(); }
 
  private:
@@ -30,7 +30,7 @@ class AwakeTime {
   double last_, awake_ = 0.0;
 };
 
-// For waits: a time from now on. Whoever waits looks every 100 ms.
+// For waits: a time from now on. The waiting thread looks every 100 ms.
 class AwakeDeadline {
  public:
   explicit AwakeDeadline(std::chrono::milliseconds time, AwakeTime awake = AwakeTime())

@@ -11,10 +11,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What CMake writes of the project `duet`, also where it is a part of another.
+// Lines that CMake writes of the project `duet`, also where it is a part of another.
 constexpr std::string_view kSources = "duet_SOURCE_DIR:STATIC=", kBuild = "duet_BINARY_DIR:STATIC=";
 
-// Somebody else's cache, in a folder above the program, says nothing.
+// A cache of somebody else, in a folder above the program, says nothing.
 bool of_one_owner(const fs::path& a, const fs::path& b) {
   struct stat of_a = {}, of_b = {};
   return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 && of_a.st_uid == of_b.st_uid;

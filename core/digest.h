@@ -43,7 +43,7 @@ class FileDigests {
  public:
   // The one that is known; "" where none is.
   [[nodiscard]] std::string find(const std::string& path) const;
-  // Likewise, but a file that is not known is read now. Throws as sha256_file.
+  // The same, but a file that is not known is read now. Throws as sha256_file.
   std::string of(const std::string& path);
   // Throws InputError where another digest of that path is known: the file changed between two reads.
   void add(const std::string& path, const std::string& sha256);

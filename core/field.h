@@ -13,15 +13,15 @@
 
 namespace duet {
 
-// Of a number.
+// The range of a number.
 struct FieldRange {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool with_low = true;  // whether `low` itself is allowed
 };
 
-// What a field is called and means. `choices` are the texts of an enumeration in the order of its enumerators from 0,
-// or of a flag: off, then on.
+// The name and the meaning of a field. `choices` are the texts of an enumeration in the order of its enumerators from
+// 0, or of a flag: off, then on.
 struct FieldWords {
   std::string name = {};
   std::string meaning = {};  // part of a sentence
@@ -112,7 +112,7 @@ std::string field_text(const FieldWords& words, const T& value) {
   }
 }
 
-// What `duet list` says that it may be.
+// The values that `duet list` says are allowed.
 template <typename T>
 std::string field_values(const FieldWords& words, const FieldRange& range) {
   if constexpr (OptionalValue<T>::value) {
@@ -175,7 +175,7 @@ FieldRange range_of(const Field<Owner>& known, const Owner& owner) {
   return range;
 }
 
-// What was expected; "" where it was set.
+// Sets the field and returns ""; where the text does not fit, returns what was expected.
 template <typename Owner>
 std::string set_field(const Field<Owner>& known, Owner& owner, const std::string& text) {
   return known.assign(owner, text, range_of(known, owner));

@@ -56,7 +56,7 @@ int open_file(const std::string& path, int flags, mode_t mode = 0) {
   return descriptor;
 }
 
-// 0, or the error number. What was written before the error stays written.
+// 0, or the error number. Bytes written before the error stay written.
 int write_all(int descriptor, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
@@ -213,7 +213,7 @@ LineAppender::LineAppender(const std::string& path) : path_(path) {
 LineAppender::~LineAppender() { ::close(descriptor_); }
 
 void LineAppender::append(std::string_view line) {
-  require(line.find('\n') == std::string_view::npos, fmt::format("'{}': a line must not hold a newline", path_));
+  require(line.find('\n') == std::string_view::npos, "'{}': a line must not hold a newline", path_);
   if (!complete_) cut_back();
   const std::string text = std::string(line) + '\n';
   complete_ = false;

@@ -1,4 +1,4 @@
-// Whose fault it is: what is found to be wrong with a file only after it was read still names the file. Thread-safe.
+// Names the file in errors that are found only after it was read. Thread-safe.
 #pragma once
 
 #include <new>

@@ -1,5 +1,5 @@
-// What stands in the place of a file that is no data at all, told by its first bytes: a pointer of Git LFS, a page that
-// a server sent, text in another encoding, a document of an office. Thread-safe.
+// Detection of a file that is no data at all, by its first bytes: a pointer of Git LFS, a page that a server sent, text
+// in another encoding, a document of an office. Thread-safe.
 #pragma once
 
 #include <cstddef>

@@ -1,5 +1,5 @@
-// What a program adds by name to what duet has by name: controllers, policies, metrics of its own. Thread-safe; an
-// entry stays for as long as the program runs, at one address.
+// Entries that a program adds by name to those that duet has: controllers, policies, metrics of its own. Thread-safe;
+// an entry stays for as long as the program runs, at one address.
 #pragma once
 
 #include <algorithm>

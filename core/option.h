@@ -1,5 +1,5 @@
-// Options by name and text, of a controller or a policy: a struct with a table of fields (core/field.h) is what they
-// set. What is listed, checked and documented is made of the table.
+// Options by name and text, of a controller or a policy: they set the fields of a struct with a table of fields
+// (core/field.h). Listing, checking and documentation are made from the table.
 #pragma once
 
 #include <map>

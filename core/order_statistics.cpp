@@ -1,7 +1,5 @@
 #include "duet/core/order_statistics.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -22,7 +20,7 @@ int order(double x, double y) {
 }  // namespace
 
 double quantile_of_sorted(std::span<const double> sorted, double p) {
-  require(p >= 0.0 && p <= 1.0, fmt::format("quantile: expected p in [0, 1], found {}", p));
+  require(p >= 0.0 && p <= 1.0, "quantile: expected p in [0, 1], found {}", p);
   if (sorted.empty()) return kUndefined;
   const double place = p * static_cast<double>(sorted.size() - 1);
   const auto below = static_cast<std::size_t>(place);
@@ -31,7 +29,7 @@ double quantile_of_sorted(std::span<const double> sorted, double p) {
 }
 
 double quantile(std::vector<double> values, double p) {
-  require(p >= 0.0 && p <= 1.0, fmt::format("quantile: expected p in [0, 1], found {}", p));
+  require(p >= 0.0 && p <= 1.0, "quantile: expected p in [0, 1], found {}", p);
   if (values.empty()) return kUndefined;
   const double place = p * static_cast<double>(values.size() - 1);
   const auto below = values.begin() + static_cast<std::ptrdiff_t>(place);
@@ -41,9 +39,8 @@ double quantile(std::vector<double> values, double p) {
 }
 
 double weighted_median(std::span<const double> values, std::span<const double> weights) {
-  require(
-      values.size() == weights.size(),
-      fmt::format("weighted median: expected one weight per value, found {} for {}", weights.size(), values.size()));
+  require(values.size() == weights.size(), "weighted median: expected one weight per value, found {} for {}",
+          weights.size(), values.size());
   require(std::ranges::all_of(weights, [](double weight) { return weight >= 0.0; }),
           "weighted median: expected weights of at least 0");
   std::vector<std::size_t> order(values.size());
@@ -61,8 +58,7 @@ double weighted_median(std::span<const double> values, std::span<const double> w
 }
 
 RankAgreement kendall(std::span<const double> a, std::span<const double> b) {
-  require(a.size() == b.size(),
-          fmt::format("Kendall's tau: expected as many values in both, found {} and {}", a.size(), b.size()));
+  require(a.size() == b.size(), "Kendall's tau: expected as many values in both, found {} and {}", a.size(), b.size());
   RankAgreement result;
   long untied_a = 0;
   long untied_b = 0;
@@ -83,7 +79,7 @@ RankAgreement kendall(std::span<const double> a, std::span<const double> b) {
 }
 
 double kaplan_meier_quantile(std::vector<Lifetime> lifetimes, double p) {
-  require(p > 0.0 && p < 1.0, fmt::format("Kaplan-Meier quantile: expected p in (0, 1), found {}", p));
+  require(p > 0.0 && p < 1.0, "Kaplan-Meier quantile: expected p in (0, 1), found {}", p);
   std::sort(lifetimes.begin(), lifetimes.end(), [](const Lifetime& x, const Lifetime& y) {
     return x.time != y.time ? x.time < y.time : x.ended && !y.ended;
   });

@@ -12,7 +12,7 @@ double quantile_of_sorted(std::span<const double> sorted, double p);
 double quantile(std::vector<double> values, double p);
 
 // The value below and above which the weights sum to the same, the mean of two where half ends between them. NaN for no
-// weight. Of ratios y / x weighted by |x| it is the slope through the origin with the least absolute deviations of y.
+// weight. For ratios y / x weighted by |x| it is the slope through the origin with the least absolute deviations of y.
 // Throws std::invalid_argument for unequal lengths and for negative weights.
 double weighted_median(std::span<const double> values, std::span<const double> weights);
 

@@ -59,7 +59,7 @@ double Random::normal() {
 }
 
 int Random::below(int n) {
-  require(n > 0, fmt::format("random number below n: expected n > 0, found {}", n));
+  require(n > 0, "random number below n: expected n > 0, found {}", n);
   const auto range = static_cast<std::uint64_t>(n);
   const std::uint64_t excess = (0 - range) % range;  // 2^64 mod n: that many values would count once too often
   std::uint64_t value = bits();

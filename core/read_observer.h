@@ -1,5 +1,5 @@
-// Who is told of each file that a thread reads whole (core/file.h): a reader knows nothing of who wants to know what it
-// read. One a thread; core/digest.h is the one that there is.
+// A callback that is told of each file that a thread reads whole (core/file.h), so that a reader knows nothing of those
+// who want to know what it read. One per thread; only core/digest.h uses it.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What every run leaves behind, be it played back, simulated or on the robot: metrics and detectors see only this.
+// The record of every run, be it played back, simulated or on the robot: metrics and detectors see only this.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,6 @@
 #include "duet/core/task.h"
 
 namespace duet {
-
-class Npz;
 
 struct RecordedContact {
   int frame = 0;
@@ -37,12 +35,5 @@ struct Recording {
 
   [[nodiscard]] int frames() const { return static_cast<int>(robot.size()); }
 };
-
-// Writes or reads a recording as NPZ (keys in docs/file-formats.md). The write is atomic. Throws InputError.
-void save_recording(const Recording& recording, const std::string& path);
-Recording load_recording(const std::string& path);
-// The same as an archive, for files that hold more than the recording; other keys are not looked at.
-Npz recording_npz(const Recording& recording);
-Recording read_recording(const Npz& npz);
 
 }  // namespace duet

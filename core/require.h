@@ -2,6 +2,8 @@
 // is a value (core/outcome.h). Thread-safe.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +16,14 @@ inline void require(bool condition, const std::string& message) {
 }
 inline void require(bool condition, const char* message) {
   if (!condition) throw std::invalid_argument(message);
+}
+
+[[noreturn]] void throw_invalid(fmt::string_view format, fmt::format_args arguments);
+
+// The same with fmt's placeholders: the message is made, out of line, only where the condition does not hold.
+template <typename First, typename... Rest>
+void require(bool condition, fmt::format_string<First, Rest...> format, First&& first, Rest&&... rest) {
+  if (!condition) throw_invalid(format, fmt::make_format_args(first, rest...));
 }
 
 // A file, an engine or a device that cannot do what was asked of it. The command line answers with exit code 2.

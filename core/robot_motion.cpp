@@ -13,14 +13,14 @@ namespace {
 constexpr double kUnitTolerance = 1e-6;
 
 void validate_sizes(const RobotMotion& motion, const std::string& what) {
-  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
-          fmt::format("{}: expected a rate above 0 Hz, found {}", what, motion.rate_hz));
+  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0, "{}: expected a rate above 0 Hz, found {}", what,
+          motion.rate_hz);
   require(motion.q.cols() == static_cast<Eigen::Index>(motion.root.size()),
-          fmt::format("{}: expected as many frames of joints as of the root ({}), found {}", what, motion.root.size(),
-                      motion.q.cols()));
+          "{}: expected as many frames of joints as of the root ({}), found {}", what, motion.root.size(),
+          motion.q.cols());
   require(motion.q.rows() == static_cast<Eigen::Index>(motion.joint_names.size()),
-          fmt::format("{}: expected {} joints as named, found {} rows of joint angles", what, motion.joint_names.size(),
-                      motion.q.rows()));
+          "{}: expected {} joints as named, found {} rows of joint angles", what, motion.joint_names.size(),
+          motion.q.rows());
 }
 
 // Messages are made only on failure: a motion has many numbers.
@@ -47,8 +47,7 @@ void validate(const RobotMotion& motion, const std::string& what) {
 }
 
 RobotMotion resample(const RobotMotion& motion, double rate_hz) {
-  require(std::isfinite(rate_hz) && rate_hz > 0.0,
-          fmt::format("resample: expected a rate above 0 Hz, found {}", rate_hz));
+  require(std::isfinite(rate_hz) && rate_hz > 0.0, "resample: expected a rate above 0 Hz, found {}", rate_hz);
   require(motion.frames() > 0, "resample: expected frames, found none");
   constexpr double kSameInstant = 1e-9;  // of a frame: two clocks that meet, meet
   const int last = motion.frames() - 1;

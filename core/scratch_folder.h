@@ -1,4 +1,4 @@
-// A folder for a while: of a name that nobody can guess or has already, and gone with its owner. What was made in it
+// A temporary folder: its name cannot be guessed or be taken already, and it goes with its owner. A file made in it
 // becomes the result by a rename, so that the result is there whole or not at all.
 #pragma once
 

@@ -1,4 +1,4 @@
-// The parts of a line of text. What is returned points into `text`.
+// The parts of a line of text. The returned parts point into `text`.
 #pragma once
 
 #include <string_view>
@@ -13,7 +13,7 @@ inline std::string_view trimmed(std::string_view text, std::string_view marks = 
   return text.substr(begin, text.find_last_not_of(marks) - begin + 1);
 }
 
-// What stands before, between and after the marks: one part more than there are marks, empty ones included.
+// The parts before, between and after the marks: one part more than there are marks, empty ones included.
 inline std::vector<std::string_view> split(std::string_view text, char mark) {
   std::vector<std::string_view> parts;
   for (;;) {

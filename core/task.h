@@ -1,5 +1,5 @@
 // Which task an interaction is, and the three phases of each (supplement B.4). The supplement's six tasks (B.1) have
-// names in code; every other is a row of tasks/list.cmake and is asked for by its name (docs/adding-a-task.md).
+// names in code; every other is a row of tasks/list.cmake and is asked for by its name (docs/extending.md, "A task").
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// A place in the list of tasks. What a task is, its TaskDefinition says (tasks/task_definition.h).
+// A place in the list of tasks. The task's TaskDefinition says what it is (tasks/task_definition.h).
 class Task {
  public:
   static const Task kHug, kHandshake, kHighFive, kWave, kBend, kFlyKiss;

@@ -19,8 +19,8 @@ std::optional<CodePoint> code_point_at(std::string_view text, std::size_t at);
 inline constexpr std::size_t kShown = 80;            // about one line of a terminal
 inline constexpr std::size_t kShownSentence = 2000;  // a sentence that lists the known names
 
-// `text` in at most `most` bytes, "..." at the end where it is longer. What could move a terminal's cursor, recolour it
-// or turn its text around is escaped: "\x1b" for a control character or a byte that is not UTF-8, "\n", "\t", "\u202e".
+// `text`, where longer cut to `most` bytes with "..." last. Escapes all that could move a terminal's cursor, recolour
+// it or turn its text around: "\x1b" for a control character or a byte that is not UTF-8, "\n", "\t", "\u202e".
 std::string shown(std::string_view text, std::size_t most = kShown);
 
 // The same for a text of any length, such as a table: line ends and tabs stay.

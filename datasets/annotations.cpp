@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/core/csv.h"
+#include "duet/archives/csv.h"
 #include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 namespace {
@@ -39,7 +39,7 @@ std::optional<Person> reactor_of(const CsvReader& line, const std::string& text)
   return text == "A" ? Person::kA : Person::kB;
 }
 
-// Of the row that the reader stands on.
+// The annotation in the row that the reader stands on.
 Annotation annotation_in(const CsvReader& line) {
   const auto fields = line.fields();
   if (fields.size() != kHeader.size())

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "duet/core/csv.h"
+#include "duet/archives/csv.h"
 #include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"

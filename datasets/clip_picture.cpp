@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "duet/core/require.h"
-#include "duet/results/report/report_parts.h"
+#include "duet/report/page/report_parts.h"
 
 namespace duet {
 namespace {
@@ -31,8 +31,8 @@ void replace_all(std::string& text, std::string_view from, std::string_view to) 
 std::string clip_picture_svg(const InteractionClip& clip, const std::vector<int>& frames, const std::string& title) {
   std::vector<KeyFrame> key_frames;
   for (const int frame : frames) {
-    require(frame >= 0 && frame < clip.frames(),
-            fmt::format("picture of clip '{}': frame {} is not among its {}", clip.id, frame, clip.frames()));
+    require(frame >= 0 && frame < clip.frames(), "picture of clip '{}': frame {} is not among its {}", clip.id, frame,
+            clip.frames());
     key_frames.push_back({.label = fmt::format("frame {} ({:.2f} s)", frame, frame / clip.rate_hz()),
                           .figures = {figure_of(clip.actor_motion(), frame, "human"),
                                       figure_of(clip.reactor_motion(), frame, "robot")}});

@@ -58,7 +58,7 @@ Worst joint_speed(const InteractionClip& clip) {
   });
 }
 
-// Of the bones from shoulders to wrists and hips to ankles: the deviation from the bone's median length.
+// The deviation from a bone's median length, over the bones from shoulders to wrists and hips to ankles.
 Worst bone_change(const InteractionClip& clip) {
   constexpr std::array<int, 8> kEnds = {kLeftElbow, kRightElbow, kLeftWrist, kRightWrist,
                                         kLeftKnee,  kRightKnee,  kLeftAnkle, kRightAnkle};
@@ -75,8 +75,8 @@ Worst bone_change(const InteractionClip& clip) {
   });
 }
 
-// How far a person's heading swings within the act. Who does a task to another faces him: a swing past a right angle is
-// a tracker that took left for right where the bodies hide each other.
+// The swing of a person's heading within the act. A person who does a task to another faces him: a swing past a right
+// angle is a tracker that took left for right where the bodies hide each other.
 Worst act_turn(const InteractionClip& clip) {
   return worse(clip, [&](const HumanMotion& motion) {
     double lowest = 0.0, highest = 0.0, turned = 0.0, before = 0.0, fastest = 0.0;
@@ -128,7 +128,7 @@ Worst act_seconds(const InteractionClip& clip) {
   return {(clip.phases.act_end - clip.phases.act_begin) / clip.rate_hz(), clip.phases.act_begin};
 }
 
-// Of the pelvis over the lower foot, against its 90th percentile: people who sit, lie or kneel.
+// The least height of the pelvis over the lower foot, against its 90th percentile: people who sit, lie or kneel.
 Worst pelvis_height(const InteractionClip& clip) {
   Worst lowest{std::numeric_limits<double>::infinity(), 0};
   for (const HumanMotion* motion : {&clip.a, &clip.b}) {
@@ -145,7 +145,7 @@ Worst pelvis_height(const InteractionClip& clip) {
 
 const HumanMotion& replaced(const InteractionClip& clip) { return clip.reactor_motion(); }
 
-// Over half a second, horizontally.
+// The root's speed over half a second, horizontally.
 Worst root_speed(const InteractionClip& clip) {
   const HumanMotion& motion = replaced(clip);
   const int window = std::min(std::max(1, static_cast<int>(0.5 * motion.rate_hz)), motion.frames() - 1);
@@ -262,7 +262,7 @@ void set_limit(CurationOptions& options, const std::string& name, const std::str
   for (const Criterion& criterion : kCriteria) known.emplace_back(criterion.info.name);
   require(std::ranges::count(known, name) > 0, unknown_name_message("curation criterion", name, known));
   const std::optional<double> limit = parse_number(value);
-  require(limit.has_value(), fmt::format("curation criterion '{}': expected a finite number, found '{}'", name, value));
+  require(limit.has_value(), "curation criterion '{}': expected a finite number, found '{}'", name, value);
   options.limits[name] = *limit;
 }
 

@@ -26,7 +26,7 @@ struct CriterionInfo {
 };
 std::span<const CriterionInfo> curation_criteria();
 
-// What each criterion allows, by name; those that are not named have the table's.
+// Limits of the criteria, by name; those that are not named have the table's.
 struct CurationOptions {
   std::map<std::string, double> limits = {};
   // How much limbs' bones change in the usual recording of this source (median of bone_change); 0: not known. A tracker

@@ -24,10 +24,10 @@
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/motion/people/people_formats.h"
-#include "duet/results/rows/json_fields.h"
 #include "duet/retarget/pair.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {
@@ -84,7 +84,7 @@ std::vector<ClipPlace> named_places(std::vector<ClipPlace> places) {
   return places;
 }
 
-// What stands in a data set tells no folder of who made it: paths begin below the inputs.
+// Removes the maker's folders from the texts of a data set: paths begin below the inputs.
 class InputFolders {
  public:
   explicit InputFolders(const std::vector<std::string>& inputs) {
@@ -305,7 +305,7 @@ class SourceDigests {
   std::map<std::string, std::string> containers_;
 };
 
-// What all threads share.
+// The state that all threads share.
 class DatasetWork {
  public:
   DatasetWork(const DatasetPlan& plan, const std::string& folder, const DatasetEvents& events)

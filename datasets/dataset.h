@@ -35,7 +35,7 @@ struct DatasetPlan {
   int threads = 1;
 };
 
-// What a caller hears while it goes on; each may be empty. Called from any thread, one at a time.
+// Events that a caller hears while it goes on; each may be empty. Called from any thread, one at a time.
 struct DatasetEvents {
   std::function<void(int clips)> found = {};
   std::function<void(const DatasetEntry& entry, bool from_before)> finished = {};

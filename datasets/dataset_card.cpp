@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/datasets/dataset_tables.h"
-#include "duet/results/report/escape_html.h"
+#include "duet/report/tables/escape_html.h"
 
 namespace duet {
 namespace {

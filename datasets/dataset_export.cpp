@@ -15,7 +15,7 @@
 #include "duet/datasets/dataset_files.h"
 #include "duet/datasets/dataset_folder.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/results/rows/json_fields.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {
@@ -50,7 +50,7 @@ std::vector<Item> items_of(const std::vector<DatasetEntry>& entries, const std::
   return items;
 }
 
-// What is written of one item, as it stands in log and manifest.
+// The entry of one item, as it stands in log and manifest.
 json row_of(const Item& item, const RobotMotionFormat& format, const RobotMotionWriting& writing,
             const std::vector<NamedDigest>& files) {
   json list = json::array();
@@ -156,7 +156,7 @@ class Export {
 DatasetExport export_dataset(const std::string& dataset, const std::string& output,
                              const std::vector<DatasetRobot>& robots, const RobotMotionFormat& format,
                              const RobotMotionWriting& writing, int threads, const DatasetEvents& events) {
-  require(format.write != nullptr, fmt::format("format '{}' is read, not written", format.name));
+  require(format.write != nullptr, "format '{}' is read, not written", format.name);
   const std::vector<DatasetEntry> entries = read_dataset(dataset);
   const std::vector<Item> items = items_of(entries, robots, dataset);
   Export work(dataset, output, format, writing);

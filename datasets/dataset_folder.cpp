@@ -9,7 +9,7 @@
 #include "duet/core/digest.h"
 #include "duet/core/json.h"
 #include "duet/core/text.h"
-#include "duet/results/rows/json_fields.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "duet/core/file.h"
 #include "duet/datasets/entry.h"
-#include "duet/results/rows/folder_lock.h"
+#include "duet/rows/folder/folder_lock.h"
 
 namespace duet {
 
@@ -28,7 +28,7 @@ class DatasetFolder {
   [[nodiscard]] std::optional<DatasetEntry> find(const std::string& clip, const std::string& key) const;
   // On disk when it returns; a later entry of a clip stands for the earlier. Thread-safe. Throws StorageError.
   void append(const DatasetEntry& entry);
-  // In the order of their ids.
+  // All entries, in the order of their ids.
   [[nodiscard]] std::vector<DatasetEntry> entries() const;
 
  private:

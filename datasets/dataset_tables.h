@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "duet/datasets/entry.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 

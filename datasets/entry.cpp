@@ -8,7 +8,7 @@
 
 #include "duet/core/json.h"
 #include "duet/core/require.h"
-#include "duet/results/rows/json_fields.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {

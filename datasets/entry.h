@@ -1,4 +1,4 @@
-// What a data set knows of one clip, kept or not: where it came from, why it was refused, what was made of it. One line
+// The record of a clip of a data set, kept or not: its origin, why it was refused, what was made of it. One line
 // of JSON in the data set's log; the tables and the card are made of nothing else.
 #pragma once
 

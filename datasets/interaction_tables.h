@@ -7,7 +7,7 @@
 
 #include "duet/core/task.h"
 #include "duet/metrics/interaction_statistics.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 

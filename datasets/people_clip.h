@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "duet/motion/people/people_formats.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/source_clip.h"
 
 namespace duet {

@@ -8,7 +8,7 @@
 #include "duet/core/order_statistics.h"
 #include "duet/core/parallel.h"
 #include "duet/motion/phase_proposal.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "duet/core/task.h"
-#include "duet/results/analyses/text_table.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 
@@ -17,7 +17,7 @@ struct PhaseError {
   double overlap = 0.0;           // of the two acts: shared over both together
 };
 
-// Of `count` clips a task, synthesised from `seed`; their own phases are hidden from the proposal.
+// Errors of `count` clips a task, synthesised from `seed`; their own phases are hidden from the proposal.
 std::vector<PhaseError> phase_errors(std::span<const Task> tasks, int count, std::uint64_t seed, int threads);
 
 // Per task and in total: clips, median and 90th percentile of the size of both errors [s], median overlap.

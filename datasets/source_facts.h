@@ -1,4 +1,4 @@
-// What the recordings of one source have in common, before each is judged: which labels they carry, and how steady the
+// Facts that the recordings of one source share, before each is judged: which labels they carry, and how steady the
 // bones of its tracker are. Deterministic: it depends on the recordings alone.
 #pragma once
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/people/people_formats.h"
+#include "duet/motion/people/formats/people_formats.h"
 
 namespace duet {
 
@@ -22,7 +22,7 @@ struct SourceFacts {
 std::map<std::string, int> count_labels(const PeopleFormat& format, const std::vector<ClipPlace>& places,
                                         const PeopleOptions& options, int threads);
 
-// Of at most 32 recordings, evenly spaced; 0 of fewer than five that can be read. Two significant digits.
+// Measured on at most 32 recordings, evenly spaced; 0 for fewer than five that can be read. Two significant digits.
 double usual_bone_change(const PeopleFormat& format, const std::vector<ClipPlace>& places, const PeopleOptions& options,
                          int threads);
 

@@ -16,9 +16,9 @@ struct ColumnBinding {
   std::vector<std::string> evidence = {};
 };
 
-// By name where there are `names`, with or without "_joint"; else as many columns as the robot has joints, or joints
-// without its wrists. Throws InputError naming `path`: another number of columns, a joint that stands twice, less than
-// half of the robot's joints.
+// Binds by name where there are `names`, with or without "_joint"; else as many columns as the robot has joints, or
+// joints without its wrists. Throws InputError naming `path`: another number of columns, a joint that stands twice,
+// less than half of the robot's joints.
 ColumnBinding bind_columns(const std::string& path, const std::vector<std::string>& names, Eigen::Index columns,
                            const RobotModel& robot);
 

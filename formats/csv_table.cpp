@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "duet/core/csv.h"
+#include "duet/archives/csv.h"
 #include "duet/core/require.h"
 #include "duet/core/split.h"
 #include "duet/core/text.h"

@@ -1,5 +1,5 @@
-// Tables of numbers in any dialect of CSV (core/csv.h): an optional line of names, lines that begin with '#' for what
-// else is known. Thread-safe.
+// Tables of numbers in any dialect of CSV (archives/csv.h): an optional line of names, lines that begin with '#' for
+// what else is known. Thread-safe.
 #pragma once
 
 #include <Eigen/Core>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/robot_motion.h"
 #include "duet/formats/file_motion.h"
 #include "duet/robots/robot_model.h"
@@ -31,7 +31,7 @@ Eigen::MatrixXd root_quaternions(const RobotMotion& motion, QuaternionOrder orde
 
 // Rows of `matrix` at `rows`.
 Eigen::MatrixXd rows_of(const Eigen::MatrixXd& matrix, const std::vector<int>& rows);
-// Those of a beneath those of b.
+// The rows of a, then those of b.
 Eigen::MatrixXd stacked(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 // The numbers of a (width, T) matrix as rows of an array of shape (T, width), or (T, width / last, last).

@@ -131,7 +131,7 @@ class Interpreter {
       why = "detected";
     }
     fact_.radians = unit == AngleUnit::kDegrees ? kDegree : 1.0;
-    // What bends no joint by more than 3.1 degrees may be half a turn whose unit was taken for the other one.
+    // A motion that bends no joint by more than 3.1 degrees may be half a turn whose unit was taken for the other one.
     const double bend = file_.q.size() > 0 ? file_.q.cwiseAbs().maxCoeff() * fact_.radians / kDegree : 0.0;
     if (!options_.angles && bend > 0.0 && bend <= std::numbers::pi)
       say(fmt::format(
@@ -269,7 +269,7 @@ class Interpreter {
     int bodies = 0;
   };
 
-  // Of the file's bodies from our kinematics, over sampled frames (all where `all`). [m]
+  // The distance of the file's bodies from our kinematics, over sampled frames (all where `all`). [m]
   [[nodiscard]] BodyDistance body_distance(const FactChoice& fact, bool all) {
     const std::vector<int> links = body_links(fact.bodies);
     const double metres = file_.bodies_in_base ? 1.0 : fact_.metres;
@@ -365,7 +365,7 @@ class Interpreter {
                     better ? "detected" : "as documented", figures));
   }
 
-  // What speaks against the motion as it was read; nobody shall take it unseen.
+  // Says what speaks against the motion as it was read, so that nobody takes it unseen.
   void say_doubts() {
     const MotionSupport support = support_of(robot_, result_.motion);
     if (support.doubts() > 0) say(fmt::format("doubt: {}", support.text()));

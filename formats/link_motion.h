@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// Of the chosen links, B of them; one column is one frame. All in W.
+// The motion of the chosen links, B of them; one column is one frame. All in W.
 struct LinkMotion {
   Eigen::MatrixXd position;          // (3 B, T) of the links' origins [m]
   Eigen::MatrixXd quat_wxyz;         // (4 B, T)
@@ -25,8 +25,8 @@ LinkMotion link_motion(const RobotModel& robot, const RobotMotion& motion, const
 // Central differences, one-sided at the ends (numpy.gradient, torch.gradient). `values`: (n, T), T >= 2.
 Eigen::MatrixXd rate_of_change(const Eigen::MatrixXd& values, double rate_hz);
 
-// Of rotations R_WB, in W: the turn between the neighbours of a frame over the time between them; the ends as their
-// neighbours (BeyondMimic's csv_to_npz). (3, T), T >= 2.
+// The angular velocity of rotations R_WB, in W: the turn between the neighbours of a frame over the time between them;
+// the ends as their neighbours (BeyondMimic's csv_to_npz). (3, T), T >= 2.
 Eigen::MatrixXd angular_velocity(const std::vector<Eigen::Quaterniond>& R_WB, double rate_hz);
 
 // Axis times angle of the shorter turn. [rad]

@@ -1,4 +1,4 @@
-// What the documentation of a format says of its files, and what somebody who reads one may know better.
+// The documented layout of a format's files, and corrections by a user who knows better.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@ std::string_view to_string(AngleUnit unit);         // "rad", "deg"
 QuaternionOrder parse_quaternion_order(std::string_view name);
 AngleUnit parse_angle_unit(std::string_view name);
 
-// What a format's documentation says of its files.
+// The layout of a format's files according to its documentation.
 struct MotionLayout {
   QuaternionOrder quaternion = QuaternionOrder::kXyzw;
   bool turns = false;                         // no quaternion but turns about the fixed axes x, then y, then z
@@ -29,7 +29,7 @@ struct MotionLayout {
   double rate_hz = 0.0;  // 0: the file says
 };
 
-// What is known better than the file and the documentation say. An empty one is detected, or taken as documented.
+// Facts known better than by the file and the documentation. An empty one is detected, or taken as documented.
 struct RobotMotionOptions {
   std::optional<double> rate_hz = {};
   std::optional<QuaternionOrder> quaternion = {};

@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/data_file.h"
-#include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/formats/pickle_fields.h"

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/pickle_node.h"
+#include "duet/archives/pickle/pickle_node.h"
 #include "duet/core/point_tracks.h"
 #include "duet/core/robot_motion.h"
 

@@ -4,10 +4,10 @@
 
 #include <filesystem>
 
+#include "duet/archives/npy/npy.h"
+#include "duet/archives/pickle/joblib.h"
 #include "duet/core/data_file.h"
 #include "duet/core/file.h"
-#include "duet/core/joblib.h"
-#include "duet/core/npy.h"
 #include "duet/core/require.h"
 
 namespace duet {

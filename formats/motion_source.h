@@ -8,9 +8,9 @@
 #include <string>
 #include <string_view>
 
-#include "duet/core/npy_array.h"
-#include "duet/core/npz.h"
-#include "duet/core/pickle_node.h"
+#include "duet/archives/npy/npy_array.h"
+#include "duet/archives/npy/npz.h"
+#include "duet/archives/pickle/pickle_node.h"
 #include "duet/formats/csv_table.h"
 
 namespace duet {
@@ -18,7 +18,7 @@ namespace duet {
 enum class MotionContainer { kNpz, kNpy, kPickle, kTable, kFolder };
 std::string_view to_string(MotionContainer container);  // "an NPZ archive", ...
 
-// Of the five, the one that `container` names is there.
+// The content of a file or folder: only the member of the five that `container` names is set.
 struct MotionSource {
   std::string path = {};  // for messages
   MotionContainer container = MotionContainer::kTable;

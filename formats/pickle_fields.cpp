@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "duet/core/pickle_machine.h"
+#include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/pickle_node.h"
+#include "duet/archives/pickle/pickle_node.h"
 
 namespace duet {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "duet/core/pickle_machine.h"
+#include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/formats/file_arrays.h"
@@ -106,7 +106,7 @@ PickleTable joint_table(const Pickle& pickle, const PickleNode& node, std::size_
   return pickle_table(pickle, node, "dof", frames, {0});
 }
 
-// What pose_aa, whose first joint is the root's rotation vector, says of the order of root_rot.
+// Tells the order of root_rot by pose_aa, whose first joint is the root's rotation vector.
 void compare_root(const Pickle& pickle, const PickleDict& dict, FileMotion& motion) {
   const PickleNode* node = dict.find("pose_aa");
   if (node == nullptr || node->shape.size() != 3) return;

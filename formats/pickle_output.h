@@ -1,5 +1,5 @@
 // Writes dicts of NumPy arrays, numbers and strings as a pickle of protocol 4: a fixed stream of opcodes that Python's
-// pickle (and joblib) loads, and core/pickle_machine.h reads.
+// pickle (and joblib) loads, and archives/pickle/pickle_machine.h reads.
 #pragma once
 
 #include <Eigen/Core>

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "duet/archives/recording_file.h"
 #include "duet/core/number.h"
-#include "duet/core/recording.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/formats/file_arrays.h"

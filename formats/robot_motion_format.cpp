@@ -41,10 +41,10 @@ const RobotMotionFormat& format_of(const MotionSource& source, const std::string
 }
 
 void require_writable(const RobotMotion& motion, const RobotModel& robot, const RobotMotionFormat& format) {
-  require(format.write != nullptr, fmt::format("format '{}' is read, not written", format.name));
+  require(format.write != nullptr, "format '{}' is read, not written", format.name);
   require(motion.joint_names == robot.joint_names(),
-          fmt::format("format '{}': expected the joints of robot '{}' in its order, found {}", format.name, robot.name,
-                      fmt::join(motion.joint_names, ", ")));
+          "format '{}': expected the joints of robot '{}' in its order, found {}", format.name, robot.name,
+          fmt::join(motion.joint_names, ", "));
   validate(motion, fmt::format("motion to be written as '{}'", format.name));
 }
 
@@ -117,12 +117,11 @@ MotionFiles robot_motion_files(const RobotMotion& motion, const RobotModel& robo
   }
   require_writable(motion, robot, format);
   const double rate_hz = written_rate(format, motion.rate_hz, writing);
-  require(rate_hz >= kLowestRate && rate_hz <= kHighestRate,
-          fmt::format("format '{}': expected a rate of {} to {} Hz, found {}", format.name, kLowestRate, kHighestRate,
-                      rate_hz));
+  require(rate_hz >= kLowestRate && rate_hz <= kHighestRate, "format '{}': expected a rate of {} to {} Hz, found {}",
+          format.name, kLowestRate, kHighestRate, rate_hz);
   const RobotMotion written = rate_hz == motion.rate_hz ? motion : resample(motion, rate_hz);
-  require(written.frames() >= 2, fmt::format("format '{}': expected at least 2 frames at {} Hz, found {}", format.name,
-                                             rate_hz, written.frames()));
+  require(written.frames() >= 2, "format '{}': expected at least 2 frames at {} Hz, found {}", format.name, rate_hz,
+          written.frames());
   return format.write(written, robot, writing);
 }
 

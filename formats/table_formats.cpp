@@ -53,7 +53,7 @@ std::optional<double> rate_of(const CsvTable& table, std::vector<std::string>& e
 
 // ---- Unitree and LAFAN1: without names, or with a line of them
 
-// What a column of the root is called: an axis, of its position or of its quaternion.
+// A named column of the root: an axis, of its position or of its quaternion.
 struct RootColumn {
   char axis = '\0';
   bool rotation = false;

@@ -1,4 +1,4 @@
-// What has to be true before a robot is allowed to move: facts that a person made true, one after the other. Pure; the
+// Conditions before a robot is allowed to move: facts that a person made true, one after the other. Pure; the
 // readings of clocks are the caller's.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// Of the configuration (docs/hardware.md, "Configuration").
+// The permission in the configuration (docs/hardware.md, "Configuration").
 struct MotionPermission {
   bool allow_motion = false;
   std::string robot;      // its serial number or address

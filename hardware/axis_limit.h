@@ -17,7 +17,7 @@ struct AxisState {
   double rate = 0.0;  // of the last tick [1/s]
 };
 
-// What kept the value from its target.
+// Limits that kept the value from its target.
 struct AxisClamps {
   bool value = false;        // the target lay outside
   bool rate = false;         // it would have needed a larger rate

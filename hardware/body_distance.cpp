@@ -1,7 +1,5 @@
 #include "duet/hardware/body_distance.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "duet/backends/narrow_phase.h"
@@ -15,10 +13,9 @@ bool is_head_region(const std::string& region) { return region == "head" || regi
 void check_touch(const RobotModel& robot, const HumanBody& human, const TouchPair& touch) {
   const bool robot_has = std::ranges::any_of(robot.shapes, [&](const auto& s) { return s.region == touch.robot; });
   const bool human_has = std::ranges::any_of(human.capsules, [&](const auto& c) { return c.region == touch.human; });
-  require(robot_has, fmt::format("touch: expected a region of robot '{}', found '{}'", robot.name, touch.robot));
-  require(human_has, fmt::format("touch: expected a region of a person, found '{}'", touch.human));
-  require(!is_head_region(touch.human),
-          fmt::format("touch: expected a region that may be touched, found '{}'", touch.human));
+  require(robot_has, "touch: expected a region of robot '{}', found '{}'", robot.name, touch.robot);
+  require(human_has, "touch: expected a region of a person, found '{}'", touch.human);
+  require(!is_head_region(touch.human), "touch: expected a region that may be touched, found '{}'", touch.human);
 }
 
 }  // namespace

@@ -35,8 +35,8 @@ class BodyDistance {
   // Throws std::invalid_argument for a touch of a region that robot or person lacks, or of head or neck.
   BodyDistance(std::shared_ptr<const RobotModel> robot, HumanBody human, const std::vector<TouchPair>& touches);
 
-  // Of the robot in this pose. `person`: SMPL-24 joints in W, or null; its capsules grow by `uncertainty` [m], but not
-  // where they may touch. `may_touch`: the task's act lasts.
+  // Measures the robot in this pose. `person`: SMPL-24 joints in W, or null; its capsules grow by `uncertainty` [m],
+  // but not where they may touch. `may_touch`: the task's act lasts.
   const BodyGaps& measure(const Pose& X_WB, const Eigen::VectorXd& q, const HumanJoints* person, double uncertainty,
                           bool may_touch);
   [[nodiscard]] const BodyGaps& gaps() const { return gaps_; }  // of the last call

@@ -1,7 +1,5 @@
 #include "duet/hardware/contact_watch.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +11,7 @@ namespace {
 const RobotModel& with_arms(const std::shared_ptr<const RobotModel>& robot) {
   require(robot != nullptr, "contact watch: expected a robot, found none");
   require(!robot->roles.arms[0].empty() && !robot->roles.arms[1].empty(),
-          fmt::format("contact watch: expected a card with two arms, found none in '{}'", robot->name));
+          "contact watch: expected a card with two arms, found none in '{}'", robot->name);
   return *robot;
 }
 
@@ -26,8 +24,8 @@ ContactWatch::ContactWatch(std::shared_ptr<const RobotModel> robot, const Hardwa
       least_force_(least_force),
       ticks_to_count_(static_cast<int>(std::ceil(limits.contact_time / dt - 1e-9))),
       dynamics_(with_arms(robot_)) {
-  require(dt > 0.0, fmt::format("contact watch: expected a dt above 0 s, found {}", dt));
-  require(least_force >= 0.0, fmt::format("contact watch: expected a force of at least 0 N, found {}", least_force));
+  require(dt > 0.0, "contact watch: expected a dt above 0 s, found {}", dt);
+  require(least_force >= 0.0, "contact watch: expected a force of at least 0 N, found {}", least_force);
   bias_.setZero(6 + robot_->dof());
   still_.v.setZero(robot_->dof());
   still_.q.setZero(robot_->dof());
@@ -66,8 +64,8 @@ double least_touch_force(const std::vector<TouchPair>& touches, const ContactLim
   double least = 0.0;
   for (const TouchPair& touch : touches) {
     const RegionLimits& region = limits.region(touch.human);
-    require(region.quasi_static_n.has_value(),
-            fmt::format("contact limits of region '{}': expected quasi_static_n, found none", touch.human));
+    require(region.quasi_static_n.has_value(), "contact limits of region '{}': expected quasi_static_n, found none",
+            touch.human);
     least = least == 0.0 ? *region.quasi_static_n : std::min(least, *region.quasi_static_n);
   }
   return least;

@@ -1,7 +1,5 @@
 #include "duet/hardware/dds_place.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 
@@ -23,17 +21,17 @@ bool is_name(const std::string& interface) {
 }  // namespace
 
 void check_place(const DdsPlace& place) {
-  require(place.domain >= 0 && place.domain <= kLastTwinDomain,
-          fmt::format("domain of DDS: expected 0 to {}, found {}", kLastTwinDomain, place.domain));
+  require(place.domain >= 0 && place.domain <= kLastTwinDomain, "domain of DDS: expected 0 to {}, found {}",
+          kLastTwinDomain, place.domain);
   require(is_name(place.interface) && place.interface != "auto",
-          fmt::format("network interface: expected the name of one (not 'auto'), found '{}'", shown(place.interface)));
+          "network interface: expected the name of one (not 'auto'), found '{}'", shown(place.interface));
 }
 
 void check_twin_place(const DdsPlace& place) {
   check_place(place);
   require(place.domain >= kFirstTwinDomain && place.interface == "lo",
-          fmt::format("twin: expected a domain from {} to {} on 'lo', found {} on '{}'", kFirstTwinDomain,
-                      kLastTwinDomain, place.domain, place.interface));
+          "twin: expected a domain from {} to {} on 'lo', found {} on '{}'", kFirstTwinDomain, kLastTwinDomain,
+          place.domain, place.interface);
 }
 
 }  // namespace duet

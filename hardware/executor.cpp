@@ -10,7 +10,7 @@ namespace duet {
 namespace {
 
 constexpr std::size_t kRootChannels = 7;
-// What of the root is executed as a velocity: x, y, and of the quaternion the turn, which is in w and z.
+// The channels of the root that are executed as a velocity: x, y, and of the quaternion the turn, which is in w and z.
 constexpr std::size_t kVelocityChannels[] = {0, 1, 3, 6};
 
 std::string joint_names(const std::vector<int>& joints, const RobotModel& robot, bool named) {

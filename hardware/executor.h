@@ -1,5 +1,5 @@
-// Who executes the guard's commands on a robot, and which channels of a 36-D reference reach it at all. A log names
-// them: what was not executed cannot be scored as if it had been. docs/hardware.md, "Executors".
+// The executor of the guard's commands on a robot, and the channels of a 36-D reference that reach it at all. A log
+// names both: what was not executed cannot be scored as if it had been. docs/hardware.md, "Executors".
 #pragma once
 
 #include <array>
@@ -49,10 +49,10 @@ class Executor : public VelocitySink {
  public:
   // Takes what it has sent us. Called once a tick, from LISTEN on.
   virtual void poll(double now) = 0;
-  // When it was last heard of and well; kNever: never. Of an executor that does not answer: unused.
+  // When it was last heard of and well; kNever: never. Unused for an executor that does not answer.
   [[nodiscard]] virtual double heard_at() const = 0;
   [[nodiscard]] virtual bool answers() const = 0;
-  // What is wrong with it, for the screen; empty where nothing is.
+  // The fault of the executor, for the screen; empty where it has none.
   [[nodiscard]] virtual std::string complaint() const = 0;
 
   // How many others command the robot, beside whom this executor steers. `command_writers`: on the low-level topic.

@@ -14,7 +14,7 @@ std::uint32_t frame_checksum(std::span<const std::uint32_t> words);
 // The same bit by bit, as the definition has it: what the table is tested against.
 std::uint32_t frame_checksum_by_bits(std::span<const std::uint32_t> words);
 
-// Of all words of a message but its last, which holds it. Padding counts: a message is built from zeros.
+// The checksum of all words of a message but its last, which holds it. Padding counts: a message is built from zeros.
 template <typename Frame>
 std::uint32_t checksum_of(const Frame& frame) {
   static_assert(std::is_trivially_copyable_v<Frame> && sizeof(Frame) % sizeof(std::uint32_t) == 0);

@@ -23,7 +23,7 @@ class FrameTransport {
   virtual bool write(const LowCommandFrame& frame) = 0;
 };
 
-// Who executes the velocity of the root, beside the low-level topic.
+// The executor of the root's velocity, beside the low-level topic.
 class VelocitySink {
  public:
   virtual ~VelocitySink() = default;

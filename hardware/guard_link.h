@@ -20,11 +20,11 @@ class GuardLink {
   // Waits for the guard's next report, 20 ms after the last by its clock; false where none came for `patience()`.
   virtual bool next(GuardReport& report) = 0;
   [[nodiscard]] virtual double patience() const = 0;  // [s]
-  // For messages: "the guard at 'duet-guard.socket'".
+  // The name for messages: "the guard at 'duet-guard.socket'".
   [[nodiscard]] virtual std::string name() const = 0;
 };
 
-// Over the guard's local socket.
+// A link over the guard's local socket.
 class SocketGuardLink final : public GuardLink {
  public:
   // Throws std::runtime_error where no guard receives at `socket`, and where another planner has its reports.

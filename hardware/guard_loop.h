@@ -30,11 +30,11 @@ class NoVelocity final : public VelocitySink {
   void send(const VelocityCommand&) override {}
 };
 
-// What came over the planner's socket since the last call, at most 32 messages. Whether a plan or a
+// Takes what came over the planner's socket since the last call, at most 32 messages. Returns whether a plan or a
 // stop was among them.
 bool take_messages(DatagramSocket& socket, RobotGuard& guard, GuardMessage& message, double now);
 
-// What the wire has for the guard beside the robot's states: odometry, battery, who executes the commands. `now`: by
+// Takes the wire's readings beside the robot's states: odometry, battery, who executes the commands. `now`: by
 // the clock of its ticks. Called before each tick.
 void take_readings(RobotWire& wire, RobotGuard& guard, double now);
 

@@ -1,5 +1,5 @@
-// What planner, perception and operator send to the guard over its local socket: fixed sizes, little-endian, a number
-// that says what it is. The guard takes the time of reception, never the sender's. Pure functions; no allocation.
+// Messages of planner, perception and operator to the guard over its local socket: fixed sizes, little-endian, a number
+// that tells the kind. The guard takes the time of reception, never the sender's. Pure functions; no allocation.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What the guard tells its planner, 50 times a second: what it measured, what it sent, what it allows. Fixed size,
+// The guard's report to its planner, 50 times a second: what it measured, what it sent, what it allows. Fixed size,
 // little-endian, over a local socket at the guard's path with ".report" behind it. Pure functions; no allocation.
 #pragma once
 
@@ -32,7 +32,7 @@ struct GuardReport {
 };
 
 GuardReport report_of(const RobotGuard& guard);
-// In place; no allocation.
+// Fills the report in place; no allocation.
 void fill_report(const RobotGuard& guard, GuardReport& report);
 
 inline constexpr std::size_t kReportBytes = 8 * (12 + 13 + 4 * kG1Motors + 4 + kClampReasons);
@@ -41,7 +41,7 @@ void encode(const GuardReport& report, ReportBuffer& buffer);
 // False for anything that is not such a report, with numbers that are finite.
 bool decode(std::span<const std::byte> datagram, GuardReport& report);
 
-// Where the reports of the guard at `socket` go.
+// The path that the reports of the guard at `socket` go to.
 std::string report_path(const std::string& socket);
 
 }  // namespace duet

@@ -39,7 +39,7 @@ class GuardedWorld final : public World {
   // most_wait of its time, and where it has gone.
   void begin(const RobotState& start) override;
   [[nodiscard]] const RobotState& state() const override { return state_; }
-  // What is sent; of the executed joints what is asked, before the limiter.
+  // The targets that are sent; for the executed joints those that are asked for, before the limiter.
   const Eigen::VectorXd& target(const Reference& reference) override;
   // A guard that has gone or ended the run is kError, a robot that fell kFell; while it holds, the episode goes on.
   Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override;
@@ -48,7 +48,7 @@ class GuardedWorld final : public World {
   // Plans to stand for so long after the episode [s]; then whoever is next may have the robot.
   void rest(double seconds);
 
-  // Of the episode's ticks.
+  // Counts over the episode's ticks.
   [[nodiscard]] int held_ticks() const { return held_ticks_; }  // the guard held
   [[nodiscard]] const ClampCounts& clamps() const { return clamps_; }
   [[nodiscard]] int missed_reports() const { return missed_; }         // that were lost between two
@@ -68,7 +68,7 @@ class GuardedWorld final : public World {
   GuardLink& link_;
   RootVelocity velocity_;
   FallRule fall_;
-  // Of the episode's frame E in odometry's frame O: a turn about z and a shift on the ground.
+  // Pose of the episode's frame E in odometry's frame O: a turn about z and a shift on the ground.
   double yaw_OE_ = 0.0;
   Eigen::Vector3d p_OE_ = Eigen::Vector3d::Zero();
   RobotState state_;  // frame E

@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// What came, and how.
+// Counts of the messages that came, and their gaps.
 struct HomieTraffic {
   long pedals = 0, arms = 0, hands = 0;  // messages
   long refused = 0;                      // of these channels, with another fingerprint or length
@@ -24,7 +24,7 @@ class HomieStandIn {
   void receive(std::span<const std::byte> datagram, double now);
   // The command that its controller writes 200 times a second. Before any arm target the arms go to 0.
   void write_command(std::uint8_t mode_machine, LowCommandFrame& frame);
-  // What its controller echoes; the datagram's length.
+  // Writes what HOMIE's controller echoes; returns the datagram's length.
   static std::size_t write_echo(const RobotReading& reading, std::uint32_t sequence, LcmBuffer& buffer);
 
   [[nodiscard]] const std::array<double, 4>& velocity() const { return velocity_; }  // the last, however old

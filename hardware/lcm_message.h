@@ -59,7 +59,7 @@ LcmReading decode(std::span<const std::byte> datagram, ArmAction& message);
 LcmReading decode(std::span<const std::byte> datagram, PdTargets& message);
 LcmReading decode(std::span<const std::byte> datagram, BodyControlData& message);
 
-// What the fields of a type hash to; on the wire it is turned left by one bit. Source: LCM, "type specification".
+// The hash of a type's fields; on the wire it is turned left by one bit. Source: LCM, "type specification".
 struct LcmField {
   std::string_view name, type;
   int count = 0;  // of an array; 0: a single value

@@ -1,7 +1,5 @@
 #include "duet/hardware/leg_odometry.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +14,7 @@ namespace {
 constexpr double kSoleSoftness = 0.002;  // a sole's point so much higher than the lowest stands e times less [m]
 constexpr double kPullTime = 0.05;       // in which the soles pull the speed to theirs [s]
 constexpr double kSlip = 0.1;            // difference from the speed so far at which a sole pulls half as much [m/s]
-// Of the pull of a sole that stands and disagrees altogether: after a stumble the speed comes back.
+// The share left of the pull of a sole that stands and disagrees altogether: after a stumble the speed comes back.
 constexpr double kLeastTrust = 0.01;
 constexpr double kLittleWeight = 0.05;  // of all soles, at which they pull half as much
 
@@ -29,7 +27,7 @@ const RobotModel& with_soles(const std::shared_ptr<const RobotModel>& robot) {
 
 LegOdometry::LegOdometry(std::shared_ptr<const RobotModel> robot, double period)
     : robot_(std::move(robot)), period_(period), kinematics_(with_soles(robot_)) {
-  require(period > 0.0, fmt::format("leg odometry: expected a period above 0 s, found {}", period));
+  require(period > 0.0, "leg odometry: expected a period above 0 s, found {}", period);
   soles_.resize(robot_->feet.size());
   jacobian_.setZero(3, 6 + robot_->dof());
   velocity_.setZero(6 + robot_->dof());

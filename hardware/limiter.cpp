@@ -1,7 +1,5 @@
 #include "duet/hardware/limiter.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -25,18 +23,15 @@ bool is_finite(const VelocityCommand& root) {
 
 const std::shared_ptr<const RobotModel>& checked_robot(const LimiterSetup& setup) {
   require(setup.robot != nullptr, "limiter: expected a robot, found none");
-  require(setup.dt > 0.0 && std::isfinite(setup.dt),
-          fmt::format("limiter: expected a dt above 0 s, found {}", setup.dt));
+  require(setup.dt > 0.0 && std::isfinite(setup.dt), "limiter: expected a dt above 0 s, found {}", setup.dt);
   return setup.robot;
 }
 
 void check_executed(const ExecutedJoints& executed, const RobotModel& robot) {
   for (const int joint : executed.joints)
-    require(joint >= 0 && joint < robot.dof(),
-            fmt::format("limiter: expected joints 0 to {}, found {}", robot.dof() - 1, joint));
+    require(joint >= 0 && joint < robot.dof(), "limiter: expected joints 0 to {}, found {}", robot.dof() - 1, joint);
   require(executed.kp.size() == robot.dof() && executed.kd.size() == robot.dof(),
-          fmt::format("limiter: expected gains of {} joints, found {} and {}", robot.dof(), executed.kp.size(),
-                      executed.kd.size()));
+          "limiter: expected gains of {} joints, found {} and {}", robot.dof(), executed.kp.size(), executed.kd.size());
   require(executed.kp.allFinite() && executed.kd.allFinite() && (executed.kp.array() >= 0.0).all() &&
               (executed.kd.array() >= 0.0).all(),
           "limiter: expected gains that are finite and not below 0, found others");
@@ -91,7 +86,7 @@ Limiter::Limiter(const LimiterSetup& setup)
 
 LimiterState Limiter::start(const RobotState& measured) const {
   require(measured.q.size() == setup_.robot->dof() && measured.q.allFinite(),
-          fmt::format("limiter: expected {} finite joint angles to start from, found others", setup_.robot->dof()));
+          "limiter: expected {} finite joint angles to start from, found others", setup_.robot->dof());
   LimiterState state;
   state.height.value = setup_.limits.height;
   for (const double q : measured.q) state.joints.push_back({q, 0.0});

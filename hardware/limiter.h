@@ -16,14 +16,14 @@
 
 namespace duet {
 
-// What a planner asks for: a velocity of the root in its heading frame and a target for every joint of the robot.
+// A planner's request: a velocity of the root in its heading frame and a target for every joint of the robot.
 struct MotionCommand {
   double stamp = 0.0;  // of the planner, increasing [s]
   VelocityCommand root;
   Eigen::VectorXd q;  // in the card's order [rad]
 };
 
-// What an executor moves, by the card's joints.
+// The joints that an executor moves, by the card's order.
 struct ExecutedJoints {
   std::vector<int> joints;  // ascending
   Eigen::VectorXd kp, kd;   // of all joints, those it holds [N m/rad], [N m s/rad]
@@ -40,7 +40,7 @@ struct LimiterSetup {
   std::vector<TouchPair> touches;  // of the task
 };
 
-// What is known at a tick.
+// The inputs of a tick.
 struct LimiterInput {
   RobotState state;                     // X_WB in the frame of odometry; joints measured
   bool odometry = false;                // X_WB.p and v_WB are measured
@@ -51,7 +51,7 @@ struct LimiterInput {
   bool release = false;                 // open the arms, then step back
 };
 
-// Of the outputs so far.
+// The state of the outputs so far.
 struct LimiterState {
   AxisState forward, lateral, yaw, height;
   std::vector<AxisState> joints;  // all; only the executed ones move
@@ -59,7 +59,7 @@ struct LimiterState {
   bool has_good = false;
 };
 
-// What leaves for the robot.
+// The command that leaves for the robot.
 struct LimitedCommand {
   VelocityCommand root;
   Eigen::VectorXd q, kp, kd;  // of all joints; of those that are not executed: measured, 0, 0
@@ -85,7 +85,7 @@ class Limiter {
   void tick(const MotionCommand* received, const LimiterInput& input, LimiterState& state, LimitedCommand& out,
             ClampCounts& counts);
 
-  // Of the arms at rest after the last tick, in the last tick's pose of the root.
+  // Distances of the arms at rest after the last tick, in the last tick's pose of the root.
   [[nodiscard]] const BodyGaps& gaps() const { return distance_.gaps(); }
   [[nodiscard]] const LimiterSetup& setup() const { return setup_; }
   [[nodiscard]] bool executes(int joint) const { return executed_[joint]; }
@@ -119,7 +119,7 @@ class Limiter {
   std::vector<double> touch_speeds_;  // of each capsule of the person [m/s]
   BodyDistance distance_;
   double approach_speed_ = 0.0;  // at which a hand and the root may come nearer together [m/s]
-  // Of the tick in work.
+  // Values of the tick in work.
   Wanted wanted_;
   std::vector<AxisState> before_;
   Eigen::VectorXd q_rest_;

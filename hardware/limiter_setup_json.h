@@ -1,4 +1,4 @@
-// What a limiter was made of, as JSON, so that a log can be passed through the same one again.
+// The setup of a limiter as JSON, so that a log can be passed through the same one again.
 #pragma once
 
 #include <nlohmann/json.hpp>

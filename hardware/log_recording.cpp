@@ -6,6 +6,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "duet/archives/recording_file.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
@@ -70,7 +71,7 @@ class LogReader {
     latest_.push_back(&ticks);
   }
 
-  // Of the tick before it in the file.
+  // Takes the command frame of the tick before it in the file.
   void take_frame(std::span<const std::byte> data) {
     if (data.size() != kCdrHeadBytes + sizeof(LowCommandFrame))
       throw InputError(fmt::format("{}: expected commands of {} bytes, found {}", path_,
@@ -125,7 +126,7 @@ bool is_finite_state(const RobotState& state) {
          state.w_WB_B.allFinite() && state.q.allFinite() && state.v.allFinite();
 }
 
-// What leads to the next frame.
+// Adds the reference and the targets that lead to the next frame.
 void add_asked(const LoggedTick& tick, const RobotState& state, Recording& recording) {
   const bool goal = (tick.record.flags & kTickGoal) != 0;
   Pose root = goal ? pose_from(tick.record.goal) : state.X_WB;
@@ -174,9 +175,8 @@ ExecutedMask executed_mask(const RobotModel& robot, const std::vector<int>& join
 }
 
 std::string executed_mask_text(const ExecutedMask& mask, const RobotModel& robot) {
-  require(mask.size() == kRootChannelCount + robot.joints.size(),
-          fmt::format("executed channels: expected {} for '{}', found {}", kRootChannelCount + robot.joints.size(),
-                      robot.name, mask.size()));
+  require(mask.size() == kRootChannelCount + robot.joints.size(), "executed channels: expected {} for '{}', found {}",
+          kRootChannelCount + robot.joints.size(), robot.name, mask.size());
   std::vector<std::string> left_out;
   for (std::size_t j = 0; j < robot.joints.size(); ++j)
     if (!mask.at(kRootChannelCount + j)) left_out.push_back(robot.joints[j].name);

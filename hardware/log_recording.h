@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/recording.h"
 #include "duet/robots/robot_model.h"
 
@@ -38,7 +38,7 @@ struct LoggedRun {
 // Throws InputError for a file that is no such log, made for another robot, or without such ticks.
 LoggedRun recording_of_log(const std::string& path, std::optional<Task> task = {});
 
-// With the mask. Throws InputError where the file cannot be written.
+// Saves the recording with the mask. Throws InputError where the file cannot be written.
 void save_logged_run(const Recording& recording, const ExecutedMask& executed, const std::string& path);
 
 }  // namespace duet

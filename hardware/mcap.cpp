@@ -237,7 +237,7 @@ void McapWriter::add(const McapChannel& channel) {
                                         sized(channel.message_encoding) + sized(""));
 }
 
-// Of one message, not packed. Allocates nothing: logs are written while a robot moves.
+// Writes the head of a chunk of one message, not packed. Allocates nothing: logs are written while a robot moves.
 void McapWriter::put_chunk_head(std::uint64_t time, std::span<const std::byte> head, std::span<const std::byte> data) {
   const std::uint64_t size = head.size() + data.size(), length = kChunkHead - kRecordHead + size;
   const std::uint32_t checksum = more_checksum(more_checksum(0, head), data);

@@ -48,7 +48,7 @@ class McapWriter {
  private:
   void put(std::span<const std::byte> bytes);
   void put_record(std::uint8_t kind, std::string_view content);
-  // To the chunk, where there are chunks.
+  // Adds to the chunk, where there are chunks.
   void gather(std::span<const std::byte> bytes);
   void gather_record(std::uint8_t kind, std::string_view content);
   void end_chunk();

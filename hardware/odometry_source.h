@@ -31,7 +31,7 @@ class WireOdometry final : public OdometryReader {
   RobotWire& wire_;
 };
 
-// What a tracker sends: the pose of the base in the frame that it measures in, and its velocity in that frame.
+// A tracker's message: the pose of the base in the frame that it measures in, and its velocity in that frame.
 struct ExternalPose {
   std::uint64_t sequence = 0;  // rises (hardware/stream_order.h)
   Pose X_WB;

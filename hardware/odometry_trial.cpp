@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "duet/backends/factory.h"
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/clock.h"
 #include "duet/core/random.h"
 #include "duet/hardware/leg_odometry.h"
@@ -36,7 +36,7 @@ StreamOptions walk_of(const OdometryTrial& trial) {
   return options;
 }
 
-// What joints and IMU would say.
+// The state as joint encoders and IMU would measure it.
 RobotState measured(const RobotState& state, const OdometryTrial& trial, Random& random) {
   RobotState seen = state;
   for (double& q : seen.q) q += trial.joint_noise * random.normal();

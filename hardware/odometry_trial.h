@@ -1,5 +1,5 @@
 // How far leg odometry goes wrong: a robot walks in a physics engine under a controller, and its legs say where it is.
-// What the engine does not have - a foot that sinks in, an encoder that is bent - is not in the figure.
+// Effects that the engine does not have - a foot that sinks in, an encoder that is bent - are not in the figure.
 #pragma once
 
 #include <memory>

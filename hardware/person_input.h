@@ -39,7 +39,7 @@ inline constexpr std::array<std::string_view, kPersonFaults> kPersonFaultNames =
 // kForm, kFinite, kFar, kBody or kNone; `estimate` is set for kNone alone.
 PersonFault decode(std::span<const std::byte> datagram, PersonEstimate& estimate);
 
-// What was received, in the frame of odometry, and the same 50 times a second.
+// Turns the received poses into a track in the frame of odometry, which is read 50 times a second.
 class PersonTrack {
  public:
   // `X_BC`: of the camera on the robot's base. `delay`: how far behind the present at() looks, so that it lies between

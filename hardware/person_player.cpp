@@ -1,7 +1,5 @@
 #include "duet/hardware/person_player.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "duet/core/require.h"
@@ -10,12 +8,12 @@ namespace duet {
 namespace {
 
 const PersonPlay& checked_play(const PersonPlay& play) {
-  require(play.rate > 0.0 && std::isfinite(play.rate),
-          fmt::format("player of a person: expected a rate above 0, found {}", play.rate));
+  require(play.rate > 0.0 && std::isfinite(play.rate), "player of a person: expected a rate above 0, found {}",
+          play.rate);
   require(play.noise >= 0.0 && std::isfinite(play.noise),
-          fmt::format("player of a person: expected a noise of at least 0 m, found {}", play.noise));
-  require(play.unseen >= 0.0 && play.unseen <= 1.0,
-          fmt::format("player of a person: expected a share from 0 to 1, found {}", play.unseen));
+          "player of a person: expected a noise of at least 0 m, found {}", play.noise);
+  require(play.unseen >= 0.0 && play.unseen <= 1.0, "player of a person: expected a share from 0 to 1, found {}",
+          play.unseen);
   return play;
 }
 

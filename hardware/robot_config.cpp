@@ -15,10 +15,10 @@ namespace duet {
 namespace {
 
 constexpr const char* kRobotSchema = "duet.robot/1";
-// Of arms beside a person: the maker's example for its arm topic.
+// Gains of arms beside a person: the maker's example for its arm topic.
 constexpr double kArmStiffness = 60.0, kArmDamping = 1.5;
 
-// Of an adult of 1.75 m, where nobody measured: pelvis to head, legs and arms [m].
+// Bones of an adult of 1.75 m, where nobody measured: pelvis to head, legs and arms [m].
 constexpr std::array<double, 24> kAdultBones = {0.12, 0.11, 0.11,  0.12,  0.40, 0.40, 0.13,  0.42,
                                                 0.42, 0.06, 0.135, 0.135, 0.20, 0.14, 0.14,  0.10,
                                                 0.11, 0.11, 0.29,  0.29,  0.25, 0.25, 0.085, 0.085};
@@ -44,7 +44,7 @@ int whole_number(const YamlSection& top, const char* key) {
   return static_cast<int>(number);
 }
 
-// By name, of a table of names.
+// The place of the key's value in a table of names.
 template <std::size_t N>
 std::size_t choice(const YamlSection& top, const char* key, const std::array<std::string_view, N>& names) {
   const std::string text = top.text(key);

@@ -1,7 +1,5 @@
 #include "duet/hardware/robot_guard.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -30,11 +28,11 @@ ContactWatch contact_watch(const LimiterSetup& setup) {
 
 const GuardSetup& checked(const GuardSetup& setup) {
   require(setup.limiter.robot != nullptr, "guard: expected a robot, found none");
-  require(setup.limiter.robot->dof() == kG1Motors,
-          fmt::format("guard: expected a robot of {} joints, found {}", kG1Motors, setup.limiter.robot->dof()));
+  require(setup.limiter.robot->dof() == kG1Motors, "guard: expected a robot of {} joints, found {}", kG1Motors,
+          setup.limiter.robot->dof());
   for (const Eigen::VectorXd* values : {&setup.stance.q_target, &setup.stance.kp, &setup.stance.kd})
     require(values->size() == kG1Motors && values->allFinite(),
-            fmt::format("guard: expected a stance of {} finite targets and gains, found another", kG1Motors));
+            "guard: expected a stance of {} finite targets and gains, found another", kG1Motors);
   return setup;
 }
 
@@ -165,7 +163,7 @@ void RobotGuard::read_states(double now) {
   }
 }
 
-// What the remote control says counts only while states arrive that carry it.
+// Reads the remote control, which counts only while states arrive that carry it.
 void RobotGuard::read_operator(double now) {
   const bool fresh = next_.state_at == now && reading_.remote.heard;
   if (fresh) next_.remote_at = now;
@@ -252,7 +250,7 @@ void RobotGuard::command(double now) {
   }
 }
 
-// From when it stands until it is damped, 50 times a second; the velocity has passed the limiter.
+// Runs from when it stands until it is damped, 50 times a second; the velocity has passed the limiter.
 void RobotGuard::walk(bool planned) {
   const bool was_walking = walks_;
   walks_ = walker_ != nullptr && (planned || (status_.order.stands && next_.stands));

@@ -1,4 +1,4 @@
-// What alone may write to the robot: reads its states, keeps the state machine, limits what the planner asks for,
+// The only writer to the robot: reads its states, keeps the state machine, limits what the planner asks for,
 // builds and sends the frame. A pure function of what was received and of the caller's clock but for its transport;
 // tick() allocates nothing. One owner, one thread. docs/hardware.md, "Guard".
 #pragma once
@@ -45,7 +45,7 @@ struct PersonMessage {
   long sender_restarts = 0;                  // of who estimates, that whoever took the estimates noticed
 };
 
-// Of the last tick, for logs and displays.
+// The status after the last tick, for logs and displays.
 struct GuardStatus {
   SafetyMemory safety;
   SafetyOrder order;
@@ -77,7 +77,7 @@ class RobotGuard {
   void receive(const PersonMessage& message, double now);
   void receive(const OdometrySample& sample);
   void receive(const BatteryReading& battery, double now);
-  // Who executes the commands was heard of at `at`.
+  // Notes that the executor of the commands was heard of at `at`.
   void executor_heard(double at) { next_.executor_at = at; }
   // The operator has armed: arming_refusal() was empty. Ignored in a dry run.
   void arm();

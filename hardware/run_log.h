@@ -14,7 +14,7 @@
 
 namespace duet {
 
-// What a tick of the limiter took and gave, to the bit. Numbers as in LimiterInput, MotionCommand and LimitedCommand.
+// Inputs and outputs of the limiter at a tick, to the bit. Numbers as in LimiterInput, MotionCommand, LimitedCommand.
 struct TickRecord {
   double now;
   std::uint64_t flags;  // TickFlag
@@ -51,7 +51,7 @@ class RunLog {
   RunLog(const RunLog&) = delete;
   RunLog& operator=(const RunLog&) = delete;
 
-  // Of the guard's last tick. No allocation, no file, no lock.
+  // Adds the guard's last tick. No allocation, no file, no lock.
   void add(const RobotGuard& guard);
   // Ticks that found no room; an event of the log says where and how many ("dropped").
   [[nodiscard]] long dropped() const { return dropped_; }

@@ -32,7 +32,7 @@ struct SafetyMemory {
   BadStates bad;
 };
 
-// What a state allows.
+// The actions that a state allows.
 struct SafetyOrder {
   bool writes = false;  // something is sent to the robot
   bool damps = false;   // and it is damping
@@ -46,7 +46,7 @@ SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, c
 
 SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);
 
-// What is missing for arming; empty where nothing is.
+// The condition that is missing for arming; empty where none is.
 std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input);
 
 }  // namespace duet

@@ -8,7 +8,7 @@
 
 namespace duet {
 
-// What a signal asks for, from the mildest.
+// The reaction that a signal asks for, from the mildest.
 enum class StopLevel { kFine, kWarn, kHold, kDamp };
 
 enum class StopCause {
@@ -73,7 +73,7 @@ struct SafetyRules {
   bool executor_answers = false;  // who executes the commands is heard of, and has to be
 };
 
-// What the robot reports of itself.
+// The robot's report on itself.
 struct RobotHealth {
   double tilt = 0.0;                   // of the base's z axis from upright [rad]
   double joint_speed = 0.0;            // largest size [rad/s]
@@ -120,11 +120,11 @@ struct Assessment {
   StopCause cause = StopCause::kNone;  // of the highest level; the planner's where nothing else asks for it
 };
 
-// Of one age.
+// The level of one age.
 StopLevel level_of(double age, const AgeLimits& limits);
 
-// Of everything that can be wrong in a state of the machine. `last_now`: of the tick before (kNever: none).
-// `moving`: planner, person, odometry and dead-man count too.
+// The assessment of everything that can be wrong in a state of the machine. `last_now`: of the tick before (kNever:
+// none). `moving`: planner, person, odometry and dead-man count too.
 Assessment assess(const SafetyRules& rules, const SafetyInput& input, const BadStates& bad, double last_now,
                   bool moving);
 

@@ -91,7 +91,7 @@ bool SportExecutor::write(const LowCommandFrame& frame) {
   return wire_.write_arms(frame_);
 }
 
-// At once where it comes to rest, otherwise ten times a second: each lasts a little longer than that.
+// Sends at once where it comes to rest, otherwise ten times a second: each order lasts a little longer than that.
 void SportExecutor::send(const VelocityCommand& velocity) {
   ++ticks_;
   if (!open_ || state_ == SafetyState::kArmed || state_ >= SafetyState::kDamp) return;

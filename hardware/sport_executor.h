@@ -28,7 +28,7 @@ class SportExecutor final : public Executor {
   ~SportExecutor() override;
 
   void poll(double now) override;
-  // Of an answer that its machine walks.
+  // The time of the last answer that its machine walks.
   [[nodiscard]] double heard_at() const override { return heard_at_; }
   [[nodiscard]] bool answers() const override { return true; }
   [[nodiscard]] std::string complaint() const override;

@@ -12,10 +12,10 @@ namespace {
 constexpr double kShortest = 0.1, kLongest = 0.5;  // of a velocity [s]
 constexpr double kMostVelocity = 10.0;             // that a parameter has room for
 
-// What is not finite is 0.
+// The value within the range of a parameter; 0 where it is not finite.
 double printable(double value) { return std::isfinite(value) ? std::clamp(value, -kMostVelocity, kMostVelocity) : 0.0; }
 
-// Of a document that came from outside; discarded where it is none.
+// Parses a document that came from outside; discarded where it is not JSON.
 nlohmann::json parsed(std::string_view text) {
   constexpr std::size_t kMostText = 4096;
   if (text.size() > kMostText) return nlohmann::json(nlohmann::json::value_t::discarded);

@@ -38,7 +38,7 @@ struct RpcResponse {
 };
 // The number of {"data": N}; none for anything else.
 std::optional<int> fsm_of(std::string_view data);
-// What a service is told; none for a parameter that is not of its call.
+// An order to a service; none for a parameter that is not of its call.
 struct SportOrder {
   VelocityCommand velocity;
   double duration = 0.0;  // [s]

@@ -18,7 +18,7 @@ class SportStandIn {
   void obey_arms(const LowCommandFrame& frame);
   // The velocity that it walks with now: 0 once the last order has ended.
   [[nodiscard]] VelocityCommand velocity(double now) const;
-  // What it writes to the motors.
+  // Writes the command to the motors.
   void write_command(std::uint8_t mode_machine, LowCommandFrame& frame);
 
   [[nodiscard]] int fsm() const { return fsm_; }

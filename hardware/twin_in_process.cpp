@@ -5,7 +5,7 @@
 namespace duet {
 namespace {
 
-// As it is after the wire, whose numbers are short.
+// The value after the wire, whose numbers are short.
 Eigen::Vector3d as_sent(const Eigen::Vector3d& value) { return value.cast<float>().cast<double>(); }
 
 }  // namespace

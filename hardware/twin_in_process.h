@@ -29,7 +29,7 @@ class TwinInProcess final : public GuardLink {
   [[nodiscard]] TwinModel& twin() { return twin_; }
 
  private:
-  // What lies between them.
+  // The transport between guard and twin.
   class Wire final : public FrameTransport {
    public:
     explicit Wire(TwinModel& twin) : twin_(twin) {}

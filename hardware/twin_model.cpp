@@ -1,7 +1,5 @@
 #include "duet/hardware/twin_model.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -19,8 +17,8 @@ void check(const TwinOptions& options) {
   for (const double value :
        {options.lag, options.delay, options.place_noise, options.speed_noise, options.joint_noise,
         options.joint_speed_noise, options.gyro_noise, options.acceleration_noise, options.tilt_noise})
-    require(std::isfinite(value) && value >= 0.0, fmt::format("twin: expected numbers of at least 0, found {}", value));
-  require(std::isfinite(options.drift), fmt::format("twin: expected a finite drift, found {}", options.drift));
+    require(std::isfinite(value) && value >= 0.0, "twin: expected numbers of at least 0, found {}", value);
+  require(std::isfinite(options.drift), "twin: expected a finite drift, found {}", options.drift);
 }
 
 bool is_sane(const LowCommandFrame& frame) {
@@ -35,8 +33,8 @@ bool is_sane(const LowCommandFrame& frame) {
 
 TwinModel::TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options)
     : robot_(std::move(robot)), options_(options), random_(options.seed, stream_key({"twin"})) {
-  require(robot_ != nullptr && robot_->dof() == kG1Motors,
-          fmt::format("twin: expected a robot of {} joints, found another", kG1Motors));
+  require(robot_ != nullptr && robot_->dof() == kG1Motors, "twin: expected a robot of {} joints, found another",
+          kG1Motors);
   check(options_);
   const RobotState standing = robot_->standing_state();
   q_ = standing.q;
@@ -85,8 +83,8 @@ void TwinModel::step_root(double dt) {
 }
 
 void TwinModel::step_body(double dt) {
-  require(std::abs(dt - physics_->dt()) < 1e-9,
-          fmt::format("twin: expected steps of {} s in an engine, found {}", physics_->dt(), dt));
+  require(std::abs(dt - physics_->dt()) < 1e-9, "twin: expected steps of {} s in an engine, found {}", physics_->dt(),
+          dt);
   physics_->step(command_);
   const RobotState& state = physics_->state();
   q_ = state.q;

@@ -36,7 +36,7 @@ struct TwinOptions {
 
 inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]
 
-// What a script may change.
+// Conditions that a script may change.
 struct TwinCondition {
   double casing = 35.0, winding = 40.0;  // [degrees C]
   double roll = 0.0;                     // of the base [rad]

@@ -18,7 +18,7 @@ class TwinPhysics {
   TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt);
 
   // One step of `dt` under the motors' law kp (q* - q) + kd (dq* - v) + tau; a motor whose mode is not 1 gives nothing.
-  // The frame's numbers are finite and its gains not below 0. What has diverged stays where it was.
+  // The frame's numbers are finite and its gains not below 0. A twin that has diverged stays where it was.
   void step(const LowCommandFrame& command);
 
   // How much of the rope is in use: 1 holds it where it hung when that was last 0, 0 is slack.
@@ -27,7 +27,7 @@ class TwinPhysics {
 
   [[nodiscard]] const RobotState& state() const { return backend_->state(); }
   [[nodiscard]] const Eigen::VectorXd& torques() const { return backend_->torques(); }
-  // What an accelerometer in the base reads [m/s^2], frame B.
+  // The reading of an accelerometer in the base [m/s^2], frame B.
   [[nodiscard]] Eigen::Vector3d specific_force() const;
   [[nodiscard]] bool diverged() const { return diverged_; }
   [[nodiscard]] double dt() const { return backend_->scene().dt; }

@@ -1,14 +1,12 @@
 #include "duet/hardware/walker.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/guard.h"
-#include "duet/controllers/published.h"
-#include "duet/controllers/registry.h"
 #include "duet/core/clock.h"
 #include "duet/core/require.h"
 
@@ -38,7 +36,7 @@ Walker::Walker(const std::string& controller, const ControllerOptions& options, 
 std::function<std::unique_ptr<Walker>()> Walker::load(const std::string& controller, const ControllerOptions& options,
                                                       const std::shared_ptr<const RobotModel>& robot) {
   const ControllerInfo info = controller_info(controller);
-  require(info.walks, fmt::format("walker: expected a controller that walks, found '{}'", controller));
+  require(info.walks, "walker: expected a controller that walks, found '{}'", controller);
   check_controller_options(info, options);
   const double steps_from = least_step_speed(controller);
   if (has_descriptor(controller) && load_descriptor(controller).command) {

@@ -1,6 +1,6 @@
-// What keeps a robot on its feet that we command joint by joint: a walking controller of controllers/, told the
-// velocity that came out of the limiter. Those made from a descriptor with a `command` (HOMIE) are told it as it is;
-// others (WBC-Sim) follow a root that moves at it. It moves what the limiter does not: legs and waist. One owner, one
+// Keeps a robot on its feet that we command joint by joint: a walking controller of controllers/, told the velocity
+// that came out of the limiter. Those made from a descriptor with a `command` (HOMIE) are told it as it is; others
+// (WBC-Sim) follow a root that moves at it. It moves what the limiter does not: legs and waist. One owner, one
 // thread.
 #pragma once
 
@@ -21,7 +21,7 @@ class Walker {
  public:
   // Throws as make_controller; std::invalid_argument for a controller that does not walk.
   Walker(const std::string& controller, const ControllerOptions& options, std::shared_ptr<const RobotModel> robot);
-  // Makes walkers, all of the files as they are now. Throws likewise. Thread-safe.
+  // Makes walkers, all of the files as they are now. Throws as the constructor. Thread-safe.
   static std::function<std::unique_ptr<Walker>()> load(const std::string& controller, const ControllerOptions& options,
                                                        const std::shared_ptr<const RobotModel>& robot);
 

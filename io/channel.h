@@ -15,11 +15,11 @@ namespace duet {
 // Where channels are named. A channel that a format does not name cannot be shown there.
 enum class ChannelFormat {
   kController,  // an IO descriptor (docs/file-formats.md)
-  kPolicy,      // a policy descriptor (docs/adding-a-policy.md) and messages to a program
-  kNetwork,     // headers of duet's own networks: WBC-Sim, D-STAR (docs/dstar-format.md)
+  kPolicy,      // a policy descriptor (docs/extending.md, "A policy") and messages to a program
+  kNetwork,     // headers of duet's own networks: WBC-Sim, D-STAR (docs/file-formats.md)
 };
 
-// What they show stands in the table (io/channel.cpp) and in docs/reference/channels.md.
+// The table (io/channel.cpp) and docs/reference/channels.md say what they show.
 enum class ChannelKind {
   kPartnerRoot,
   kPartnerJoints,

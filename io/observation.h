@@ -53,7 +53,7 @@ int channels_size(std::span<const Channel> channels, const ChannelWidths& widths
 class ChannelWriter {
  public:
   explicit ChannelWriter(std::span<float> out) : out_(out) {}
-  // What follows is this channel's: with its scale, within its clip. Before the first: as it is.
+  // Begins a channel: the numbers that follow get its scale and its clip. Before the first: as they are.
   void begin(const Channel& channel) {
     scale_ = channel.scale;
     clip_ = channel.clip;
@@ -104,7 +104,7 @@ class ObservationWriter {
   ObservationWriter(const ObservationLayout& layout, const ChannelWidths& widths);
 
   void reset();
-  // As write_channels, of every group; then histories go on by a frame.
+  // Calls write_channels for every group; then histories go on by a frame.
   template <typename Show>
   void update(const Show& show) {
     for (Group& group : groups_) write_channels(group.channels, show, group.values);

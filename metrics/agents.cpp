@@ -72,8 +72,7 @@ Agent follow(const RobotModel& robot, int frames, PoseAt pose, JointsAt joints) 
 }  // namespace
 
 Agent human_agent(const PointTracks& smpl24) {
-  require(smpl24.points() == kSmplJoints,
-          fmt::format("human agent: expected {} joints, found {}", kSmplJoints, smpl24.points()));
+  require(smpl24.points() == kSmplJoints, "human agent: expected {} joints, found {}", kSmplJoints, smpl24.points());
   Agent agent = empty_agent(smpl24.frames());
   for (int t = 0; t < smpl24.frames(); ++t) {
     const PointTracks::ConstFrame joints = smpl24.frame(t);
@@ -97,9 +96,9 @@ Agent robot_agent(const RobotModel& robot, const std::vector<RobotState>& states
 
 Agent robot_agent(const RobotModel& robot, const RobotMotion& motion) {
   require(motion.joint_names.empty() || motion.joint_names == robot.joint_names(),
-          fmt::format("robot agent: the joints of the motion are not those of {} in its order", robot.name));
-  require(motion.q.cols() == motion.frames(),
-          fmt::format("robot agent: {} root poses, but joint angles of {} frames", motion.frames(), motion.q.cols()));
+          "robot agent: the joints of the motion are not those of {} in its order", robot.name);
+  require(motion.q.cols() == motion.frames(), "robot agent: {} root poses, but joint angles of {} frames",
+          motion.frames(), motion.q.cols());
   return follow(
       robot, motion.frames(), [&](int t) -> const Pose& { return motion.root[t]; },
       [&](int t) { return motion.q.col(t); });

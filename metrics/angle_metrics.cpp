@@ -23,10 +23,10 @@ std::vector<int> compound_of_hinges(const RobotModel& robot) {
 void check_group(const HingeGroup& group, size_t index, Eigen::Index joints) {
   const std::string what = fmt::format("grouped_magnitudes: group {}", index);
   require(!group.rows.empty(), what + " has no hinge");
-  require(group.rows.size() == group.axes.size(),
-          fmt::format("{} has {} rows but {} axes", what, group.rows.size(), group.axes.size()));
+  require(group.rows.size() == group.axes.size(), "{} has {} rows but {} axes", what, group.rows.size(),
+          group.axes.size());
   for (const int row : group.rows)
-    require(row >= 0 && row < joints, fmt::format("{} names row {}, but q has {} joints", what, row, joints));
+    require(row >= 0 && row < joints, "{} names row {}, but q has {} joints", what, row, joints);
   for (const Eigen::Vector3d& axis : group.axes)
     require(axis.allFinite() && axis.norm() > 0.0, what + " has an axis without direction");
 }
@@ -92,7 +92,7 @@ double large_angle_ratio(const Eigen::MatrixXd& magnitudes, LargeAngle reading, 
 
 double angle_std(const Eigen::MatrixXd& magnitudes, AngleStd reading, int ddof) {
   require_finite(magnitudes, "angle_std: magnitudes");
-  require(ddof == 0 || ddof == 1, fmt::format("angle_std: ddof must be 0 or 1, found {}", ddof));
+  require(ddof == 0 || ddof == 1, "angle_std: ddof must be 0 or 1, found {}", ddof);
   if (reading == AngleStd::kPooled) return standard_deviation(magnitudes.array(), ddof);
   double sum = 0.0;
   for (Eigen::Index j = 0; j < magnitudes.rows(); ++j) sum += standard_deviation(magnitudes.row(j).array(), ddof);

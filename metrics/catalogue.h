@@ -26,7 +26,7 @@ struct MetricInfo {
 std::span<const MetricInfo> metric_catalogue();
 // Throws std::invalid_argument for an unknown name, with the nearest.
 const MetricInfo& metric_info(std::string_view name);
-// Of a figure of retargeting_metrics_all_readings: "jerk_mean.links.diff" is a jerk_mean. Throws likewise.
+// The metric of a figure of retargeting_metrics_all_readings: "jerk_mean.links.diff" is a jerk_mean. Throws likewise.
 const MetricInfo& metric_of_reading(std::string_view name);
 
 }  // namespace duet

@@ -1,7 +1,5 @@
 #include "duet/metrics/clip_statistics.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <limits>
@@ -92,7 +90,7 @@ Eigen::Vector3d centre_of_mass(const PointTracks::ConstFrame& joints) {
 
 ClipStatistics clip_statistics(const InteractionClip& clip) {
   const int frames = clip.frames();
-  require(frames >= 3, fmt::format("statistics of clip '{}': expected at least 3 frames, found {}", clip.id, frames));
+  require(frames >= 3, "statistics of clip '{}': expected at least 3 frames, found {}", clip.id, frames);
   ClipStatistics result{.seconds = frames / clip.rate_hz()};
   int events = 0, contacts = 0, outside = 0;
   bool touched = false;

@@ -1,5 +1,5 @@
-// What Table S5 of the supplement says of two people's motion, per clip. Its definitions are not printed there; those
-// below are ours (docs/deviations.md, D12). Pure functions.
+// The statistics of Table S5 of the supplement on two people's motion, per clip. Its definitions are not printed there;
+// those below are ours (docs/deviations.md, D12). Pure functions.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// What a contact may do to a person, per body region: an editable table in the form of ISO/TS 15066 (YAML,
+// Limits of a contact with a person, per body region: an editable table in the form of ISO/TS 15066 (YAML,
 // docs/file-formats.md). A table that nobody has checked against the standard is "unverified", and whatever is judged
 // by it says so.
 #pragma once

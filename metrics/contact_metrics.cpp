@@ -1,6 +1,5 @@
 // Multi-threshold contact classification: which hands touch, in the source and after retargeting. An entry is a frame
 // and a hand of the initiator; its partner hand comes from the matching.
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +9,7 @@
 #include "duet/core/require.h"
 #include "duet/metrics/retargeting.h"
 #include "duet/metrics/track_checks.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/frame_windows.h"
 
 namespace duet {
 namespace {
@@ -74,7 +73,7 @@ std::array<FrameMask, 2> contacts(const std::vector<HandDistances>& distances, c
 void check(const PointTracks& hands, const PointTracks& first, const char* name) {
   const std::string what = std::string("contact_counts: ") + name;
   require_finite(hands, what);
-  require(hands.points() == 2, fmt::format("{} has {} points, expected 2 hands", what, hands.points()));
+  require(hands.points() == 2, "{} has {} points, expected 2 hands", what, hands.points());
   require_same_shape(hands, first, what, "source_initiator");
 }
 
@@ -108,10 +107,9 @@ ContactCounts contact_counts(const PointTracks& source_initiator, const PointTra
   check(source_responder, source_initiator, "source_responder");
   check(new_initiator, source_initiator, "new_initiator");
   check(robot, source_initiator, "robot");
-  require(std::isfinite(threshold) && threshold > 0.0,
-          fmt::format("contact_counts: the threshold must be positive, found {}", threshold));
-  require(readings.min_frames >= 1,
-          fmt::format("contact_counts: min_frames must be 1 or more, found {}", readings.min_frames));
+  require(std::isfinite(threshold) && threshold > 0.0, "contact_counts: the threshold must be positive, found {}",
+          threshold);
+  require(readings.min_frames >= 1, "contact_counts: min_frames must be 1 or more, found {}", readings.min_frames);
 
   const std::vector<HandDistances> source = hand_distances(source_initiator, source_responder);
   const std::vector<HandDistances> after = hand_distances(new_initiator, robot);

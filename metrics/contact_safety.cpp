@@ -22,7 +22,7 @@ int steps_within(double duration, double dt) { return static_cast<int>(std::floo
 int nearest_steps(double duration, double dt) { return std::max(1, static_cast<int>(std::lround(duration / dt))); }
 
 void require_option(bool holds, const char* name, const char* expected, double found) {
-  require(holds, fmt::format("contact safety: '{}': expected {}, found {}", name, expected, found));
+  require(holds, "contact safety: '{}': expected {}, found {}", name, expected, found);
 }
 
 void check_positive(const char* name, double value) {
@@ -132,8 +132,8 @@ ContactSafety::ContactSafety(const HumanBody& human, const ContactLimits& limits
     region.figures.region = capsule.region;
     region.limits = limits.region(capsule.region);
     require(region.limits.transient_allowed || region.limits.quasi_static_n,
-            fmt::format("contact limits '{}': region '{}': a transient limit of 'not_allowed' needs a quasi-static one",
-                        limits.name, capsule.region));
+            "contact limits '{}': region '{}': a transient limit of 'not_allowed' needs a quasi-static one",
+            limits.name, capsule.region);
   }
   events_.reserve(options.max_events);
 }

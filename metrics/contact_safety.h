@@ -1,5 +1,5 @@
-// What the robot's contacts do to the human partner: force, impulse and pressure per body region, held against a table
-// of limits (metrics/contact_limits.h), and the list of single contacts. Fed once per physics step.
+// The effect of the robot's contacts on the human partner: force, impulse and pressure per body region, held against a
+// table of limits (metrics/contact_limits.h), and the list of single contacts. Fed once per physics step.
 //
 // Force of a region in a step: contacts of one robot link with one capsule add up as vectors (a pair); the region bears
 // the larger of the vector sum over its pairs and its largest pair, so that a squeeze from two sides does not cancel.
@@ -31,7 +31,7 @@ struct ContactSafetyOptions {
   double mean_window = 0.1;   // of the windowed mean [s]
   double least_force = 1e-3;  // contacts with less count as none [N]
   double least_patch = 1e-4;  // floor of the estimated contact patch [m^2]
-  // Of the robot's surface by link, as from link_radii(); 0 or no entry: the default. [m]
+  // Radii of the robot's surface by link, as from link_radii(); 0 or no entry: the default. [m]
   std::vector<double> link_radius = {};
   double default_link_radius = 0.03;  // [m]
   int max_events = 1024;              // ended and present ones in the result
@@ -118,7 +118,7 @@ class ContactSafety {
   // std::invalid_argument for a capsule that the body lacks.
   void add(std::span<const Contact> contacts);
 
-  // Of the steps so far; a contact that still lasts counts as it stands.
+  // The result of the steps so far; a contact that still lasts counts as it stands.
   [[nodiscard]] ContactSafetyResult result() const;
 
  private:

@@ -15,13 +15,13 @@ namespace {
 void check_tracks(Task task, const Tracks& tracks) {
   const Eigen::Index frames = tracks.front().track->cols();
   for (const auto& [name, track] : tracks) {
-    require(track->cols() > 0, fmt::format("{} detector: the track {} is needed and empty", to_string(task), name));
-    require(track->cols() == frames, fmt::format("{} detector: the track {} has {} frames, but {} has {}",
-                                                 to_string(task), name, track->cols(), tracks.front().name, frames));
+    require(track->cols() > 0, "{} detector: the track {} is needed and empty", to_string(task), name);
+    require(track->cols() == frames, "{} detector: the track {} has {} frames, but {} has {}", to_string(task), name,
+            track->cols(), tracks.front().name, frames);
     if (track->allFinite()) continue;
     for (Eigen::Index t = 0; t < frames; ++t)
-      require(track->col(t).allFinite(),
-              fmt::format("{} detector: the track {} is not finite at frame {}", to_string(task), name, t));
+      require(track->col(t).allFinite(), "{} detector: the track {} is not finite at frame {}", to_string(task), name,
+              t);
   }
 }
 
@@ -35,7 +35,7 @@ Thresholds completed(Task task, const Thresholds& given, ThresholdSet set = Thre
       for (const auto& entry : complete) names.push_back(entry.first);
       throw std::invalid_argument(unknown_name_message(fmt::format("threshold of {}", to_string(task)), name, names));
     }
-    require(std::isfinite(value), fmt::format("threshold {} of {} is not finite", name, to_string(task)));
+    require(std::isfinite(value), "threshold {} of {} is not finite", name, to_string(task));
     known->second = value;
   }
   return complete;
@@ -43,7 +43,7 @@ Thresholds completed(Task task, const Thresholds& given, ThresholdSet set = Thre
 
 const ActRule& rule_of(Task task) {
   const ActRule* rule = definition_of(task).rule;
-  require(rule != nullptr, fmt::format("{} detector: the set act has no rule of its own for it", to_string(task)));
+  require(rule != nullptr, "{} detector: the set act has no rule of its own for it", to_string(task));
   return *rule;
 }
 

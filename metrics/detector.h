@@ -18,8 +18,8 @@
 
 namespace duet {
 
-// Of the code of all detectors: rows carry it, and rows of two versions are never in one table. Raised whenever a
-// verdict, a value or a margin of any clip changes (DetectorsVersion.StandsForTheseVerdicts says when).
+// The version of the code of all detectors: rows carry it, and rows of two versions are never in one table. Raised
+// whenever a verdict, a value or a margin of any clip changes (DetectorsVersion.StandsForTheseVerdicts says when).
 inline constexpr std::string_view kDetectorsVersion = "1";
 
 // `kInteraction` is no view of a detector but the rule of metrics/interaction.h, which asks the set `act` of the robot
@@ -42,7 +42,7 @@ Thresholds thresholds(Task task, ThresholdSet set = ThresholdSet::kPaper);
 DetectorResult detect_performer(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds,
                                 const DetectorReadings& readings = {});
 
-// By the task's rule of the set `act`. Throws std::invalid_argument as above, and for a task that has none.
+// Detects by the task's rule of the set `act`. Throws std::invalid_argument as above, and for a task that has none.
 DetectorResult detect_by_rule(Task task, const Agent& performer, const Agent& partner, const Thresholds& thresholds);
 
 // Two agents as the rules look at them: smoothed once for all of them.

@@ -16,7 +16,7 @@ namespace duet {
 // In the order of Table S11.
 std::span<const ThresholdInfo> threshold_catalogue(Task task);
 std::span<const DetectorFigure> detector_figures(Task task);
-// Of the task's rule of the set `act`; empty where it has none.
+// The thresholds and figures of the task's rule of the set `act`; empty where it has none.
 std::span<const RuleThreshold> rule_thresholds(Task task);
 std::span<const DetectorFigure> rule_figures(Task task);
 // Throw std::invalid_argument for a name that the task's detector does not have, with the nearest.

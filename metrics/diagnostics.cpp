@@ -89,10 +89,9 @@ struct Tracking {
 
 Tracking tracking_of(const Recording& recording) {
   const Eigen::Index frames = recording.frames();
-  require(frames >= kMinFrames,
-          fmt::format("controller diagnostics need {} frames or more, found {}", kMinFrames, frames));
+  require(frames >= kMinFrames, "controller diagnostics need {} frames or more, found {}", kMinFrames, frames);
   require(static_cast<Eigen::Index>(recording.reference.size()) == frames,
-          fmt::format("controller diagnostics: {} states but {} references", frames, recording.reference.size()));
+          "controller diagnostics: {} states but {} references", frames, recording.reference.size());
   const Eigen::Index dof = recording.robot.front().q.size();
   Tracking t{Eigen::MatrixXd(dof, frames),
              Eigen::MatrixXd(dof, frames),
@@ -160,8 +159,8 @@ double root_jerk(const Eigen::Matrix3Xd& p, double rate_hz, const DiagnosticRead
 
 RootError root_error(const std::vector<Pose>& X_WB, const std::vector<Pose>& reference) {
   require(!X_WB.empty(), "root_error: X_WB is empty");
-  require(X_WB.size() == reference.size(),
-          fmt::format("root_error: reference has {} frames, but X_WB has {}", reference.size(), X_WB.size()));
+  require(X_WB.size() == reference.size(), "root_error: reference has {} frames, but X_WB has {}", reference.size(),
+          X_WB.size());
   check_poses(X_WB, "X_WB");
   check_poses(reference, "reference");
   RootError sum;

@@ -30,7 +30,7 @@ struct DofError {
 DofError dof_error(const Eigen::MatrixXd& q, const Eigen::MatrixXd& q_ref, const Eigen::MatrixXd& v,
                    const Eigen::MatrixXd& v_ref, const DiagnosticReadings& readings = {});
 
-// Of a recording, by catalogue name: hf_ratio, dof_jerk, root_jerk, root_error, root_angle_error, dof_error,
+// Diagnostics by catalogue name: hf_ratio, dof_jerk, root_jerk, root_error, root_angle_error, dof_error,
 // dof_velocity_error (executed against reference), and hf_ratio_reference, dof_jerk_reference, root_jerk_reference
 // (before the controller). Joint velocity of the reference by central differences. Needs 4 frames or more.
 std::map<std::string, double> controller_diagnostics(const Recording& recording,

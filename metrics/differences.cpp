@@ -1,7 +1,5 @@
 #include "duet/metrics/differences.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "duet/core/require.h"
@@ -31,10 +29,8 @@ Eigen::MatrixXd third_derivative(const Eigen::Ref<const Eigen::MatrixXd>& x, dou
 int min_samples(JerkScheme scheme) { return scheme == JerkScheme::kCentral ? 5 : 4; }
 
 void require_sampling(Eigen::Index samples, double rate_hz, JerkScheme scheme, const char* what) {
-  require(std::isfinite(rate_hz) && rate_hz > 0.0,
-          fmt::format("{}: the rate must be positive, found {}", what, rate_hz));
-  require(samples >= min_samples(scheme),
-          fmt::format("{} needs {} frames or more, found {}", what, min_samples(scheme), samples));
+  require(std::isfinite(rate_hz) && rate_hz > 0.0, "{}: the rate must be positive, found {}", what, rate_hz);
+  require(samples >= min_samples(scheme), "{} needs {} frames or more, found {}", what, min_samples(scheme), samples);
 }
 
 }  // namespace duet

@@ -1,5 +1,5 @@
 // How a retargeted motion stands and moves, beside the 18 metrics: soles over the floor, skating, bodies in each other,
-// the partner's bones, peaks of the joints, limits, the base's lean. What the supplement does not ask and physics does.
+// the partner's bones, peaks of the joints, limits, the base's lean. Physics asks for these, the supplement not.
 #pragma once
 
 #include <map>
@@ -10,10 +10,10 @@
 
 namespace duet {
 
-// By catalogue name; NaN where undefined (no foot stands, a robot without soles).
-//   sole_height, sole_height_max  [m]      distance of the middle of a sole from the floor z = 0 while the person's
-//   foot
-//                                          stands (motion/foot_contact.h): median and largest
+// Figures by catalogue name; NaN where undefined (no foot stands, a robot without soles).
+//   sole_height, sole_height_max  [m]      distance of the middle of a sole from the floor z = 0
+//                                          while the person's foot stands (motion/foot_contact.h):
+//                                          median and largest
 //   foot_skate, foot_skate_max    [m/s]    horizontal speed of the middle of a sole meanwhile: mean and 99th percentile
 //   penetration, penetration_max  [m]      depth of the robot's shapes in the partner's capsules, but for hands and
 //                                          forearms of the two, which are meant to meet: mean over frames and largest

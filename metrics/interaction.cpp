@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "duet/core/require.h"
-#include "duet/tasks/frame_windows.h"
 #include "duet/tasks/rules/evidence.h"
+#include "duet/tasks/rules/frame_windows.h"
 
 namespace duet {
 namespace {
@@ -25,8 +25,8 @@ constexpr double kEarlier = 0.5, kLater = 1.0;  // [s]
 constexpr double kRaised = 0.2;
 constexpr double kLeans = 10.0 * std::numbers::pi / 180.0;
 constexpr double kStays = 0.3;  // [s]
-// Of the two who shake hands in SBU and K3HI, 95 % begin at most so long before the other (5 % quantiles of both
-// roles: 0.46 and 0.28 s). [s]
+// The lead over the other that 95 % of those who shake hands in SBU and K3HI stay within (5 % quantiles of both roles:
+// 0.46 and 0.28 s). [s]
 constexpr double kLead = 0.5;
 // Nobody has to wait longer than the person did in whose place the robot is, give or take this. [s]
 constexpr double kModelLead = 0.3;
@@ -209,7 +209,7 @@ std::string cannot_judge(Task task, const InteractionEvidence& evidence) {
 
 DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
   const std::string why_not = cannot_judge(task, e);
-  require(why_not.empty(), fmt::format("cannot be judged under `interaction`: {}", why_not));
+  require(why_not.empty(), "cannot be judged under `interaction`: {}", why_not);
   const InteractionRule& rule = definition_of(task).interaction;
   const SmoothedAgents agents = smoothed_for_rules(e.performer, e.partner);
   const DetectorResult act = detect_by_rule(task, agents);

@@ -31,12 +31,12 @@ ActWindow act_window(const Recording& recording);
 PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& robot, const HumanBody& human,
                            const ActWindow& window, double rate_hz);
 
-// What the rule looks at, of one episode at 50 Hz.
+// The evidence of one episode that the rule looks at, at 50 Hz.
 struct InteractionEvidence {
   Agent performer, partner;                // of the whole episode
   std::optional<PartnerTouch> touch = {};  // none: the partner is a ghost
   ActWindow window = {};
-  // Who was in the performer's place when the clip was made, over the act: nobody has to wait longer than he did.
+  // The person in the performer's place when the clip was made, over the act: nobody has to wait longer than he did.
   std::optional<Agent> model = {};
   int model_begin = 0;  // frame of the episode at which `model` begins
   bool stands = true;   // to the end

@@ -1,7 +1,5 @@
 #include "duet/metrics/interaction_statistics.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,7 +41,7 @@ double facing(const HumanMotion& person, int t) {
 
 double turned(double angle) { return std::remainder(angle, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi; }
 
-// To the right of where this one faces. [deg]
+// The direction to the other, to the right of where this one faces. [deg]
 double bearing_of_other(const HumanMotion& person, const HumanMotion& other, int t) {
   const Eigen::Vector3d way = joint(other, t, kPelvis) - joint(person, t, kPelvis);
   return turned(facing(person, t) - std::atan2(way.y(), way.x()));
@@ -178,7 +176,7 @@ double noise_of(const InteractionClip& clip, const People& people) {
   return quantile(std::move(residuals), 0.5);
 }
 
-// Of what is measured in each frame of a person.
+// The median of what is measured in each frame of a person.
 template <typename Measure>
 double median_over_frames(const HumanMotion& person, const Measure& measure) {
   std::vector<double> values;
@@ -235,8 +233,7 @@ double source_rate(const InteractionClip& clip) {
 
 InteractionStatistics interaction_statistics(const InteractionClip& clip) {
   const int frames = clip.frames();
-  require(frames >= 3,
-          fmt::format("interaction statistics of clip '{}': expected at least 3 frames, found {}", clip.id, frames));
+  require(frames >= 3, "interaction statistics of clip '{}': expected at least 3 frames, found {}", clip.id, frames);
   const People people = {&clip.a, &clip.b};
   InteractionStatistics result{.seconds = frames / clip.rate_hz()};
   add_touch(clip, people, result);

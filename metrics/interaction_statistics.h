@@ -66,7 +66,7 @@ struct InteractionStatisticInfo {
 };
 std::span<const InteractionStatisticInfo> interaction_statistic_catalogue();
 
-// Of one statistic over clips that have it.
+// The spread of one statistic over clips that have it.
 struct StatisticSpread {
   int clips = 0;
   double low = 0.0, middle = 0.0, high = 0.0;  // 10 %, 50 %, 90 %; a share has its mean in all three; NaN for none

@@ -1,5 +1,4 @@
 // Motion smoothness: the third derivative of positions.
-#include <fmt/format.h>
 
 #include <cmath>
 #include <limits>
@@ -14,7 +13,7 @@ namespace duet {
 Jerk jerk(const PointTracks& positions, double rate_hz, JerkScheme scheme, int ddof) {
   require_finite(positions, "jerk: positions");
   require_sampling(positions.frames(), rate_hz, scheme, "jerk");
-  require(ddof == 0 || ddof == 1, fmt::format("jerk: ddof must be 0 or 1, found {}", ddof));
+  require(ddof == 0 || ddof == 1, "jerk: ddof must be 0 or 1, found {}", ddof);
   const Eigen::Map<const Eigen::MatrixXd> x(positions.data().data(), 3L * positions.points(), positions.frames());
   const Eigen::MatrixXd third = third_derivative(x, rate_hz, scheme);
   const Eigen::ArrayXd norms =

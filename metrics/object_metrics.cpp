@@ -24,7 +24,7 @@ void check_lengths(const PairedMotion& motion) {
   const auto frames = static_cast<int>(motion.object.poses.size());
   require(frames == motion.frames() && motion.source_reactor.frames() == frames &&
               motion.source_partner.frames() == frames && motion.partner.frames() == frames,
-          fmt::format("object metrics: expected motions of {} frames, as the object has poses", frames));
+          "object metrics: expected motions of {} frames, as the object has poses", frames);
 }
 
 double nearest(const PointTracks& hands, const PointTracks& object, int t, int hand) {

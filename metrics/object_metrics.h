@@ -17,10 +17,10 @@ namespace duet {
 // zero without an object.
 std::array<ContactCounts, 3> object_contact_counts(const PairedMotion& motion, const RobotModel& robot);
 
-// By catalogue name; empty without an object.
-//   object_distance_error          [m]  mean over frames, hands and keypoints of how far the distance is from the
-//   source's object_distance_error.partner  [m]  the same of the partner's hands object_contact_f1_{0.2,0.35,0.5}    of
-//   the counts above; NaN where there is no contact
+// Figures by catalogue name; empty without an object.
+//   object_distance_error          [m]  how far the distance is from the source's, mean over frames, hands, keypoints
+//   object_distance_error.partner  [m]  the same of the partner's hands
+//   object_contact_f1_{0.2,0.35,0.5}    of the counts above; NaN where there is no contact
 // Throws std::invalid_argument for motions of different lengths.
 std::map<std::string, double> object_metrics(const PairedMotion& motion, const RobotModel& robot,
                                              ZeroDivision zero_division = ZeroDivision::kNan);

@@ -1,7 +1,5 @@
 #include "duet/metrics/readings.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
 #include <span>
@@ -113,7 +111,7 @@ int parse_count(const Option& option, const std::string& value) {
   int number = 0;
   const auto [end, error] = std::from_chars(value.data(), value.data() + value.size(), number);
   require(error == std::errc() && end == value.data() + value.size() && number >= 1,
-          fmt::format("reading '{}' of {}: expected a whole number from 1 on", value, option.name));
+          "reading '{}' of {}: expected a whole number from 1 on", value, option.name);
   return number;
 }
 

@@ -22,7 +22,7 @@ using MotionMetric = std::function<double(const PairedMotion& motion, const Robo
 // was added, and where `metric` is empty.
 void register_metric(const MetricInfo& info, MotionMetric metric);
 
-// Those of score_motion: the catalogue's 18 in its order, then those added in theirs.
+// The metrics of score_motion: the catalogue's 18 in its order, then those added in theirs.
 std::vector<MetricInfo> motion_metric_infos();
 
 // Every one of them by name. Throws as retargeting_metrics, and what an added metric throws.

@@ -22,8 +22,8 @@ struct ScoredTracks {
 
 void check_frames(const PairedMotion& motion, const RobotModel& robot) {
   const auto check = [&](int frames, const char* name) {
-    require(frames == motion.frames(),
-            fmt::format("retargeting metrics: {} has {} frames, but robot has {}", name, frames, motion.frames()));
+    require(frames == motion.frames(), "retargeting metrics: {} has {} frames, but robot has {}", name, frames,
+            motion.frames());
   };
   require(motion.frames() > 0, "retargeting metrics: the paired motion is empty");
   check(static_cast<int>(motion.robot.q.cols()), "robot.q");
@@ -32,7 +32,7 @@ void check_frames(const PairedMotion& motion, const RobotModel& robot) {
   check(motion.source_reactor.frames(), "source_reactor");
   if (!motion.reshaped.empty()) check(motion.reshaped.frames(), "reshaped");
   require(motion.robot.joint_names.empty() || motion.robot.joint_names == robot.joint_names(),
-          fmt::format("retargeting metrics: the joints of the motion are not those of {} in its order", robot.name));
+          "retargeting metrics: the joints of the motion are not those of {} in its order", robot.name);
 }
 
 ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) {

@@ -65,7 +65,7 @@ std::vector<HingeGroup> hinge_groups(const RobotModel& robot);
 // Jerk is of the robot's 16 pair points.
 std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
                                                   const MetricReadings& readings = {});
-// Those of them that a robot's motion has by itself: large_angle_ratio, angle_std, jerk_mean, jerk_std.
+// The metrics that a robot's motion has by itself: large_angle_ratio, angle_std, jerk_mean, jerk_std.
 std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,
                                              const MetricReadings& readings = {});
 // The contact counts behind them per threshold, to be added over clips (micro average).

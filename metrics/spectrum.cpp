@@ -1,7 +1,5 @@
 #include "duet/metrics/spectrum.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -138,9 +136,8 @@ void high_pass(Eigen::VectorXd& x, double k) {
 }
 
 BandEnergy filtered_energy(const Eigen::VectorXd& x, double rate_hz, double cutoff_hz) {
-  require(rate_hz > 2.0 * cutoff_hz,
-          fmt::format("butterworth spectrum: a cut-off of {} Hz needs more than {} Hz, found {}", cutoff_hz,
-                      2.0 * cutoff_hz, rate_hz));
+  require(rate_hz > 2.0 * cutoff_hz, "butterworth spectrum: a cut-off of {} Hz needs more than {} Hz, found {}",
+          cutoff_hz, 2.0 * cutoff_hz, rate_hz);
   const Eigen::Index n = x.size();
   const Eigen::Index padding = std::min(kFilterPadding, n - 1);
   Eigen::VectorXd padded(n + 2 * padding);

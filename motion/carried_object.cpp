@@ -18,16 +18,16 @@ constexpr double kUnitRotation = 1e-6;  // |R| - 1, as for the robot's root
 
 void validate(const CarriedObject& object, int frames, const std::string& what) {
   if (object.empty()) return;
-  require(static_cast<int>(object.poses.size()) == frames,
-          fmt::format("{}: expected {} poses, one a frame, found {}", what, frames, object.poses.size()));
+  require(static_cast<int>(object.poses.size()) == frames, "{}: expected {} poses, one a frame, found {}", what, frames,
+          object.poses.size());
   require(object.keypoints.cols() >= 1 && object.keypoints.cols() <= kMostObjectKeypoints,
-          fmt::format("{}: expected 1 to {} keypoints, found {}", what, kMostObjectKeypoints, object.keypoints.cols()));
-  require(object.keypoints.allFinite(), fmt::format("{}: a keypoint is not finite", what));
+          "{}: expected 1 to {} keypoints, found {}", what, kMostObjectKeypoints, object.keypoints.cols());
+  require(object.keypoints.allFinite(), "{}: a keypoint is not finite", what);
   for (std::size_t t = 0; t < object.poses.size(); ++t) {
     const Pose& X_WO = object.poses[t];
-    require(X_WO.p.allFinite(), fmt::format("{}: frame {}: the position is not finite", what, t));
+    require(X_WO.p.allFinite(), "{}: frame {}: the position is not finite", what, t);
     require(std::abs(X_WO.R.norm() - 1.0) <= kUnitRotation,
-            fmt::format("{}: frame {}: expected a unit quaternion, found one of norm {}", what, t, X_WO.R.norm()));
+            "{}: frame {}: expected a unit quaternion, found one of norm {}", what, t, X_WO.R.norm());
   }
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/point_tracks.h"
 #include "duet/core/pose.h"
 
@@ -28,7 +28,7 @@ void validate(const CarriedObject& object, int frames, const std::string& what);
 // The keypoints in W: (T, O, 3) [m]; empty without an object.
 PointTracks keypoint_tracks(const CarriedObject& object);
 
-// As the people of the same functions: another rate, standing still before and after, the mirror image in y = 0.
+// The same functions as for people: another rate, standing still before and after, the mirror image in y = 0.
 CarriedObject resample(const CarriedObject& object, double rate_hz, double new_rate_hz);
 CarriedObject held(const CarriedObject& object, int before, int after);
 CarriedObject mirrored(const CarriedObject& object);

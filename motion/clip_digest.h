@@ -1,4 +1,4 @@
-// What tells whether two motions come from one clip, whatever they were called: for data splits.
+// A digest that tells whether two motions come from one clip, whatever they were called: for data splits.
 #pragma once
 
 #include <string>

@@ -22,15 +22,14 @@ std::string place(const std::string& what, int frame, int joint) {
 }
 
 void check_sizes(const HumanMotion& motion, const std::string& what) {
-  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
-          fmt::format("{}: expected a positive rate, found {} Hz", what, motion.rate_hz));
-  require(motion.joints.points() == kSmplJoints,
-          fmt::format("{}: expected {} joints, found {}", what, kSmplJoints, motion.joints.points()));
-  require(motion.frames() >= 2, fmt::format("{}: expected at least 2 frames, found {}", what, motion.frames()));
+  require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0, "{}: expected a positive rate, found {} Hz", what,
+          motion.rate_hz);
+  require(motion.joints.points() == kSmplJoints, "{}: expected {} joints, found {}", what, kSmplJoints,
+          motion.joints.points());
+  require(motion.frames() >= 2, "{}: expected at least 2 frames, found {}", what, motion.frames());
   const std::size_t expected = static_cast<std::size_t>(motion.frames()) * kSmplJoints;
   require(motion.rotations.empty() || motion.rotations.size() == expected,
-          fmt::format("{}: expected {} rotations (frames x joints) or none, found {}", what, expected,
-                      motion.rotations.size()));
+          "{}: expected {} rotations (frames x joints) or none, found {}", what, expected, motion.rotations.size());
 }
 
 void check_positions(const HumanMotion& motion, const std::string& what) {
@@ -66,8 +65,8 @@ void validate(const HumanMotion& motion, const std::string& what) {
 
 std::array<double, kSmplJoints> bone_lengths(const HumanMotion& motion) {
   require(motion.joints.points() == kSmplJoints && motion.frames() > 0,
-          fmt::format("bone lengths: expected {} joints and at least one frame, found {} and {}", kSmplJoints,
-                      motion.joints.points(), motion.frames()));
+          "bone lengths: expected {} joints and at least one frame, found {} and {}", kSmplJoints,
+          motion.joints.points(), motion.frames());
   std::array<double, kSmplJoints> lengths{};
   for (int t = 0; t < motion.frames(); ++t)
     for (int j = 1; j < kSmplJoints; ++j)
@@ -87,10 +86,9 @@ double heading(const PointTracks& joints, int frame) {
 }
 
 HumanMotion resample(const HumanMotion& motion, double rate_hz) {
-  require(std::isfinite(rate_hz) && rate_hz > 0.0,
-          fmt::format("resample: expected a positive rate, found {}", rate_hz));
+  require(std::isfinite(rate_hz) && rate_hz > 0.0, "resample: expected a positive rate, found {}", rate_hz);
   require(std::isfinite(motion.rate_hz) && motion.rate_hz > 0.0,
-          fmt::format("resample: expected a source with a positive rate, found {}", motion.rate_hz));
+          "resample: expected a source with a positive rate, found {}", motion.rate_hz);
   require(motion.frames() > 0, "resample: the motion has no frames");
   const int points = motion.joints.points();
   const int frames = resampled_frames(motion.frames(), motion.rate_hz, rate_hz);
@@ -121,8 +119,8 @@ FrameBetween frame_between(double index, int frames) {
 
 int resampled_frames(int frames, double rate_hz, double new_rate_hz) {
   const double last = (frames - 1) * (new_rate_hz / rate_hz);
-  require(last < kMostFrames, fmt::format("resample: {} frames at {} Hz are more than {:g} frames at {} Hz", frames,
-                                          rate_hz, kMostFrames, new_rate_hz));
+  require(last < kMostFrames, "resample: {} frames at {} Hz are more than {:g} frames at {} Hz", frames, rate_hz,
+          kMostFrames, new_rate_hz);
   return static_cast<int>(std::floor(last * (1.0 + kSameInstant))) + 1;
 }
 

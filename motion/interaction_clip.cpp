@@ -18,12 +18,11 @@ constexpr std::int64_t kSchemaVersion = 1;
 
 void check_contact(const InteractionClip& clip, const ContactWindow& window, std::size_t index) {
   require(0 <= window.begin && window.begin < window.end && window.end <= clip.frames(),
-          fmt::format("clip '{}': contact window {}: expected 0 <= begin < end <= {} frames, found [{}, {})", clip.id,
-                      index, clip.frames(), window.begin, window.end));
+          "clip '{}': contact window {}: expected 0 <= begin < end <= {} frames, found [{}, {})", clip.id, index,
+          clip.frames(), window.begin, window.end);
   for (const int joint : {window.joint_a, window.joint_b})
-    require(0 <= joint && joint < kSmplJoints,
-            fmt::format("clip '{}': contact window {}: expected joints 0..{}, found {}", clip.id, index,
-                        kSmplJoints - 1, joint));
+    require(0 <= joint && joint < kSmplJoints, "clip '{}': contact window {}: expected joints 0..{}, found {}", clip.id,
+            index, kSmplJoints - 1, joint);
 }
 
 void put_contacts(Npz& npz, const std::vector<ContactWindow>& contacts) {
@@ -53,7 +52,7 @@ std::vector<ContactWindow> get_contacts(const Npz& npz, const std::vector<int>& 
   return contacts;
 }
 
-// Those of the file, or a proposal, which is said in `source`. Two lengths are left to validate().
+// Takes the file's phases, or a proposal, which is said in `source`. Two lengths are left to validate().
 void take_phases(const Npz& npz, InteractionClip& clip) {
   if (npz.contains("phases")) {
     clip.phases = get_phases(npz);
@@ -85,15 +84,14 @@ void validate(const InteractionClip& clip) {
   validate(clip.a, fmt::format("clip '{}', person A", clip.id));
   validate(clip.b, fmt::format("clip '{}', person B", clip.id));
   require(clip.a.frames() == clip.b.frames(),
-          fmt::format("clip '{}': expected two people of the same length, found {} and {} frames", clip.id,
-                      clip.a.frames(), clip.b.frames()));
-  require(clip.a.rate_hz == clip.b.rate_hz,
-          fmt::format("clip '{}': expected two people at the same rate, found {} and {} Hz", clip.id, clip.a.rate_hz,
-                      clip.b.rate_hz));
+          "clip '{}': expected two people of the same length, found {} and {} frames", clip.id, clip.a.frames(),
+          clip.b.frames());
+  require(clip.a.rate_hz == clip.b.rate_hz, "clip '{}': expected two people at the same rate, found {} and {} Hz",
+          clip.id, clip.a.rate_hz, clip.b.rate_hz);
   require(0 <= clip.phases.act_begin && clip.phases.act_begin <= clip.phases.act_end &&
               clip.phases.act_end <= clip.frames(),
-          fmt::format("clip '{}': expected phases with 0 <= act_begin <= act_end <= {} frames, found [{}, {})", clip.id,
-                      clip.frames(), clip.phases.act_begin, clip.phases.act_end));
+          "clip '{}': expected phases with 0 <= act_begin <= act_end <= {} frames, found [{}, {})", clip.id,
+          clip.frames(), clip.phases.act_begin, clip.phases.act_end);
   for (std::size_t i = 0; i < clip.contacts.size(); ++i) check_contact(clip, clip.contacts[i], i);
   validate(clip.object, clip.frames(), fmt::format("clip '{}', object", clip.id));
 }
@@ -176,7 +174,7 @@ HumanMotion held(const HumanMotion& motion, int before, int after) {
 
 InteractionClip padded(const InteractionClip& clip, double before, double after) {
   for (const double time : {before, after})
-    require(std::isfinite(time) && time >= 0.0, fmt::format("padding: expected seconds, found {}", time));
+    require(std::isfinite(time) && time >= 0.0, "padding: expected seconds, found {}", time);
   const int first = static_cast<int>(std::lround(before * clip.rate_hz()));
   const int last = static_cast<int>(std::lround(after * clip.rate_hz()));
   InteractionClip result = clip;

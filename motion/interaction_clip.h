@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/task.h"
-#include "duet/core/zip.h"
 #include "duet/motion/carried_object.h"
 #include "duet/motion/human_motion.h"
 #include "duet/motion/person.h"
@@ -56,8 +56,8 @@ std::string clip_bytes(const InteractionClip& clip, ZipMethod method = ZipMethod
 InteractionClip parse_clip(std::string_view bytes, const std::string& name);
 InteractionClip read_clip(const Npz& npz);
 
-// Who the robot replaces. Another person than before gives another id, "-A" or "-B" at its end, and back the first one:
-// the two are different clips and may be in one run.
+// Sets the person whom the robot replaces. Another person than before gives another id, "-A" or "-B" at its end, and
+// back the first one: the two are different clips and may be in one run.
 void set_reactor(InteractionClip& clip, Person reactor);
 
 // Both people stand as in their first frame for `before` seconds, and as in their last for `after`: for recordings that

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/require.h"
 #include "duet/core/task.h"
 #include "duet/motion/human_motion.h"

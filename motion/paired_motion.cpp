@@ -17,17 +17,17 @@ void check_same_time(const PairedMotion& motion) {
   for (const auto& [who, human] : {std::pair<const char*, const HumanMotion*>{"partner", &motion.partner},
                                    {"source_partner", &motion.source_partner},
                                    {"source_reactor", &motion.source_reactor}}) {
-    require(human->frames() == motion.frames(),
-            fmt::format("{}: expected the robot's {} frames, found {}", who, motion.frames(), human->frames()));
-    require(human->rate_hz == motion.robot.rate_hz, fmt::format("{}: expected the robot's rate of {} Hz, found {} Hz",
-                                                                who, motion.robot.rate_hz, human->rate_hz));
+    require(human->frames() == motion.frames(), "{}: expected the robot's {} frames, found {}", who, motion.frames(),
+            human->frames());
+    require(human->rate_hz == motion.robot.rate_hz, "{}: expected the robot's rate of {} Hz, found {} Hz", who,
+            motion.robot.rate_hz, human->rate_hz);
   }
   require(motion.reshaped.empty() || motion.reshaped.frames() == motion.frames(),
-          fmt::format("reshaped: expected the robot's {} frames, found {}", motion.frames(), motion.reshaped.frames()));
+          "reshaped: expected the robot's {} frames, found {}", motion.frames(), motion.reshaped.frames());
   require(0 <= motion.phases.act_begin && motion.phases.act_begin <= motion.phases.act_end &&
               motion.phases.act_end <= motion.frames(),
-          fmt::format("phases: expected 0 <= act_begin <= act_end <= {} frames, found [{}, {})", motion.frames(),
-                      motion.phases.act_begin, motion.phases.act_end));
+          "phases: expected 0 <= act_begin <= act_end <= {} frames, found [{}, {})", motion.frames(),
+          motion.phases.act_begin, motion.phases.act_end);
   validate(motion.object, motion.frames(), "object");
 }
 

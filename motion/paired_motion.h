@@ -1,4 +1,4 @@
-// What retargeting makes of a clip: the robot's motion, the adapted human partner, what they came from, and how it
+// The result of retargeting a clip: the robot's motion, the adapted human partner, what they came from, and how it
 // went.
 #pragma once
 
@@ -9,7 +9,6 @@
 
 #include "duet/core/episode_tags.h"
 #include "duet/core/robot_motion.h"
-#include "duet/core/zip.h"
 #include "duet/motion/interaction_clip.h"
 
 namespace duet {

@@ -2,8 +2,6 @@
 // threshold. docs/conventions.md describes signals and thresholds.
 #include "duet/motion/phase_proposal.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -98,7 +96,7 @@ Signal share(const Signal& signal, double least) {
   return result;
 }
 
-// What either person does, each measured by the own peak.
+// The larger signal of the two people, each measured by the own peak.
 Signal either(const Signal& a, const Signal& b, double least) {
   Signal result = share(a, least);
   const Signal other = share(b, least);
@@ -190,11 +188,9 @@ Phases stretch(const Activity& activity, double rate_hz) {
 
 Phases propose_phases(const HumanMotion& a, const HumanMotion& b, Task task) {
   require(a.joints.points() == kSmplJoints && b.joints.points() == kSmplJoints,
-          fmt::format("phase proposal: expected {} joints, found {} and {}", kSmplJoints, a.joints.points(),
-                      b.joints.points()));
+          "phase proposal: expected {} joints, found {} and {}", kSmplJoints, a.joints.points(), b.joints.points());
   require(a.frames() == b.frames() && a.frames() >= 1,
-          fmt::format("phase proposal: expected two motions of the same length, found {} and {} frames", a.frames(),
-                      b.frames()));
+          "phase proposal: expected two motions of the same length, found {} and {} frames", a.frames(), b.frames());
   const Activity activity = activity_of(a, b, definition_of(task).phases);
   if (!activity.found) return {.act_begin = a.frames() / 3, .act_end = std::max(a.frames() - a.frames() / 3, 1)};
   return stretch(activity, a.rate_hz);

@@ -8,13 +8,13 @@
 #include <numbers>
 #include <optional>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/require.h"
 
 namespace duet {
 namespace {
 
-// Of 282 recordings of two people (SBU) the mean upright lies within 8.6 degrees of vertical in nine of ten once the
+// In 282 recordings of two people (SBU) the mean upright lies within 8.6 degrees of vertical in nine of ten once the
 // camera's tilt is removed, and 9.5 degrees off on average before.
 constexpr double kOddTilt = 10.0 * std::numbers::pi / 180.0;  // [rad] of both people's mean upright
 constexpr double kOddFloor = 0.15;                            // [m]

@@ -1,4 +1,4 @@
-// What varies from one synthesised clip to another.
+// The options that vary from one synthesised clip to another.
 #pragma once
 
 #include <array>
@@ -10,15 +10,15 @@ namespace duet {
 
 enum class Side { kLeft, kRight };
 
-// Whose way the two have: that of the first generator (long acts, three metres apart at the start), or that of recorded
-// people (docs/synthesis.md).
+// The way in which the two act: that of the first generator (long acts, three metres apart at the start), or that of
+// recorded people (docs/synthesis.md).
 enum class Likeness { kRehearsed, kPeople };
 
 // How an act goes: done, done after a half-raised hand has waited, or broken off before anything touches.
 enum class ActOutcome { kComplete, kHesitant, kAborted };
 inline constexpr std::array<std::string_view, 3> kActOutcomeNames = {"complete", "hesitant", "aborted"};  // likewise
 
-// What varies; an empty field is drawn from (seed, task, index). Ranges and draws: docs/conventions.md.
+// Options of a clip; an empty field is drawn from (seed, task, index). Ranges and draws: docs/conventions.md.
 struct SynthesisOptions {
   std::uint64_t seed = 42;
   int index = 0;
@@ -32,7 +32,7 @@ struct SynthesisOptions {
   std::optional<double> duration{};              // of the whole clip [s]; default as in Table S6 per task
   double rate_hz = 50.0;
   Likeness like = Likeness::kRehearsed;
-  // Of people only, who are cropped to the act unless told:
+  // With kPeople only; such clips are cropped to the act unless told:
   std::optional<double> before{};       // standing before anything moves [s]
   std::optional<double> after{};        // standing after everything [s]
   std::optional<ActOutcome> outcome{};  // default: drawn

@@ -111,7 +111,7 @@ void in_blocks(int n, const F& f) {
 void elu(int n, float* x) {
   in_blocks(n, [x](int at, int count) {
     const Block a = load(x + at, count);
-    // The positive and the negative part; a selection would not be vectorised. What is not a number stays so.
+    // The positive and the negative part; a selection would not be vectorised. NaN stays NaN.
     const Block value = a.max(0.0F) + (a.min(0.0F).exp() - 1.0F);
     store(value, x + at, count);
   });

@@ -18,8 +18,8 @@ struct ExternalPlace {
 
 inline constexpr std::int64_t kMostExternalBytes = std::int64_t{1} << 30;  // of one tensor
 
-// What is wrong with a location, as the end of a sentence; empty where nothing is: it is relative, without "..", and
-// what it leads to, links followed, is a file of `folder` or below it.
+// The fault of a location, as the end of a sentence; empty where there is none: it is relative, without "..", and
+// leads, links followed, to a file of `folder` or below it.
 std::string location_fault(const std::string& folder, const std::string& location);
 
 // The files of one model's folder, each read once and whole, so that its digest is of what was used. Not thread-safe.
@@ -27,8 +27,8 @@ class ExternalData {
  public:
   explicit ExternalData(std::string folder) : folder_(std::move(folder)) {}
   [[nodiscard]] const std::string& folder() const { return folder_; }
-  // Those bytes. Throws InputError beginning with `where` ("'net.onnx': constant 'W'"): a location with a fault, a file
-  // that is not there or shorter than is said, a tensor of more than kMostExternalBytes.
+  // The bytes at that place. Throws InputError beginning with `where` ("'net.onnx': constant 'W'"): a location with a
+  // fault, a file that is not there or shorter than is said, a tensor of more than kMostExternalBytes.
   std::string read(const ExternalPlace& place, const std::string& where);
 
  private:

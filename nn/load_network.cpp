@@ -60,7 +60,7 @@ bool is_zip(std::string_view bytes) { return bytes.starts_with("PK"); }
       path, what));
 }
 
-// What its first bytes, or the names in its directory, say of a file of weights alone.
+// Refuses a file of weights alone, told by its first bytes or by the names in its directory.
 void check_is_network(std::string_view bytes, const std::string& path) {
   if (bytes.starts_with('\x80')) refuse_checkpoint(path, "a pickle");
   if (bytes.starts_with("\x89HDF")) refuse_checkpoint(path, "an HDF5 file");
@@ -94,8 +94,8 @@ std::unique_ptr<Network> load_network(const std::string& path, const std::string
 
 NetworkFile load_network_file(const std::string& path, const std::string& engine) {
   const std::vector<std::string> engines = network_engines();
-  require(std::ranges::find(engines, engine) != engines.end(),
-          fmt::format("no network engine '{}' in this build. It has: {}", engine, fmt::join(engines, ", ")));
+  require(std::ranges::find(engines, engine) != engines.end(), "no network engine '{}' in this build. It has: {}",
+          engine, fmt::join(engines, ", "));
   require_data(path);
   const std::string bytes = read_data(path);
   if (engine == "libtorch") return {[bytes, path] { return libtorch_network(bytes, path); }};

@@ -12,9 +12,9 @@
 
 namespace duet {
 
-// By content, not by name: ONNX with its external data, TorchScript of the kinds in nn/torch_script.h, safetensors of
-// nn/mlp_file.h. Throws InputError (file, place, expected, found) for a file that is not readable, truncated, of
-// another kind, with an operator or a shape that is not supported (by name), or with weights that are not finite.
+// Loads by content, not by name: ONNX with its external data, TorchScript of the kinds in nn/torch_script.h,
+// safetensors of nn/mlp_file.h. Throws InputError (file, place, expected, found) for a file that is unreadable,
+// truncated, of another kind, with an operator or a shape that is not supported (by name), or with non-finite weights.
 // `engine`: "duet" (ours), or "libtorch" where it was built in (std::invalid_argument otherwise, naming those present).
 std::unique_ptr<Network> load_network(const std::string& path, const std::string& engine = "duet");
 std::vector<std::string> network_engines();
@@ -29,9 +29,9 @@ struct NetworkFile {
 // Throws as load_network.
 NetworkFile load_network_file(const std::string& path, const std::string& engine = "duet");
 
-// What the network of that path is loaded from: "network", and for each file of an ONNX model's external data "network
-// data NAME"; those that load_network refuses (absent, outside of its folder) are left out. Throws InputError where the
-// network cannot be read.
+// The files that the network of that path is loaded from: "network", and for each file of an ONNX model's external data
+// "network data NAME"; those that load_network refuses (absent, outside of its folder) are left out. Throws InputError
+// where the network cannot be read.
 LoadedFiles network_files(const std::string& path);
 
 }  // namespace duet

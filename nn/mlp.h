@@ -1,5 +1,5 @@
 // A multilayer perceptron with ELU between its layers, in float: weights as values, evaluated at batch 1 without
-// allocation. What WBC-Sim's oracle and student are.
+// allocation. WBC-Sim's oracle and student are such networks.
 #pragma once
 
 #include <Eigen/Core>

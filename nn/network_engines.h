@@ -11,8 +11,8 @@ namespace duet {
 
 bool libtorch_built_in();
 
-// Of a file's bytes; `path` is for messages. Throws InputError as load_network does; MissingError where the library is
-// not built in.
+// A network from a file's bytes; `path` is for messages. Throws InputError as load_network does; MissingError where the
+// library is not built in.
 std::unique_ptr<Network> libtorch_network(const std::string& bytes, const std::string& path);
 
 }  // namespace duet

@@ -29,7 +29,7 @@ void unary(OnnxBuilder& builder, UnaryKernel kernel, float parameter = 0.0F) {
   builder.step([=, count = source.count()] { kernel(In(from, count), Out(to, count), parameter); });
 }
 
-// Of floats alone.
+// A unary operator for floats alone.
 void smooth(OnnxBuilder& builder, UnaryKernel kernel, float parameter = 0.0F) {
   (void)builder.float_input(0);
   unary(builder, kernel, parameter);
@@ -274,7 +274,7 @@ void extreme(OnnxBuilder& builder, bool greatest) {
 void least(OnnxBuilder& builder) { extreme(builder, false); }
 void greatest(OnnxBuilder& builder) { extreme(builder, true); }
 
-// Of numbers known at load as int64 too: shapes are put together with it.
+// Where on int64 numbers known at load, as shapes are put together with it.
 void where_whole(OnnxBuilder& builder, const BroadcastLoop<3>& loop, const Shape& shape) {
   std::vector<std::int64_t> values;
   for (const auto& from : loop.from)

@@ -164,7 +164,7 @@ struct Convolution {
   float *window = nullptr, *result = nullptr, *y = nullptr;
 };
 
-// What the kernel sees at one place: (in, kernel), zeros beyond the ends.
+// Fills the window that the kernel sees at one place: (in, kernel), zeros beyond the ends.
 void fill_window(const Convolution& c, const float* x, std::int64_t place) {
   const std::int64_t begin = place * c.stride - c.pad;
   float* to = c.window;

@@ -1,5 +1,5 @@
-// What an ONNX file says, free of protobuf: a graph of named nodes, its constants and its ports. Nothing is evaluated
-// here. Thread-safe.
+// The content of an ONNX file, free of protobuf: a graph of named nodes, its constants and its ports. Nothing is
+// evaluated here. Thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -42,7 +42,7 @@ class OnnxNetwork final : public Network {
     from_.push_back(value.data);
   }
 
-  // What the file says of an output must be what its nodes give, where it says anything.
+  // The shape that the file states for an output, where it states one, must be the one that its nodes give.
   static void check_shape(const OnnxGraph& graph, const OnnxPort& port, const Shape& found) {
     if (port.shape.empty()) return;
     bool fits = port.shape.size() == found.size();

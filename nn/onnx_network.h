@@ -12,7 +12,7 @@ namespace duet {
 
 // `folder`: of files that the model keeps numbers in; "": it may have none. Throws InputError (see load_network).
 std::unique_ptr<Network> onnx_network(std::string_view bytes, const std::string& file, const std::string& folder = "");
-// Of a graph that another format was read into.
+// A network from a graph that another format was read into.
 std::unique_ptr<Network> onnx_network(const OnnxGraph& graph);
 
 }  // namespace duet

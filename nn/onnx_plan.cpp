@@ -116,7 +116,7 @@ const OnnxValue& OnnxBuilder::input(int i) const {
 
 const OnnxValue& OnnxBuilder::float_input(int i) const {
   const OnnxValue& value = input(i);
-  require(value.type == ElementType::kFloat, fmt::format("input {}: expected floats, found whole numbers", i));
+  require(value.type == ElementType::kFloat, "input {}: expected floats, found whole numbers", i);
   return value;
 }
 
@@ -129,8 +129,7 @@ const float* OnnxBuilder::data(const OnnxValue& value) {
 
 const std::vector<std::int64_t>& OnnxBuilder::whole_numbers(int i) const {
   const OnnxValue& value = input(i);
-  require(value.whole_constant(),
-          fmt::format("input {}: expected whole numbers that do not depend on the network's input", i));
+  require(value.whole_constant(), "input {}: expected whole numbers that do not depend on the network's input", i);
   return value.integers;
 }
 
@@ -144,7 +143,7 @@ const T* OnnxBuilder::typed(const std::string& name) const {
   const OnnxAttribute* found = attribute(name);
   if (found == nullptr) return nullptr;
   const T* value = std::get_if<T>(found);
-  require(value != nullptr, fmt::format("attribute '{}' is not of the expected type", name));
+  require(value != nullptr, "attribute '{}' is not of the expected type", name);
   return value;
 }
 
@@ -156,7 +155,7 @@ std::int64_t OnnxBuilder::integer(const std::string& name, std::int64_t otherwis
 float OnnxBuilder::number(const std::string& name, float otherwise) const {
   const auto* value = typed<float>(name);
   if (value == nullptr) return otherwise;
-  require(std::isfinite(*value), fmt::format("attribute '{}': expected a finite number, found {}", name, *value));
+  require(std::isfinite(*value), "attribute '{}': expected a finite number, found {}", name, *value);
   return *value;
 }
 
@@ -171,13 +170,13 @@ std::optional<std::vector<std::int64_t>> OnnxBuilder::integers(const std::string
 }
 
 int OnnxBuilder::axis(std::int64_t axis, int rank) const {
-  require(axis >= -rank && axis < rank, fmt::format("expected an axis of a tensor of rank {}, found {}", rank, axis));
+  require(axis >= -rank && axis < rank, "expected an axis of a tensor of rank {}, found {}", rank, axis);
   return static_cast<int>(axis < 0 ? axis + rank : axis);
 }
 
 float* OnnxBuilder::memory(std::int64_t count) {
   float* taken = plan_.arena.take(count);
-  require(taken != nullptr, fmt::format("needs more than the {} numbers that a network may hold", OnnxArena::kLimit));
+  require(taken != nullptr, "needs more than the {} numbers that a network may hold", OnnxArena::kLimit);
   return taken;
 }
 
@@ -189,8 +188,8 @@ bool OnnxBuilder::inputs_are_constant() const {
 
 void OnnxBuilder::define(int i, OnnxValue value) {
   if (!has_output(i)) return;
-  require(plan_.values.emplace(node_.outputs[i], std::move(value)).second,
-          fmt::format("output '{}': the name is taken", node_.outputs[i]));
+  require(plan_.values.emplace(node_.outputs[i], std::move(value)).second, "output '{}': the name is taken",
+          node_.outputs[i]);
 }
 
 float* OnnxBuilder::output(int i, const Shape& shape, ElementType type) {

@@ -3,6 +3,8 @@
 // a kernel room. Internal to nn/; operators are in nn/onnx_*.cpp, one table per file.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <functional>
 #include <map>
 #include <memory>
@@ -68,6 +70,10 @@ class OnnxBuilder {
   void require(bool condition, const std::string& problem) const {
     if (!condition) refuse(problem);
   }
+  template <typename First, typename... Rest>
+  void require(bool condition, fmt::format_string<First, Rest...> problem, First&& first, Rest&&... rest) const {
+    if (!condition) refuse(fmt::vformat(problem, fmt::make_format_args(first, rest...)));
+  }
 
   [[nodiscard]] int opset() const { return graph_.opset; }
   [[nodiscard]] const std::string& op() const { return node_.op; }
@@ -76,7 +82,7 @@ class OnnxBuilder {
   [[nodiscard]] bool has_input(int i) const;
   [[nodiscard]] bool has_output(int i) const;
   [[nodiscard]] const OnnxValue& input(int i) const;
-  // Of a floating-point input, and of any other input as floats.
+  // The value of a floating-point input, and of any other input as floats.
   [[nodiscard]] const OnnxValue& float_input(int i) const;
   const float* data(const OnnxValue& value);
   // The int64 that an input holds (shapes, axes): must be a constant.

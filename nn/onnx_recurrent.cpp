@@ -10,8 +10,8 @@
 namespace duet {
 namespace {
 
-// What LSTM and GRU share: X (steps, batch, inputs), W (1, gates H, inputs), R (1, gates H, H), B (1, 2 gates H),
-// initial states (1, batch, H).
+// The common part of LSTM and GRU: X (steps, batch, inputs), W (1, gates H, inputs), R (1, gates H, H), B (1, 2 gates
+// H), initial states (1, batch, H).
 struct Recurrence {
   std::int64_t steps = 1, batch = 1, inputs = 1, hidden = 1, gates = 1;
   const float *x = nullptr, *W = nullptr, *R = nullptr;

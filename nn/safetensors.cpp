@@ -221,8 +221,8 @@ void append(std::string& bytes, T value) {
 
 void append_tensor(std::string& bytes, const std::string& name, const Tensor& tensor, TensorType type) {
   const std::optional<std::uint64_t> count = count_of(tensor.shape);
-  require(count == tensor.values.size(), fmt::format("tensor '{}': shape ({}) does not give the {} values found", name,
-                                                     fmt::join(tensor.shape, ", "), tensor.values.size()));
+  require(count == tensor.values.size(), "tensor '{}': shape ({}) does not give the {} values found", name,
+          fmt::join(tensor.shape, ", "), tensor.values.size());
   for (const float value : tensor.values) {
     if (!std::isfinite(value))  // the sentence is made only where it is needed: files hold many numbers
       throw std::invalid_argument(fmt::format("tensor '{}': expected finite numbers, found {}", name, value));
@@ -238,13 +238,10 @@ void append_tensor(std::string& bytes, const std::string& name, const Tensor& te
 }
 
 std::string header_text(const Json& header) {
-  try {
-    std::string text = dumped(header);
-    text.append((kAlignment - text.size() % kAlignment) % kAlignment, ' ');
-    return text;
-  } catch (const Json::type_error&) {
-    throw std::invalid_argument("safetensors: expected names and metadata in UTF-8, found other bytes");
-  }
+  std::string text = dumped(header);
+  require(Json::parse(text) == header, "safetensors: expected names and metadata in UTF-8, found other bytes");
+  text.append((kAlignment - text.size() % kAlignment) % kAlignment, ' ');
+  return text;
 }
 
 }  // namespace
@@ -262,7 +259,7 @@ std::string safetensors_bytes(const SafeTensors& content, TensorType type) {
   if (!content.metadata.empty()) header[kMetadata] = content.metadata;
   std::string data;
   for (const auto& [name, tensor] : content.tensors) {
-    require(name != kMetadata, fmt::format("a tensor cannot have the name '{}'", kMetadata));
+    require(name != kMetadata, "a tensor cannot have the name '{}'", kMetadata);
     const std::size_t begin = data.size();
     const TensorType stored = tensor.type.value_or(type);
     append_tensor(data, name, tensor, stored);

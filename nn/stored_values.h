@@ -16,7 +16,7 @@ Tensor columns_tensor(const Eigen::Ref<const Eigen::MatrixXf>& matrix);
 const Tensor& tensor_named(const SafeTensors& content, const std::string& name, const std::string& file);
 Eigen::VectorXf vector_of(const SafeTensors& content, const std::string& name, Eigen::Index size,
                           const std::string& file);
-// What columns_tensor made.
+// The matrix that columns_tensor stored.
 Eigen::MatrixXf columns_of(const SafeTensors& content, const std::string& name, Eigen::Index rows, Eigen::Index columns,
                            const std::string& file);
 std::string text_of(const SafeTensors& content, const std::string& key, const std::string& file);

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/core/zip.h"
 
 namespace duet {
 namespace {

@@ -16,7 +16,7 @@ struct TorchArchive {
 
   // Throws InputError("'policy.pt': TorchScript: PROBLEM").
   [[noreturn]] void refuse(const std::string& problem) const;
-  // Those numbers of data/`number`, which are to be finite; throws likewise.
+  // The numbers of data/`number`, which are to be finite; throws likewise.
   [[nodiscard]] const std::vector<float>& finite(int number) const;
 };
 

@@ -65,7 +65,7 @@ std::string plain_name(std::string name) {
   return name;
 }
 
-// What an expression of the code stands for.
+// The value that an expression of the code stands for.
 struct Value {
   enum class Kind { kNone, kNumber, kGraph, kStored, kTuple };
   Kind kind = Kind::kNone;
@@ -260,7 +260,7 @@ class GraphReader {
 
   // ---- modules
 
-  // What the method of the module makes of its arguments. `path`: its name within the file's module.
+  // The result of the module's method for its arguments. `path`: its name within the file's module.
   Value call(int place, const std::string& path, const std::string& method, std::vector<Value> arguments, int depth) {
     const TorchNode& object = pickle_.nodes[place];
     if (object.kind != TorchKind::kObject) refuse(fmt::format("'{}', which is no module", path));
@@ -331,7 +331,7 @@ class GraphReader {
     return made;
   }
 
-  // As it is evaluated, not trained.
+  // Batch normalisation as it is evaluated, not trained.
   Value batch_norm(const TorchNode& object, const std::string& path, const std::string& value) {
     const std::string mean = vector_of(object, path, "running_mean");
     const std::string shifted = add_value(path + "/shift", "Sub", {value, mean}).name;
@@ -390,7 +390,7 @@ class GraphReader {
             gate_constant(name + ".B", std::move(bias), {1, 2 * gates * R.sizes[1]}), R.sizes[1]};
   }
 
-  // Of the part `layer` of a state (layers, 1, hidden).
+  // The name of the part `layer` of a state (layers, 1, hidden).
   std::string state_of_layer(const std::string& state, int layer, int layers) {
     if (layers == 1) return state;
     return add_value(fmt::format("{}/{}", state, layer), "Slice",

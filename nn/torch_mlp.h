@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// What a module remembers from one evaluation to the next: an input of the graph, and the output that follows it.
+// A state that a module keeps from one evaluation to the next: an input of the graph, and the output that follows it.
 struct TorchState {
   std::string input, output;
 };

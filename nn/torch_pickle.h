@@ -1,4 +1,4 @@
-// What a TorchScript archive's data.pkl says: a module, its members, and which numbers its tensors are. Only the
+// The content of a TorchScript archive's data.pkl: a module, its members, and which numbers its tensors are. Only the
 // opcodes that PyTorch's own writer uses are read, and nothing is ever executed. Internal to nn/.
 #pragma once
 

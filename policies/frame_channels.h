@@ -1,5 +1,5 @@
-// What the channels of one frame show of partner and robot: the same numbers for D-STAR, networks of others and
-// programs of others.
+// The channels of one frame, which show partner and robot: the same numbers for D-STAR, networks of others and programs
+// of others.
 #pragma once
 
 #include <span>
@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// What positions and orientations of an observation refer to.
+// The frame that positions and orientations of an observation refer to.
 enum class PolicyFrame {
   kWorld,  // W; the robot's root since the episode's start
   kEgo,    // E: on the ground below the robot's root as it is now, x along its heading; joints of the partner from its
@@ -32,7 +32,7 @@ class FrameSenses {
   static FrameSenses in_ego(const ObservationFrame& frame, const RobotModel& robot, std::span<const int> joints,
                             const Pose& X_EW);
 
-  // Of a kind that frame_channels may have; std::logic_error for another.
+  // Writes a channel of a kind that frame_channels may have; std::logic_error for another.
   void show(ChannelKind kind, ChannelWriter& out) const;
 
  private:

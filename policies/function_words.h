@@ -1,5 +1,5 @@
-// English words that say little: the built-in language encoder leaves them out of phrases. What words mean tasks, the
-// tasks' definitions say (tasks/task_definition.h).
+// English words that say little: the built-in language encoder leaves them out of phrases. The tasks' definitions say
+// which words mean tasks (tasks/task_definition.h).
 #pragma once
 
 #include <span>

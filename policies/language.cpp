@@ -10,8 +10,8 @@
 #include <set>
 #include <utility>
 
+#include "duet/archives/npy/npz.h"
 #include "duet/core/names.h"
-#include "duet/core/npz.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
 #include "duet/policies/function_words.h"
@@ -90,7 +90,7 @@ class BuiltInLanguage final : public LanguageEncoder {
 
   [[nodiscard]] std::vector<float> embed(std::string_view prompt) const override {
     const Weights weights = weights_of(prompt);
-    require(!weights.empty(), fmt::format("language: expected a prompt with a word, found '{}'", prompt));
+    require(!weights.empty(), "language: expected a prompt with a word, found '{}'", prompt);
     std::vector<double> sum(kLanguageSize, 0.0);
     for (const auto& [key, weight] : weights) add_direction(key, weight, sum);
     double square = 0.0;
@@ -112,7 +112,7 @@ class BuiltInLanguage final : public LanguageEncoder {
     }
   }
 
-  // What the text is made of -> how much that counts; each part once, however often it is said.
+  // The parts of the text -> how much each counts; each part once, however often it is said.
   [[nodiscard]] Weights weights_of(std::string_view prompt) const {
     Weights weights;
     Words content;
@@ -177,10 +177,9 @@ class LanguageTable final : public LanguageEncoder {
   [[nodiscard]] int size() const override { return size_; }
   [[nodiscard]] std::vector<float> embed(std::string_view prompt) const override {
     const Words words = split_words(prompt);
-    require(!words.empty(), fmt::format("language: expected a prompt with a word, found '{}'", prompt));
+    require(!words.empty(), "language: expected a prompt with a word, found '{}'", prompt);
     const auto found = rows_.find(joined(words));
-    require(found != rows_.end(),
-            fmt::format("language table {}: {}", path_, unknown_name_message("prompt", prompt, prompts_)));
+    require(found != rows_.end(), "language table {}: {}", path_, unknown_name_message("prompt", prompt, prompts_));
     return found->second;
   }
 
@@ -220,8 +219,7 @@ std::unique_ptr<LanguageEncoder> load_language_table(const std::string& path) {
 }
 
 double cosine(const std::vector<float>& a, const std::vector<float>& b) {
-  require(a.size() == b.size(),
-          fmt::format("cosine: expected vectors of one size, found {} and {}", a.size(), b.size()));
+  require(a.size() == b.size(), "cosine: expected vectors of one size, found {} and {}", a.size(), b.size());
   double ab = 0.0, aa = 0.0, bb = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     ab += static_cast<double>(a[i]) * b[i];

@@ -1,7 +1,5 @@
 #include "duet/policies/on_other_body.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -67,8 +65,8 @@ std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, std::share
   const std::vector<std::string> ours = made_for->joint_names(), theirs = body.joint_names();
   require(std::ranges::any_of(ours,
                               [&](const std::string& name) { return std::ranges::find(theirs, name) != theirs.end(); }),
-          fmt::format("policy '{}': robot '{}' has no joint of robot '{}', which it was made for", policy->name(),
-                      body.name, made_for->name));
+          "policy '{}': robot '{}' has no joint of robot '{}', which it was made for", policy->name(), body.name,
+          made_for->name);
   return std::make_unique<OnOtherBody>(std::move(policy), std::move(made_for), body);
 }
 

@@ -1,7 +1,5 @@
 #include "duet/policies/phase_adaptation.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -19,27 +17,25 @@ namespace {
 
 void check_joints(const RobotMotion& motion, const RobotModel& robot) {
   require(static_cast<int>(motion.joint_names.size()) == robot.dof(),
-          fmt::format("phase adaptation: expected the {} joints of robot '{}', found {}", robot.dof(), robot.name,
-                      motion.joint_names.size()));
+          "phase adaptation: expected the {} joints of robot '{}', found {}", robot.dof(), robot.name,
+          motion.joint_names.size());
   for (int j = 0; j < robot.dof(); ++j) {
     const auto k = static_cast<std::size_t>(j);
-    require(motion.joint_names[k] == robot.joints[k].name,
-            fmt::format("phase adaptation: expected joint {} to be '{}', found '{}'", j, robot.joints[k].name,
-                        motion.joint_names[k]));
+    require(motion.joint_names[k] == robot.joints[k].name, "phase adaptation: expected joint {} to be '{}', found '{}'",
+            j, robot.joints[k].name, motion.joint_names[k]);
   }
 }
 
 void check(const RobotMotion& motion, const Phases& phases, const RobotModel& robot, const AdaptationOptions& options) {
   validate(motion, "phase adaptation");
-  require(motion.rate_hz == kTickRate,
-          fmt::format("phase adaptation: expected a motion at {} Hz, found {} Hz", kTickRate, motion.rate_hz));
+  require(motion.rate_hz == kTickRate, "phase adaptation: expected a motion at {} Hz, found {} Hz", kTickRate,
+          motion.rate_hz);
   check_joints(motion, robot);
   require(0 <= phases.act_begin && phases.act_begin < phases.act_end && phases.act_end <= motion.frames(),
-          fmt::format("phase adaptation: expected an act inside [0, {}), found [{}, {})", motion.frames(),
-                      phases.act_begin, phases.act_end));
+          "phase adaptation: expected an act inside [0, {}), found [{}, {})", motion.frames(), phases.act_begin,
+          phases.act_end);
   const auto check_option = [](const char* name, double value) {
-    require(std::isfinite(value) && value >= 0.0,
-            fmt::format("phase adaptation: expected {} >= 0, found {}", name, value));
+    require(std::isfinite(value) && value >= 0.0, "phase adaptation: expected {} >= 0, found {}", name, value);
   };
   check_option("start_radius", options.start_radius);
   check_option("lead", options.lead);
@@ -63,7 +59,7 @@ RobotMotion cut(const RobotMotion& motion, int begin, int end) {
           motion.q.middleCols(begin, end - begin)};
 }
 
-// What kAct does to one motion whose base may be the trunk. Frames and phases are those of that motion.
+// Applies kAct to one motion whose base may be the trunk. Frames and phases are those of that motion.
 class Adaptation {
  public:
   Adaptation(RobotMotion& motion, const Phases& phases, const RobotModel& robot)

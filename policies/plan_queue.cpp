@@ -137,19 +137,19 @@ class QueuedPolicy final : public Policy {
 
 std::shared_ptr<PlanQueue> PlanQueue::make(PlanQueueOptions options) {
   require(options.patience >= 0.0 && std::isfinite(options.patience),
-          fmt::format("plan queue: patience: expected 0 s or more, found {}", options.patience));
-  require(options.share > 0.0 && options.share <= 1.0,
-          fmt::format("plan queue: share: expected a number in (0, 1], found {}", options.share));
+          "plan queue: patience: expected 0 s or more, found {}", options.patience);
+  require(options.share > 0.0 && options.share <= 1.0, "plan queue: share: expected a number in (0, 1], found {}",
+          options.share);
   return std::shared_ptr<PlanQueue>(new PlanQueue(std::move(options)));
 }
 
 PolicyMaker PlanQueue::maker(std::shared_ptr<const RobotModel> robot) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", options_.name));
+  require(robot != nullptr, "policy '{}' needs a robot", options_.name);
   const std::lock_guard lock(mutex_);
   if (!robot_) robot_ = robot;
   require(robot->joint_names() == robot_->joint_names(),
-          fmt::format("policy '{}': expected the joints of robot '{}', found those of '{}'", options_.name,
-                      robot_->name, robot->name));
+          "policy '{}': expected the joints of robot '{}', found those of '{}'", options_.name, robot_->name,
+          robot->name);
   return
       [queue = shared_from_this(), robot = std::move(robot)] { return std::make_unique<QueuedPolicy>(queue, robot); };
 }
@@ -238,8 +238,8 @@ void PlanQueue::answer(const PlanRequest& request, std::span<const double> numbe
   const std::shared_ptr<const RobotModel> body = robot();
   const int width = kBeforeJoints + body->dof();
   require((rows == kAnchors || rows == kDensePlan) && numbers.size() == static_cast<std::size_t>(rows * width),
-          fmt::format("policy '{}': plan: expected ({}, {}) or ({}, {}) numbers, found {} rows and {} numbers",
-                      options_.name, kAnchors, width, kDensePlan, width, rows, numbers.size()));
+          "policy '{}': plan: expected ({}, {}) or ({}, {}) numbers, found {} rows and {} numbers", options_.name,
+          kAnchors, width, kDensePlan, width, rows, numbers.size());
   const std::string fault = fault_of_plan(numbers, rows);
   std::vector<Reference> plan;
   if (fault.empty()) plan = references_of(numbers, rows, *body);

@@ -19,7 +19,7 @@
 
 namespace duet {
 
-// What an episode asks; it owns its numbers, as the episode may have given up before they are read.
+// The question of an episode; it owns its numbers, as the episode may have given up before they are read.
 struct PlanRequest {
   std::int64_t episode = 0;  // counts the episodes of a queue, by their first question: tells apart those under way
   int tick = 0;              // 50 Hz ticks since the episode's start
@@ -50,7 +50,7 @@ class PlanQueue : public std::enable_shared_from_this<PlanQueue> {
   // Makes policies of episodes that ask here. All have the joints of the first robot: throws std::invalid_argument for
   // one of other joints.
   PolicyMaker maker(std::shared_ptr<const RobotModel> robot);
-  // Of the robot; null before maker().
+  // The model of the robot; null before maker().
   [[nodiscard]] std::shared_ptr<const RobotModel> robot() const;
 
   // Waits until `share` of the episodes under way ask, or for `seconds`; returns those that ask, by episode. None:
@@ -62,7 +62,7 @@ class PlanQueue : public std::enable_shared_from_this<PlanQueue> {
   void answer(const PlanRequest& request, std::span<const double> numbers, int rows);
   // The episode ends as an error with this sentence.
   void refuse(const PlanRequest& request, const std::string& why);
-  // Nobody answers any more: episodes that ask, now and later, end with this sentence.
+  // Ends the answers: episodes that ask, now and later, end with this sentence.
   void close(const std::string& why);
   [[nodiscard]] bool closed() const;
 

@@ -46,7 +46,7 @@ bool is_finite(const Observation& observation);
 // w, x, y, z with w >= 0: q and -q are one orientation.
 Eigen::Vector4d wxyz_of(const Eigen::Quaterniond& R);
 
-// What a policy may know when an episode starts. Only `replay` looks at `hindsight`.
+// The facts that a policy may know when an episode starts. Only `replay` looks at `hindsight`.
 struct EpisodeContext {
   Task task = Task::kHug;
   std::string prompt;  // the language command
@@ -56,8 +56,8 @@ struct EpisodeContext {
   std::function<bool()> stop_asked = {};  // asked while a policy waits for a program; true: give up, no fault
 };
 
-// What went wrong since reset, of policies that can fail: a process that is late or dies, a network whose numbers are
-// not finite. A plan that fails is left out; the scheduler then holds the last one (F).
+// Faults since reset, of policies that can fail: a process that is late or dies, a network whose numbers are not
+// finite. A plan that fails is left out; the scheduler then holds the last one (F).
 struct PolicyFaults {
   int late = 0;         // no plan in time
   int invalid = 0;      // not finite, of the wrong size, not unit
@@ -79,14 +79,14 @@ class Policy {
   virtual void reset(const EpisodeContext& context) = 0;
   // Anchors at observation.tick / 50 + {0, ..., 2} s.
   virtual Anchors act(const Observation& observation) = 0;
-  // What the scheduler gets: references at observation.tick + {0, 1, ...} ticks. Algorithm 8 on act(), unless a policy
-  // knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 % of one
-  // of 1 Hz (docs/deviations.md). Empty: no plan this time (see PolicyFaults).
+  // The plan for the scheduler: references at observation.tick + {0, 1, ...} ticks. Algorithm 8 on act(), unless a
+  // policy knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 %
+  // of one of 1 Hz (docs/deviations.md). Empty: no plan this time (see PolicyFaults).
   virtual std::vector<Reference> plan(const Observation& observation);
   [[nodiscard]] virtual PolicyFaults faults() const { return {}; }
 };
 
-// What a suite may set of one policy, by name ("network", "prompt", ...); values as written there.
+// The options that a suite may set of one policy, by name ("network", "prompt", ...); values as written there.
 using PolicyOptions = std::map<std::string, std::string>;
 
 struct PolicyOption {

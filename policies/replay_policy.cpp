@@ -1,7 +1,5 @@
 #include "duet/policies/replay_policy.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -19,11 +17,11 @@ void ReplayPolicy::reset(const EpisodeContext& context) {
   const RobotMotion& motion = *context.hindsight;
   validate(motion, "policy 'replay'");
   require(motion.frames() > 0, "policy 'replay': expected a motion with frames, found none");
-  require(motion.rate_hz == kTickRate,
-          fmt::format("policy 'replay': expected a motion at {} Hz, found {} Hz", kTickRate, motion.rate_hz));
+  require(motion.rate_hz == kTickRate, "policy 'replay': expected a motion at {} Hz, found {} Hz", kTickRate,
+          motion.rate_hz);
   require(motion.joint_names == robot_->joint_names(),
-          fmt::format("policy 'replay': expected the {} joints of robot '{}' in its order, found {} others",
-                      robot_->dof(), robot_->name, motion.joint_names.size()));
+          "policy 'replay': expected the {} joints of robot '{}' in its order, found {} others", robot_->dof(),
+          robot_->name, motion.joint_names.size());
   motion_ = motion;
 }
 

@@ -35,17 +35,16 @@ void check(const Reference& reference, const char* what) {
 
 Scheduler::Scheduler(const SchedulerOptions& options) : options_(options) {
   const auto check_ticks = [](const char* name, int ticks) {
-    require(1 <= ticks && ticks <= kMostFuseTicks,
-            fmt::format("scheduler: expected {} in 1..{}, found {}", name, kMostFuseTicks, ticks));
+    require(1 <= ticks && ticks <= kMostFuseTicks, "scheduler: expected {} in 1..{}, found {}", name, kMostFuseTicks,
+            ticks);
   };
   check_ticks("fuse_ticks", options.fuse_ticks);
   check_ticks("late_after_ticks", options.late_after_ticks);
-  require(options.max_root_speed > 0.0,
-          fmt::format("scheduler: expected max_root_speed > 0, found {}", options.max_root_speed));
-  require(options.max_root_yaw_rate > 0.0,
-          fmt::format("scheduler: expected max_root_yaw_rate > 0, found {}", options.max_root_yaw_rate));
+  require(options.max_root_speed > 0.0, "scheduler: expected max_root_speed > 0, found {}", options.max_root_speed);
+  require(options.max_root_yaw_rate > 0.0, "scheduler: expected max_root_yaw_rate > 0, found {}",
+          options.max_root_yaw_rate);
   require(options.late_factor > 0.0 && options.late_factor <= 1.0,
-          fmt::format("scheduler: expected late_factor in (0, 1], found {}", options.late_factor));
+          "scheduler: expected late_factor in (0, 1], found {}", options.late_factor);
 }
 
 void Scheduler::reset(const Reference& start) {
@@ -66,10 +65,10 @@ void Scheduler::push(const Anchors& anchors, int tick) {
 void Scheduler::push(std::vector<Reference> plan, int tick) {
   require(!plan.empty(), "scheduler: expected a plan with references, found none");
   for (const Reference& reference : plan) check_plan(reference);
-  require(plan_.empty() || tick > plan_start_,
-          fmt::format("scheduler: expected a plan made after tick {}, found {}", plan_start_, tick));
-  require(!asked_ || tick <= tick_ + 1,
-          fmt::format("scheduler: expected a plan made at tick {} or before, found {}", tick_ + 1, tick));
+  require(plan_.empty() || tick > plan_start_, "scheduler: expected a plan made after tick {}, found {}", plan_start_,
+          tick);
+  require(!asked_ || tick <= tick_ + 1, "scheduler: expected a plan made at tick {} or before, found {}", tick_ + 1,
+          tick);
   const int next = asked_ ? tick_ + 1 : tick;
   std::vector<Reference> before;
   if (plan_.empty() || late_) {
@@ -86,9 +85,8 @@ void Scheduler::push(std::vector<Reference> plan, int tick) {
 
 const Reference& Scheduler::at(int tick) {
   require(started_, "scheduler: reset comes before the first tick");
-  require(!asked_ || tick == tick_ + 1, fmt::format("scheduler: expected tick {}, found {}", tick_ + 1, tick));
-  require(plan_.empty() || tick >= plan_start_,
-          fmt::format("scheduler: expected tick {} or later, found {}", plan_start_, tick));
+  require(!asked_ || tick == tick_ + 1, "scheduler: expected tick {}, found {}", tick_ + 1, tick);
+  require(plan_.empty() || tick >= plan_start_, "scheduler: expected tick {} or later, found {}", plan_start_, tick);
   asked_ = true;
   tick_ = tick;
   late_ = plan_.empty() || tick - plan_start_ >= options_.late_after_ticks;
@@ -110,7 +108,7 @@ void Scheduler::check_plan(const Reference& reference) const {
         fmt::format("scheduler: plan: expected {} joints, found {}", last_.q.size(), reference.q.size()));
 }
 
-// Of the new plan, in [0, 1].
+// The weight of the new plan, in [0, 1].
 double Scheduler::weight(int tick) const {
   return std::min(1.0, static_cast<double>(tick - takeover_) / options_.fuse_ticks);
 }

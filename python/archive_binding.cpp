@@ -6,28 +6,28 @@
 #include <string>
 #include <utility>
 
-#include "duet/bench/clips.h"
-#include "duet/bench/motion_scores.h"
-#include "duet/bench/recording_scores.h"
+#include "duet/archives/npy/npz.h"
+#include "duet/archives/recording_file.h"
 #include "duet/core/file.h"
 #include "duet/core/naming_file.h"
-#include "duet/core/npz.h"
-#include "duet/core/recording.h"
 #include "duet/core/require.h"
 #include "duet/datasets/dataset_folder.h"
 #include "duet/datasets/people_clip.h"
+#include "duet/experiment/plan/clips.h"
 #include "duet/formats/robot_motion_format.h"
 #include "duet/metrics/detector.h"
 #include "duet/motion/paired_motion.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_detection.h"
-#include "duet/motion/people/people_formats.h"
 #include "duet/motion/phase_proposal.h"
 #include "duet/motion/plausibility.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/python/bindings.h"
-#include "duet/results/rows/json_fields.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/robot_model.h"
+#include "duet/rows/json_fields.h"
+#include "duet/scoring/motion_scores.h"
+#include "duet/scoring/recording_scores.h"
 
 namespace duet::python {
 namespace {
@@ -105,7 +105,7 @@ Archive paired_archive(const PairedMotion& motion) {
 }
 
 Person person_of(const std::string& name) {
-  require(name == "A" || name == "B", fmt::format("reactor: expected A or B, found '{}'", name));
+  require(name == "A" || name == "B", "reactor: expected A or B, found '{}'", name);
   return name == "A" ? Person::kA : Person::kB;
 }
 
@@ -129,7 +129,7 @@ Archive make_clip(const Numbers& a, const Numbers& b, double rate_hz, const std:
 
 Archive retarget_clip(const Archive& archive, const Texts& options, const std::string& card,
                       const std::string& reactor) {
-  require(archive.kind == "clip", fmt::format("retarget: expected a clip of two people, found a {}", archive.kind));
+  require(archive.kind == "clip", "retarget: expected a clip of two people, found a {}", archive.kind);
   InteractionClip clip = read_clip(archive.npz);
   if (!reactor.empty()) set_reactor(clip, person_of(reactor));
   return paired_archive(retarget(clip, *load_shared_robot(card), pair_options_from(options)));
@@ -156,7 +156,7 @@ std::string score(const Archive& archive, const Texts& readings, const std::stri
   return dumped(score_json({scored}, summarize_scores({scored}, options.readings.metrics)).at("clips").at(0));
 }
 
-// The two whom a detector looks at: the human first. Of a clip, the reactor stands for the robot.
+// The two whom a detector looks at: the human first. In a clip, the reactor stands for the robot.
 std::pair<Agent, Agent> agents_of(const Archive& archive, const std::string& card) {
   if (archive.kind == "clip") {
     const InteractionClip clip = read_clip(archive.npz);
@@ -175,8 +175,7 @@ std::pair<Agent, Agent> agents_of(const Archive& archive, const std::string& car
 
 std::string detect_in(const Archive& archive, const std::string& task, const std::string& version,
                       const std::string& thresholds, const std::string& card) {
-  require(version == "robot" || version == "paper",
-          fmt::format("version: expected robot or paper, found '{}'", version));
+  require(version == "robot" || version == "paper", "version: expected robot or paper, found '{}'", version);
   const auto [human, robot] = agents_of(archive, card);
   const DetectorResult result =
       detect(parse_task(task), human, robot, version == "robot" ? DetectorVersion::kRobot : DetectorVersion::kPaper,
@@ -208,7 +207,7 @@ class PeopleReader {
   [[nodiscard]] std::size_t size() const { return places_.size(); }
   [[nodiscard]] std::string format() const { return std::string(format_->name); }
   [[nodiscard]] std::pair<Archive, std::vector<std::string>> at(std::size_t i) const {
-    require(i < places_.size(), fmt::format("people: expected a place below {}, found {}", places_.size(), i));
+    require(i < places_.size(), "people: expected a place below {}, found {}", places_.size(), i);
     const PeopleClip read = read_people_clip(*format_, places_[i], options_);
     if (!read.source)
       throw InputError(fmt::format("'{}': its label '{}' is none of the tasks: say which it is (task=...)",
@@ -244,8 +243,8 @@ Archive motion_archive(const RobotMotionFile& file) {
 
 RobotMotion robot_motion_of(const Archive& archive) {
   if (archive.kind == "paired") return read_paired_motion(archive.npz).robot;
-  require(archive.kind == "robot",
-          fmt::format("robot motion: expected a paired motion or one of a robot, found a {}", archive.kind));
+  require(archive.kind == "robot", "robot motion: expected a paired motion or one of a robot, found a {}",
+          archive.kind);
   const Npz& npz = archive.npz;
   RobotMotion motion{npz.number("rate_hz"), npz.strings("joint_names", {-1}), {}, {}};
   const std::vector<double> p = npz.numbers("root_position", {-1, 3}), w = npz.numbers("root_quat_wxyz", {-1, 4}),

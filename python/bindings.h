@@ -1,4 +1,4 @@
-// What the module duet._duet is made of. pybind11 appears in this folder alone, and nothing here computes: each
+// Parts of the module duet._duet. pybind11 appears in this folder alone, and nothing here computes: each
 // function calls one of the library, with the interpreter's lock released where that takes long. Texts that have a
 // structure cross as JSON.
 #pragma once
@@ -30,7 +30,7 @@ py::array view_of(const T* data, const std::vector<py::ssize_t>& shape, const st
   return array;
 }
 
-// In C order.
+// A view of an array in C order.
 template <typename T>
 py::array view_of(const T* data, const std::vector<py::ssize_t>& shape, const py::object& owner) {
   std::vector<py::ssize_t> strides(shape.size(), sizeof(T));

@@ -10,12 +10,12 @@
 #include <tuple>
 #include <vector>
 
-#include "duet/bench/led_episodes.h"
-#include "duet/bench/shipped_suites.h"
 #include "duet/core/require.h"
+#include "duet/execution/led_episodes.h"
+#include "duet/experiment/plan/shipped_suites.h"
 #include "duet/python/bindings.h"
-#include "duet/results/rows/episode_row.h"
-#include "duet/results/rows/json_fields.h"
+#include "duet/rows/episode_row.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet::python {
 namespace {
@@ -29,7 +29,7 @@ struct Part {
 class EpisodeBatch {
  public:
   EpisodeBatch(std::shared_ptr<const LedSuite> suite, int n, Led led) : suite_(std::move(suite)), led_(led) {
-    require(n >= 1 && n <= 4096, fmt::format("n: expected 1 to 4096 episodes, found {}", n));
+    require(n >= 1 && n <= 4096, "n: expected 1 to 4096 episodes, found {}", n);
     joints_ = suite_->robot()->dof();
     numbers_ = 91 + 2 * joints_;
     for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(suite_, led));
@@ -50,8 +50,7 @@ class EpisodeBatch {
 
   // Begins episode numbers[i] at place places[i]; all compute at once.
   void reset(const std::vector<int>& places, const std::vector<int>& numbers) {
-    require(places.size() == numbers.size(),
-            fmt::format("reset: expected {} episodes, found {}", places.size(), numbers.size()));
+    require(places.size() == numbers.size(), "reset: expected {} episodes, found {}", places.size(), numbers.size());
     for (const int place : places) check(place);
     for (std::size_t i = 0; i < places.size(); ++i) {
       episodes_[places[i]]->start(numbers[i]);
@@ -95,7 +94,7 @@ class EpisodeBatch {
 
  private:
   void check(int place) const {
-    require(place >= 0 && place < size(), fmt::format("episode: expected a place below {}, found {}", size(), place));
+    require(place >= 0 && place < size(), "episode: expected a place below {}, found {}", size(), place);
   }
 
   void show(int place, const std::shared_ptr<const PlanRequest>& request) {
@@ -205,8 +204,8 @@ std::shared_ptr<LedSuite> led_suite(const std::string& suite, const Overrides& o
 }
 
 std::tuple<std::string, std::string, std::string> about_episode(const LedSuite& suite, int episode) {
-  require(episode >= 0 && episode < suite.size(),
-          fmt::format("episode: expected a number below {}, found {}", suite.size(), episode));
+  require(episode >= 0 && episode < suite.size(), "episode: expected a number below {}, found {}", suite.size(),
+          episode);
   const PairedMotion& clip = *suite.at(episode).clip;
   return {clip.clip_id, std::string(to_string(clip.task)), suite.prompt(episode)};
 }

@@ -14,24 +14,24 @@
 #include <utility>
 
 #include "duet/backends/factory.h"
-#include "duet/bench/clips.h"
-#include "duet/bench/missing_tags.h"
-#include "duet/bench/run_identity.h"
-#include "duet/bench/runner.h"
-#include "duet/bench/shipped_suites.h"
-#include "duet/bench/story.h"
-#include "duet/bench/suite_actors.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
 #include "duet/core/plain_name.h"
 #include "duet/core/require.h"
+#include "duet/execution/missing_tags.h"
+#include "duet/execution/runner.h"
+#include "duet/execution/story.h"
+#include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/run_identity.h"
+#include "duet/experiment/plan/shipped_suites.h"
+#include "duet/experiment/suite_file/suite_actors.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/plan_queue.h"
-#include "duet/policies/registry.h"
 #include "duet/python/bindings.h"
-#include "duet/results/analyses/leaderboard_rows.h"
-#include "duet/results/report/run_analyses.h"
-#include "duet/results/rows/json_fields.h"
-#include "duet/results/statistics/resolution.h"
+#include "duet/report/page/run_analyses.h"
+#include "duet/report/ranking/leaderboard_rows.h"
+#include "duet/report/ranking/resolution.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet::python {
 namespace {
@@ -64,8 +64,7 @@ void add_policies(const std::vector<AskedPolicy>& asked, const std::string& dire
     const std::vector<std::string> known = policy_names_of(suite);
     const bool there = std::ranges::find(known, policy.name) != known.end() || policy.name == kNullPolicy;
     if (!there || !policy.options.empty()) {
-      require(!there,
-              fmt::format("policy '{}' is the suite's own: expected another name for the function", policy.name));
+      require(!there, "policy '{}' is the suite's own: expected another name for the function", policy.name);
       require(is_plain_name(policy.name), plain_name_message(policy.name));
       SuitePolicy added{.name = policy.name, .use = policy.use, .options = policy.options};
       check_options_of(added);
@@ -165,7 +164,7 @@ std::unique_ptr<Evaluation> start(const SuiteQuestion& question, const std::vect
                                   const std::map<std::string, std::vector<std::string>>& only,
                                   const std::string& output, int jobs, bool retry_errors, bool replace, bool quiet,
                                   const std::vector<std::string>& argv) {
-  require(jobs >= 1 && jobs <= 1024, fmt::format("jobs: expected 1 to 1024, found {}", jobs));
+  require(jobs >= 1 && jobs <= 1024, "jobs: expected 1 to 1024, found {}", jobs);
   Suite suite = suite_of(question);
   RunOptions options;
   options.threads = jobs;

@@ -1,4 +1,4 @@
-// The module duet._duet (docs/python.md).
+// The module duet._duet (docs/using-duet.md).
 #include <pybind11/pybind11.h>
 
 #include "duet/core/file.h"

@@ -81,8 +81,8 @@ void add_observations(py::module_& module) {
       .def(
           "part",
           [](const Observations& batch, std::size_t i) {
-            require(i < batch.requests.size(),
-                    fmt::format("observations: expected a place below {}, found {}", batch.requests.size(), i));
+            require(i < batch.requests.size(), "observations: expected a place below {}, found {}",
+                    batch.requests.size(), i);
             return Observations{{batch.requests[i]}, batch.robot};
           },
           py::arg("i"), "The question of one episode, as a batch of one.")

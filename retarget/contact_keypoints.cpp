@@ -17,16 +17,16 @@ namespace {
 double weight_of(std::string_view text, std::string_view entry) {
   const std::optional<double> value = parse_number(text);
   require(value.has_value() && *value >= 0.0,
-          fmt::format("keypoint '{}': expected a weight, a finite number of zero or more, found '{}'", entry, text));
+          "keypoint '{}': expected a weight, a finite number of zero or more, found '{}'", entry, text);
   return *value;
 }
 
 ContactKeypoint keypoint_of(std::string_view entry) {
   const std::vector<std::string_view> parts = split(entry, ':');
-  require(parts.size() <= 3, fmt::format("keypoint '{}': expected joint[@frame][:weight[:object]]", entry));
+  require(parts.size() <= 3, "keypoint '{}': expected joint[@frame][:weight[:object]]", entry);
   const std::vector<std::string_view> names = split(parts[0], '@');
   require(names.size() <= 2 && !(names.size() == 2 && names[1].empty()),
-          fmt::format("keypoint '{}': expected joint[@frame][:weight[:object]]", entry));
+          "keypoint '{}': expected joint[@frame][:weight[:object]]", entry);
   const auto joint = std::find(kSmplNames.begin(), kSmplNames.end(), names[0]);
   if (joint == kSmplNames.end()) {
     const std::vector<std::string> known(kSmplNames.begin(), kSmplNames.end());
@@ -40,7 +40,7 @@ ContactKeypoint keypoint_of(std::string_view entry) {
   return keypoint;
 }
 
-// What the card pairs with the joint: a keypoint of interaction, else one of the 16 pairs.
+// The frame that the card pairs with the joint: a keypoint of interaction, else one of the 16 pairs.
 int frame_of_card(const RobotModel& robot, int smpl) {
   for (const Keypoint& key : robot.keypoints)
     if (key.smpl == smpl) return key.frame;
@@ -61,7 +61,7 @@ std::vector<ContactKeypoint> parse_contact_keypoints(const std::string& text) {
   for (const std::string_view entry : split(text, ',')) {
     ContactKeypoint keypoint = keypoint_of(entry);
     for (const ContactKeypoint& other : keypoints)
-      require(other.smpl != keypoint.smpl, fmt::format("keypoint '{}': its joint is named twice", entry));
+      require(other.smpl != keypoint.smpl, "keypoint '{}': its joint is named twice", entry);
     keypoints.push_back(std::move(keypoint));
   }
   return keypoints;

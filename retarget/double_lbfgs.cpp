@@ -127,7 +127,7 @@ PairVariables DoubleLbfgs::choose_direction() const {
   return from_filtered(direction);
 }
 
-// To where the objective is lower along `direction`, remembering the step; false where there is no such place.
+// Moves to where the objective is lower along `direction`, remembering the step; false where there is no such place.
 bool DoubleLbfgs::go(const PairVariables& direction) {
   PairVariables& gradient = vectors_[LbfgsMemory::kGradient];
   const double longest = direction.frames.topRows(problem_.chain.dof()).cwiseAbs().maxCoeff();

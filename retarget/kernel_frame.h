@@ -57,7 +57,7 @@ struct Work {
   V a, b, c;  // its left Jacobian a I + b [w]x + c w w^T
 };
 
-// What one call of a stage works on: a block, and the first of the kWidth lanes.
+// The work of one call of a stage: a block, and the first of the kWidth lanes.
 struct Place {
   const Setup& setup;
   const Step& step;

@@ -1,7 +1,7 @@
-// What the SIMD kernels read and write: plain arrays of float, so that a kernel file (compiled for a wider instruction
-// set) shares no inline code with the rest of the program. One block = one frame of each of 16 time segments of the
-// sequence; a row = one quantity of a block, 16 lanes. Frame t of a sequence with S frames per segment lies in block
-// t mod S, lane t / S. Every instruction set works on this same layout, so AVX2 and AVX-512 give the same bits.
+// Data that the SIMD kernels read and write: plain arrays of float, so that a kernel file (compiled for a wider
+// instruction set) shares no inline code with the rest of the program. A block is one frame of each of 16 time segments
+// of the sequence, a row one quantity of a block, 16 lanes. Frame t of a sequence with S frames per segment lies in
+// block t mod S, lane t / S. Every instruction set works on this same layout, so AVX2 and AVX-512 give the same bits.
 #pragma once
 
 #include <cstddef>
@@ -61,7 +61,7 @@ struct Setup {
   int pair_point[kPairs];  // -1: the chain has no such point
   int key_point[kMaxKeys];
   int human_offset[kMaxKeys];
-  // Of the modes on the ground; the paper's kernel leaves them alone.
+  // Members for the modes on the ground; the paper's kernel leaves them alone.
   bool extended;
   bool upright;  // the root does not turn
   bool bones;

@@ -22,7 +22,7 @@ constexpr double kFarthestTurn = 1.0;  // of a joint along the direction in one 
 constexpr double kLongestTurn = 0.4;   // of it what is taken: longer turns jump into poor minima, and a few joints that
                                        // would turn far do not hold up the others
 
-// What a state of two values at a lane's beginning adds to the frames after it: the answers of the filter to 1.
+// The sum that a state of two values at a lane's beginning adds to the frames after it: the answers of the filter to 1.
 struct Answer {
   std::vector<float> first, second;                // until they have faded
   Eigen::Matrix2d over = Eigen::Matrix2d::Zero();  // from the state before a segment to that at its end
@@ -225,7 +225,7 @@ std::optional<LaneLbfgs::Step> LaneLbfgs::search(const Rows& direction, const Ei
   return std::nullopt;
 }
 
-// To next_, remembering the step; false where its curvature is of no use.
+// Moves to next_, remembering the step; false where its curvature is of no use.
 bool LaneLbfgs::take(const Step& step) {
   const int slot = memory_.next_slot();
   lanes_.kernel().step(whole(), x_.data() + lanes_.halo(), next_.data() + lanes_.halo(), here_.data(), there_.data(),

@@ -9,7 +9,7 @@
 
 namespace duet {
 
-// Of a kernel in lanes that runs here (kPortable or wider).
+// The functions of a kernel in lanes that runs here (kPortable or wider).
 const pair_kernel::LaneKernel& lane_kernel(KernelKind kind);
 
 bool kernel_fits(const PairProblem& problem);  // whether the robot fits the kernels' arrays

@@ -130,7 +130,7 @@ inline void move(const VectorSweep& at, const Row* x, const Row* direction, floa
   }
 }
 
-// What the kernel file gives out, under the name of its instruction set.
+// The functions that the kernel file exports, under the name of its instruction set.
 constexpr LaneKernel kKernel = {.sweep = sweep_blocks,
                                 .filter_gradient = filter_gradient,
                                 .step = step,

@@ -1,4 +1,4 @@
-// What L-BFGS remembers, as products of its vectors alone (Chen, Wang, Zhou 2014, "vector-free L-BFGS"): the two loops
+// The memory of L-BFGS, as products of its vectors alone (Chen, Wang, Zhou 2014, "vector-free L-BFGS"): the two loops
 // run on a few numbers, whatever the vectors are made of.
 #pragma once
 

@@ -1,7 +1,5 @@
 #include "duet/retarget/options.h"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "duet/core/names.h"
@@ -187,7 +185,7 @@ PairOptions make_pair_options(const std::vector<std::pair<std::string, std::stri
 
 void set_pair_option(PairOptions& options, const std::string& name, const std::string& value) {
   const std::string expected = set_field(known_option(name), options, value);
-  require(expected.empty(), fmt::format("pair option '{}' has no value '{}': {}", name, value, expected));
+  require(expected.empty(), "pair option '{}' has no value '{}': {}", name, value, expected);
 }
 
 std::string pair_option(const PairOptions& options, const std::string& name) {

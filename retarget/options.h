@@ -18,7 +18,7 @@ struct PairWeights {  // supplement A.1.2, stage 1
   double temp = 5.0;
   double acceleration = 1.0;  // w_a of L_temp, not given in the text
   double pose = 0.02;
-  // Not in the paper, of the modes on the ground.
+  // Weights of the modes on the ground; the paper does not have them.
   double bone = 0.0;       // the partner's bones, collars to wrists, keep their lengths
   double partner = 0.0;    // L_temp of the partner's offsets, as a share of `temp`
   double collision = 0.0;  // depth of spheres of the two bodies in each other

@@ -1,7 +1,5 @@
 #include "duet/retarget/pair_chain.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 
@@ -15,32 +13,32 @@ namespace {
 bool is_hand(int smpl) { return smpl == kLeftHand || smpl == kRightHand; }
 
 void check_pairs(const RobotModel& robot) {
-  require(robot.pairs.size() == kRetargetPairs,
-          fmt::format("robot '{}': expected the 16 retarget pairs of A.1.1, found {}", robot.name, robot.pairs.size()));
+  require(robot.pairs.size() == kRetargetPairs, "robot '{}': expected the 16 retarget pairs of A.1.1, found {}",
+          robot.name, robot.pairs.size());
   require(robot.pairs.front().smpl == kPelvis,
-          fmt::format("robot '{}': expected the pelvis as the first retarget pair, found SMPL joint {}", robot.name,
-                      robot.pairs.front().smpl));
+          "robot '{}': expected the pelvis as the first retarget pair, found SMPL joint {}", robot.name,
+          robot.pairs.front().smpl);
   for (int i = 0; i < kRetargetPairs; ++i) {
     const RetargetPair& pair = robot.pairs[i];
     const bool inside = pair.frame >= 0 && pair.frame < static_cast<int>(robot.frames.size()) && pair.smpl >= 0 &&
                         pair.smpl < kSmplJoints;
-    require(inside, fmt::format("robot '{}': retarget pair {} names frame {} and SMPL joint {}, which do not exist",
-                                robot.name, i, pair.frame, pair.smpl));
+    require(inside, "robot '{}': retarget pair {} names frame {} and SMPL joint {}, which do not exist", robot.name, i,
+            pair.frame, pair.smpl);
     for (int k = 0; k < i; ++k) {
-      require(robot.pairs[k].smpl != pair.smpl,
-              fmt::format("robot '{}': retarget pairs {} and {} name the same SMPL joint", robot.name, k, i));
+      require(robot.pairs[k].smpl != pair.smpl, "robot '{}': retarget pairs {} and {} name the same SMPL joint",
+              robot.name, k, i);
     }
   }
 }
 
 void check_links(const RobotModel& robot) {
   require(robot.links.size() == robot.joints.size() + 1,
-          fmt::format("robot '{}': expected one link more than joints, found {} links and {} joints", robot.name,
-                      robot.links.size(), robot.joints.size()));
+          "robot '{}': expected one link more than joints, found {} links and {} joints", robot.name,
+          robot.links.size(), robot.joints.size());
   for (std::size_t i = 1; i < robot.links.size(); ++i) {
     const int parent = robot.links[i].parent;
-    require(parent >= 0 && parent < static_cast<int>(i),
-            fmt::format("robot '{}': link '{}' comes before its parent", robot.name, robot.links[i].name));
+    require(parent >= 0 && parent < static_cast<int>(i), "robot '{}': link '{}' comes before its parent", robot.name,
+            robot.links[i].name);
   }
 }
 
@@ -67,8 +65,8 @@ std::vector<ChainJoint> make_joints(const RobotModel& robot, std::vector<Eigen::
     joint.turned = joint.rotation != Eigen::Matrix3d::Identity();
     joint.lower = robot.joints[i - 1].lower;
     joint.upper = robot.joints[i - 1].upper;
-    require(joint.lower <= joint.upper, fmt::format("robot '{}': joint '{}' has its lower limit above its upper",
-                                                    robot.name, robot.joints[i - 1].name));
+    require(joint.lower <= joint.upper, "robot '{}': joint '{}' has its lower limit above its upper", robot.name,
+            robot.joints[i - 1].name);
     joints.push_back(joint);
   }
   return joints;
@@ -103,13 +101,13 @@ std::vector<FrameAndJoint> choose_keypoints(const RobotModel& robot, ContactKeyp
   }
   const int expected = choice == ContactKeypoints::kSeven ? 7 : choice == ContactKeypoints::kNine ? 9 : 11;
   require(static_cast<int>(chosen.size()) == expected,
-          fmt::format("robot '{}': expected {} interaction keypoints (head, shoulders, elbows, wrists, ...), found {}",
-                      robot.name, expected, chosen.size()));
+          "robot '{}': expected {} interaction keypoints (head, shoulders, elbows, wrists, ...), found {}", robot.name,
+          expected, chosen.size());
   for (const FrameAndJoint& key : chosen) {
     const bool inside =
         key.frame >= 0 && key.frame < static_cast<int>(robot.frames.size()) && key.smpl >= 0 && key.smpl < kSmplJoints;
-    require(inside, fmt::format("robot '{}': a keypoint names frame {} and SMPL joint {}, which do not exist",
-                                robot.name, key.frame, key.smpl));
+    require(inside, "robot '{}': a keypoint names frame {} and SMPL joint {}, which do not exist", robot.name,
+            key.frame, key.smpl);
   }
   return chosen;
 }

@@ -14,7 +14,7 @@ struct PairTerms {
   double hum = 0.0;
   double temp = 0.0;  // velocity + w_a acceleration
   double pose = 0.0;
-  // Not in the paper.
+  // Terms that the paper does not have.
   double bone = 0.0;       // squared changes of the partner's arm bones, mean over frames
   double partner = 0.0;    // velocity + w_a acceleration of the partner's offsets
   double collision = 0.0;  // squared depths of spheres, mean over frames

@@ -1,7 +1,5 @@
 #include "duet/retarget/pair_problem.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "duet/core/require.h"
@@ -106,9 +104,8 @@ void stand_on_ground(const RobotModel& robot, const HumanMotion& source, const H
 PairProblem make_pair_problem(const InteractionClip& clip, const RobotModel& robot, const PairOptions& options) {
   const HumanMotion& source = clip.reactor_motion();
   const HumanMotion& partner = clip.actor_motion();
-  require(source.frames() >= kMinFrames,
-          fmt::format("clip '{}': retargeting needs at least {} frames at 50 Hz, found {}", clip.id, kMinFrames,
-                      source.frames()));
+  require(source.frames() >= kMinFrames, "clip '{}': retargeting needs at least {} frames at 50 Hz, found {}", clip.id,
+          kMinFrames, source.frames());
   PairProblem problem;
   problem.chain = make_chain(robot, options.keypoints, options.keypoint_list);
   if (options.keypoint_list.empty()) weigh_hands(options.weights.hand, problem.chain);

@@ -8,7 +8,7 @@
 
 namespace duet {
 
-// What one iteration does: its weights, its learning rate, and its place in Adam's count.
+// One iteration: its weights, its learning rate, and its place in Adam's count.
 struct PairIteration {
   PairWeights weights;
   double rate = 0.0;

@@ -71,10 +71,9 @@ KernelKind choose_kernel(const PairProblem& problem, const PairOptions& options)
     return kernel_fits(problem) ? available_kernels().front() : KernelKind::kScalar;
   }
   if (options.kernel == KernelKind::kScalar) return KernelKind::kScalar;
-  require(
-      kernel_fits(problem),
-      fmt::format("pair kernel '{}' has no room for {} joints, {} points and {} keypoints; use 'auto' or 'scalar'",
-                  to_string(options.kernel), problem.chain.dof(), problem.chain.points.size(), problem.chain.keys()));
+  require(kernel_fits(problem),
+          "pair kernel '{}' has no room for {} joints, {} points and {} keypoints; use 'auto' or 'scalar'",
+          to_string(options.kernel), problem.chain.dof(), problem.chain.points.size(), problem.chain.keys());
   if (!kernel_runs_here(options.kernel)) {
     throw MissingError(fmt::format("pair kernel '{}' cannot run on this processor; the best that can is '{}'",
                                    to_string(options.kernel), to_string(available_kernels().front())));

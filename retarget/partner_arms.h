@@ -1,5 +1,5 @@
-// What PAIR moves of the partner: shoulders, elbows and wrists, 6 offsets a frame; and his arm bones, whose lengths are
-// those of the source. Pure.
+// The parts of the partner that PAIR moves: shoulders, elbows and wrists, 6 offsets a frame; and his arm bones, whose
+// lengths are those of the source. Pure.
 #pragma once
 
 #include <Eigen/Core>

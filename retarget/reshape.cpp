@@ -1,11 +1,9 @@
 #include "duet/retarget/reshape.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/require.h"
 #include "duet/core/skeleton.h"
 
@@ -60,7 +58,7 @@ PairBones robot_bones(const PairChain& chain, const PairTree& tree) {
     const Eigen::Vector3d bone =
         pose.points.col(chain.pair_points[i]) - pose.points.col(chain.pair_points[tree.parent[i]]);
     bones.length[i] = bone.norm();
-    require(bones.length[i] > 1e-6, fmt::format("retarget pairs {} and {} of the robot coincide", i, tree.parent[i]));
+    require(bones.length[i] > 1e-6, "retarget pairs {} and {} of the robot coincide", i, tree.parent[i]);
     bones.direction[i] = bone / bones.length[i];
   }
   return bones;
@@ -149,8 +147,8 @@ PointTracks reshape(const HumanMotion& source, const PairTree& tree, const std::
       }
       const Eigen::Vector3d bone = joint - source.joints.at(t, tree.smpl[parent]);
       const double norm = bone.norm();
-      require(norm > 1e-6, fmt::format("source person: joints '{}' and '{}' coincide in frame {}",
-                                       kSmplNames[tree.smpl[i]], kSmplNames[tree.smpl[parent]], t));
+      require(norm > 1e-6, "source person: joints '{}' and '{}' coincide in frame {}", kSmplNames[tree.smpl[i]],
+              kSmplNames[tree.smpl[parent]], t);
       out.at(t, i) = out.at(t, parent) + length[i] / norm * bone;
     }
   }
@@ -169,13 +167,13 @@ double height_scale(const RobotModel& robot, const PairChain& chain, const PairT
   const PairBones bones = robot_bones(chain, tree);
   const auto pair = [&](int smpl) { return pair_of(tree, smpl); };
   for (const int smpl : {kLeftHip, kRightHip, kLeftKnee, kLeftAnkle}) {
-    require(pair(smpl) >= 0, fmt::format("robot '{}': no retarget pair for '{}'", robot.name, kSmplNames[smpl]));
+    require(pair(smpl) >= 0, "robot '{}': no retarget pair for '{}'", robot.name, kSmplNames[smpl]);
   }
   const auto hip = [&](int smpl) { return Eigen::Vector3d(bones.length[pair(smpl)] * bones.direction[pair(smpl)]); };
   const double robot_leg = leg_height(Eigen::Vector3d::Zero(), hip(kLeftHip), hip(kRightHip),
                                       bones.length[pair(kLeftKnee)], bones.length[pair(kLeftAnkle)]);
-  require(robot.neutral.size() == chain.dof(), fmt::format("robot '{}': expected a neutral pose of {} joints, found {}",
-                                                           robot.name, chain.dof(), robot.neutral.size()));
+  require(robot.neutral.size() == chain.dof(), "robot '{}': expected a neutral pose of {} joints, found {}", robot.name,
+          chain.dof(), robot.neutral.size());
   ChainPose pose;
   forward(chain, Eigen::Matrix3d::Identity(), Eigen::Vector3d(0.0, 0.0, robot.standing_height), robot.neutral, pose);
   const double robot_ankle = pose.points(2, chain.pair_points[pair(kLeftAnkle)]);

@@ -28,7 +28,7 @@ struct PairBones {
   std::array<double, kRetargetPairs> length{};
 };
 
-// Of the robot at q = 0.
+// The bones of the robot at q = 0.
 PairBones robot_bones(const PairChain& chain, const PairTree& tree);
 
 // SMPL joints as functions of shape: J(beta) = J_template + J_shapedirs beta. NPZ keys "J_template" (24, 3) and

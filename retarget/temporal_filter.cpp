@@ -9,8 +9,8 @@ namespace duet {
 namespace {
 
 constexpr double kLeastStiffness = 1e-2;  // of a joint that moves no point
-// Of the stiffness of distances that all count, where only near ones do: with .3, .5 and 1 the search ended after
-// equally many steps on development clips, with 3 it did not end.
+// The share of the stiffness of distances that all count, for where only near ones do: with .3, .5 and 1 the search
+// ended after equally many steps on development clips, with 3 it did not end.
 constexpr double kNearShare = 0.5;
 
 // Squared lever arms of one hinge at q = 0: of the pairs' points and of the keypoints' that it moves.

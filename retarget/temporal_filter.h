@@ -9,7 +9,7 @@
 
 namespace duet {
 
-// Of one variable: L has 1, `first`, `second` on its diagonals; D is `scale`^2.
+// The factor of one variable: L has 1, `first`, `second` on its diagonals; D is `scale`^2.
 struct TemporalFactor {
   double first = 0.0, second = 0.0, scale = 1.0;
 };
@@ -17,7 +17,7 @@ struct TemporalFactor {
 // Factor of stiffness + velocity (-1, 2, -1) + acceleration (1, -4, 6, -4, 1), all per frame; stiffness > 0.
 TemporalFactor temporal_factor(double stiffness, double velocity, double acceleration);
 
-// Of T times the objective: per row of PairVariables::frames, and of the root's offset.
+// The preconditioner of T times the objective: per row of PairVariables::frames, and of the root's offset.
 struct Preconditioner {
   std::vector<TemporalFactor> rows;
   double offset = 1.0;  // stiffness

@@ -1,7 +1,5 @@
 #include "duet/retarget/upright_chain.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "duet/core/require.h"
@@ -34,9 +32,9 @@ ChainPoint kept_point(const PairChain& whole, const ChainPoint& point, const std
 UprightChain make_upright_chain(const RobotModel& robot, const PairChain& whole) {
   const std::vector<int> legs = leg_joints(robot);
   require(!legs.empty() && soles_of_feet(robot).size() == 2,
-          fmt::format("robot '{}': to stand on the ground, retargeting needs 'legs' and the soles of two feet in its "
-                      "card; take mode=paper for a robot without",
-                      robot.name));
+          "robot '{}': to stand on the ground, retargeting needs 'legs' and the soles of two feet in its "
+          "card; take mode=paper for a robot without",
+          robot.name);
   UprightChain out;
   out.chain.joints.push_back(tilt_joint(robot));
   out.robot_joint.push_back(-1);
@@ -60,9 +58,9 @@ UprightChain make_upright_chain(const RobotModel& robot, const PairChain& whole)
   for (const int point : whole.pair_points) out.chain.pair_points.push_back(point_of[point]);
   for (const int point : whole.key_points) {
     require(point_of[point] >= 0,
-            fmt::format("robot '{}': an interaction keypoint lies on a leg below the hip; mode=grounded has no place "
-                        "for it",
-                        robot.name));
+            "robot '{}': an interaction keypoint lies on a leg below the hip; mode=grounded has no place "
+            "for it",
+            robot.name);
     out.chain.key_points.push_back(point_of[point]);
   }
   out.chain.key_smpl = whole.key_smpl;

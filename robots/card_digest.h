@@ -12,7 +12,7 @@
 
 namespace duet {
 
-// Of a card's keys but `extends` and `urdf`: the value in one spelling, mappings by key, numbers in the shortest form.
+// Values of a card's keys but `extends` and `urdf`: in one spelling, mappings by key, numbers in the shortest form.
 std::map<std::string, std::string> content_of(const YAML::Node& card);
 
 // SHA-256, hex.

@@ -81,8 +81,8 @@ std::array<Eigen::Vector3d, 2> HumanCapsule::ends(const Eigen::Ref<const Eigen::
 HumanBody make_human_body(const std::array<double, 24>& bone_lengths) {
   for (int j = 1; j < kSmplJoints; ++j)
     require(std::isfinite(bone_lengths[j]) && bone_lengths[j] > 0.0,
-            fmt::format("human body: expected a finite, positive length of the bone from '{}' to '{}', found {}",
-                        kSmplNames[j], kSmplNames[kSmplParents[j]], bone_lengths[j]));
+            "human body: expected a finite, positive length of the bone from '{}' to '{}', found {}", kSmplNames[j],
+            kSmplNames[kSmplParents[j]], bone_lengths[j]);
   const double spine = bone_lengths[kSpine1] + bone_lengths[kSpine2] + bone_lengths[kSpine3] + bone_lengths[kNeck];
   HumanBody body;
   for (const Part& part : kParts) {

@@ -1,7 +1,5 @@
 #include "duet/robots/joint_map.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -16,8 +14,8 @@ JointMap::JointMap(const std::vector<std::string>& from, const RobotModel& to) :
   }
   const bool common = std::ranges::any_of(source_, [](int joint) { return joint >= 0; });
   require(common || from.empty() || source_.empty(),
-          fmt::format("expected a motion with joints of robot '{}' ('{}', ...), found one of '{}', ...", to.name,
-                      source_.empty() ? "" : to.joints.front().name, from.empty() ? "" : from.front()));
+          "expected a motion with joints of robot '{}' ('{}', ...), found one of '{}', ...", to.name,
+          source_.empty() ? "" : to.joints.front().name, from.empty() ? "" : from.front());
 }
 
 Eigen::VectorXd JointMap::fill(const Eigen::VectorXd& values, Eigen::VectorXd filled) const {

@@ -27,7 +27,7 @@ class JointMap {
   std::vector<int> source_;  // of each joint of `to`; -1 where `from` lacks it
 };
 
-// A motion on another robot. Throws as JointMap. Of the same joints in the same order: the motion to the bit.
+// A motion on another robot. Throws as JointMap. With the same joints in the same order: the motion to the bit.
 RobotMotion on_body(const RobotMotion& motion, const RobotModel& body);
 
 }  // namespace duet

@@ -20,8 +20,8 @@ RobotModel with_origin_at(RobotModel robot, const Eigen::Vector3d& p_B);
 // The URDF's origin of the base, in the base's frame [m]: zero but for a robot whose origin was moved.
 Eigen::Vector3d urdf_origin(const RobotModel& robot);
 
-// What a user should know of how a card's files were read, in sentences: an origin that was moved, what of the URDF is
-// not simulated. `card`: by name or path. Throws as load_robot.
+// Notes for the user on how a card's files were read, in sentences: an origin that was moved, what of the URDF is not
+// simulated. `card`: by name or path. Throws as load_robot.
 std::vector<std::string> robot_notes(const std::string& card);
 
 }  // namespace duet

@@ -65,13 +65,13 @@ Pose mildly_turned(const Pose& start, const Pose& goal, double mild_yaw) {
 
 void sim_to_real(RobotMotion& motion, const Phases& phases, const RobotModel& robot, double mild_yaw) {
   require(motion.joint_names == robot.joint_names() && motion.q.rows() == robot.dof(),
-          fmt::format("sim to real: expected the {} joints of robot '{}' in its order, found {}", robot.dof(),
-                      robot.name, fmt::join(motion.joint_names, ", ")));
+          "sim to real: expected the {} joints of robot '{}' in its order, found {}", robot.dof(), robot.name,
+          fmt::join(motion.joint_names, ", "));
   require(0 <= phases.act_begin && phases.act_begin < phases.act_end && phases.act_end <= motion.frames(),
-          fmt::format("sim to real: expected an act inside [0, {}), found [{}, {})", motion.frames(), phases.act_begin,
-                      phases.act_end));
-  require(std::isfinite(mild_yaw) && mild_yaw >= 0.0,
-          fmt::format("sim to real: expected a turn of 0 or more, found {} rad", mild_yaw));
+          "sim to real: expected an act inside [0, {}), found [{}, {})", motion.frames(), phases.act_begin,
+          phases.act_end);
+  require(std::isfinite(mild_yaw) && mild_yaw >= 0.0, "sim to real: expected a turn of 0 or more, found {} rad",
+          mild_yaw);
   const Pose goal = motion.root[static_cast<std::size_t>(phases.act_begin)];
   walk_straight(motion, phases, mildly_turned(motion.root.front(), goal, mild_yaw));
   raise_upper_body(motion, phases, robot, kSimToRealRamp);

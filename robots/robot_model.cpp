@@ -60,12 +60,12 @@ double RobotModel::total_mass() const {
 }
 
 const StanceSize& RobotModel::stance_size() const {
-  require(stance.has_value(), fmt::format("robot '{}': expected 'stance' in its card, found none", name));
+  require(stance.has_value(), "robot '{}': expected 'stance' in its card, found none", name);
   return *stance;
 }
 
 const RootBounds& RobotModel::bounds_of_root() const {
-  require(root_bounds.has_value(), fmt::format("robot '{}': expected 'root_bounds' in its card, found none", name));
+  require(root_bounds.has_value(), "robot '{}': expected 'root_bounds' in its card, found none", name);
   return *root_bounds;
 }
 
@@ -88,8 +88,8 @@ RobotState RobotModel::standing_state(const Pose& X_WB) const {
 }
 
 JointCommand RobotModel::default_command(const Eigen::VectorXd& q_target) const {
-  require(q_target.size() == dof(),
-          fmt::format("default command of '{}': expected {} joint targets, found {}", name, dof(), q_target.size()));
+  require(q_target.size() == dof(), "default command of '{}': expected {} joint targets, found {}", name, dof(),
+          q_target.size());
   JointCommand command{q_target, Eigen::VectorXd(dof()), Eigen::VectorXd(dof()), Eigen::VectorXd::Zero(dof())};
   for (int j = 0; j < dof(); ++j) {
     command.kp[j] = joints[j].kp;

@@ -92,8 +92,8 @@ struct RootBounds {
   double min_pitch = 0.0, max_pitch = 0.0;
 };
 
-// What the parts of a robot are for: the card's, so that nothing else has to know a joint's or a link's name. Joints
-// are indices in RobotModel::joints, links in RobotModel::links, left before right. Empty where the card names none.
+// The roles of a robot's parts: the card's, so that nothing else has to know a joint's or a link's name. Joints are
+// indices in RobotModel::joints, links in RobotModel::links, left before right. Empty where the card names none.
 struct RobotRoles {
   std::array<std::vector<int>, 2> legs, arms;  // joints from the trunk outwards
   std::vector<int> waist;                      // joints between pelvis and trunk, whichever of the two is the base
@@ -139,7 +139,7 @@ struct RobotModel {
   [[nodiscard]] int keypoint_index(std::string_view name) const;
   [[nodiscard]] int track_frame(std::string_view name) const;  // index in frames of one of `tracks`
   [[nodiscard]] double total_mass() const;
-  // Those of the card, or std::invalid_argument naming the robot and the missing key.
+  // The values of the card, or std::invalid_argument naming the robot and the missing key.
   [[nodiscard]] const StanceSize& stance_size() const;
   [[nodiscard]] const RootBounds& bounds_of_root() const;
   // A pose of the card by name, or null.

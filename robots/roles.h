@@ -1,5 +1,5 @@
-// What follows from a robot's roles: where the pelvis is, which of its joints tilt the trunk, how it mirrors. Functions
-// of a loaded robot alone; thread-safe.
+// Facts that follow from a robot's roles: where the pelvis is, which of its joints tilt the trunk, how it mirrors.
+// Functions of a loaded robot alone; thread-safe.
 #pragma once
 
 #include <Eigen/Core>

@@ -15,7 +15,7 @@ class TreeFactor {
  public:
   using Triple = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-  // Of the generalised velocity of robots/kinematics.h: 6 + dof rows.
+  // Prepares a factor over the generalised velocity of robots/kinematics.h: 6 + dof rows.
   explicit TreeFactor(const RobotModel& model);
 
   // Factors mass + diag(0, joint_inertia). False where it is not positive definite.

@@ -77,7 +77,7 @@ void check_joints(const TiXmlElement& robot, const std::string& file) {
       throw InputError(fmt::format("{}: link '{}': expected joints that form a tree, found a cycle", file, link));
 }
 
-// By the file's first bytes.
+// Checks the encoding by the file's first bytes.
 void check_encoding(std::string_view text, const std::string& file) {
   const auto begins = [&](std::string_view bytes) { return text.starts_with(bytes); };
   const bool wide = begins("\xff\xfe") || begins("\xfe\xff") || begins(std::string_view("<\0", 2)) ||

@@ -54,7 +54,7 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file) {
     YAML::Parser(stream).HandleNextDocument(counter);
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    // What a text with ": " in it is taken for, and the library's words for it.
+    // A text with ": " in it is taken for a map value; the library says only "illegal map value".
     const char* hint = error.msg == YAML::ErrorMsg::MAP_VALUE ? " (a text that holds \": \" stands in quotes)" : "";
     throw InputError(fmt::format("{}:{}: expected YAML, found: {}{}", file, error.mark.line + 1, error.msg, hint));
   }

@@ -56,7 +56,7 @@ class YamlSection {
 // keys and values.
 YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
-// What a node holds, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".
+// The content of a node, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".
 std::string describe(const YAML::Node& node);
 
 }  // namespace duet

@@ -18,10 +18,10 @@ struct RolloutSetup : EpisodeConditions {
   const PairedMotion* clip = nullptr;
   AdaptedMotion reference;  // the robot's side after A.4.4; frame 0 is tick 0
   std::string prompt;       // the policy's language command; empty: the task's own
-  // What the policy sees of a partner in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
-  // none.
+  // The partner that the policy sees in the place of the real one; frame 0 is tick 0, the last one stands. Empty:
+  // the real one.
   PointTracks seen_partner;
-  // Of an episode whose partner is led (Episode::led_partner); null: the partner follows the clip.
+  // The partner's joints where the partner is led (Episode::led_partner); null: the partner follows the clip.
   std::shared_ptr<const PointTracks> led_partner;
   std::uint64_t seed = 0;
   bool foot_trace = false;                                    // whether the row is to have one
@@ -37,7 +37,7 @@ Rollout roll_out(const RolloutSetup& setup, World& world, Policy& policy, std::s
 // The same without physics.
 Rollout play_back(const RolloutSetup& setup, Policy& policy);
 
-// What the partner does from tick 0 on, one frame more than the episode has ticks; and the number of those.
+// The partner's motion from tick 0 on, one frame more than the episode has ticks; and the number of those.
 HumanMotion episode_partner(const RolloutSetup& setup);
 int episode_ticks(const RolloutSetup& setup);
 

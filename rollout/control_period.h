@@ -25,7 +25,7 @@ Outcome step_control_period(Backend& backend, int steps, const CommandAt& comman
   return Outcome::kOk;
 }
 
-// With one command throughout.
+// The same with one command throughout.
 inline Outcome step_control_period(Backend& backend, int steps, const JointCommand& command) {
   return step_control_period(
       backend, steps, [&](int) -> const JointCommand& { return command; }, [](int) { return true; });

@@ -8,7 +8,7 @@
 
 namespace duet {
 
-// What an episode's limit is measured by [s]; both from any beginning.
+// The two clocks that measure an episode's limit [s]; each may start anywhere.
 struct EpisodeClock {
   AwakeTime::Clock wall = monotonic_seconds;
   std::function<double()> computed = thread_computed_seconds;  // of the thread that rolls the episode out
@@ -30,7 +30,7 @@ class Deadline {
         awake_(clock.wall) {}
   [[nodiscard]] bool stop_asked() const { return stop_asked_ && stop_asked_(); }
   [[nodiscard]] bool passed() { return computed_() - begin_ > seconds_ || awake_.look() > kWaitingShare * seconds_; }
-  // What passes between the two does not count.
+  // The time between pause() and go_on() does not count.
   void pause() {
     static_cast<void>(awake_.look());
     paused_ = computed_();

@@ -1,7 +1,5 @@
 #include "duet/rollout/play_back.h"
 
-#include <fmt/format.h>
-
 #include "duet/core/require.h"
 #include "duet/rollout/kinematic_follower.h"
 
@@ -9,9 +7,9 @@ namespace duet {
 
 Recording play_back(const RobotMotion& motion, const PointTracks& partner, std::optional<Task> task,
                     const Phases& phases, const std::shared_ptr<const RobotModel>& robot) {
-  require(motion.frames() >= 2, fmt::format("playback needs 2 frames or more, found {}", motion.frames()));
+  require(motion.frames() >= 2, "playback needs 2 frames or more, found {}", motion.frames());
   require(partner.empty() || partner.frames() == motion.frames(),
-          fmt::format("playback: {} frames of the robot but {} of the partner", motion.frames(), partner.frames()));
+          "playback: {} frames of the robot but {} of the partner", motion.frames(), partner.frames());
   Recording recording;
   recording.task = task;
   recording.phases = phases;

@@ -8,7 +8,7 @@
 #include "duet/policies/observation_history.h"
 #include "duet/policies/policy.h"
 #include "duet/policies/scheduler.h"
-#include "duet/rollout/perception.h"
+#include "duet/rollout/perturbations/perception.h"
 #include "duet/rollout/reference_source.h"
 #include "duet/rollout/rollout.h"
 

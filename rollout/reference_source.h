@@ -1,4 +1,4 @@
-// Who says where the robot shall be: one 36-D reference a tick.
+// The source of the robot's reference: one 36-D reference a tick.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 
 namespace duet {
 
-// What a source may look at: the present. `partner` is null where nobody is there.
+// The present, which is all that a source may look at. `partner` is null where nobody is there.
 struct Present {
   int tick = 0;
   const RobotState& robot;
@@ -20,7 +20,7 @@ struct Present {
 class ReferenceSource {
  public:
   virtual ~ReferenceSource() = default;
-  // Before tick 0, where engine and controller stand in `start`.
+  // Called before tick 0, where engine and controller stand in `start`.
   virtual void begin(const RobotState& start) = 0;
   // The reference of this tick; ticks come in order from 0. Valid until the next call. Null: there is none any more.
   virtual const Reference* at(const Present& present) = 0;

@@ -1,7 +1,5 @@
 #include "duet/rollout/reference_stream.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -15,8 +13,7 @@ namespace duet {
 namespace {
 
 void check_share(double share, const char* name) {
-  require(share >= 0.0 && share <= 1.0,
-          fmt::format("reference stream: {} is {}, expected a share in [0, 1]", name, share));
+  require(share >= 0.0 && share <= 1.0, "reference stream: {} is {}, expected a share in [0, 1]", name, share);
 }
 
 // Moves `value` to `goal` no faster than `rate`.
@@ -37,12 +34,11 @@ ReferenceStream::ReferenceStream(std::shared_ptr<const RobotModel> robot, const 
   if (options.crouch > 0.0) bounds_ = robot_->bounds_of_root();
   const bool draws_poses = options.moves_upper_body || options.holds_upper_body;
   require(!draws_poses || upper_.empty() || !robot_->roles.pose_ranges.empty(),
-          fmt::format("reference stream: robot '{}' has no 'pose_ranges' in its card, which random poses need",
-                      robot_->name));
+          "reference stream: robot '{}' has no 'pose_ranges' in its card, which random poses need", robot_->name);
   if (options.data)
     for (const RobotMotion& motion : *options.data)
-      require(motion.q.rows() == robot_->dof(),
-              fmt::format("reference stream: a motion of {} joints for a robot of {}", motion.q.rows(), robot_->dof()));
+      require(motion.q.rows() == robot_->dof(), "reference stream: a motion of {} joints for a robot of {}",
+              motion.q.rows(), robot_->dof());
   reference_.q = from_ = to_ = robot_->neutral;
 }
 

@@ -11,13 +11,13 @@
 #include "duet/core/require.h"
 #include "duet/rollout/control_period.h"
 #include "duet/rollout/deadline.h"
-#include "duet/rollout/disturbance.h"
 #include "duet/rollout/kinematic_follower.h"
+#include "duet/rollout/perturbations/disturbance.h"
 
 namespace duet {
 namespace {
 
-// What is measured at every physics step.
+// Measures contacts at every physics step.
 class StepMeter {
  public:
   StepMeter(const Backend& backend, const std::optional<ContactLimits>& limits) : backend_(backend) {
@@ -136,7 +136,7 @@ class Simulated final : public World {
   StepMeter meter_;
 };
 
-// Without physics: the robot is where its reference was a tick ago.
+// A world without physics: the robot is where its reference was a tick ago.
 class Moved final : public World {
  public:
   explicit Moved(const Episode& episode) : episode_(episode) {}

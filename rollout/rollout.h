@@ -1,5 +1,5 @@
 // The one closed loop: a robot in an engine follows a reference under a controller, at 50 Hz, until the episode ends.
-// Who gives the reference - a policy with its scheduler, a scripted stream, a recorded motion - is a ReferenceSource's;
+// The reference comes from a ReferenceSource: a policy with its scheduler, a scripted stream or a recorded motion;
 // everything that happens ends in a Recording.
 #pragma once
 
@@ -16,7 +16,7 @@
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
 #include "duet/rollout/deadline.h"
-#include "duet/rollout/perturbation.h"
+#include "duet/rollout/perturbations/perturbation.h"
 #include "duet/rollout/reference_source.h"
 #include "duet/rollout/world.h"
 
@@ -34,7 +34,7 @@ struct PlanTimes {
   double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
 };
 
-// What holds whoever leads the robot, and however long.
+// The conditions of an episode that do not depend on who leads the robot, nor on how long it lasts.
 struct EpisodeConditions {
   RobotState start;
   // Its friction, its mass and the partner's size are the scene's too, its view of the partner and its plans are a
@@ -65,7 +65,7 @@ struct Rollout {
   std::optional<ContactSafetyResult> safety;  // of a solid partner, at physics rate
   ControllerFaults faults;
   bool interrupted = false;
-  // Of a policy, where one leads (rollout/policy_reference.h):
+  // Faults and times of the policy, where one leads (rollout/policy_reference.h):
   int late_plans = 0;
   PolicyFaults policy_faults;
   PlanTimes plan_times;

@@ -22,13 +22,13 @@ class World {
   virtual void begin(const RobotState& start) = 0;
   [[nodiscard]] virtual const RobotState& state() const = 0;
   [[nodiscard]] virtual std::span<const Contact> contacts() const { return {}; }  // of the last physics step
-  // What the joints are sent for this reference [rad]. Valid until the next call.
+  // The joint targets that are sent for this reference [rad]. Valid until the next call.
   virtual const Eigen::VectorXd& target(const Reference& reference) = 0;
   // The 20 ms of this tick. `partner`: SMPL joints, frame 0 at tick 0; empty: nobody.
   virtual Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) = 0;
   // Why it ended the episode; empty: what the outcome says of itself.
   [[nodiscard]] virtual std::string message() const { return ""; }
-  // What it measured.
+  // Writes the world's measurements into the rollout.
   virtual void finish(Rollout&) const {}
 };
 

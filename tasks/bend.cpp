@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/frame_windows.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 

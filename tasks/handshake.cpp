@@ -7,8 +7,8 @@
 #include <cmath>
 #include <limits>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/frame_windows.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 
@@ -57,7 +57,7 @@ Layout handshake_layout(const Cast& cast, Draws& draws) {
   const double share = draws.uniform("reach.share", 0.80, 0.87);
   Lean lean;
   lean.forward = draws.styled("lean", cast.style, 0.03, 0.12);
-  // Who has the other before the acting hand has no need to turn the trunk.
+  // A person who has the other before the acting hand has no need to turn the trunk.
   lean.twist = -side_sign(cast.side) *
                (cast.manner.rehearsed ? draws.uniform("twist", 0.10, 0.22) : draws.uniform("twist", -0.04, 0.06));
   if (cast.manner.distance) {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/frame_windows.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 

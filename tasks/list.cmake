@@ -1,5 +1,5 @@
 # The tasks, in the order of tables: a row here and the file of the same name beside it are a task
-# (docs/adding-a-task.md). The six of the supplement come first.
+# (docs/extending.md, "A task"). The six of the supplement come first.
 set(DUET_TASKS
   hug
   handshake

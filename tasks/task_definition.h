@@ -1,6 +1,6 @@
-// What a task is: its words, how two people do it, and how it is told whether they did. One file a task
-// (docs/adding-a-task.md), which says all of this; one table of them, made from tasks/list.cmake. The rooms above ask
-// the table: motion/ synthesises and proposes phases, metrics/ detects, policies/ embed the prompt.
+// The definition of a task: its words, how two people do it, and how it is told whether they did. Each task has one
+// file (docs/extending.md) that says all of this; the one table of them is made from tasks/list.cmake. The rooms
+// above ask the table: motion/ synthesises and proposes phases, metrics/ detects, policies/ embed the prompt.
 #pragma once
 
 #include <array>
@@ -8,10 +8,10 @@
 #include <string_view>
 
 #include "duet/core/task.h"
-#include "duet/tasks/agent.h"
 #include "duet/tasks/detector_readings.h"
-#include "duet/tasks/detector_result.h"
 #include "duet/tasks/rules/act_rule.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/detector_result.h"
 #include "duet/tasks/synthesis/act.h"
 
 namespace duet {
@@ -23,7 +23,7 @@ struct TaskPhrase {
   double weight;  // 1: says it outright; less: a hint that a plainer phrase overrules
 };
 
-// What says how far an act is under way; larger is more. Phases are proposed from it (docs/conventions.md, "Phases").
+// The signal that says how far an act is under way; larger is more. It proposes phases (docs/conventions.md, "Phases").
 enum class ActSignal {
   kHandsTogether,  // nearness of the nearest hands of the two; the act is the contact
   kHandAtChest,    // nearness of a hand of either to the other's chest; likewise
@@ -57,12 +57,12 @@ struct TaskDetector {
   void (*read_strictly)(DetectorReadings& readings) = nullptr;
 };
 
-// What has to touch what for an act to be an interaction.
+// The parts that have to touch for an act to be an interaction.
 enum class Touch { kNone, kHands, kArmsRoundTrunk };
-// What tells that an act begins: a hand that rises, a trunk that leans; nothing where arms open on the way up.
+// The sign that an act begins: a hand that rises, a trunk that leans; nothing where arms open on the way up.
 enum class ActOnset { kNone, kHandRises, kTrunkLeans };
 
-// What makes an act of the task an interaction with the partner, beside the act itself (metrics/interaction.h).
+// The rule by which an act of the task is an interaction with the partner, beside the act (metrics/interaction.h).
 struct InteractionRule {
   Touch touch = Touch::kNone;
   double touch_s = 0.0;      // a solid partner is touched for so long in all [s]

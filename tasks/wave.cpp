@@ -11,8 +11,8 @@
 #include <numbers>
 #include <optional>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/frame_windows.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 

@@ -15,7 +15,7 @@ minute), and the tests of every room that links it run too: a changed engine, li
 DUET_ENGINES and DUET_PROGRAM. Only then it has survived.
 
 What is not drawn: headers; lines of `for (`, `require(`, `throw` and `fmt::` (loops that run out of an array and words of
-messages); bench/benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
+messages); app/benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
 runs it. A change that gives
 the same machine code, or that stands in tests/mutants_equivalent.txt with its reason, is counted apart.
 
@@ -166,7 +166,7 @@ class Trials:
                 else:
                     (folder / engine).symlink_to(f'{self.build.folder}/{engine}')
             environment['DUET_ENGINES'] = str(folder / 'engines')
-        if room == 'bench' and self.build.holds('duet', changed.path):
+        if room == 'app' and self.build.holds('duet', changed.path):
             self.build.link('duet', changed, str(folder / 'duet'))
             environment['DUET_PROGRAM'] = str(folder / 'duet')
         return environment

@@ -8,14 +8,15 @@ import subprocess
 import sys
 import typing
 
-ROOMS = 'core tasks motion robots nn io formats retarget backends controllers policies metrics rollout hardware results datasets training bench'.split()
+with open(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), 'cmake', 'rooms.txt'), encoding='utf-8') as rooms:
+    ROOMS = [line.split(':')[0] for line in rooms if line[0].isalpha()]
 OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' > '), (r' \+ ', ' - '), (r' - ', ' + '),
              (r' \* ', ' + '), (r' / ', ' * '), (r' \+= ', ' -= '), (r' -= ', ' += '), (r' && ', ' || '),
              (r' \|\| ', ' && '), (r' == ', ' != '), (r' != ', ' == '), (r'std::max\(', 'std::min('),
              (r'std::min\(', 'std::max('), (r'\b0\.5\b', '0.6'), (r'return true;', 'return false;'),
              (r'return false;', 'return true;'), (r'if \(!', 'if ('), (r'\[0\]', '[1]')]
 SKIPPED_LINES = ('require(', 'throw ', 'fmt::', '#', 'template', 'for (', 'using ', 'typedef', 'static_assert')
-SKIPPED_FILES = ('bench/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'cli/train_dstar.cpp')
+SKIPPED_FILES = ('app/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'cli/train_dstar.cpp')
 EQUIVALENT = 'tests/mutants_equivalent.txt'
 OUTPUT = re.compile(r'(?<= -o )\S+')
 

@@ -1,4 +1,4 @@
-// What PPO learns: the oracle's networks and their normalisers. Value type, and how it is kept in a file.
+// The agent that PPO trains: the oracle's networks and their normalisers. Value type, and how it is kept in a file.
 #pragma once
 
 #include <cstdint>

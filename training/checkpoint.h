@@ -1,4 +1,4 @@
-// What checkpoints of all trainings have in common: normalisers and Adam's moments among the tensors of a file. Reading
+// Parts that checkpoints of all trainings share: normalisers and Adam's moments among the tensors of a file. Reading
 // throws InputError naming the file, what is missing or what has another size.
 #pragma once
 

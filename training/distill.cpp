@@ -96,12 +96,11 @@ Distillation::Distillation(const std::shared_ptr<const RobotModel>& robot, const
                            const DistillOptions& options, WbcAgent teacher, StudentState state, long rounds)
     : options_(options), teacher_(std::move(teacher)), state_(std::move(state)), rounds_(rounds) {
   require(options.threads >= 1 && options.environments % options.threads == 0,
-          fmt::format("distillation: {} environments on {} threads, expected a multiple", options.environments,
-                      options.threads));
+          "distillation: {} environments on {} threads, expected a multiple", options.environments, options.threads);
   const WbcLayout layout(robot->dof());
   require(teacher_.actor.inputs() == layout.oracle() && state_.student.inputs() == layout.student(),
-          fmt::format("distillation: an oracle of {} and a student of {} inputs, expected {} and {}",
-                      teacher_.actor.inputs(), state_.student.inputs(), layout.oracle(), layout.student()));
+          "distillation: an oracle of {} and a student of {} inputs, expected {} and {}", teacher_.actor.inputs(),
+          state_.student.inputs(), layout.oracle(), layout.student());
   inputs_.resize(layout.student(), options.buffer);
   targets_.resize(robot->dof(), options.buffer);
   const int each = options.environments / options.threads;

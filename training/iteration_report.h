@@ -1,4 +1,4 @@
-// What one iteration of a training of WBC-Sim says of itself: of the oracle's PPO and of the student's distillation.
+// The report of one iteration of a training of WBC-Sim: of the oracle's PPO and of the student's distillation.
 #pragma once
 
 #include "duet/training/wbc_environment.h"

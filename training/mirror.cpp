@@ -1,7 +1,5 @@
 #include "duet/training/mirror.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "duet/controllers/wbc_sim/observation.h"
@@ -17,7 +15,7 @@ Mirror columns_mirror() {                                                       
   return {.from = {0, 1, 2, 3, 4, 5}, .sign = {1.0F, -1.0F, 1.0F, -1.0F, 1.0F, -1.0F}};
 }
 
-// Of one channel of WBC-Sim's; `joints`: of all that has a number for each joint.
+// The mirror of one channel of WBC-Sim's; `joints` is that of every channel with a number for each joint.
 Mirror mirror_of(ChannelKind kind, const Mirror& joints) {
   switch (kind) {
     case ChannelKind::kBaseAngularVelocity:
@@ -73,8 +71,8 @@ Mirror mirror_critic(const RobotModel& robot, const std::vector<int>& links) {
   for (const int link : links) {
     const int wanted = link == 0 ? 0 : robot.roles.counterpart[link - 1] + 1;
     const auto other = std::ranges::find(links, wanted);
-    require(other != links.end(),
-            fmt::format("mirror: link '{}' has no counterpart '{}'", robot.links[link].name, robot.links[wanted].name));
+    require(other != links.end(), "mirror: link '{}' has no counterpart '{}'", robot.links[link].name,
+            robot.links[wanted].name);
     mirror.append(body, begin + 9 * static_cast<int>(other - links.begin()));
   }
   return mirror;

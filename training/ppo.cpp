@@ -1,7 +1,5 @@
 #include "duet/training/ppo.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -75,17 +73,16 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
       actor_mirror_(mirror_actor(*robot)),
       critic_mirror_(mirror_critic(*robot, robot->roles.bodies)),
       action_mirror_(mirror_joints(*robot)) {
-  require(
-      options.threads >= 1 && options.environments % options.threads == 0,
-      fmt::format("ppo: {} environments on {} threads, expected a multiple", options.environments, options.threads));
+  require(options.threads >= 1 && options.environments % options.threads == 0,
+          "ppo: {} environments on {} threads, expected a multiple", options.environments, options.threads);
   const int samples = options.environments * options.horizon;
   require(samples % (options.minibatches * options.threads) == 0,
-          fmt::format("ppo: {} samples in {} minibatches on {} threads, expected a multiple", samples,
-                      options.minibatches, options.threads));
+          "ppo: {} samples in {} minibatches on {} threads, expected a multiple", samples, options.minibatches,
+          options.threads);
   require(state_.agent.actor.inputs() == actor_mirror_.size() &&
               state_.agent.critic.inputs() == critic_mirror_.size() && state_.agent.actor.outputs() == robot->dof(),
-          fmt::format("ppo: networks of {} and {} inputs for a robot that needs {} and {}", state_.agent.actor.inputs(),
-                      state_.agent.critic.inputs(), actor_mirror_.size(), critic_mirror_.size()));
+          "ppo: networks of {} and {} inputs for a robot that needs {} and {}", state_.agent.actor.inputs(),
+          state_.agent.critic.inputs(), actor_mirror_.size(), critic_mirror_.size());
   batch_ = std::make_unique<Batch>(actor_mirror_.size(), critic_mirror_.size(), robot->dof(), samples);
   const int each = options.environments / options.threads;
   for (int t = 0; t < options.threads; ++t)
@@ -94,7 +91,7 @@ Ppo::Ppo(const std::shared_ptr<const RobotModel>& robot, const WbcTask& task, co
     Worker& worker = *workers_[t];
     Random start(state_.seed, stream_key({"ppo start", std::to_string(t)}));
     for (int i = 0; i < each; ++i) {
-      // Of a continued training the environments are new ones: their streams carry the iteration.
+      // A continued training has new environments: their streams carry the iteration.
       worker.environments.emplace_back(
           robot, task, state_.seed + 1000003ULL * static_cast<std::uint64_t>(state_.iteration), t * each + i);
       worker.environments.back().skip_to(start.below(task.episode_ticks));
@@ -144,7 +141,7 @@ double Ppo::learn(Batch& batch) {
   return divergence;
 }
 
-// What the threads counted; their moments go into the normalisers.
+// Sums what the threads counted; their moments go into the normalisers.
 IterationReport Ppo::summary() {
   IterationReport report;
   for (const auto& worker : workers_) {
@@ -270,7 +267,7 @@ double Ppo::minibatch(const std::vector<int>& order, const std::vector<std::uint
   return std::accumulate(divergence.begin(), divergence.end(), 0.0) / options_.threads;
 }
 
-// Of the clipped objective, the entropy and the pull to symmetry by the mean; of the squared error by the value.
+// Differentiates the clipped objective, entropy and pull to symmetry by the mean, the squared error by the value.
 double Ppo::gradients(int thread, std::span<const int> samples, const std::vector<std::uint8_t>& mirrored, int size,
                       Batch& batch) {
   Worker& worker = *workers_[thread];

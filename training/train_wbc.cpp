@@ -309,7 +309,7 @@ WbcNetwork network_of(const RobotModel& robot, const GaitOptions& gait, const St
 bool train_wbc(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run,
                const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop) {
   const WbcStage& stage = find_wbc_stage(run.stage);
-  require(run.steps >= 0, fmt::format("train wbc: {} steps, expected a positive number", run.steps));
+  require(run.steps >= 0, "train wbc: {} steps, expected a positive number", run.steps);
   const long steps = run.steps > 0 ? run.steps : stage.steps;
   if (stage.distils) {
     Distillation student = student_trainer(robot, run, steps);

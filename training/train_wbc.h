@@ -36,7 +36,7 @@ struct WbcRun {
   std::shared_ptr<const std::vector<RobotMotion>> motions;  // for the stages that follow motions; may be none
 };
 
-// All stages in turn. `run.from` is what the first begins with; each other one has the one before it.
+// Runs of all stages in turn. `run.from` is what the first begins with; each other one has the one before it.
 std::vector<WbcRun> wbc_runs(const WbcRun& run);
 
 struct WbcProgress {
@@ -54,7 +54,7 @@ struct WbcProgress {
 bool train_wbc(const std::shared_ptr<const RobotModel>& robot, const WbcRun& run,
                const std::function<void(const WbcProgress&)>& report, const std::function<bool()>& stop);
 
-// Of <folder>/<stage>: where the checkpoint, the network and the curves are.
+// Files of <folder>/<stage>: the checkpoint, the network and the curves.
 std::string wbc_checkpoint(const std::string& folder, const std::string& stage);
 std::string wbc_network_file(const std::string& folder, const std::string& stage);
 std::string wbc_curves(const std::string& folder, const std::string& stage);

@@ -146,7 +146,7 @@ void WbcEnvironment::disturb() {
   backend_->kick({speed * std::cos(direction), speed * std::sin(direction), 0.0});
 }
 
-// As a policy's plans move when it plans anew: by some centimetres, five times a second.
+// Shifts the reference as a policy's plans move when it plans anew: by some centimetres, five times a second.
 const Reference& WbcEnvironment::show_reference() {
   if (!jumps_) return stream_.reference();
   const DomainOptions& domain = task_.domain;

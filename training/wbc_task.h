@@ -1,5 +1,5 @@
-// What WBC-Sim is trained on: commands, rewards (supplement A.3.2), domain randomisation, and the stages that the
-// training goes through. Plain data.
+// The tasks that WBC-Sim is trained on: commands, rewards (supplement A.3.2), domain randomisation, and the stages that
+// the training goes through. Plain data.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 
 namespace duet {
 
-// Weights of the reward; each is multiplied by the tick (0.02 s). Kernels are exp(-error^2 / width^2). What the
-// supplement gives is marked A.3.2; all other weights and widths were set by hand with the gates in view (`duet bench
+// Weights of the reward; each is multiplied by the tick (0.02 s). Kernels are exp(-error^2 / width^2). Values that the
+// supplement gives are marked A.3.2; all other weights and widths were set by hand with the gates in view (`duet bench
 // wbc`). Nobody has swept them.
 struct RewardWeights {
   double root_xy = 3.0, root_xy_width = 0.25;      // A.3.2: root_position_xy
@@ -65,7 +65,7 @@ struct WbcTask {
   DomainOptions domain;
   GaitOptions gait;
   double dt = 0.005;  // physics [s]
-  // Of MuJoCo: less than half the time of its defaults; what was learnt is tested with those.
+  // MuJoCo's options: less than half the time of its defaults; what was learnt is tested with those.
   EngineOptions engine = {{"solver", "pgs"}, {"iterations", "12"}, {"cone", "pyramidal"}};
   double entropy = 0.002;    // weight of the policy's entropy
   double largest_std = 1.0;  // of an action
@@ -77,8 +77,8 @@ struct WbcTask {
 WbcTask wbc_stage(const std::string& name);
 std::vector<std::string> wbc_stages();
 
-// What RewardWeights::lift weighs: the square of how far a swinging foot is above its wanted height [m]; less above
-// than below.
+// The cost that RewardWeights::lift weighs: the square of how far a swinging foot is above its wanted height [m]; less
+// above than below.
 double lift_cost(double above);
 
 // Action: joint target = base + scale a, |a| <= kActionBound; base is the tracker's q.

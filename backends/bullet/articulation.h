@@ -32,7 +32,7 @@ class Articulation {
   void accelerate(const Eigen::VectorXd& Q, const Eigen::Matrix3d& R_WB, double dt);
   void integrate(double dt) { body_->stepPositionsMultiDof(dt); }  // positions, with velocity()
 
-  // What Bullet stores of a state, without the rounding of write() and read().
+  // The state as Bullet stores it, without the rounding of write() and read().
   void append_to(std::vector<double>& values) const;
   void read_from(std::span<const double> values);
 

@@ -1,7 +1,5 @@
 #include "duet/backends/bullet/bare_loop.h"
 
-#include <fmt/format.h>
-
 #include "duet/backends/bullet/bullet_world.h"
 #include "duet/backends/thread_clock.h"
 #include "duet/core/require.h"
@@ -9,7 +7,7 @@
 namespace duet {
 
 double bullet_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
-  require(steps >= 1, fmt::format("bullet_bare_step_seconds: steps is {}, expected >= 1", steps));
+  require(steps >= 1, "bullet_bare_step_seconds: steps is {}, expected >= 1", steps);
   NarrowPhase narrow_phase(scene);
   BulletWorld world(scene, narrow_phase.capacity());
   world.articulation().write(state);

@@ -58,8 +58,8 @@ void BulletWorld::step(std::span<const ContactPoint> points, const LinkPushes* p
   articulation_.read(state);
 }
 
-// What only M knows must give the acceleration that M + S has without contacts; with them, the rows' response is that
-// of M + S already.
+// Bullet's own algorithm knows only M: its torques must give the acceleration that M + S has without contacts; with
+// them, the rows' response is that of M + S already.
 void BulletWorld::solve(const Eigen::VectorXd& q) {
   law_.forces(Q_, a_);
   law_.factor().solve(a_);

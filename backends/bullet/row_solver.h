@@ -34,7 +34,7 @@ class RowSolver final : public btMultiBodyConstraintSolver {
   // Adds to the velocity of `articulation` what contacts and stops change in this step. `q`: its joints before it.
   void solve(Articulation& articulation, const TreeFactor& factor, const Kinematics& kinematics,
              const Eigen::VectorXd& q);
-  // Of the other side on the link of point i, mean over the step. [N], frame W.
+  // The force of the other side on the link of point i, mean over the step. [N], frame W.
   [[nodiscard]] Eigen::Vector3d contact_force(std::size_t i) const;
 
  private:
@@ -67,7 +67,7 @@ class RowSolver final : public btMultiBodyConstraintSolver {
   std::vector<ContactRows> contacts_;  // the first `used_` count
   std::size_t used_ = 0;
 
-  // Of the step that is being solved.
+  // Inputs of the step that is being solved.
   Articulation* articulation_ = nullptr;
   const TreeFactor* factor_ = nullptr;
   const Eigen::VectorXd* q_ = nullptr;

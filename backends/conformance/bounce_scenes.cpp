@@ -75,7 +75,7 @@ Bounce bounce_in(const Trial& trial, const Skin& skin, double dt) {
   return bounce;
 }
 
-// Of a unilateral spring and damper whose force never pulls: Schwager and Poeschel, Granular Matter 9 (2007), eq. 21.
+// Restitution of a unilateral spring and damper (no pull): Schwager and Poeschel, Granular Matter 9 (2007), eq. 21.
 double restitution(const Skin& skin) {
   const double beta = 0.5 * skin.damping / kMass;
   const double omega = std::sqrt(skin.stiffness / kMass - beta * beta);

@@ -65,7 +65,7 @@ std::span<const ConformanceScene> scenes();
 // Throws std::invalid_argument with the nearest and all known names.
 const ConformanceScene& find_scene(std::string_view name);
 
-// A robot that lacks what the scene needs is no fault: the run says what. What an engine throws, or its divergence,
+// A robot that lacks what the scene needs is no fault: the run says what. An engine's exception, or its divergence,
 // becomes a failed measurement "ran to its end" with the message. Throws what make_backend throws for an engine's name
 // (unknown, absent).
 SceneRun run_scene(const ConformanceScene& scene, const std::string& engine, const Settings& settings);

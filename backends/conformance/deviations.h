@@ -9,7 +9,7 @@
 
 namespace duet::conformance {
 
-// What the engine's module says of itself; nothing of an engine that is not there.
+// The deviations that the engine's module states; none for an engine that is not there.
 std::span<const EngineDeviation> deviations(const std::string& engine);
 const EngineDeviation* find_deviation(const std::string& engine, std::string_view scene, std::string_view quantity);
 

@@ -36,8 +36,8 @@ JointCommand thrash(const RobotModel& robot, double time) {
   return command;
 }
 
-// What should be zero is of first order in dt. How large it is on the robot that stands in is known; on another one it
-// has to shrink with the step: to 0.5 of what it was, and 0.1 more.
+// A value that should be zero is of first order in dt. Its size is known for the robot that stands in; on another robot
+// it has to shrink with the step: to 0.5 of what it was, and 0.1 more.
 void note_momentum(Trial& trial, const char* quantity, const char* unit, double dt, double value, double per_second,
                    double& before) {
   const double shrunk = 0.6 * std::exchange(before, value);

@@ -1,5 +1,5 @@
-// What the suite compares engines with: our own dynamics (robots/dynamics.h) integrated by Runge-Kutta, and the
-// momentum and energy of a state. Internal to backends/conformance.
+// The reference that the suite compares engines with: our own dynamics (robots/dynamics.h) integrated by Runge-Kutta,
+// and the momentum and energy of a state. Internal to backends/conformance.
 #pragma once
 
 #include <Eigen/Core>

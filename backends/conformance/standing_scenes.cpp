@@ -97,7 +97,7 @@ void measure_stand(Trial& trial) {
 }
 
 void measure_fall(Trial& trial) {
-  // Of MuJoCo 2.2.2 at 2 ms; Bullet, DART and ODE fall at the same step. The median takes its place where engines run.
+  // From MuJoCo 2.2.2 at 2 ms; Bullet, DART and ODE fall at the same step. The median replaces it where engines run.
   constexpr double kStored = 1.218;
   const std::vector<double> sizes = trial.full() ? trial.step_sizes() : std::vector{trial.dt()};
   for (const double dt : sizes) {
@@ -187,7 +187,7 @@ Press press(const Trial& trial, double dt) {
 }  // namespace
 
 void measure_held_push(Trial& trial) {
-  // Of MuJoCo 2.2.2 at 2 ms, as in measure_fall.
+  // From MuJoCo 2.2.2 at 2 ms, as in measure_fall.
   constexpr double kStoredPeak = 96.0, kStoredHeld = -6.17;
   std::vector<double> peaks;
   for (const double dt : trial.step_sizes()) {

@@ -1,4 +1,4 @@
-// What the engine makes of a state: kinematics and instantaneous accelerations.
+// Scenes that check what the engine makes of a state: kinematics and instantaneous accelerations.
 #include <algorithm>
 #include <cmath>
 

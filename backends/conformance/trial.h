@@ -1,4 +1,4 @@
-// What the scenes of the suite share: the settings they run under, a timed world, and how they note what they found.
+// The common part of the suite's scenes: the settings they run under, a timed world, and how they note what they found.
 // Internal to backends/conformance.
 #pragma once
 

@@ -1,4 +1,4 @@
-// To be included by every unit that sees DART's headers.
+// Every unit that sees DART's headers includes this one.
 #pragma once
 
 #include <Eigen/Core>

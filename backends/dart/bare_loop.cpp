@@ -1,7 +1,5 @@
 #include "duet/backends/dart/bare_loop.h"
 
-#include <fmt/format.h>
-
 #include "duet/backends/dart/dart_world.h"
 #include "duet/backends/thread_clock.h"
 #include "duet/core/require.h"
@@ -9,7 +7,7 @@
 namespace duet {
 
 double dart_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
-  require(steps >= 1, fmt::format("dart_bare_step_seconds: steps is {}, expected >= 1", steps));
+  require(steps >= 1, "dart_bare_step_seconds: steps is {}, expected >= 1", steps);
   NarrowPhase narrow_phase(scene);
   DartWorld world(scene, narrow_phase.capacity());
   world.write_state(state);

@@ -9,7 +9,7 @@ namespace {
 using dart::dynamics::BodyNode;
 
 constexpr double kNoSlip = 1e-12;  // [m/s], below which a direction of sliding has no meaning
-// Of friction rows, as a share of their inverse inertia: the rows of one link depend on one another.
+// The softness of friction rows, as a share of their inverse inertia: the rows of one link depend on one another.
 constexpr double kFrictionCfm = 1e-5;
 constexpr double kNoSkin = 1e-9;  // [N s/m], the least h K + D of a skin
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

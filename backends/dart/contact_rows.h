@@ -13,7 +13,7 @@
 
 namespace duet {
 
-// Of the rigid contacts with the ground and of the robot with itself.
+// Settings of the rigid contacts with the ground and of the robot with itself.
 struct RigidContact {
   double erp = 0.0;             // share of the depth that is recovered in a step
   double recovery_speed = 0.0;  // at most [m/s]
@@ -30,7 +30,7 @@ class ContactRows final : public dart::constraint::ConstraintBase {
   void set(std::span<const ContactPoint> points);
   // The joints whose stops DART will solve for together with the points.
   void set_stops(std::span<const int> joints) { stops_ = joints; }
-  // Of the step that has ended: force of the other side on the link at points[index], mean over the step. [N], W.
+  // The force of the other side on the link at points[index], mean over the step that has ended. [N], W.
   [[nodiscard]] Eigen::Vector3d force(std::size_t index) const;
 
  private:

@@ -23,8 +23,8 @@ using dart::dynamics::FreeJoint;
 using dart::dynamics::Joint;
 using dart::dynamics::Skeleton;
 
-// Beyond these, and kDivergedSpeed, a run has diverged. Debian's libdart ends the process at the first NaN (assertions
-// are on in it), so nothing that could overflow may reach it.
+// Limits beyond which, as beyond kDivergedSpeed, a run has diverged. Debian's libdart ends the process at the first NaN
+// (assertions are on in it), so nothing that could overflow may reach it.
 constexpr double kFarthest = 1e9;    // [m], [rad]
 constexpr double kStrongest = 1e15;  // [N], [N m]
 
@@ -224,7 +224,7 @@ void DartWorld::use_law() {
   skeleton_->dirtyArticulatedInertia(0);
 }
 
-// What simulation::World::step does with the velocities once the accelerations are known.
+// Does what simulation::World::step does with the velocities once the accelerations are known.
 bool DartWorld::move() {
   skeleton_->integrateVelocities(dt_);
   if (!velocities_are_sensible()) return false;

@@ -47,7 +47,7 @@ class DartWorld {
   // `state`: as read_state() gives it. False where the velocities left any sensible range: then the state is useless.
   [[nodiscard]] bool step(const JointCommand& command, const RobotState& state, std::span<const ContactPoint> points);
 
-  // Of points[index] in the last step, on the link, mean over the step. [N], frame W.
+  // The force at points[index] in the last step, on the link, mean over the step. [N], frame W.
   [[nodiscard]] Eigen::Vector3d contact_force(std::size_t index) const;
   void read_torques(Eigen::VectorXd& torques) const;  // of the law in the last step
 

@@ -110,8 +110,8 @@ bool GroupSolver::bound_friction() {
   return unfit;
 }
 
-// Coulomb's friction is the point of a disc that is nearest to itself less any multiple of the slip. Of a point that
-// slips the bounds become the sides of that point, of one that sticks the disc's radius.
+// Coulomb's friction is the point of a disc that is nearest to itself less any multiple of the slip. The bounds become
+// the sides of that point where it slips, and the disc's radius where it sticks.
 bool GroupSolver::bound_friction_of(int normal) {
   const int n = static_cast<int>(mX.size()), first = normal + 1;
   const double limit = friction_[first] * std::max(0.0, mX[normal]);

@@ -18,7 +18,7 @@ class ImplicitHinge final : public dart::dynamics::RevoluteJoint {
 
   // Motion of the child body per unit velocity, in its frame: angular, then linear.
   [[nodiscard]] const Eigen::Vector6d& motion() const;
-  // Of the articulated inertia projected on the axis, with what is added. [1/(kg m^2)]
+  // The inverse of the articulated inertia projected on the axis, with what is added. [1/(kg m^2)]
   [[nodiscard]] double inverse_inertia() const { return getInvProjArtInertia()(0, 0); }
 
  private:

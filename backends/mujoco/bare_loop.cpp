@@ -1,6 +1,5 @@
 #include "duet/backends/mujoco/bare_loop.h"
 
-#include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
 #include "duet/backends/mujoco/mujoco_law.h"
@@ -11,7 +10,7 @@
 namespace duet {
 
 double mujoco_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
-  require(steps >= 1, fmt::format("mujoco_bare_step_seconds: steps is {}, expected >= 1", steps));
+  require(steps >= 1, "mujoco_bare_step_seconds: steps is {}, expected >= 1", steps);
   MujocoModel compiled = compile_mujoco(scene);
   mjModel& m = *compiled.model;
   mjData& d = *compiled.data;

@@ -20,7 +20,7 @@ constexpr const char* kImpedance = "0.95 0.99 0.001";  // of the ground and of t
 // mebibyte, of which the rows take most.
 constexpr int kContacts = 64;
 constexpr int kRows = 192;
-// What the solver and the collision take from MuJoCo's stack at most with so many rows, with a margin.
+// The most that the solver and the collision take from MuJoCo's stack with so many rows, with a margin.
 constexpr int kStackPerRow = 60, kStack = 8000;  // [doubles]
 // Capsules wait here until the partner is set.
 constexpr double kFarAway = 1000.0;  // [m]

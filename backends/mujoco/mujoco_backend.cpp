@@ -150,7 +150,7 @@ class MujocoBackend final : public Backend {
             .depth = std::max(0.0, -contact.dist)};
   }
 
-  // Of two links the one whose shape the declared pair names first.
+  // Between two links, the link is the one whose shape the declared pair names first.
   [[nodiscard]] bool second_is_the_link(const MujocoGeom& first, const MujocoGeom& second) const {
     if (first.side != second.side) return second.side == ContactSide::kRobot;
     const std::vector<std::pair<int, int>>& pairs = scene().robot->self_collision;

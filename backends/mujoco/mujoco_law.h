@@ -1,5 +1,5 @@
-// The torque law of JointCommand in MuJoCo, as ImplicitLaw has it: (M + S) a = t0 - b + J^T f. What the law adds to the
-// inertia of a joint, dt kd + dt^2 kp, stands beside the armature in MuJoCo's mass matrix; so the constraint solver
+// The torque law of JointCommand in MuJoCo, as ImplicitLaw has it: (M + S) a = t0 - b + J^T f. The law's addition to
+// the inertia of a joint, dt kd + dt^2 kp, stands beside the armature in MuJoCo's mass matrix; so the constraint solver
 // sees M + S and the integrator has nothing left to do. No allocation after construction.
 #pragma once
 

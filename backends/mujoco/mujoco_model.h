@@ -14,7 +14,7 @@ struct mjData_;
 
 namespace duet {
 
-// What a geom of the compiled model is: a shape on a link, a capsule of the human or the ground.
+// A geom of the compiled model: a shape on a link, a capsule of the human or the ground.
 struct MujocoGeom {
   ContactSide side = ContactSide::kGround;
   int index = -1;  // link of the robot or capsule of the human; -1 for the ground

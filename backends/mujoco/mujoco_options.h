@@ -1,4 +1,4 @@
-// What a profile may set of MuJoCo, and the values that hold for a scene.
+// The settings of MuJoCo that a profile may change, and the values that hold for a scene.
 #pragma once
 
 #include <span>

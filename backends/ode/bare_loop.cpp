@@ -1,7 +1,5 @@
 #include "duet/backends/ode/bare_loop.h"
 
-#include <fmt/format.h>
-
 #include "duet/backends/ode/ode_library.h"
 #include "duet/backends/ode/ode_stepper.h"
 #include "duet/backends/thread_clock.h"
@@ -10,7 +8,7 @@
 namespace duet {
 
 double ode_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
-  require(steps >= 1, fmt::format("ode_bare_step_seconds: steps is {}, expected >= 1", steps));
+  require(steps >= 1, "ode_bare_step_seconds: steps is {}, expected >= 1", steps);
   enter_ode();
   NarrowPhase narrow_phase(scene);
   OdeStepper stepper(scene, narrow_phase.capacity());

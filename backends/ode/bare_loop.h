@@ -1,4 +1,4 @@
-// What ODE itself costs: the loop against which the overhead of Backend::step is measured.
+// The cost of ODE itself: the loop against which the overhead of Backend::step is measured.
 #pragma once
 
 #include "duet/backends/scene.h"

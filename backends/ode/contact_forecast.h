@@ -34,10 +34,10 @@ class ContactForecast {
   void solve(const TreeFactor& factor, Eigen::VectorXd& v);
 
   [[nodiscard]] bool empty() const { return used_ == 0; }
-  // Of contact i, in the order in which they were added. Columns: normal, two tangents.
+  // The axes of contact i, in the order in which contacts were added. Columns: normal, two tangents.
   [[nodiscard]] const Eigen::Matrix3d& axes_W(std::size_t i) const { return parts_[i].axes_W; }
   [[nodiscard]] Eigen::Vector3d impulse(std::size_t i) const;  // on the link, along the axes [N s]
-  // Of the stops, by joint: towards the inside of the range [N m s]. 0 where none was added.
+  // The impulse of a joint's stop, towards the inside of the range [N m s]. 0 where none was added.
   [[nodiscard]] double stop_impulse(int joint) const { return stop_impulses_[joint]; }
 
  private:

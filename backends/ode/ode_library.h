@@ -1,4 +1,4 @@
-// What ODE keeps for the process and for each thread. Every function of this folder that calls ODE enters it first.
+// The data that ODE keeps per process and per thread. Every function of this folder that calls ODE enters it first.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a profile may set for ODE, with its defaults.
+// The settings of ODE that a profile may change, with their defaults.
 #pragma once
 
 #include <span>

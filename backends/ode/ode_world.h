@@ -54,7 +54,7 @@ class OdeWorld {
   // False where a link moves faster than kDivergedSpeed, or is nowhere.
   [[nodiscard]] bool sane() const;
 
-  // Of the next step only.
+  // Inputs of the next step only.
   void clear_forces();
   [[nodiscard]] bool has_stop(int joint) const { return has_stop_[joint]; }  // that ODE can hold
   void add_torque(int joint, double torque);

@@ -1,7 +1,5 @@
 #include "duet/backends/simbody/bare_loop.h"
 
-#include <fmt/format.h>
-
 #include "duet/backends/simbody/simbody_stepper.h"
 #include "duet/backends/thread_clock.h"
 #include "duet/core/require.h"
@@ -9,7 +7,7 @@
 namespace duet {
 
 double simbody_bare_step_seconds(const Scene& scene, const RobotState& state, const JointCommand& command, int steps) {
-  require(steps >= 1, fmt::format("simbody_bare_step_seconds: steps is {}, expected >= 1", steps));
+  require(steps >= 1, "simbody_bare_step_seconds: steps is {}, expected >= 1", steps);
   NarrowPhase narrow_phase(scene);
   SimbodyStepper stepper(scene, narrow_phase.capacity());
   const LinkPushes no_pushes(scene.robot->links.size());

@@ -1,4 +1,4 @@
-// What a step around Simbody costs by itself: the loop against which the overhead of Backend::step is measured.
+// The cost of a step around Simbody by itself: the loop against which the overhead of Backend::step is measured.
 #pragma once
 
 #include "duet/backends/scene.h"

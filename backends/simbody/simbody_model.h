@@ -27,7 +27,7 @@ class SimbodyModel {
   void update(const RobotState& state);
   // Applies a force at a point of a link, until the next update. [N], frame W; [m], frame L.
   void apply(int link, const Eigen::Vector3d& f_W, const Eigen::Vector3d& p_L);
-  // Of velocities, gravity and what is applied: the forces that give zero acceleration, as Dynamics::bias().
+  // The bias of velocities, gravity and applied forces: the forces that give zero acceleration, as Dynamics::bias().
   const Eigen::VectorXd& update_bias();
 
   [[nodiscard]] const std::vector<Eigen::Matrix3d>& rotations() const { return R_WL_; }  // of links

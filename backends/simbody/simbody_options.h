@@ -1,4 +1,4 @@
-// What a profile may set of the step around Simbody.
+// The settings of the step around Simbody that a profile may change.
 #pragma once
 
 #include <span>

@@ -64,7 +64,7 @@ void SimbodyStepper::solve(const RobotState& state, std::span<const ContactPoint
   a_ = (v_ - v_begin_) / dt_;
 }
 
-// Of joints that would end the step beyond a stop.
+// Adds the stops of joints that would end the step beyond one.
 void SimbodyStepper::add_stops(const RobotState& state) {
   const Softness soft = {.erp = settings_.stop_erp, .cfm = 0.0};
   for (int i = 0; i < robot_->dof(); ++i) {

@@ -1,7 +1,5 @@
 #include "duet/controllers/wbc_sim/leg_chain.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -29,8 +27,8 @@ Eigen::Vector3d turn(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B) {
 }  // namespace
 
 LegChain::LegChain(const RobotModel& robot, const Leg& leg) : joints_(leg.joints) {
-  require(leg.joints.size() == 6, fmt::format("robot '{}': leg of '{}' has {} joints, expected 6", robot.name,
-                                              robot.links[leg.link].name, leg.joints.size()));
+  require(leg.joints.size() == 6, "robot '{}': leg of '{}' has {} joints, expected 6", robot.name,
+          robot.links[leg.link].name, leg.joints.size());
   for (const int joint : joints_) {
     const RobotLink& link = robot.links[joint + 1];
     hinges_.push_back({.R_PL0 = link.X_PL.R.toRotationMatrix(),

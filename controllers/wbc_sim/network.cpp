@@ -191,8 +191,8 @@ const Eigen::VectorXf& WbcPolicy::act(std::span<const float> observation) {
 void save_wbc_network(const std::string& path, const WbcNetwork& network, TensorType type) {
   require(network.mlp.inputs() == WbcLayout(network.mlp.outputs()).size(network.kind) &&
               network.mean.size() == network.mlp.inputs() && network.deviation.size() == network.mlp.inputs(),
-          fmt::format("save_wbc_network: {} inputs and a normaliser of {} for {} joints", network.mlp.inputs(),
-                      network.mean.size(), network.mlp.outputs()));
+          "save_wbc_network: {} inputs and a normaliser of {} for {} joints", network.mlp.inputs(), network.mean.size(),
+          network.mlp.outputs());
   SafeTensors tensors;
   add_mlp(tensors, "mlp", network.mlp);
   tensors.tensors["input.mean"] = tensor_of(network.mean);

@@ -28,20 +28,20 @@ class WbcLayout {
   [[nodiscard]] int oracle() const { return size(WbcKind::kOracle); }
   [[nodiscard]] int student() const { return size(WbcKind::kStudent); }
   [[nodiscard]] int critic(int bodies) const { return oracle() + 9 * bodies; }
-  // As a network's header has them; what the student is shown of the past is one entry, "history".
+  // The channels as a network's header has them; all that the student is shown of the past is one entry, "history".
   [[nodiscard]] std::vector<LayoutEntry> channels(WbcKind kind) const;
 
  private:
   int n_;
 };
 
-// One input. Of the oracle: joint position and velocity, base angular and linear velocity, gravity, action, then the
-// reference's joint position and velocity, root position error, root orientation error. Of the student: a frame (joint
+// One input. The oracle's: joint position and velocity, base angular and linear velocity, gravity, action, then the
+// reference's joint position and velocity, root position error, root orientation error. The student's: a frame (joint
 // position and velocity, base angular velocity, gravity, action), the same of the reference, and the ten frames before,
 // oldest first, the first of an episode standing for those before it.
 const ObservationLayout& wbc_observation(WbcKind kind);
 
-// What is read from sensors and from u_t; noise is added here (Table S3) before it is written.
+// The values read from sensors and from u_t; noise is added here (Table S3) before it is written.
 struct WbcSensors {
   Eigen::VectorXd q, v;                                  // relative to neutral; [rad], [rad/s]
   Eigen::Vector3d w = Eigen::Vector3d::Zero();           // gyro [rad/s]
@@ -55,7 +55,7 @@ struct WbcSensors {
 // No allocation after the first call.
 void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors& sensors);
 
-// What a network is shown, tick by tick. No allocation after construction.
+// Writes the input of a network, tick by tick. No allocation after construction.
 class WbcObserver {
  public:
   WbcObserver(WbcKind kind, int joints) : writer_(wbc_observation(kind), WbcLayout(joints).widths()) {}

@@ -1,7 +1,5 @@
 #include "duet/controllers/wbc_sim/tracker.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -13,8 +11,7 @@ namespace duet {
 namespace {
 
 std::array<LegChain, 2> two_legs(const RobotModel& robot, const Stance& stance) {
-  require(stance.legs().size() == 2,
-          fmt::format("robot '{}' has {} legs, expected 2", robot.name, stance.legs().size()));
+  require(stance.legs().size() == 2, "robot '{}' has {} legs, expected 2", robot.name, stance.legs().size());
   return {LegChain(robot, stance.legs()[0]), LegChain(robot, stance.legs()[1])};
 }
 

@@ -1,6 +1,6 @@
-// What WBC-Sim tracks, once per tick: the 36-D reference u_t with its legs replaced by steps. Both the controller and
-// the training environment use it, so that a policy sees in a rollout what it saw in training. No allocation after
-// construction.
+// The reference that WBC-Sim tracks, once per tick: the 36-D reference u_t with its legs replaced by steps. Both the
+// controller and the training environment use it, so that a policy sees in a rollout what it saw in training. No
+// allocation after construction.
 #pragma once
 
 #include <Eigen/Core>

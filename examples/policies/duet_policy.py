@@ -1,4 +1,4 @@
-"""Serves a policy to duet: connection and messages (docs/adding-a-policy.md). Standard library only."""
+"""Serves a policy to duet: connection and messages (docs/extending.md). Standard library only."""
 import json
 import os
 import select

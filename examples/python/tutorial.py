@@ -40,7 +40,7 @@ def main(folder):
     print(run.table())
     print(run.compare("raise", "hold"))
 
-    # What an episode left: its row, and its motion as arrays.
+    # The results of an episode: its row, and its motion as arrays.
     row = next(row for row in run.episodes if row["policy"] == "raise")
     recording = run.recording(row["key"])
     right_hand = recording["q_target"][:, 22]

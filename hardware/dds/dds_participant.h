@@ -1,5 +1,5 @@
-// What every user of DDS here shares: one participant in one domain on one named interface, with the quality of service
-// that hardware/dds/dds_wire.h tells of. Only in this folder. One owner, one thread.
+// The participant that every user of DDS here shares: one, in one domain on one named interface, with the quality of
+// service that hardware/dds/dds_wire.h tells of. Only in this folder. One owner, one thread.
 #pragma once
 
 #include <dds/dds.h>

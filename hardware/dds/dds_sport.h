@@ -9,7 +9,7 @@
 
 namespace duet {
 
-// As open_robot_wire.
+// Opens the wire as open_robot_wire does.
 std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place);
 
 // The other side, in a twin's domain.

@@ -7,8 +7,8 @@
 namespace duet {
 namespace {
 
-// Of the low-level commands of a robot that this executor steers: HOMIE's controller; of the maker's walking it is not
-// known.
+// The number of writers of low-level commands on a robot that this executor steers: HOMIE's controller is one; for the
+// maker's walking the number is not known.
 int expected_writers(ExecutorKind kind) {
   constexpr int kAny = 1000;
   if (kind == ExecutorKind::kSport) return kAny;

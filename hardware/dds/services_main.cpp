@@ -35,7 +35,7 @@ struct ServicesArguments {
   int fsm = kFsmStart;
 };
 
-// What it writes to the twin: its motors, and how it walks.
+// Writes to the twin: its motors' commands, and how it walks.
 class TwinMotors {
  public:
   explicit TwinMotors(const ServicesArguments& arguments)

@@ -1,5 +1,5 @@
 // Two people who were recorded apart, put into one world. Person A stays; person B is turned about the vertical and
-// moved as a rigid body, the same in every frame. What comes out is an estimate, and its source says so.
+// moved as a rigid body, the same in every frame. The result is an estimate, and its source says so.
 //
 // floor: both stand on one floor (the 5th percentile of each one's lower toe). Level, they stay where the files have
 // them if their pelvises come within 0.2 to 2.5 m of one another; else B faces A at 0.8 m in the middle frame.

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/people/number_table.h"
+#include "duet/motion/bodies/number_table.h"
 #include "duet/motion/people/people_format.h"
 
 namespace duet {

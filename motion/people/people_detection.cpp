@@ -209,8 +209,7 @@ PeopleFinding<double> find_unit(const RawPeople& people, const SampledPeople& ra
   for (const auto& person : raw) mean += 0.5 * median_over(person, 0, person.size(), head_to_ankles);
   if (options.metres_per_unit) {
     const double metres = *options.metres_per_unit;
-    require(std::isfinite(metres) && metres > 0.0,
-            fmt::format("expected a positive unit of length, found {} m", metres));
+    require(std::isfinite(metres) && metres > 0.0, "expected a positive unit of length, found {} m", metres);
     return {metres, fmt::format("unit: {} m (as told; head to ankle {:.2f} m)", metres, metres * mean)};
   }
   if (people.metres_per_unit)
@@ -319,8 +318,7 @@ PeopleFinding<double> find_floor(const SampledPeople& people, const PeopleOption
       lowest.push_back(std::min({p(2, kLeftToe), p(2, kRightToe), p(2, kLeftAnkle), p(2, kRightAnkle)}));
   const double height = quantile(std::move(lowest), 0.5) - kToeHeight;
   if (options.floor) {
-    require(std::isfinite(*options.floor),
-            fmt::format("expected a finite height of the floor, found {}", *options.floor));
+    require(std::isfinite(*options.floor), "expected a finite height of the floor, found {}", *options.floor);
     return {-*options.floor,
             fmt::format("floor: at {:.3f} m (as told; the feet say {:.3f} m)", *options.floor, height)};
   }

@@ -1,6 +1,6 @@
-// What the positions of two people say of themselves: unit, up axis, mirror, the tilt of the floor and its height. Each
-// finding is a value and a sentence for the user; what cannot be told is refused with the option that settles it. Pure
-// functions.
+// Facts that the positions of two people tell: unit, up axis, mirror, the tilt of the floor and its height. Each
+// finding is a value and a sentence for the user; a fact that cannot be told is refused with the option that settles
+// it. Pure functions.
 #pragma once
 
 #include <array>

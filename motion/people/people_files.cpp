@@ -10,10 +10,10 @@
 #include <filesystem>
 #include <utility>
 
+#include "duet/archives/npy/npy.h"
+#include "duet/archives/npy/npy_header.h"
 #include "duet/core/data_file.h"
 #include "duet/core/naming_file.h"
-#include "duet/core/npy.h"
-#include "duet/core/npy_header.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 

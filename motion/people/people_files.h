@@ -1,4 +1,4 @@
-// What the readers of this folder share: folders, labels, and arrays of positions. Thread-safe.
+// Helpers that the readers of this folder share: folders, labels, and arrays of positions. Thread-safe.
 #pragma once
 
 #include <optional>
@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/npy_array.h"
-#include "duet/core/pickle_node.h"
+#include "duet/archives/npy/npy_array.h"
+#include "duet/archives/pickle/pickle_node.h"
 #include "duet/core/point_tracks.h"
 #include "duet/core/task.h"
 

@@ -1,5 +1,5 @@
-// What a format of two-person motion is: it finds its clips below the paths that a user names and reads one at a time;
-// nothing of a data set but the clip at hand is in memory. people_formats.h has the table.
+// A format of two-person motion: it finds its clips below the paths that a user names and reads one at a time; nothing
+// of a data set but the clip at hand is in memory. people_formats.h has the table.
 #pragma once
 
 #include <map>

@@ -1,5 +1,5 @@
-// What a user may say of a recording of two people where the file does not, or says it wrongly. Empty = what the layout
-// is known to have, else what is found from the data; the evidence says which.
+// Facts that a user may state of a recording of two people where the file does not, or states wrongly. Empty = what the
+// layout is known to have, else what is found from the data; the evidence says which.
 #pragma once
 
 #include <optional>
@@ -24,7 +24,7 @@ struct PeopleOptions {
   std::optional<bool> level = {};        // turn the world so that its floor is level (a camera that looked down)
   std::optional<double> floor = {};      // height of the floor along the up axis, in metres after the unit
   std::optional<bool> drop_t_pose = {};  // an added T pose in frame 0
-  std::string skeleton = {};             // name of a joint layout (motion/people/joint_layout.h) or of a file of names
+  std::string skeleton = {};             // name of a joint layout (motion/layouts/joint_layout.h) or of a file of names
   std::string body_model = {};           // the user's SMPL, SMPL-H or SMPL-X file
   std::string object = {};               // the user's file of a carried object's shape (motion/people/object_shape.h)
   Alignment align = Alignment::kNone;

@@ -12,7 +12,7 @@
 #include "duet/core/point_tracks.h"
 #include "duet/core/pose.h"
 #include "duet/core/task.h"
-#include "duet/motion/people/joint_layout.h"
+#include "duet/motion/layouts/joint_layout.h"
 #include "duet/motion/people/people_options.h"
 #include "duet/motion/person.h"
 

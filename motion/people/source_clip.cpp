@@ -125,7 +125,7 @@ void find_world(const RawPeople& people, const PeopleSamples& samples, const Peo
 
 Plan plan_of(const RawPeople& people, const PeopleOptions& options, std::vector<std::string>& evidence) {
   require(std::isfinite(options.output_rate_hz) && options.output_rate_hz > 0.0,
-          fmt::format("import: expected a positive output rate, found {} Hz", options.output_rate_hz));
+          "import: expected a positive output rate, found {} Hz", options.output_rate_hz);
   Plan plan;
   plan.output_rate_hz = options.output_rate_hz;
   find_world(people, PeopleSamples(people, people.joints[0].frames() > 4 ? 1 : 0), options, plan, evidence);

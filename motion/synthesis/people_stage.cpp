@@ -121,7 +121,7 @@ ActOutcome draw_outcome(const SynthesisOptions& options, Draws& draws) {
   return options.outcome.value_or(drawn);
 }
 
-// What the clip shows: as recordings are cropped, or with the time asked for before the first step and after the last.
+// Crops the clip as recordings are, or to the time asked for before the first step and after the last.
 void crop(const Act& act, const SynthesisOptions& options, double last, Staged& staged, Draws& draws) {
   const Scene& scene = staged.scene;
   const double tempo = scene.cast.manner.tempo;

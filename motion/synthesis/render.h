@@ -9,7 +9,7 @@
 
 namespace duet::synthesis {
 
-// What of the scene's time a clip shows: from `first` on, `tempo` seconds of it in each second of the clip.
+// The part of the scene's time that a clip shows: from `first` on, `tempo` seconds of it in each second of the clip.
 struct Showing {
   double first = 0.0;  // [s]
   double tempo = 1.0;

@@ -1,7 +1,5 @@
 #include "duet/motion/synthesis/stage.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -216,8 +214,8 @@ Staged set_stage(Task task, const SynthesisOptions& options, Draws& draws) {
   Timing timing = plan_timing(act, scene, ways, speeds, false, draws);
   if (timing.fixed(act) > seconds) timing = plan_timing(act, scene, ways, speeds, true, draws);
   require(!options.duration || timing.fixed(act) <= seconds,
-          fmt::format("synthesize: duration {} s is too short for these ways and this act; expected [{:.2f}, 60] s",
-                      seconds, timing.fixed(act)));
+          "synthesize: duration {} s is too short for these ways and this act; expected [{:.2f}, 60] s", seconds,
+          timing.fixed(act));
   seconds = std::max(seconds, timing.fixed(act));
   const int frames = static_cast<int>(std::lround(seconds * options.rate_hz));
 

@@ -35,7 +35,7 @@ Ways plan_ways(const Layout& layout, double distance, double angle, double share
 Walk step_back(const Body& body, const Placement& from, double speed, double by);
 Performer make_performer(const Body& body, const Ways& ways, int k, double style, Draws& draws);
 
-// Whoever turns round to leave stops looking at the partner; to be called once the act has been performed.
+// Makes people who turn round to leave stop looking at the partner; to be called once the act has been performed.
 void look_away(Scene& scene);
 
 }  // namespace duet::synthesis

@@ -1,7 +1,5 @@
 #include "duet/policies/controls/control_policy.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -46,11 +44,11 @@ constexpr ControlArray kControls = {
 
 const ControlScript& control_named(std::string_view name) {
   const auto found = std::ranges::find(kControls, name, &ControlScript::name);
-  require(found != kControls.end(), fmt::format("policy '{}' is no control", name));
+  require(found != kControls.end(), "policy '{}' is no control", name);
   return *found;
 }
 
-// What `canned` does for a task: another control, or a gesture.
+// The script of `canned` for a task: another control, or a gesture.
 ControlScript told_script(Task task) {
   const std::string_view name = to_string(task);
   if (name == "hug") return control_named("walker");
@@ -95,7 +93,7 @@ std::vector<std::string> control_names() {
 }
 
 PolicyMaker control_maker(std::string_view name, std::shared_ptr<const RobotModel> robot) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  require(robot != nullptr, "policy '{}' needs a robot", name);
   const ControlScript script = control_named(name);
   static_cast<void>(ControlPolicy(robot, script));  // a robot that does not fit is found here
   return [robot = std::move(robot), script] { return std::make_unique<ControlPolicy>(robot, script); };
@@ -109,7 +107,7 @@ ControlPolicy::ControlPolicy(std::shared_ptr<const RobotModel> robot, const Cont
       kinematics_(*robot_),
       J_(3, 6 + robot_->dof()) {
   require(!robot_->roles.arms[0].empty() && !robot_->roles.arms[1].empty(),
-          fmt::format("policy '{}': robot '{}' has no arms in its card (roles.arms)", name_, robot_->name));
+          "policy '{}': robot '{}' has no arms in its card (roles.arms)", name_, robot_->name);
   kinematics_.update({}, robot_->neutral);
   for (const int side : {0, 1}) {
     shoulder_B_[side] = kinematics_.frame_position(robot_->track_frame(side == 0 ? "lshoulder" : "rshoulder"));

@@ -19,7 +19,7 @@ namespace {
 
 using Robot = std::shared_ptr<const RobotModel>;
 
-// What the scheduler takes: finite, its quaternion unit.
+// Whether the scheduler takes it: finite, its quaternion unit.
 bool is_reference(const Reference& reference) {
   constexpr double kUnit = 1e-6;
   return reference.X_WB.p.allFinite() && std::abs(reference.X_WB.R.norm() - 1.0) < kUnit && reference.q.allFinite();
@@ -53,7 +53,7 @@ class DstarPolicy final : public Policy {
   }
 
   Anchors act(const Observation& observation) override {
-    require(drawn_, fmt::format("policy '{}': reset comes first", name_));
+    require(drawn_, "policy '{}': reset comes first", name_);
     if (sampling_.noise == NoiseMode::kCall) draw();
     past_.add(observation);
     maker_.make(observation, past_.frames(), features_);
@@ -95,7 +95,7 @@ class DstarPolicy final : public Policy {
 // Networks that ship, by the network of WBC-Sim that they learnt over.
 constexpr std::string_view kBraced = "braced", kStudent = "student";
 
-// What a suite may set; an empty language is the one that is built in.
+// The options of a suite; an empty language is the one that is built in.
 struct DstarOptions {
   std::string network{kBraced}, language;
   DstarSampling sampling;
@@ -148,11 +148,10 @@ std::shared_ptr<const LanguageEncoder> language_of(const std::string& name, cons
 
 void check_language(const std::string& name, const DstarNetwork& network, const LanguageEncoder* language) {
   if (!network.config.language_on) return;
-  require(language != nullptr, fmt::format("policy '{}': its network needs a language encoder", name));
-  require(
-      network.language == language->name() && network.config.language == language->size(),
-      fmt::format("policy '{}': expected the language encoder of its network ('{}', {} numbers), found '{}' with {}",
-                  name, network.language, network.config.language, language->name(), language->size()));
+  require(language != nullptr, "policy '{}': its network needs a language encoder", name);
+  require(network.language == language->name() && network.config.language == language->size(),
+          "policy '{}': expected the language encoder of its network ('{}', {} numbers), found '{}' with {}", name,
+          network.language, network.config.language, language->name(), language->size());
 }
 
 }  // namespace
@@ -161,11 +160,10 @@ std::unique_ptr<Policy> make_dstar_policy(const std::string& name, Robot robot,
                                           std::shared_ptr<const DstarNetwork> network,
                                           std::shared_ptr<const LanguageEncoder> language,
                                           const DstarSampling& sampling) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
-  require(network != nullptr, fmt::format("policy '{}' needs a network", name));
-  require(
-      network->joints == robot->joint_names(),
-      fmt::format("policy '{}': its network was made for other joints than those of robot '{}'", name, robot->name));
+  require(robot != nullptr, "policy '{}' needs a robot", name);
+  require(network != nullptr, "policy '{}' needs a network", name);
+  require(network->joints == robot->joint_names(),
+          "policy '{}': its network was made for other joints than those of robot '{}'", name, robot->name);
   check_language(name, *network, language.get());
   return std::make_unique<DstarPolicy>(name, std::move(robot), std::move(network), std::move(language), sampling);
 }
@@ -187,7 +185,7 @@ LoadedFiles dstar_files(const std::string& name, const PolicyOptions& given) {
 }
 
 PolicyMaker dstar_maker(const std::string& name, Robot robot, const PolicyOptions& given) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  require(robot != nullptr, "policy '{}' needs a robot", name);
   const DstarOptions options = read_dstar_options(name, given);
   const std::shared_ptr<const LanguageEncoder> language = language_of(name, options);
   const std::shared_ptr<const DstarNetwork> network = load_dstar_network(network_path(name, options), *robot);

@@ -27,7 +27,7 @@ std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_p
                                           std::shared_ptr<const LanguageEncoder> language,
                                           const DstarSampling& sampling = {});
 
-// Of "dstar" and "dp": options `network` (braced: the default, student, or a file), `language` (NPZ table;
+// The entry of "dstar" or "dp": options `network` (braced: the default, student, or a file), `language` (NPZ table;
 // default: built in), `noise` (episode | call), `temperature`. Throws what load_dstar_network and load_language_table
 // throw; MissingError where the file is not there.
 PolicyInfo dstar_info(const std::string& name);

@@ -87,8 +87,8 @@ FeatureMaker::FeatureMaker(std::shared_ptr<const RobotModel> robot)
       left_hand_(robot_->track_frame("lhand")),
       right_hand_(robot_->track_frame("rhand")) {
   const std::size_t channels = channel_names(*robot_).size();
-  require(channels == kFrameSize, fmt::format("robot '{}' gives {} channels of observation, expected {} (29 joints)",
-                                              robot_->name, channels, kFrameSize));
+  require(channels == kFrameSize, "robot '{}' gives {} channels of observation, expected {} (29 joints)", robot_->name,
+          channels, kFrameSize);
 }
 
 void FeatureMaker::make(const Observation& observation, std::span<const ObservationFrame> past,

@@ -1,4 +1,4 @@
-// What the network sees, made from an observation: the same code for training and rollouts, so that they cannot differ.
+// The network's input, made from an observation: the same code for training and rollouts, so that they cannot differ.
 // Ego-centric (A.3.1): frame E stands on the ground below the robot's root as it is now, x along its heading, z up.
 #pragma once
 
@@ -15,7 +15,7 @@
 namespace duet {
 
 inline constexpr int kFrameSize = kObservationSize;  // 149 per frame
-// Of what MSS looks at: partner's root, head and hands from the robot's root, head and hands.
+// The number of relations that MSS looks at: partner's root, head and hands from the robot's root, head and hands.
 inline constexpr int kRelations = 6;
 inline constexpr int kPositionBands = 4;  // sinusoids per axis: wavelengths 4, 2, 1, 0.5 m
 inline constexpr int kPositionSize = kRelations * 3 * 2 * kPositionBands;  // 144

@@ -15,8 +15,8 @@ struct Moments {
   float mean, inverse_deviation;
 };
 
-// Of `rows` numbers in each of `columns` columns that begin `step` apart. Four sums side by side: one after the other
-// would wait for each addition.
+// The sum of `f` over `rows` numbers in each of `columns` columns that begin `step` apart. Four sums side by side: one
+// after the other would wait for each addition.
 template <typename F>
 float sum(const float* x, int rows, int columns, int step, const F& f) {
   float sums[4] = {};

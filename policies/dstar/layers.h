@@ -1,6 +1,6 @@
 // The layers that D-STAR is made of, in float, over columns: a column is a frame, a token or a position, and columns
-// follow one another without gaps. What is not a number stays so. Nothing here allocates but in constructors. Private
-// to policies/dstar/.
+// follow one another without gaps. NaN stays NaN. Nothing here allocates but in constructors. Private to
+// policies/dstar/.
 #pragma once
 
 #include <span>

@@ -16,7 +16,7 @@ namespace duet {
 
 inline constexpr double kPlanGoldenError = 1e-4;  // of a normalised plan at load
 
-// Everything a file holds. Tensor names and shapes: docs/dstar-format.md; weights are (out, in), row-major.
+// Everything a file holds. Tensor names and shapes: docs/file-formats.md; weights are (out, in), row-major.
 struct DstarNetwork {
   DstarConfig config;
   std::string robot;                  // name of the card
@@ -29,7 +29,7 @@ struct DstarNetwork {
   std::map<std::string, std::string> notes;     // seed, windows, epochs, data, split digest: for people
 };
 
-// What one evaluation needs and gives, in the network's own units.
+// The input and the output of one evaluation, in the network's own units.
 struct DstarInput {
   const DstarFeatures* features = nullptr;
   std::span<const float> language;  // config.language numbers

@@ -1,4 +1,4 @@
-// Networks of D-STAR in files. docs/dstar-format.md describes them.
+// Networks of D-STAR in files. docs/file-formats.md describes them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -231,7 +231,7 @@ std::shared_ptr<const DstarNetwork> load_dstar_network(const std::string& path, 
 
 void save_dstar_network(const std::string& path, const DstarNetwork& network, TensorType type) {
   const std::string problem = network_problem(network);
-  require(problem.empty(), fmt::format("save_dstar_network: {}", problem));
+  require(problem.empty(), "save_dstar_network: {}", problem);
   SafeTensors content = content_of(network);
   // The plan is of what the file holds, which F16 rounds.
   SafeTensors held = parse_safetensors(safetensors_bytes(content, type), path);

@@ -1,5 +1,5 @@
-// What D-STAR's long stream looks back on: frames further apart, kept over an episode, of which an observation only
-// brings the newest. One owner, not thread-safe.
+// The past that D-STAR's long stream looks back on: frames further apart, kept over an episode, of which an observation
+// only brings the newest. One owner, not thread-safe.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ class PastFrames {
   void reset() { seen_.clear(); }
   // Keeps the frames of an observation; what was kept of its ticks or later ones is replaced.
   void add(const Observation& observation);
-  // kHistoryFrames frames, `stride` ticks apart, the newest last. Of a tick that was not seen: the last one before it,
+  // kHistoryFrames frames, `stride` ticks apart, the newest last. For a tick that was not seen: the last one before it,
   // or the first of all. Valid until the next call. Throws std::invalid_argument before the first add.
   std::span<const ObservationFrame> frames();
 

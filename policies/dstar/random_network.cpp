@@ -1,7 +1,5 @@
 #include "duet/policies/dstar/random_network.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 #include "duet/core/random.h"
@@ -40,7 +38,7 @@ void fill_normaliser(Eigen::VectorXf& mean, Eigen::VectorXf& deviation, int size
 
 DstarNetwork random_dstar_network(const DstarConfig& config, const RobotModel& robot, std::uint64_t seed) {
   const std::string problem = config_problem(config);
-  require(problem.empty(), fmt::format("random_dstar_network: {}", problem));
+  require(problem.empty(), "random_dstar_network: {}", problem);
   DstarNetwork network{.config = config,
                        .robot = robot.name,
                        .joints = robot.joint_names(),

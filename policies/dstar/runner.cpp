@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 
 #include <optional>
 #include <utility>
@@ -17,7 +16,7 @@ constexpr float kFrameClip = 10.0F;  // of a normalised channel
 std::shared_ptr<const DstarNetwork> checked(std::shared_ptr<const DstarNetwork> network) {
   require(network != nullptr, "D-STAR: a runner needs a network");
   const std::string problem = network_problem(*network);
-  require(problem.empty(), fmt::format("network of D-STAR: {}", problem));
+  require(problem.empty(), "network of D-STAR: {}", problem);
   return network;
 }
 

@@ -21,7 +21,7 @@ class ChannelValues {
   ChannelValues(std::shared_ptr<const RobotModel> robot, std::vector<int> joints, const PolicyDescriptor& descriptor);
   // `language`: the prompt's embedding, where a channel shows it.
   void reset(const EpisodeContext& context, std::vector<float> language);
-  // Of the observation's frame `frame` (0 the oldest) and of its tick. `out` has channel_size numbers. No allocation.
+  // Writes frame `frame` (0 the oldest) of the observation and its tick. `out` has channel_size numbers. No allocation.
   void write(const Channel& channel, const Observation& observation, int frame, std::span<float> out);
 
  private:

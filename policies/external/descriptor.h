@@ -1,5 +1,5 @@
 // A policy descriptor (schema duet.policy/1): a policy that is not compiled into duet, as data. A network with what it
-// is shown and what its output means, or a program that answers messages. Format: docs/adding-a-policy.md. Joints are
+// is shown and what its output means, or a program that answers messages. Format: docs/extending.md. Joints are
 // named, not yet bound to a robot.
 #pragma once
 
@@ -16,7 +16,7 @@ inline constexpr int kPlanNumbersBeforeJoints = 7;  // of an anchor: root positi
 
 enum class PolicyKind { kOnnx, kProcess };
 
-// What the root of an anchor refers to.
+// The frame that the root of an anchor refers to.
 enum class PlanFrame {
   kWorld,
   kEgo,           // E of the observation's last frame
@@ -50,7 +50,7 @@ struct PolicyDescriptor {
   PolicyKind kind = PolicyKind::kOnnx;
   std::vector<std::string> joints;  // order of every joint vector; empty: the robot's
   int joints_line = 0;
-  // What it was made for, in the order of the channel `task`; an episode of another is refused.
+  // The tasks that it was made for, in the order of the channel `task`; an episode of another is refused.
   std::vector<Task> tasks = {kPaperTasks.begin(), kPaperTasks.end()};
   PolicyFrame frame = PolicyFrame::kWorld;
   PlanFormat output;

@@ -20,7 +20,7 @@
 namespace duet {
 namespace {
 
-// What a suite may set of a network; "" where it is the descriptor's, or built in.
+// The options of a network that a suite may set; "" where it is the descriptor's, or built in.
 struct OnnxOptions {
   std::string network, engine = "duet", language;
 };
@@ -83,8 +83,8 @@ bool is_beside(const PolicyDescriptor& descriptor, const std::string& word) {
   return std::filesystem::is_regular_file(std::filesystem::path(descriptor.folder()) / path);
 }
 
-// What the command names beside the descriptor, and the other files of the same kind there: a script loads its modules
-// without naming them. From the descriptor's folder, sorted.
+// The files that the command names beside the descriptor, and the others of the same kind there: a script loads its
+// modules without naming them. From the descriptor's folder, sorted.
 std::set<std::string> command_files(const PolicyDescriptor& descriptor) {
   namespace fs = std::filesystem;
   std::set<std::string> files;
@@ -154,7 +154,7 @@ PolicyMaker external_maker(
     const std::string& name,
     std::shared_ptr<const RobotModel> robot,  // NOLINT(performance-unnecessary-value-param): as all makers
     const PolicyOptions& options) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", name));
+  require(robot != nullptr, "policy '{}' needs a robot", name);
   const PolicyDescriptor descriptor = read_policy_descriptor(name);
   return descriptor.kind == PolicyKind::kOnnx ? onnx_maker(descriptor, robot, options)
                                               : process_maker(descriptor, robot, options);

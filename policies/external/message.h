@@ -1,4 +1,4 @@
-// Messages between duet and the process of a policy (docs/adding-a-policy.md, "Messages"): a length of four bytes,
+// Messages between duet and the process of a policy (docs/extending.md, "Messages"): a length of four bytes,
 // little-endian, and as many bytes of JSON. Bytes and texts only; nothing here reads or writes a socket.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace duet {
 inline constexpr int kPolicyMessageVersion = 1;
 inline constexpr std::size_t kLargestPolicyMessage = std::size_t{1} << 20;  // [bytes]
 
-// What a process says.
+// A message from a process.
 struct PolicyMessage {
   enum class Type { kHello, kReady, kPlan };
   Type type = Type::kReady;
@@ -32,7 +32,7 @@ struct PolicyMessage {
 PolicyMessage parse_policy_message(std::string_view text);
 std::string_view to_string(PolicyMessage::Type type);
 
-// What duet says.
+// The messages that duet sends.
 std::string hello_message(const PolicyDescriptor& descriptor, const RobotModel& robot,
                           const std::vector<std::string>& joints);
 std::string reset_message(const EpisodeContext& context);

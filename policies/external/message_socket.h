@@ -29,7 +29,7 @@ class MessageSocket {
   MessageSocket(const MessageSocket&) = delete;
   MessageSocket& operator=(const MessageSocket&) = delete;
 
-  // kLate: the message is not sent, or its rest follows with the next call. What an earlier call left goes first.
+  // kLate: the message is not sent, or its rest follows with the next call. The rest of an earlier call goes first.
   Result send(std::string_view message, AwakeDeadline& deadline);
   // Throws InputError as MessageBuffer::next.
   Result receive(std::string& message, AwakeDeadline& deadline);

@@ -125,11 +125,10 @@ std::unique_ptr<Policy> make_onnx_policy(const PolicyDescriptor& descriptor,
                                          const std::shared_ptr<const RobotModel>& robot,
                                          std::unique_ptr<Network> network, const std::string& network_path,
                                          std::shared_ptr<const LanguageEncoder> language) {
-  require(robot != nullptr && network != nullptr,
-          fmt::format("policy '{}': expected a robot and a network, found none", descriptor.name));
+  require(robot != nullptr && network != nullptr, "policy '{}': expected a robot and a network, found none",
+          descriptor.name);
   require(!shows_language(descriptor) || (language != nullptr && language->size() == kLanguageSize),
-          fmt::format("policy '{}': expected a language encoder of {} numbers, found none", descriptor.name,
-                      kLanguageSize));
+          "policy '{}': expected a language encoder of {} numbers, found none", descriptor.name, kLanguageSize);
   return std::make_unique<OnnxPolicy>(descriptor, robot, std::move(network), network_path, std::move(language));
 }
 

@@ -246,7 +246,7 @@ class ProcessPolicy final : public Policy {
 
 std::unique_ptr<Policy> make_process_policy(const PolicyDescriptor& descriptor,
                                             const std::shared_ptr<const RobotModel>& robot) {
-  require(robot != nullptr, fmt::format("policy '{}' needs a robot", descriptor.name));
+  require(robot != nullptr, "policy '{}' needs a robot", descriptor.name);
   return std::make_unique<ProcessPolicy>(descriptor, robot, bind_joints(descriptor, *robot));
 }
 

@@ -1,4 +1,4 @@
-"""duet: a benchmark for two-person interactions with a humanoid. The guide is docs/python.md.
+"""duet: a benchmark for two-person interactions with a humanoid. The guide is docs/using-duet.md.
 
     run = duet.evaluate(my_policy, "demo", engines=["mujoco"], jobs=2, output="runs/mine")
     print(run.table())

@@ -38,7 +38,7 @@ _NOT_OF_A_CLASS = frozenset((
 # Methods that have done their work before a policy is called.
 _BEFORE_CALLS = frozenset(("__init__", "__new__", "__post_init__", "__init_subclass__", "__set_name__", "__del__", "__setstate__",
                            "__getstate__", "__reduce__", "__reduce_ex__", "__copy__", "__deepcopy__", "__repr__", "__str__"))
-# What code reads that is neither in it nor in what it holds.
+# Names by which code reads what is neither in it nor in what it holds.
 _READS = frozenset((
     "builtins.open", "builtins.input", "builtins.eval", "builtins.exec", "builtins.globals", "builtins.__import__", "io.open",
     "os.environ", "os.environb", "os.getenv", "os.getenvb", "os.open", "os.popen", "os.system", "numpy.load", "numpy.loadtxt",
@@ -401,7 +401,7 @@ class _Walk:
         for name, value in sorted(vars(kind).items()):
             if name not in _NOT_OF_A_CLASS:
                 self._put("entry", name.encode())
-                # Who names a class makes objects of it.
+                # Code that names a class makes objects of it.
                 is_made = name in ("__init__", "__new__", "__post_init__") and not path.endswith(".__class__") and path != "policy"
                 self.walk(value, path if is_made else f"{path}.{name}")
 

@@ -8,8 +8,8 @@
 #include <span>
 #include <string_view>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/detector_result.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/detector_result.h"
 
 namespace duet {
 

@@ -1,12 +1,12 @@
-// What the rules of acts look at: smoothed tracks, spans of frames, and the times at which a hand of one stays with a
+// The input of the rules of acts: smoothed tracks, spans of frames, and the times at which a hand of one stays with a
 // hand of the other. 50 Hz. Thread-safe.
 #pragma once
 
 #include <Eigen/Core>
 #include <vector>
 
-#include "duet/tasks/agent.h"
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/agent.h"
+#include "duet/tasks/rules/frame_windows.h"
 
 namespace duet::rules {
 
@@ -66,7 +66,7 @@ struct HandMeeting {
   double parted = 0.0;  // farthest that the two are apart afterwards; where nothing follows: at its end [m]
 };
 
-// Of smoothed tracks (hands, torso, shoulders of both), in the order LL, LR, RL, RR and of time.
+// The meetings in smoothed tracks (hands, torso, shoulders of both), in the order LL, LR, RL, RR and of time.
 std::vector<HandMeeting> hand_meetings(const Agent& performer, const Agent& partner, const Nearness& near);
 
 // Hands, torso and shoulders of both.

@@ -23,7 +23,7 @@ Tracks fly_kiss_rule_tracks(const Agent& performer, const Agent& partner) {
   return tracks;
 }
 
-// What one hand does, per frame. [m], but `out` in arms
+// The motion of one hand, per frame. [m], but `out` in arms
 struct KissHand {
   Eigen::ArrayXd to_mouth, out, height, to_hands, trunks;
 };

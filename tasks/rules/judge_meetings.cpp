@@ -12,7 +12,7 @@ int held(const std::vector<MeetingCondition>& conditions) {
       std::count_if(conditions.begin(), conditions.end(), [](const MeetingCondition& c) { return c.slack >= 0.0; }));
 }
 
-// Of equally good ones the longest, of equally long ones the first.
+// The meeting that holds the most conditions; among equally good ones the longest, then the first.
 const HandMeeting* judged_meeting(const std::vector<HandMeeting>& meetings, const Thresholds& tau,
                                   MeetingConditions conditions) {
   const HandMeeting* best = nullptr;

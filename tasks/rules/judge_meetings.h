@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/tasks/detector_result.h"
+#include "duet/tasks/rules/detector_result.h"
 #include "duet/tasks/rules/evidence.h"
 
 namespace duet::rules {

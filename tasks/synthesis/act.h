@@ -1,4 +1,4 @@
-// What tasks have in common when two people do them: where the two stand for the act, and the scene that an act fills.
+// The common part of tasks that two people do: where the two stand for the act, and the scene that an act fills.
 #pragma once
 
 #include <array>
@@ -15,12 +15,12 @@ struct Manner {
   bool rehearsed = true;
   double tempo = 1.0;                   // how many times as fast the scene is played as it is planned
   std::optional<double> distance = {};  // of the roots in the act [m]; else the layout's own
-  // Of A and B: where each has the other when its feet stand for the act, from its own facing towards the acting hand,
+  // For A and B: where each has the other when its feet stand for the act, from its own facing towards the acting hand,
   // and by how much it then turns away from there, the hand forward. [rad]
   std::array<double, 2> bearing = {0.0, 0.0}, turn = {0.0, 0.0};
 };
 
-// What recorded people do in an act. docs/synthesis.md says where each figure is from.
+// The manner of recorded people in an act. docs/synthesis.md says where each figure is from.
 struct RecordedManner {
   Deciles tempo = {1.4, 1.7, 2.0};      // of the planned motion
   Deciles act = {};                     // from its begin to its end, at tempo 1 [s]; zeros: as the rehearsed act has it
@@ -39,7 +39,7 @@ struct RecordedManner {
   Deciles after = {0.2, 0.5, 1.0};      // and after it [s]
 };
 
-// Who takes part, before anybody is placed.
+// The two people who take part, before anybody is placed.
 struct Cast {
   std::array<Body, 2> body;  // A, B
   int side = 1;              // of the acting hand: 0 left, 1 right

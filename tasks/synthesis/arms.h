@@ -9,7 +9,7 @@
 
 namespace duet::synthesis {
 
-// What a hold may look at. The figures have their torsos posed, not yet their arms.
+// The values that a hold may look at. The figures have their torsos posed, not yet their arms.
 struct Moment {
   double t = 0.0;
   int side = 0;  // of the arm

@@ -1,5 +1,5 @@
 // Every random quantity of a clip, each from its own Philox stream (seed; task, index, quantity): fixing one of them by
-// an option leaves all others as they were. What was drawn or given is recorded as text for the clip's `source`.
+// an option leaves all others as they were. Drawn and given values are recorded as text for the clip's `source`.
 #pragma once
 
 #include <array>

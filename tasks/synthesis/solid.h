@@ -14,9 +14,9 @@ struct SolidPart {
   double radius = 0.0;       // [m]
 };
 
-// Of a figure whose torso is posed.
+// The parts of a figure whose torso is posed.
 std::vector<SolidPart> solid_parts(const Body& body, const Figure& figure);
-// Of a figure whose arm is posed.
+// The hand of a figure whose arm is posed.
 SolidPart solid_hand(const Body& body, const Figure& figure, int side);
 
 // How deep two parts are in each other [m], negative: how far apart; and the unit vector that takes the first out.

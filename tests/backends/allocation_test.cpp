@@ -14,7 +14,7 @@ TEST(Allocation, IsCounted) {
   EXPECT_GE(test::allocation_count(), before + 2);
 }
 
-// What an engine's own library allocates in a step, per step at most; our code adds none.
+// The allocations of an engine's own library, per step at most; our code adds none.
 long allowed_per_step(const std::string& engine) {
   if (engine == "dart") return 2000;   // libdart's recursions and assertions
   if (engine == "ode") return 4;       // its memory grows with more contacts than were reserved for

@@ -1,4 +1,4 @@
-// What Backend itself promises for every engine: arguments are checked once, with messages that name the joint.
+// Promises of Backend itself for every engine: arguments are checked once, with messages that name the joint.
 #include "duet/backends/backend.h"
 
 #include <fmt/format.h>
@@ -98,7 +98,7 @@ TEST(Backend, RefusesLinksWithoutMassOrInertiaByName) {
   }
 }
 
-// Of the engines that are here.
+// The physics engines that are here.
 std::vector<std::string> physics_engines() {
   std::vector<std::string> names;
   for (const EngineInfo& info : engines())

@@ -1,4 +1,4 @@
-// Bullet: drift of a free box, stops of wrists, thrashing, options. What holds in every engine is in engine_*_test.cpp.
+// Bullet: drift of a free box, stops of wrists, thrashing, options. Laws of every engine are in engine_*_test.cpp.
 #include <cmath>
 
 #include "duet/backends/factory.h"

@@ -238,7 +238,7 @@ TEST(ConformanceSuite, DeviationsNameScenesOfTheSuiteAndGiveAReason) {
     }
 }
 
-// What the engines are compared with among one another, each against the median of those that are here.
+// Figures that the engines are compared by with one another, each against the median of those that are here.
 TEST(ConformanceSuite, EnginesAgreeOnFallAndHeldPush) {
   std::vector<EngineReport> reports;
   for (const EngineInfo& info : engines())
@@ -251,7 +251,7 @@ TEST(ConformanceSuite, EnginesAgreeOnFallAndHeldPush) {
         if (verdict_on(report.engine, found) == Verdict::kFail) ADD_FAILURE() << sentence(report.engine, found);
 }
 
-// What the suite asks, line by line: nothing is asked less, and no closed form gives another figure.
+// The questions of the suite, line by line: nothing is asked less, and no closed form gives another figure.
 TEST(ConformanceSuite, AsksWhatItAsked) {
   if (const std::string reason = absence("mujoco"); !reason.empty()) GTEST_SKIP() << "not run: " << reason;
   std::vector<std::string> asked;

@@ -1,5 +1,5 @@
 // DART: the torque law and contacts of its own, and the traps of its Debian build: it prints, it ends the process at a
-// NaN, and a detector of it brings a second Bullet. What holds in every engine is in engine_*_test.cpp.
+// NaN, and a detector of it brings a second Bullet. Laws of every engine are in engine_*_test.cpp.
 #include <cmath>
 #include <fstream>
 

@@ -1,4 +1,4 @@
-// What holds of contacts in every engine: friction per pair, the sign and the sum of forces, links that touch.
+// Laws of contacts in every engine: friction per pair, the sign and the sum of forces, links that touch.
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -16,14 +16,14 @@ namespace {
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
 
-// What an engine is held to.
+// The accuracy that an engine is held to.
 struct Accuracy {
   // Whether it moves the centre of mass of a turning body as it falls. Engines in coordinates of joints move the origin
   // of the base: the centre follows to the first order of the step.
   bool moves_the_centre = true;
   // Beyond a stop that is hit at 16 rad/s, 0.032 rad a step; at rest there; speed at rest. [rad], [rad], [rad/s]
   double stop_hit = 1e-6, stop_rest = 1e-3, stop_speed = 1e-3;
-  // Of the G1's joints that are pressed against their stops; Simbody's do not come to rest there. [rad], [rad/s]
+  // The G1's joints that are pressed against their stops; Simbody's do not come to rest there. [rad], [rad/s]
   double joint_stops = 0.01, joint_stop_speed = 0.05;
   bool velocity_products_late = false;  // taken in one step later: exact from rest only
 };

@@ -1,4 +1,4 @@
-// What holds of contacts with the human in every engine: the skin, the friction and the motion of the partner.
+// Laws of contacts with the human in every engine: the skin, the friction and the motion of the partner.
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// What holds of free bodies, of one joint under the torque law and of the repeatability of runs in every engine.
+// Laws of free bodies, of one joint under the torque law and of the repeatability of runs in every engine.
 #include <cmath>
 #include <thread>
 
@@ -17,7 +17,7 @@ using test::Trace;
 
 constexpr double kAlgebra = 1e-9;  // rounding of a few hundred steps
 
-// Of a constant torque as it is reported: MuJoCo and Simbody give it exactly, the others as their step solves for it.
+// Rounding of a constant torque as reported: MuJoCo and Simbody give it exactly, others as their step solves for it.
 double torque_rounding(const std::string& engine) { return engine == "mujoco" || engine == "simbody" ? 0.0 : kAlgebra; }
 
 struct Engine : test::OnEngine<::testing::TestWithParam<std::string>> {

@@ -1,4 +1,4 @@
-// MuJoCo: its law against the shared one, its options and what they change. What holds in every engine is in
+// MuJoCo: its law against the shared one, its options and what they change. Laws of every engine are in
 // engine_*_test.cpp.
 #include <fmt/format.h>
 #include <gmock/gmock.h>

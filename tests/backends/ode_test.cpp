@@ -1,4 +1,4 @@
-// ODE: drift of its hinges, what it keeps per process and per thread, and its options. What holds in every engine is in
+// ODE: drift of its hinges, what it keeps per process and per thread, and its options. Laws of every engine are in
 // engine_*_test.cpp.
 #include <dlfcn.h>
 

@@ -1,4 +1,4 @@
-// Simbody: stiff servos, ways back from beyond a stop, options, standing at three steps. What holds in every engine is
+// Simbody: stiff servos, ways back from beyond a stop, options, standing at three steps. Laws of every engine are
 // in engine_*_test.cpp.
 #include <cmath>
 

@@ -1,4 +1,4 @@
-// What a run of the G1 went through, for comparison bit by bit.
+// The states that a run of the G1 went through, for comparison bit by bit.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -17,7 +17,7 @@ WalkSetup wbc_sim(const char* network, double seconds) {
   return {.controller = "wbc_sim", .options = {{"network", network}}, .seconds = seconds};
 }
 
-// Of four pushes of 80 N for a second on the trunk, one in each direction, from how many it stays upright.
+// The number of pushes that it withstands upright, of four of 80 N for a second on the trunk, one in each direction.
 int pushes_stood(const char* network) {
   const auto robot = test::body("g1");
   const int torso = robot->frames[robot->track_frame("torso")].link;

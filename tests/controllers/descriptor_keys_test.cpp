@@ -1,11 +1,11 @@
-// What the keys of a descriptor do that no network of the first six needed: a command by its axes, a stance, clocks
+// Effects of a descriptor's keys that no network of the first six needed: a command by its axes, a stance, clocks
 // that hold and warp, actions around two poses, states, the gyro's frame. The network is a fake.
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/robots/kinematics.h"
@@ -162,7 +162,7 @@ TEST(WarpedClock, TakesTheStanceForTheFirstHalfOfTheWave) {
   channel.gait.stance = 0.6;
   Layout l = layout_of(showing({channel}), {{"command", "0,0,0"}});
   l.act();
-  // Of a turn: 0, 0.3, 0.6, 0.8, 2.3, -0.2; of the wave: 0, 0.25, 0.5, 0.75, 0.25, 0.75.
+  // Phases in parts of a turn: 0, 0.3, 0.6, 0.8, 2.3, -0.2; in parts of the wave: 0, 0.25, 0.5, 0.75, 0.25, 0.75.
   const double expected[] = {0.0, 1.0, 0.0, -1.0, 1.0, -1.0};
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(l.shown(i), expected[i], kNear) << i;
   l.act();

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/controllers/published.h"
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "duet/controllers/published.h"
+#include "duet/controllers/catalogue/published.h"
 #include "duet/nn/network.h"
 
 namespace duet::test {
@@ -38,7 +38,7 @@ class FakeNetwork final : public Network {
   FakeMemory& memory_;
 };
 
-// Of a card by name or path.
+// The robot of a card, by name or path.
 inline std::shared_ptr<const RobotModel> body(const std::string& card) { return load_shared_robot(card_path(card)); }
 
 }  // namespace duet::test

@@ -8,7 +8,7 @@
 
 namespace duet::test {
 
-// Of float arithmetic on numbers of size 1 to 30.
+// Tolerance of float arithmetic on numbers of size 1 to 30.
 inline constexpr double kNear = 4e-6;
 
 // A controller over a fake network, in a state whose numbers can be told apart.

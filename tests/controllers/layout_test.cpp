@@ -1,4 +1,4 @@
-// What each published controller's network is shown, number by number, against the tables of its own documentation, and
+// The input of each published controller's network, number by number, against the tables of its own documentation, and
 // what becomes of its answer. The network is a fake.
 #include "tests/controllers/layout.h"
 

@@ -1,4 +1,4 @@
-// What holds for the layouts of all published controllers: resets, allocation, and what is refused.
+// Laws for the layouts of all published controllers: resets, allocation, and what is refused.
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/controllers/published.h"
+#include "duet/controllers/catalogue/published.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/nn/load_network.h"

@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 
 #include "duet/backends/factory.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
-#include "duet/controllers/registry.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/support.h"
 

@@ -20,7 +20,7 @@ inline WalkSetup published(const std::string& name) {
   return {.controller = name, .options = {{"network", shared_file("models/" + load_descriptor(name).network)}}};
 }
 
-// Of a velocity command, or of one with a height; "": the root of the reference commands.
+// HOMIE under a velocity command, or one with a height; "": under the root of the reference commands.
 inline WalkSetup homie(const std::string& command) {
   WalkSetup setup = published("homie");
   setup.start = arms_down(*body("g1_27dof"));

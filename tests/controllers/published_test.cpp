@@ -1,10 +1,10 @@
 // The published controllers with their own networks in MuJoCo, against measurements of their own code
 // (section 7). The networks do not ship: without them nothing here runs.
-#include "duet/controllers/published.h"
+#include "duet/controllers/catalogue/published.h"
 
 #include <gmock/gmock.h>
 
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "tests/backends/engine_names.h"
 #include "tests/controllers/published_cases.h"

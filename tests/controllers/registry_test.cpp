@@ -1,5 +1,5 @@
 // Controllers that a program adds. Each test ends its own process: what is added stays.
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 
 #include <gmock/gmock.h>
 

@@ -1,10 +1,10 @@
 // Every published descriptor with a network of its layout, written here: the way from the name to the joints without
-// the networks themselves, which do not ship. What those do is in published_test.cpp.
+// the networks themselves, which do not ship. Tests of those are in published_test.cpp.
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/controllers/fake_network.h"

@@ -8,7 +8,7 @@
 #include <functional>
 
 #include "duet/backends/factory.h"
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/random.h"
 #include "duet/core/skeleton.h"
 #include "duet/robots/dynamics.h"

@@ -6,8 +6,8 @@
 #include <functional>
 
 #include "duet/backends/factory.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
-#include "duet/controllers/registry.h"
 #include "duet/core/require.h"
 #include "duet/rollout/control_period.h"
 #include "tests/controllers/fake_network.h"
@@ -27,7 +27,7 @@ struct WalkSetup {
   std::function<void(int tick, Backend&)> act_on = {};                          // pushes; absent: nobody does
 };
 
-// What a run came to; means are over the time from 2 s on.
+// The result of a run; means are over the time from 2 s on.
 struct Walk {
   bool upright = true;
   double seconds = 0.0;

@@ -1,4 +1,4 @@
-// What WBC-Sim's networks are shown, number by number.
+// The inputs of WBC-Sim's networks, number by number.
 #include <gtest/gtest.h>
 
 #include "duet/controllers/wbc_sim/observation.h"

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/controllers/standing.h"

@@ -1,4 +1,4 @@
-// What WBC-Sim tracks: legs, gait, and the reference with its legs replaced.
+// The motion that WBC-Sim tracks: legs, gait, and the reference with its legs replaced.
 #include <gtest/gtest.h>
 
 #include <cmath>

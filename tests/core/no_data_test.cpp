@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "duet/archives/npy/npz.h"
 #include "duet/core/data_file.h"
-#include "duet/core/npz.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 

@@ -38,7 +38,7 @@ TEST(ShareFile, AProgramWhereItWasBuiltReadsTheSources) {
   EXPECT_TRUE(fs::equivalent(tree->sources, DUET_SOURCE_DIR));
 }
 
-// Whoever can write where it was built could give robots and engines to all users of the machine.
+// Anyone who can write where it was built could give robots and engines to all users of the machine.
 TEST(ShareFile, AProgramThatIsInstalledReadsNothingOfTheTreeItWasBuiltIn) {
   const test::ScratchFolder scratch;
   fs::create_directories(scratch / "bin");

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet {
 namespace {

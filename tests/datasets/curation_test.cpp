@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet {
 namespace {
@@ -96,7 +96,7 @@ TEST(Curation, AWaveAtTheChestIsSeenUnlessThePrintedHeightIsAskedFor) {
   EXPECT_EQ(finding(curate(clip), "task_seen").value, 1.0);
 }
 
-// What a depth camera does where two who hug hide each other: left and right are exchanged from one frame on.
+// A depth camera's error where two who hug hide each other: left and right are exchanged from one frame on.
 TEST(Curation, WhoTurnsAboutWithinTheActIsATrackersExchangeOfSides) {
   for (const bool of_a : {false, true}) {
     InteractionClip clip = synthesize(Task::kHug, {.seed = 11});

@@ -10,7 +10,7 @@
 #include "duet/core/file.h"
 #include "duet/datasets/dataset_files.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
 #include "tests/support.h"
 

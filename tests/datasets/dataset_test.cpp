@@ -11,15 +11,15 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "duet/archives/npy/npz.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
-#include "duet/core/npz.h"
 #include "duet/datasets/dataset_card.h"
 #include "duet/datasets/dataset_files.h"
 #include "duet/datasets/dataset_folder.h"
 #include "duet/datasets/dataset_tables.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
 #include "tests/support.h"
 

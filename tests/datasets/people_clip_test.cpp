@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
 #include "tests/support.h"
 

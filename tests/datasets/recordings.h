@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/retarget/options.h"
 

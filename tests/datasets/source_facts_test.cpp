@@ -5,7 +5,7 @@
 
 #include "duet/core/file.h"
 #include "duet/datasets/curation.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
 #include "tests/support.h"
 

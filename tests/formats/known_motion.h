@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npy.h"
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npy.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/formats/file_arrays.h"
 #include "duet/formats/robot_motion_format.h"
 #include "duet/robots/kinematics.h"

@@ -8,7 +8,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "tests/core/pickle_bytes.h"
+#include "tests/archives/pickle_bytes.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -5,8 +5,8 @@
 
 #include <cstdlib>
 
+#include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/file.h"
-#include "duet/core/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/formats/pickle_fields.h"
 #include "duet/formats/robot_motion_format.h"

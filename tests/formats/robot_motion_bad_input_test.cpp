@@ -1,4 +1,4 @@
-// What files of robot motions may have wrong with them: each is refused in one sentence that names the file.
+// Faults in files of robot motions: each is refused in one sentence that names the file.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <functional>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
 #include "duet/formats/pickle_output.h"
 #include "duet/formats/robot_motion_format.h"
-#include "tests/core/pickle_bytes.h"
+#include "tests/archives/pickle_bytes.h"
 #include "tests/formats/known_motion.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-// What is told of a robot motion from its numbers, and what stays as it is documented.
+// Facts that are told of a robot motion from its numbers, and those that stay as documented.
 #include <gmock/gmock.h>
 
 #include <numbers>

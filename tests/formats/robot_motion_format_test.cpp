@@ -162,7 +162,7 @@ TEST(RobotMotionFormat, RealMotionsSurviveEveryFormat) {
 
 // ---- public test vectors
 
-// What stands in examples/data/robot; DUET_WRITE_EXAMPLES=1 writes it again.
+// The files in examples/data/robot; DUET_WRITE_EXAMPLES=1 writes them again.
 TEST(RobotMotionFormat, TheExamplesAreReadAsTheKnownMotion) {
   constexpr int kFrames = 6;
   constexpr std::uintmax_t kMostBytes = 200'000;

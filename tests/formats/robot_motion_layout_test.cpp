@@ -1,4 +1,4 @@
-// What each layout of a robot motion is documented to be.
+// The documented layout of each format of robot motions.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -6,7 +6,7 @@
 
 #include "duet/formats/link_motion.h"
 #include "duet/formats/robot_motion_format.h"
-#include "tests/core/pickle_bytes.h"
+#include "tests/archives/pickle_bytes.h"
 #include "tests/formats/known_motion.h"
 #include "tests/formats/motion_files.h"
 

@@ -1,5 +1,5 @@
 // Files of robot motions with one fact wrong each. None is imported silently: it is refused, or read as the motion that
-// it is, or a line that begins with "doubt" says what speaks against it. What no file can tell is listed last.
+// it is, or a line that begins with "doubt" says what speaks against it. Facts that no file can tell are listed last.
 #include <gmock/gmock.h>
 
 #include <cctype>
@@ -244,7 +244,7 @@ std::vector<WrongFact> wrong_facts() {
   return all;
 }
 
-// What is said of a file: its evidence, or its refusal alone.
+// The report on a file: its evidence, or its refusal alone.
 struct Told {
   std::vector<std::string> lines;
   bool refused = false, right = false;
@@ -290,8 +290,8 @@ TEST(OneWrongFact, NothingIsDoubtedOfTheRightMotion) {
     }
 }
 
-// What a file without names and bodies cannot tell; docs/file-formats.md says so. A reader that learns to tell one of
-// them moves it into the list above.
+// Facts that a file without names and bodies cannot tell; docs/file-formats.md says so. A reader that learns to tell
+// one of them moves it into the list above.
 TEST(OneWrongFact, WhatNoFileCanTellIsKnown) {
   std::vector<WrongFact> silent;
   const auto add = [&](const std::string& reason, const Edit& edit, const std::string& file = "x_50hz.csv") {

@@ -7,7 +7,7 @@
 #include <variant>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 
 namespace duet::fuzz {
 

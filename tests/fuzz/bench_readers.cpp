@@ -1,14 +1,14 @@
-// What a benchmark is told: suites, profiles of engines, limits of contacts, certificates of parity.
+// Inputs of a benchmark: suites, profiles of engines, limits of contacts, certificates of parity.
 #include <nlohmann/json.hpp>
 
-#include "duet/bench/certificate.h"
-#include "duet/bench/cluster/attempt.h"
-#include "duet/bench/cluster/shard_plan.h"
-#include "duet/bench/cluster/training_jobs.h"
-#include "duet/bench/episode.h"
-#include "duet/bench/profile.h"
-#include "duet/bench/suite.h"
+#include "duet/app/certificate.h"
+#include "duet/cluster/attempt.h"
+#include "duet/cluster/shard_plan.h"
+#include "duet/cluster/training_jobs.h"
 #include "duet/core/file.h"
+#include "duet/experiment/plan/episode.h"
+#include "duet/experiment/suite/profile.h"
+#include "duet/experiment/suite/suite.h"
 #include "duet/metrics/contact_limits.h"
 #include "duet/robots/yaml_section.h"
 #include "tests/fuzz/reader.h"

@@ -1,20 +1,20 @@
 // Containers of other programs (joblib, torch.save, NumPy's objects), and two people as parameters of body models.
 #include <algorithm>
 
+#include "duet/archives/hdf5/hdf5.h"
+#include "duet/archives/pickle/joblib.h"
+#include "duet/archives/pickle/npy_objects.h"
+#include "duet/archives/pickle/pickle_machine.h"
+#include "duet/archives/pickle/torch_tensors.h"
 #include "duet/core/file.h"
-#include "duet/core/hdf5.h"
-#include "duet/core/joblib.h"
-#include "duet/core/npy_objects.h"
-#include "duet/core/pickle_machine.h"
-#include "duet/core/torch_tensors.h"
-#include "duet/motion/people/amass.h"
-#include "duet/motion/people/body_model.h"
-#include "duet/motion/people/gvhmr.h"
-#include "duet/motion/people/inter_x.h"
-#include "duet/motion/people/inter_x_h5.h"
-#include "duet/motion/people/interhuman_raw.h"
-#include "duet/motion/people/motion_rows.h"
-#include "duet/motion/people/video_tracks.h"
+#include "duet/motion/bodies/body_model.h"
+#include "duet/motion/people/formats/amass.h"
+#include "duet/motion/people/formats/gvhmr.h"
+#include "duet/motion/people/formats/inter/inter_x.h"
+#include "duet/motion/people/formats/inter/inter_x_h5.h"
+#include "duet/motion/people/formats/inter/interhuman_raw.h"
+#include "duet/motion/people/formats/motion_rows.h"
+#include "duet/motion/people/formats/video_tracks.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
 #include "tests/motion/body_files.h"
@@ -51,9 +51,9 @@ void read_inter_x_h5_file(std::string_view bytes) {
   for (const ClipPlace& place : inter_x_h5_format().find(paths, {})) (void)inter_x_h5_format().read(place, {});
 }
 
-// What HDF5's own library wrote: filters, chunks, both kinds of headers.
+// A file that HDF5's own library wrote: filters, chunks, both kinds of headers.
 std::string hdf5_sample(unsigned seed) {
-  return read_file(std::string(DUET_SOURCE_DIR "/tests/core/hdf5/library") + (seed % 2 == 0 ? "" : "_18") + ".h5");
+  return read_file(std::string(DUET_SOURCE_DIR "/tests/archives/hdf5/library") + (seed % 2 == 0 ? "" : "_18") + ".h5");
 }
 void read_hdf5_file(std::string_view bytes) {
   Hdf5File file(scratch_file("a.h5", bytes));

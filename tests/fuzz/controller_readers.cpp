@@ -1,4 +1,4 @@
-// What controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
+// Files that controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
 #include "duet/controllers/descriptor.h"
 #include "duet/controllers/wbc_sim/network.h"
 #include "duet/controllers/wbc_sim/observation.h"

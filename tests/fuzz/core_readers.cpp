@@ -1,7 +1,7 @@
 // NPZ archives of any content, and recordings.
+#include "duet/archives/npy/npz.h"
+#include "duet/archives/recording_file.h"
 #include "duet/core/file.h"
-#include "duet/core/npz.h"
-#include "duet/core/recording.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
 

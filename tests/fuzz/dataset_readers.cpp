@@ -1,8 +1,8 @@
-// What a person edits of a data set, and what it keeps of each clip.
+// Files of a data set that a person edits, and those that it keeps of each clip.
 #include "duet/datasets/annotations.h"
 #include "duet/datasets/clip_labels.h"
 #include "duet/datasets/entry.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/fuzz/reader.h"
 
 namespace duet::fuzz {

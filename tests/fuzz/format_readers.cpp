@@ -19,7 +19,7 @@ std::string written(const char* format) {
   return robot_motion_files(test::known_motion(g1(), 2), g1(), robot_motion_format(format), {.rate_hz = 50.0}).at("");
 }
 
-// What was read can be written, whatever the format.
+// A motion that was read can be written, whatever the format.
 void read_motion(std::string_view bytes, const std::string& name) {
   const RobotMotionFile file =
       read_robot_motion(motion_source(std::string(bytes), name), g1(), {.motion = name == "fuzz.npz" ? "0" : ""});

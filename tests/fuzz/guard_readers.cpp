@@ -1,4 +1,4 @@
-// What the guard reports to its planner, and the log of a run read as a recording.
+// Reports of the guard to its planner, and the log of a run read as a recording.
 #include <cstring>
 #include <filesystem>
 

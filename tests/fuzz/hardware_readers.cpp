@@ -1,4 +1,4 @@
-// What reaches the guard of a real robot from outside: messages of sockets and topics, configurations, logs.
+// Bytes that reach the guard of a real robot from outside: messages of sockets and topics, configurations, logs.
 #include <cstring>
 
 #include "duet/core/file.h"

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "duet/core/zip.h"
+#include "duet/archives/zip/zip.h"
 #include "duet/nn/mlp_file.h"
 #include "duet/nn/onnx_network.h"
 #include "duet/nn/torch_script.h"

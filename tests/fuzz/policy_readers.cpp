@@ -1,16 +1,16 @@
-// What policies are made from and what they say: messages of a process, descriptors, D-STAR's configuration and
-// networks, libraries of retrieval, tables of language.
+// Files that policies are made from and messages that they send: messages of a process, descriptors, D-STAR's
+// configuration and networks, libraries of retrieval, tables of language.
 #include <numeric>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/policies/dstar/config.h"
 #include "duet/policies/dstar/network.h"
+#include "duet/policies/dstar/retrieval.h"
 #include "duet/policies/external/descriptor.h"
 #include "duet/policies/external/message.h"
 #include "duet/policies/external/plan_decoder.h"
 #include "duet/policies/language.h"
-#include "duet/policies/retrieval.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
 #include "tests/policies/dstar_fixtures.h"

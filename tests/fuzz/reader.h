@@ -40,7 +40,7 @@ std::vector<Reader> all_readers();
 std::string scratch_file(const std::string& name, std::string_view bytes);
 std::string scratch_folder();
 
-// What a reader's parts are separated by where its bytes stand for several files.
+// The separator of a reader's parts where its bytes stand for several files.
 inline constexpr std::string_view kSeparator = "\n====\n";
 // The parts; as many as asked for, the last ones empty where there are fewer.
 std::vector<std::string_view> parts(std::string_view bytes, std::size_t count);

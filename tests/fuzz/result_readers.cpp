@@ -1,16 +1,16 @@
-// What a run leaves behind and what is made from it: run directories, published or not, baselines, training curves.
+// Files that a run leaves behind and those made from it: run directories, published or not, baselines, training curves.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "duet/core/digest.h"
-#include "duet/results/analyses/leaderboard.h"
-#include "duet/results/report/training_curves.h"
-#include "duet/results/rows/golden.h"
-#include "duet/results/rows/published.h"
-#include "duet/results/rows/row_scan.h"
-#include "duet/results/rows/run_directory.h"
+#include "duet/report/page/training_curves.h"
+#include "duet/report/ranking/golden.h"
+#include "duet/report/ranking/leaderboard.h"
+#include "duet/rows/folder/published.h"
+#include "duet/rows/folder/run_directory.h"
+#include "duet/rows/row_scan.h"
 #include "tests/fuzz/reader.h"
-#include "tests/results/rows.h"
+#include "tests/rows/rows.h"
 
 namespace duet::fuzz {
 namespace {

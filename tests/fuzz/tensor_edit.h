@@ -1,5 +1,5 @@
 // Edits of safetensors as the bytes of a fuzzer say: texts of the header are replaced, tensors renamed, reshaped and
-// changed. What reads networks and libraries looks at these, behind a container that random bytes hardly ever get
+// changed. Readers of networks and libraries look at these, behind a container that random bytes hardly ever get
 // right.
 #pragma once
 

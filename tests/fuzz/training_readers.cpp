@@ -1,4 +1,4 @@
-// What trainings leave behind: checkpoints of WBC-Sim, demonstrations, lists of held-out clips.
+// Files that trainings leave behind: checkpoints of WBC-Sim, demonstrations, lists of held-out clips.
 #include "duet/core/file.h"
 #include "duet/training/agent.h"
 #include "duet/training/dstar/demonstrations.h"

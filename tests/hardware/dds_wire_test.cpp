@@ -103,7 +103,7 @@ struct WiredGuard {
   PlannerMessage message;
 };
 
-// What DDS tells others of our types. Those of the maker's headers were compared with the same digests.
+// The names and digests of our types that DDS tells others. Those of the maker's headers gave the same digests.
 TEST(DdsWire, TypesAreTheMakers) {
   struct Type {
     const char* name;

@@ -25,7 +25,7 @@ TEST(Executor, IsKnownByItsName) {
             "executor: expected twin, homie-lcm, sport, found 'homie'");
 }
 
-// Of the 36 channels of a reference: place and turn as a velocity, height where HOMIE takes it, 14 arm joints.
+// Expects, of a reference's 36 channels: place and turn as a velocity, height where HOMIE takes it, 14 arm joints.
 TEST(Executor, NamesTheChannelsThatItExecutes) {
   for (const ExecutorKind kind : {ExecutorKind::kTwin, ExecutorKind::kHomieLcm, ExecutorKind::kSport}) {
     const ExecutedChannels channels = channels_of(kind);

@@ -103,7 +103,7 @@ struct LastingFault {
   std::function<void(Frames&)> spoil;
 };
 
-// What the counts of bad states are for: each tick or each other brings one.
+// Faults that the counts of bad states are for: each tick or each other brings one.
 TEST(FaultSweep, RepeatedAndSwappedStatesThatLastHold) {
   const std::vector<LastingFault> faults = {{"each twice", [](Frames& f) { f.push_back(f.front()); }},
                                             {"each with the one before it again",

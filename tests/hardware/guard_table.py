@@ -202,7 +202,7 @@ EDITS = {
     ],
 }
 
-# Of each limit: what it is when it is missing.
+# The value of each limit with which the limit is missing.
 LAX = {'forward': 10, 'backward': 10, 'lateral': 10, 'yaw_rate': 10, 'height_range': 1, 'height_rate': 100, 'acceleration': 1000,
        'stop_acceleration': 1000, 'yaw_acceleration': 1000, 'jerk': 1e5, 'joint_margin': 0, 'arm_speed': 100,
        'arm_acceleration': 1e5, 'torque_share': 1000, 'self_distance': -1e9, 'fence_x': 1000, 'fence_y': 1000,
@@ -210,7 +210,7 @@ LAX = {'forward': 10, 'backward': 10, 'lateral': 10, 'yaw_rate': 10, 'height_ran
        'reserve': 0, 'arm_reach': 0, 'arm_mass': 1e-3, 'step_back': 0}
 LAX_OF_CONTACT = {'shoulder_torque': 1e9, 'wrist_torque': 1e9, 'release_effort': 1e9,
                   'release_force': 1e9, 'contact_lever': 1e9}
-# Of each rule: likewise.
+# The value of each rule with which the rule is missing.
 LAX_RULES = {'hold_bad_states': 1000000, 'damp_bad_states': 1000000, 'hold_bad_time': 0, 'damp_bad_time': 0,
              'odometry_jump': 1e9, 'hold_tilt': 1e9,
              'damp_tilt': 1e9, 'joint_speed': 1e9, 'gyro': 1e9, 'hold_casing': 1e9, 'damp_casing': 1e9,

@@ -164,7 +164,7 @@ struct GuardedTwin {
   bool plans = true, sees = true, measures = true;
   double now = 1000.0;
   long ticks = 0;
-  // Of all frames that were sent.
+  // Counts over all frames that were sent.
   long bad_frames = 0;
   double largest_step = 0.0;  // of a target between two frames [rad]
   LowCommandFrame last{};

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "duet/archives/recording_file.h"
 #include "duet/backends/factory.h"
 #include "duet/core/clock.h"
 #include "duet/core/file.h"

@@ -5,7 +5,7 @@
 
 #include "duet/core/file.h"
 #include "duet/hardware/dds_place.h"
-#include "tests/bench/program.h"
+#include "tests/app/program.h"
 
 namespace duet {
 namespace {
@@ -38,7 +38,7 @@ TEST(HwCommand, SaysFirstThatNothingIsWrittenAndThenThatNobodyAnswers) {
   EXPECT_THAT(answer.err, HasSubstr("no state of twin 'twin'"));
 }
 
-// What a tick costs is measured while the guard runs, beside a twin with everything that running needs.
+// The cost of a tick is measured while the guard runs, beside a twin with everything that running needs.
 TEST(HwCommand, BenchTimesAGuardThatRuns) {
   const Answer answer = duet_program("bench hardware/tick/alone --seconds 0.01");
   EXPECT_EQ(answer.code, 0) << answer.err;

@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// What liblcm's own generator prints for HOMIE's types.
+// Hashes that liblcm's own generator prints for HOMIE's types.
 TEST(LcmMessage, HashesAreThoseOfTheFields) {
   const LcmField pedal[] = {{"command", "double", 4}};
   const LcmField arms[] = {{"act", "double", 14}};

@@ -44,7 +44,7 @@ struct Liblcm {
   int (*handle)(void*, int) = nullptr;
 };
 
-// Of the default route; empty where there is none.
+// The interface of the default route; empty where there is none.
 std::string routed_interface() {
   std::ifstream routes("/proc/net/route");
   std::string line, name, destination;
@@ -64,7 +64,7 @@ std::unique_ptr<LcmChannel> joined(const LcmPlace& place) {
   }
 }
 
-// What is in a datagram of ours behind "LC02", number and channel.
+// The payload of a datagram of ours, behind "LC02", number and channel.
 std::string payload(std::span<const std::byte> datagram) {
   const std::string all(reinterpret_cast<const char*>(datagram.data()), datagram.size());
   return all.substr(all.find('\0', 8) + 1);

@@ -7,7 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/hardware/person_player.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 

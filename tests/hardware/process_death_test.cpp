@@ -129,7 +129,7 @@ TEST(ProcessDeath, AGuardThatWasStoppedForASecondDamps) {
   });
 }
 
-// What a robot does when commands end is not known; this says only that nothing else of ours commands it.
+// The robot's reaction when commands end is not known; this says only that nothing else of ours commands it.
 TEST(ProcessDeath, AGuardThatIsKilledLeavesALogThatCanBeReplayed) {
   try_until("none", [](ArmedTrial& trial) {
     usleep(500000);

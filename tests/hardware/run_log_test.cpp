@@ -285,7 +285,7 @@ TEST(RunLog, ACutLogIsCoveredByChecksumsUpToTheCut) {
       ++refused;
     }
   }
-  // What is left are heads of records: a length that is too long reads as the place where the file was cut.
+  // Flips that pass are in heads of records: a length that is too long reads as the place where the file was cut.
   EXPECT_GE(refused, kFlips - 3);
 }
 

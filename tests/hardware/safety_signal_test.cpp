@@ -22,7 +22,7 @@ SafetyInput well() {
   return input;
 }
 
-// Of a robot whose executor answers.
+// Rules for a robot whose executor answers.
 SafetyRules answered() {
   SafetyRules rules;
   rules.executor_answers = true;

@@ -1,4 +1,4 @@
-# The installed package, used as a stranger uses it: what is there, the four examples of examples/cpp, an engine of one's
+# The installed package, used as a stranger uses it: what is there, the five examples of examples/cpp, an engine of one's
 # own, pkg-config, and a project that takes the tree in by add_subdirectory. Any failure ends the script with its output.
 cmake_minimum_required(VERSION 3.25)
 if(SANITIZE)
@@ -104,6 +104,16 @@ engines: [${engine}]\ncontrollers: [vmc]\npolicies: [replay]\nstart: act\nnull_a
   run(text ${SCRATCH}/score_my_motion/score_my_motion ${recordings})
   expect("${text}" "ended: ok\nwave (not )?detected\n  margin of ")
 endif()
+
+# run_a_suite runs what `duet run` runs, with libraries alone, and prints the same board.
+file(WRITE ${SCRATCH}/played.yaml "schema: duet.suite/1\nname: played\nversion: 1.0.0\nclips: {synth: {per_task: 1}}\ntasks: [wave]
+engines: [playback]\ncontrollers: [vmc]\npolicies: [replay]\nstart: act\n")
+build(run_a_suite ${SOURCE}/examples/cpp/run_a_suite)
+run(text ${SCRATCH}/run_a_suite/run_a_suite played.yaml played)
+run(ended ${duet} run played.yaml --output played)
+foreach(screen IN ITEMS "${text}" "${ended}")
+  expect("${screen}" "1  replay \\(knows the motion\\) +vmc +100.0")
+endforeach()
 
 # my_metric prints the 18 and its own.
 build(my_metric ${SOURCE}/examples/cpp/my_metric)

@@ -7,7 +7,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// What is shown after each frame (k, 10 k).
+// The history as it is shown after each frame (k, 10 k).
 std::vector<std::vector<float>> shown(FrameHistory& history, int count) {
   std::vector<std::vector<float>> all;
   for (int k = 1; k <= count; ++k) {

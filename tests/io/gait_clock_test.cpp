@@ -60,7 +60,7 @@ TEST(GaitClock, HoldsWhileItStandsAndStartsAgain) {
 
 TEST(GaitClock, TakesTheStanceForTheFirstHalfOfTheWave) {
   const StandGate gate;
-  // Of a turn, and of the wave.
+  // Pairs of parts of a turn and parts of the wave.
   for (const auto& [place, wave] : {std::pair{0.0, 0.0}, std::pair{0.3, 0.25}, std::pair{0.6, 0.5},
                                     std::pair{0.8, 0.75}, std::pair{-0.2, 0.75}, std::pair{2.3, 0.25}}) {
     const GaitClock clock{.frequency_hz = 1.0, .phases = {2.0 * kPi * place}, .standing = {}, .stance = 0.6};

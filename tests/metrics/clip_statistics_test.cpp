@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet {
 namespace {

@@ -83,7 +83,7 @@ TEST(InteractionStatistics, BearingIsToTheRightAndTurnHasNoSign) {
   }
 }
 
-// Of both, so that B's alone counts half: 0.4 rad to the left from the first frame to the middle of the touch.
+// The turn is a mean over both, so that B's alone counts half: 0.4 rad left from the first frame to mid-touch.
 TEST(InteractionStatistics, HipsTurnUntilTheMiddleOfTheTouch) {
   InteractionClip clip = facing_each_other(0.0, 0.0);
   const InteractionClip turned = facing_each_other(0.0, 0.4);
@@ -94,7 +94,7 @@ TEST(InteractionStatistics, HipsTurnUntilTheMiddleOfTheTouch) {
   EXPECT_NEAR(interaction_statistics(clip).turned_hips, 0.0, 1e-9);
 }
 
-// Of one ankle in four, and of one neck in two.
+// One ankle in four is moved, and one neck in two.
 TEST(InteractionStatistics, FeetAndNecksAreThereWhereTheyAreMostly) {
   InteractionClip clip = meeting(20, 70);
   for (int t = 0; t < clip.frames(); ++t)

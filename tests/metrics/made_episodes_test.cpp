@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "duet/metrics/interaction.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/metrics/acting.h"
 
 namespace duet {

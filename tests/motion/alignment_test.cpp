@@ -4,7 +4,7 @@
 
 #include "duet/core/pose.h"
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,16 +1,16 @@
-// What is particular to each of the formats of body models (tests/motion/body_formats_test.cpp: what they share).
+// Peculiarities of each of the formats of body models (tests/motion/body_formats_test.cpp: what they share).
 #include <gmock/gmock.h>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
-#include "duet/motion/people/amass.h"
-#include "duet/motion/people/body_model.h"
-#include "duet/motion/people/inter_x.h"
-#include "duet/motion/people/inter_x_h5.h"
-#include "duet/motion/people/interhuman_raw.h"
+#include "duet/motion/bodies/body_model.h"
+#include "duet/motion/people/formats/amass.h"
+#include "duet/motion/people/formats/inter/inter_x.h"
+#include "duet/motion/people/formats/inter/inter_x_h5.h"
+#include "duet/motion/people/formats/inter/interhuman_raw.h"
+#include "duet/motion/people/formats/video_tracks.h"
 #include "duet/motion/people/source_clip.h"
-#include "duet/motion/people/video_tracks.h"
 #include "tests/motion/body_files.h"
 #include "tests/support.h"
 

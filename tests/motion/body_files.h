@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/skeleton.h"
-#include "duet/motion/people/body_kinematics.h"
-#include "tests/core/hdf5_bytes.h"
-#include "tests/core/pickle_bytes.h"
-#include "tests/core/torch_bytes.h"
+#include "duet/motion/bodies/body_kinematics.h"
+#include "tests/archives/hdf5_bytes.h"
+#include "tests/archives/pickle_bytes.h"
+#include "tests/archives/torch_bytes.h"
 
 namespace duet::test {
 

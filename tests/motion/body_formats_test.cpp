@@ -1,24 +1,24 @@
 // The formats that hold two people as parameters of body models: each stand-in is found, read, and refused where it is
-// damaged. What the joints should be comes from tests/motion/body_files.h, by another way.
+// damaged. The expected joints come from tests/motion/body_files.h, by another way.
 #include <gmock/gmock.h>
 
 #include <filesystem>
 #include <functional>
 #include <numbers>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
-#include "duet/motion/people/amass.h"
-#include "duet/motion/people/body_model.h"
-#include "duet/motion/people/gvhmr.h"
-#include "duet/motion/people/inter_x.h"
-#include "duet/motion/people/inter_x_h5.h"
-#include "duet/motion/people/interhuman_raw.h"
-#include "duet/motion/people/motion_rows.h"
-#include "duet/motion/people/people_formats.h"
+#include "duet/motion/bodies/body_model.h"
+#include "duet/motion/people/formats/amass.h"
+#include "duet/motion/people/formats/gvhmr.h"
+#include "duet/motion/people/formats/inter/inter_x.h"
+#include "duet/motion/people/formats/inter/inter_x_h5.h"
+#include "duet/motion/people/formats/inter/interhuman_raw.h"
+#include "duet/motion/people/formats/motion_rows.h"
+#include "duet/motion/people/formats/people_formats.h"
+#include "duet/motion/people/formats/video_tracks.h"
 #include "duet/motion/people/source_clip.h"
-#include "duet/motion/people/video_tracks.h"
 #include "tests/motion/body_files.h"
 #include "tests/motion/body_model_files.h"
 #include "tests/support.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/people/body_model.h"
+#include "duet/motion/bodies/body_model.h"
 #include "tests/motion/body_files.h"
 
 namespace duet::test {

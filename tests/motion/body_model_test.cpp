@@ -1,4 +1,4 @@
-#include "duet/motion/people/body_model.h"
+#include "duet/motion/bodies/body_model.h"
 
 #include <gmock/gmock.h>
 
@@ -98,7 +98,7 @@ TEST(BodyModel, JointsAreKeptBesideTheFileUntilItChanges) {
   EXPECT_THAT(again.note, HasSubstr("joints kept beside it"));
   EXPECT_EQ(again.kind, "SMPL");
   EXPECT_LT((rest_joints(again, kBetas) - rest_joints(first, kBetas)).norm(), 1e-15);
-  // What is kept is a shape basis for retargeting, and a model of its own.
+  // The file that is kept is a shape basis for retargeting, and a model of its own.
   const BodyModel alone = load_body_model(path + ".duet-joints.npz");
   EXPECT_LT((rest_joints(alone, kBetas) - rest_joints(first, kBetas)).norm(), 1e-15);
   SmallModel(55).npz().save(path);

@@ -8,8 +8,8 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/bvh.h"
-#include "duet/motion/bvh_people.h"
+#include "duet/motion/bvh/bvh.h"
+#include "duet/motion/bvh/bvh_people.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "duet/motion/bvh.h"
+#include "duet/motion/bvh/bvh.h"
 
 #include <gmock/gmock.h>
 
@@ -6,7 +6,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/bvh_kinematics.h"
+#include "duet/motion/bvh/bvh_kinematics.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/support.h"
 

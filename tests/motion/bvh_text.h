@@ -141,7 +141,7 @@ inline std::vector<BvhBone> lafan_bones() {
   return bones;
 }
 
-// What others call the joints of lafan_bones(), "@" for the side.
+// Names that others give to the joints of lafan_bones(), "@" for the side.
 struct BvhNames {
   std::string maker, left, right;
   std::string hips, spine, spine1, spine2, neck, head, collar, shoulder, elbow, wrist, hip, knee, ankle, toe;

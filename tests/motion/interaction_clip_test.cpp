@@ -7,7 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/motion/npz_edit.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "duet/motion/people/joint_layout.h"
+#include "duet/motion/layouts/joint_layout.h"
 
 namespace duet {
 namespace {

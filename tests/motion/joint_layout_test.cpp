@@ -1,10 +1,10 @@
-#include "duet/motion/people/joint_layout.h"
+#include "duet/motion/layouts/joint_layout.h"
 
 #include <gmock/gmock.h>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 
 namespace duet::test {
 

@@ -4,7 +4,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/people/people_formats.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"
 

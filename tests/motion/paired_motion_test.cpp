@@ -74,7 +74,7 @@ TEST(PairedMotion, FileGivesBackEveryBit) {
   EXPECT_EQ(read.settings, motion.settings);
 }
 
-// What a Python user sees: (T, joints) of angles and w first in the quaternions.
+// The arrays that a Python user sees: (T, joints) of angles and w first in the quaternions.
 TEST(PairedMotion, ArraysHaveTheDocumentedShapes) {
   const PairedMotion motion = example();
   const Npz npz = Npz::parse(paired_motion_bytes(motion), "x");

@@ -1,12 +1,12 @@
-// What the readers of people refuse: each with one sentence that names the file and the place.
+// Files that the readers of people refuse: each with one sentence that names the file and the place.
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/motion/people/people_formats.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"
 

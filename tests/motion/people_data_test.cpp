@@ -11,9 +11,9 @@
 #include "duet/core/file.h"
 #include "duet/core/order_statistics.h"
 #include "duet/core/require.h"
-#include "duet/motion/bvh.h"
+#include "duet/motion/bvh/bvh.h"
+#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/motion/people/people_formats.h"
 #include "duet/motion/plausibility.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"
@@ -171,7 +171,7 @@ TEST(PeopleData, TheCmuPairComesAsItDid) {
   std::string joints;
   for (const HumanMotion* motion : {&found.clip.a, &found.clip.b})
     joints.append(reinterpret_cast<const char*>(motion->joints.data().data()), 8 * motion->joints.data().size());
-  // Of the clip that was imported before there was a table of formats.
+  // The digest is that of the clip that was imported before there was a table of formats.
   if (!kSinesOfTheExamples) GTEST_SKIP() << "not run: digests are of x86-64";
   EXPECT_EQ(sha256_hex(joints), "a851dc763cf69c27d9dd8313aca951418204f63aed50ccffaae59c68170b56de");
 }

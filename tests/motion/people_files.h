@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/npy.h"
-#include "duet/core/npz.h"
-#include "duet/core/zip.h"
-#include "tests/core/pickle_bytes.h"
+#include "duet/archives/npy/npy.h"
+#include "duet/archives/npy/npz.h"
+#include "duet/archives/zip/zip.h"
+#include "tests/archives/pickle_bytes.h"
 #include "tests/motion/bvh_text.h"
 #include "tests/motion/people_standins.h"
 
@@ -56,7 +56,7 @@ inline std::string f4_npy(const PointTracks& tracks) {
                 tracks.data());
 }
 
-// What numpy.save makes of one Python object, whose opcodes `put` writes.
+// The bytes that numpy.save makes of one Python object, whose opcodes `put` writes.
 inline std::string object_npy(const std::function<void(PickleWriter&)>& put) {
   PickleWriter out(3);
   out.call("numpy.core.multiarray", "_reconstruct")

@@ -1,5 +1,5 @@
 // Every format of people: its stand-in is recognised, found and read back as the people that it was made of.
-#include "duet/motion/people/people_formats.h"
+#include "duet/motion/people/formats/people_formats.h"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/people/inter_x_actions.h"
+#include "duet/motion/people/formats/inter/inter_x_actions.h"
 #include "duet/motion/people/people_files.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"

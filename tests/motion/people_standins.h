@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/people/joint_recipes.h"
+#include "duet/motion/layouts/joint_recipes.h"
 #include "duet/motion/people/raw_people.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet::test {
 
@@ -83,7 +83,7 @@ inline RawPeople standin_people(const InteractionClip& clip, const JointLayout& 
   return people;
 }
 
-// What a reader should make of such a file: the SMPL joints of the skeleton's columns in W, at 50 Hz.
+// The motion that a reader should make of such a file: the SMPL joints of the skeleton's columns in W, at 50 Hz.
 inline HumanMotion expected_motion(const HumanMotion& motion, const JointLayout& layout, double rate_hz = 50.0) {
   const HumanMotion columns =
       resample({.rate_hz = motion.rate_hz, .joints = standin_columns(layout, motion), .rotations = {}}, rate_hz);

@@ -4,8 +4,8 @@
 #include <set>
 #include <string>
 
-#include "duet/motion/synthesis.h"
-#include "duet/motion/tracked_clip.h"
+#include "duet/motion/people/tracked_clip.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/tasks/task_definition.h"
 #include "tests/support.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"
 

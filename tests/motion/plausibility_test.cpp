@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/motion/fifteen_joints.h"
 #include "tests/motion/npz_edit.h"
 #include "tests/support.h"

@@ -1,10 +1,10 @@
-// What must hold of the bodies in every synthesized clip, whatever was drawn.
+// Laws of the bodies in every synthesized clip, whatever was drawn.
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "tests/support.h"
 
 namespace duet {

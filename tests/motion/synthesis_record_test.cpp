@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 namespace duet {
 namespace {

@@ -1,4 +1,4 @@
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 
 #include <cmath>
 #include <set>

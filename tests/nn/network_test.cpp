@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <cstring>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
 #include "duet/nn/load_network.h"
 #include "duet/nn/mlp_file.h"
 #include "duet/nn/safetensors.h"
@@ -27,7 +27,7 @@ using ::testing::Pointwise;
 
 constexpr double kTolerance = 1e-5;
 
-// What ONNX Runtime 1.16.3 gives for test::wave().
+// The outputs of ONNX Runtime 1.16.3 for test::wave().
 const std::vector<float> kHomie = {1.621504F,   -0.4413289F, -0.451069F, 0.2446406F, 1.499561F, -0.2426685F,
                                    -0.6993031F, 0.9277365F,  0.4702923F, 1.281899F,  -1.4428F,  0.1635714F};
 const std::vector<float> kTwist2 = {-1.799943F,  -0.1862341F, 0.02289873F, -0.4585755F, -0.7746909F, -0.2291465F,
@@ -135,7 +135,7 @@ TEST(Network, FilesThatAreNoNetworksAreRefused) {
   };
   EXPECT_THAT(refusal(""), HasSubstr("net': the file is empty"));
   EXPECT_THAT(refusal("\x08"), HasSubstr("expected an ONNX model"));
-  // What a training keeps: torch.save, a pickle, NumPy's archive.
+  // Files that a training keeps: torch.save, a pickle, NumPy's archive.
   const std::string saved = zip_bytes({{"model_100/data.pkl", "x"}, {"model_100/data/0", "1234"}});
   for (const std::string& weights : {saved, std::string("\x80\x02}q."), zip_bytes({{"w.npy", "x"}})})
     EXPECT_THAT(refusal(weights), HasSubstr("a training checkpoint: it holds weights and says nothing of the network; "

@@ -25,7 +25,7 @@ Operand counted(const Shape& shape) {
   return x;
 }
 
-// What a node makes of a counted tensor and of whole numbers that the file fixes; once as input, once as constant.
+// The result of a node on a counted tensor and whole numbers that the file fixes; once as input, once as constant.
 std::vector<float> moved(const std::string& op, const Shape& shape, const std::vector<Whole>& fixed,
                          const Attributes& attributes = {}, int opset = 13) {
   std::vector<std::vector<float>> results;

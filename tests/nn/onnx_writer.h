@@ -50,8 +50,8 @@ struct Operand {
 // Numbers that differ, of both signs, below `scale`; another stream for another seed.
 Operand operand(const Shape& shape, int seed = 0, double scale = 1.0);
 
-// What one node makes of its operands, each of them an input of the network or, where its bit in `constants` is set, a
-// constant of the file.
+// The result of one node on its operands, each of them an input of the network or, where its bit in `constants` is set,
+// a constant of the file.
 std::vector<float> through(const std::string& op, const std::vector<Operand>& operands, const Attributes& attributes,
                            int opset, unsigned constants);
 

@@ -6,9 +6,9 @@
 #include <cstring>
 #include <functional>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
 #include "duet/nn/load_network.h"
 #include "duet/nn/torch_script.h"
 #include "tests/nn/evaluate.h"

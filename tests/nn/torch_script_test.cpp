@@ -7,9 +7,9 @@
 #include <cstring>
 #include <map>
 
+#include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/zip.h"
 #include "duet/nn/load_network.h"
 #include "duet/nn/network.h"
 #include "tests/nn/evaluate.h"

@@ -227,8 +227,8 @@ TEST(DstarFile, IsNotWrittenForWhatDoesNotFit) {
                std::runtime_error);
 }
 
-// Of the paper's sizes, of sizes that all differ, and of the latter without short stream, phases and space: a size that
-// stands for another shows in one of them.
+// Counts weights for the paper's sizes, for sizes that all differ, and for the latter without short stream, phases and
+// space: a size that stands for another shows in one of them.
 TEST(DstarTensors, NumberAsManyWeightsAsTheyDid) {
   const auto weights = [](const DstarConfig& config) {
     std::int64_t sum = 0;

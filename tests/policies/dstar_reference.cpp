@@ -1,4 +1,4 @@
-// D-STAR in double precision as docs/dstar-format.md words it, without a thought for speed.
+// D-STAR in double precision as docs/file-formats.md words it, without a thought for speed.
 #include <fmt/format.h>
 
 #include <algorithm>

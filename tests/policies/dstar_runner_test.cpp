@@ -16,7 +16,7 @@ using test::random_sample;
 using test::small_config;
 using test::thrown_message;
 
-// Of the largest number of a plan: a few hundred roundings of float on the way through ten steps.
+// Tolerance relative to a plan's largest number: a few hundred roundings of float on the way through ten steps.
 constexpr double kRelative = 1e-5;
 
 double error_of(std::span<const float> found, const Eigen::VectorXd& expected) {

@@ -107,7 +107,7 @@ TEST(PolicyDescriptor, RefusesWhatItDoesNotUnderstand) {
             "mine.yaml:6: policy descriptor: 'hang_ms': expected a whole number in [1, 600000], found 1.5");
 }
 
-// What was made before there was a seventh task keeps its six numbers.
+// A descriptor that was made before there was a seventh task keeps its six numbers.
 TEST(PolicyDescriptor, KnowsTheSixTasksOfTheSupplementUnlessItSaysOthers) {
   const PolicyDescriptor six = parse_policy_descriptor(replaced(kNetwork, "noise, size: 180", "task"), "mine.yaml");
   EXPECT_EQ(six.tasks, std::vector<Task>(kPaperTasks.begin(), kPaperTasks.end()));

@@ -60,7 +60,7 @@ inline bool runs(int pid) {
   return end != std::string::npos && text.at(end + 2) != 'Z' && text.at(end + 2) != 'X';
 }
 
-// What another process writes into a file: waits until it is there.
+// The number that another process writes into a file: waits until it is there.
 inline int number_in(const std::string& path) {
   int number = 0;
   for (int i = 0; i < 2000 && number == 0; ++i) {

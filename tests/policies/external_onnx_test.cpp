@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "duet/core/require.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/dstar/features.h"
 #include "duet/policies/external/channel_values.h"
 #include "duet/policies/external/external_policy.h"
 #include "duet/policies/external/plan_decoder.h"
-#include "duet/policies/registry.h"
 #include "duet/policies/scheduler.h"
 #include "tests/nn/onnx_writer.h"
 #include "tests/policies/external_fixtures.h"
@@ -120,7 +120,7 @@ TEST(OnnxPolicy, BetweenAnchorsIsWhatDensifyMakes) {
   }
 }
 
-// What each output frame says of the same place.
+// Checks that each output frame gives the same place.
 TEST(OnnxPolicy, RootsComeBackFromEveryFrame) {
   const MovingHistory history(2);
   const RobotState& now = history.at(0).now().robot;

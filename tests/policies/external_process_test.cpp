@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "duet/core/require.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/child_process.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/policies/registry.h"
 #include "duet/robots/kinematics.h"
 #include "tests/policies/process_fixtures.h"
 
@@ -36,7 +36,7 @@ TEST_F(ProcessPolicyTest, AnswersWithItsPlan) {
   EXPECT_EQ(policy_->name(), "mine");
 }
 
-// What it was told comes back as a plan: joints of the newest frame, the size of everything in the root.
+// The policy's inputs come back as a plan: joints of the newest frame, the size of everything in the root.
 TEST_F(ProcessPolicyTest, IsToldTheEpisodeAndTheObservation) {
   start(polite(R"(
 first = {e['name']: e['first'] for e in h['channels']}

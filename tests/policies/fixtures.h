@@ -27,7 +27,7 @@ inline std::shared_ptr<const RobotModel> t1() {
   return robot;
 }
 
-// Of the G1.
+// Whether a joint belongs to a leg of the G1.
 inline bool is_leg(int joint) {
   const std::vector<int> legs = leg_joints(*g1());
   return std::find(legs.begin(), legs.end(), joint) != legs.end();

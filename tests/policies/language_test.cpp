@@ -5,8 +5,8 @@
 
 #include <cmath>
 
+#include "duet/archives/npy/npz.h"
 #include "duet/core/digest.h"
-#include "duet/core/npz.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 
@@ -163,7 +163,7 @@ TEST(Language, CaseOrderAndPunctuationDoNotMatter) {
   EXPECT_GT(cosine(encoder->embed("hugging"), encoder->embed("hugs")), 1.0 - kFloat);
 }
 
-// What no lexicon knows is told apart by its letters.
+// Words that no lexicon knows are told apart by their letters.
 TEST(Language, UnknownWordsOfLikeSpellingAreNearEachOther) {
   const auto encoder = built_in_language();
   const std::vector<float> wrong = encoder->embed("pirouete");

@@ -24,7 +24,7 @@ std::vector<int> ticks_of(PastFrames& past) {
   return ticks;
 }
 
-// What is looked back on at `tick`, with an observation every `every` ticks from 0.
+// The ticks that are looked back on at `tick`, with an observation every `every` ticks from 0.
 std::vector<int> seen_at(int tick, int stride, int every) {
   PastFrames past(stride);
   ObservationHistory history;

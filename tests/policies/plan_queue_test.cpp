@@ -53,7 +53,7 @@ struct AskingEpisode {
   std::vector<ObservationFrame> frames;
 };
 
-// What one question leaves, answered by `how`.
+// The outcome of one question, answered by `how`.
 struct Asked {
   std::vector<Reference> plan;
   PolicyFaults faults;

@@ -1,6 +1,6 @@
 #include "duet/policies/policy.h"
 
-#include "duet/policies/registry.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/scheduler.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"

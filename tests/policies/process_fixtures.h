@@ -10,9 +10,9 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/child_process.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/policies/registry.h"
 #include "tests/policies/external_fixtures.h"
 
 namespace duet::test {

@@ -1,4 +1,4 @@
-// What a policy in a process of its own outlives, and what ends with it.
+// Events that a policy in a process of its own outlives, and those that end with it.
 #include <gmock/gmock.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "duet/core/require.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/child_process.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/policies/registry.h"
 #include "duet/robots/kinematics.h"
 #include "tests/policies/process_fixtures.h"
 

@@ -1,5 +1,5 @@
 // Policies that a program adds. Each test ends its own process: what is added stays.
-#include "duet/policies/registry.h"
+#include "duet/policies/catalogue/registry.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "duet/policies/retrieval.h"
+#include "duet/policies/dstar/retrieval.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "duet/core/require.h"
-#include "duet/policies/registry.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/robots/robot_model.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-"""Prints the figures of docs/python.md: what a policy of Python costs, and how long the import takes.
+"""Prints the figures of docs/using-duet.md: what a policy of Python costs, and how long the import takes.
 
     PYTHONPATH=build/release/python python3 tests/python/measure.py [ENGINE] [EPISODES] [REPETITIONS]
 

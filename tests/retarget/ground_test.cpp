@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "duet/motion/foot_contact.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/retarget/body_spheres.h"
 #include "duet/retarget/leg_pose.h"
 #include "duet/retarget/pair.h"

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/core/npz.h"
+#include "duet/archives/npy/npz.h"
 #include "duet/core/require.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "duet/metrics/grounding.h"
-#include "duet/motion/people/people_formats.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/people/formats/people_formats.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/retarget/joint_speeds.h"
 #include "duet/retarget/pair.h"
 #include "duet/robots/kinematics.h"

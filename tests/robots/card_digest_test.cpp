@@ -10,7 +10,7 @@ using test::kSmallCard;
 using test::load_small;
 using test::replaced;
 
-// Of URDF and card, byte by byte, as they were when rows were published under them.
+// Digests of URDF and card, byte by byte, as they were when rows were published under them.
 constexpr std::pair<const char*, const char*> kPublishedDigests[] = {
     {"g1", "b22cde7449b8de81c5bb67eb826ea8dddc87783671befcad2c40d80e1b44af7b"},
     {"g1_12dof", "a973fe9e6231e92af5ed4d7f964a4ebea7c0eccbc5b491f2624da4d0902c20ab"},

@@ -68,7 +68,7 @@ TEST_F(CardExtends, AFaultOfTheCardExtendedNamesItsFileAndLine) {
   add("base/broken.yaml", replaced(kSmallCard, "kp: 20", "kp: stiff"));
   EXPECT_EQ(error(add("base/mine.yaml", "name: mine\nextends: broken.yaml\n")),
             folder_ / "base/broken.yaml" + ":5: joint 'shoulder': 'kp': expected a finite number, found 'stiff'");
-  // What the card itself breaks of what it extends is told at the place of the latter.
+  // A fault that the card itself makes in what it extends is told at the place of the latter.
   EXPECT_THAT(error(add("base/less.yaml", R"(name: less
 extends: small.yaml
 locked: [{name: elbow, position: 0}]

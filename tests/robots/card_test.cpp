@@ -8,12 +8,12 @@ using test::kSmallCard;
 using test::kSmallUrdf;
 using test::replaced;
 
-// What parsing the small card says after `from` became `to`; the file is called c.yaml.
+// The error of parsing the small card after `from` became `to`; the file is called c.yaml.
 std::string card_error(const std::string& from, const std::string& to) {
   return test::thrown_message<InputError>([&] { parse_card(replaced(kSmallCard, from, to), "c.yaml"); });
 }
 
-// What loading it says, without the folders.
+// The error of loading it, without the folders.
 std::string load_error(const std::string& from, const std::string& to, const std::string& urdf = kSmallUrdf) {
   std::string message = test::load_error(replaced(kSmallCard, from, to), urdf);
   for (size_t slash = message.rfind("/small."); slash != std::string::npos; slash = message.rfind("/small.")) {

@@ -35,7 +35,7 @@ const RobotModel& t1() {
   return model;
 }
 
-// Of a frame over the soles in the neutral pose, base upright.
+// The height of a frame over the soles in the neutral pose, base upright.
 double height_of(const RobotModel& robot, const std::string& frame) {
   Kinematics kinematics(robot);
   kinematics.update(robot.standing_state().X_WB, robot.neutral);

@@ -203,8 +203,8 @@ TEST(UrdfErrors, Joints) {
       AllOf(StartsWith("x.urdf: not a valid URDF: "), HasSubstr("axis"), HasSubstr("[shoulder]"), HasSubstr("zero")));
 }
 
-// What mimics a joint that moves is refused where the card does not lock it; what mimics a locked one is locked with
-// it.
+// Joints that mimic one that moves are refused where the card does not lock them; those that mimic a locked one are
+// locked with it.
 TEST(UrdfErrors, MimicsThatTheCardDoesNotLock) {
   const auto with_fingers = [](const std::string& locked) {
     const test::ScratchFolder folder;

@@ -32,7 +32,7 @@ TEST(XmlNesting, RefusesWhatNestsDeeper) {
   }
 }
 
-// What looks like an end and is none must not hide the depth.
+// Text that looks like an end and is none must not hide the depth.
 TEST(XmlNesting, IsNotFooledByEndsInCommentsValuesAndText) {
   for (const char* level :
        {"<a><!-- </a> -->", "<a><![CDATA[</a>]]>", "<a b='/>'>", "<a b=\"</\">", "<a b='/' >", "<a b=\"'/>'\">",

@@ -1,12 +1,12 @@
-#include "duet/rollout/disturbance.h"
+#include "duet/rollout/perturbations/disturbance.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "duet/bench/suite.h"
+#include "duet/experiment/suite/suite.h"
 #include "tests/backends/allocation_count.h"
-#include "tests/bench/fixtures.h"
+#include "tests/experiment/fixtures.h"
 
 namespace duet {
 namespace {

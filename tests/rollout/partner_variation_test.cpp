@@ -1,18 +1,18 @@
-#include "duet/rollout/partner_variation.h"
+#include "duet/rollout/perturbations/partner_variation.h"
 
 #include <gmock/gmock.h>
 
 #include <numbers>
 
 #include "duet/backends/factory.h"
-#include "duet/bench/runner.h"
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/pose.h"
 #include "duet/core/require.h"
-#include "duet/policies/registry.h"
+#include "duet/execution/runner.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
-#include "duet/rollout/perturbation.h"
-#include "tests/bench/fixtures.h"
+#include "duet/rollout/perturbations/perturbation.h"
+#include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -148,7 +148,7 @@ TEST(PartnerVariation, APartnerWhoMovesOnStaysThere) {
   }
 }
 
-// Who waits before it comes stands where it begins.
+// A partner who waits before it comes stands where it begins.
 TEST(PartnerVariation, WaysGoByItsOwnTime) {
   const HumanMotion motion = varied({.shift_s = 1.0, .comes_m = 1.0});
   EXPECT_NEAR(motion.joints.at(50, kPelvis).x(), 3.0, kRounding);

@@ -1,13 +1,13 @@
-#include "duet/rollout/perception.h"
+#include "duet/rollout/perturbations/perception.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/rollout/perturbation.h"
+#include "duet/rollout/perturbations/perturbation.h"
 #include "tests/backends/allocation_count.h"
-#include "tests/bench/fixtures.h"
+#include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -24,7 +24,7 @@ Joints at_tick(int tick) {
   return joints;
 }
 
-// What is seen over so many ticks.
+// The partner as it is seen over so many ticks.
 std::vector<Joints> watch(const PerceptionPlan& plan, int ticks, std::uint64_t seed = 5) {
   Perception perception(plan, seed);
   std::vector<Joints> seen;

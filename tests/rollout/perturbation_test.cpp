@@ -1,4 +1,4 @@
-#include "duet/rollout/perturbation.h"
+#include "duet/rollout/perturbations/perturbation.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "duet/core/require.h"
-#include "tests/bench/fixtures.h"
+#include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -92,7 +92,7 @@ TEST(Perturbation, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THAT(refusal("[{mass: 3}]"), HasSubstr("mass"));
 }
 
-// What a suite's hash is made of: no row of the table may change a letter of it.
+// The text that a suite's hash is made of: no row of the table may change a letter of it.
 TEST(Perturbation, EveryKindIsWrittenAsItAlwaysWas) {
   const std::vector<std::pair<std::string, std::string>> written = {
       {"delay", "{ticks: 2}"},

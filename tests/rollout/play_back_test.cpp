@@ -6,7 +6,7 @@
 
 #include "duet/rollout/kinematic_follower.h"
 #include "tests/backends/small_robots.h"
-#include "tests/bench/fixtures.h"
+#include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
 namespace duet {

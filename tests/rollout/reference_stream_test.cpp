@@ -141,7 +141,7 @@ TEST(ReferenceStream, OptionsOutOfRangeAreRefusedByName) {
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("there are none")));
 }
 
-// Of another robot than the one that was trained: what is asked for and its card lacks is said, the rest works.
+// A robot other than the one that was trained: what is asked for and its card lacks is said, the rest works.
 TEST(ReferenceStream, AsksTheCardForRangesAndBounds) {
   const auto t1 = load_shared_robot("t1");
   const auto refusal = [&](const StreamOptions& asked) {

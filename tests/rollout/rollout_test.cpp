@@ -4,13 +4,13 @@
 #include <thread>
 
 #include "duet/backends/factory.h"
-#include "duet/bench/profile.h"
-#include "duet/bench/runner.h"
-#include "duet/bench/scoring.h"
-#include "duet/controllers/registry.h"
-#include "duet/policies/registry.h"
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/execution/runner.h"
+#include "duet/experiment/suite/profile.h"
+#include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
-#include "tests/bench/fixtures.h"
+#include "duet/scoring/scoring.h"
+#include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -261,7 +261,7 @@ TEST(ActRule, FistBumpTouches) {
     EXPECT_EQ(detect_by_rule(fist_bump, s.performer, s.partner, {{"shortest", together + more}}).success, more < 0.0);
 }
 
-// Of equally good hands a left and a right one are no bump.
+// A left and a right hand, equally good, are no bump.
 TEST(ActRule, FistBumpIsOfOneSide) {
   Scene s = bumped({});
   std::swap(s.partner.lhand, s.partner.rhand);

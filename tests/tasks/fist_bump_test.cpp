@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/policies/dstar/dstar_policy.h"
 #include "tests/metrics/acting.h"
 #include "tests/policies/dstar_fixtures.h"

@@ -1,4 +1,4 @@
-#include "duet/tasks/frame_windows.h"
+#include "duet/tasks/rules/frame_windows.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "duet/motion/synthesis.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/robots/human_body.h"
 #include "duet/tasks/synthesis/performer.h"
 #include "duet/tasks/synthesis/solid.h"

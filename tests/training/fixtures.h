@@ -1,4 +1,4 @@
-// What the tests of training share: the robot, and whether its simulator is here.
+// Fixtures that the tests of training share: the robot, and whether its simulator is here.
 #pragma once
 
 #include <memory>

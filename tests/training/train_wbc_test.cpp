@@ -135,7 +135,7 @@ TEST_F(TrainWbcInMujoco, ACheckpointOfAnotherRobotOrSeedIsRefused) {
               ThrowsMessage<InputError>(HasSubstr("another robot")));
 }
 
-// What --from names was once the beginning of every stage.
+// The network that --from names was once the beginning of every stage.
 TEST(TrainWbc, OnlyTheFirstOfAllStagesBeginsWithWhatIsNamed) {
   WbcRun run;
   run.from = "oracle.safetensors";

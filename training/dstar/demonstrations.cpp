@@ -17,7 +17,7 @@
 namespace duet {
 namespace {
 
-// What was made here may be larger than a file of somebody else: 2,000 clips are 2.5 GB.
+// A file made here may be larger than one of somebody else: 2,000 clips are 2.5 GB.
 constexpr std::int64_t kMostDemonstrationBytes = std::int64_t{1} << 35;
 constexpr const char* kFormat = "duet.demonstrations/2";
 constexpr int kPartnerSize = 3 * kSmplJoints;
@@ -73,8 +73,8 @@ std::vector<Demonstration> list_of(const std::string& text, const std::string& p
 void DemonstrationSet::add(Demonstration entry, const std::vector<RobotState>& seen, const RobotMotion& meant,
                            const PointTracks& partner_joints) {
   require(static_cast<int>(seen.size()) == meant.frames() && partner_joints.frames() == meant.frames(),
-          fmt::format("demonstration '{}': {} states, {} references and {} frames of the partner, expected as many",
-                      entry.clip_id, seen.size(), meant.frames(), partner_joints.frames()));
+          "demonstration '{}': {} states, {} references and {} frames of the partner, expected as many", entry.clip_id,
+          seen.size(), meant.frames(), partner_joints.frames());
   const Eigen::Index n = meant.q.rows(), used = list.empty() ? 0 : list.back().end(), more = meant.frames();
   const Eigen::Index room = std::max(more, used / 2);  // grows by halves, trimmed when it is saved
   grow(observed, 13 + 2 * n, used, observed.cols() >= used + more ? 0 : room);

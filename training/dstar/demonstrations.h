@@ -1,4 +1,4 @@
-// What D-STAR learns from: what the robot was seen to do beside a partner, and what it was meant to do. Frames of all
+// Demonstrations for D-STAR: what the robot was seen to do beside a partner, and what it was meant to do. Frames of all
 // demonstrations lie in one matrix per channel, so that a set of hours is a few hundred megabytes and one file.
 #pragma once
 

@@ -1,4 +1,4 @@
-// What a training of D-STAR reports: sums between reports, the curve as CSV, and when it is time to print and to save.
+// The log of a training of D-STAR: sums between reports, the curve as CSV, and when it is time to print and to save.
 #pragma once
 
 #include "duet/training/dstar/trainer.h"
@@ -12,7 +12,7 @@ struct LossParts {
 
 class DstarLog {
  public:
-  // From step `done` after `minutes`; a curve of no step is begun anew.
+  // Goes on from step `done` after `minutes`; a curve of no step is begun anew.
   DstarLog(const DstarRun& run, long done, double minutes);
 
   void add(const LossParts& parts);

@@ -1,7 +1,7 @@
 // The library of `retrieval`: windows of demonstrations as they are.
 #pragma once
 
-#include "duet/policies/retrieval.h"
+#include "duet/policies/dstar/retrieval.h"
 #include "duet/training/dstar/windows.h"
 
 namespace duet {

@@ -81,7 +81,7 @@ class WindowMaker {
 // Fills a batch with windows drawn evenly from a list.
 void draw_windows(WindowMaker& maker, const std::vector<Window>& windows, Random& random, WindowBatch& batch);
 
-// What the network saw of a window.
+// The features of a window as the network saw them.
 DstarFeatures features_of(const WindowBatch& batch, int column);
 
 // Mean and deviation per channel of frames and plans over a sample of windows, as a network keeps them. Deviations are

@@ -35,7 +35,7 @@ function verdictTable(row: Row, track: Track): HTMLElement {
           verdict.success ? null : el('span', {class: 'why'}, why(verdict, track)))))));
 }
 
-// What the headline detector says at the end of a motion that no run judged.
+// The headline detector's verdict at the end of a motion that no run judged.
 function seenIn(track: Track, task: string): string {
   const detector = track.detectors[0];
   if (!track.robot) return 'People, no robot';

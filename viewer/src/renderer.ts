@@ -6,7 +6,7 @@ import {Hull} from './replay';
 
 export type Colour = [number, number, number];
 
-// What an instance is made of: position 3, quaternion 4, radius, half length, taper, colour 3.
+// The numbers of an instance: position 3, quaternion 4, radius, half length, taper, colour 3.
 const STRIDE = 13;
 
 export class Bodies {

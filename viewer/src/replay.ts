@@ -1,4 +1,4 @@
-// What a page holds, schema `duet.replay/1` (bench/replay/replay_header.h), and how it is read from the page.
+// The data of a page, schema `duet.replay/1` (replay/replay_header.h), and how it is read from the page.
 import {Block, Columns, readColumns} from './columns';
 
 export interface Robot {

@@ -1,4 +1,4 @@
-// What stands on the floor at an instant: robots, their partner, forces, the reference.
+// Bodies on the floor at an instant: robots, their partner, forces, the reference.
 import {Bodies, Colour, Layer} from './renderer';
 import {Kinematics, Quat, Vec3, multiply, rotate, turnOfZ} from './kinematics';
 import {Contact, Limits, Motion, Partner, Robot, Track} from './replay';

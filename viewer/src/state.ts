@@ -1,4 +1,4 @@
-// What of the view a link can carry: the part of the address behind '#'.
+// The part of the view that a link can carry, in the address behind '#'.
 export interface ViewState {
   scene: string;
   tracks: number[]; // that are shown
@@ -28,7 +28,7 @@ function numbers(text: string | null, separator: string): number[] {
   return text.split(separator).map(Number).filter(Number.isFinite);
 }
 
-// What is missing or no number is left out.
+// Reads the view from an address; a value that is missing or no number is left out.
 export function readState(hash: string): Partial<ViewState> {
   const fields = new URLSearchParams(hash.replace(/^#/, ''));
   const state: Partial<ViewState> = {};

@@ -1,4 +1,4 @@
-// One clock for all tracks of a scene: seconds since the act began. What happens on it.
+// One clock for all tracks of a scene, in seconds since the act began, and the events on it.
 import {Kinematics, Vec3} from './kinematics';
 import {Columns} from './columns';
 import {Track} from './replay';

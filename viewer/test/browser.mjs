@@ -1,4 +1,4 @@
-// What the checks of pages share: Debian's Chromium with software WebGL and no network, pictures, archives of numbers.
+// Parts that the checks of pages share: Debian's Chromium (software WebGL, no network), pictures, archives of numbers.
 import {chromium} from 'playwright-core';
 import {existsSync, mkdirSync, readFileSync} from 'node:fs';
 import {join} from 'node:path';
@@ -37,7 +37,7 @@ export async function open(browser, path, {hash = '', width = 1440, height = 100
   return {page, errors, context};
 }
 
-// Of a PNG of 8 bits a channel: width, height, brightness of each pixel.
+// Reads a PNG of 8 bits a channel: width, height, brightness of each pixel.
 export function brightness(png) {
   let at = 8, width = 0, height = 0, channels = 3;
   const data = [];

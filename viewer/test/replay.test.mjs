@@ -124,7 +124,7 @@ function placed({translation: p, rotation: {x, y, z, w}}, [a, b, c]) {
   return [p.x + a + w * u + y * t - z * v, p.y + b + w * v + z * u - x * t, p.z + c + w * t + x * v - y * u];
 }
 
-// Of MCAP's transforms, which C++ made (rounded to 0.01 mm): both ends of each capsule.
+// Both ends of each capsule, against MCAP's transforms, which C++ made (rounded to 0.01 mm).
 test('links are where C++ has them, to 0.1 mm', async () => {
   const {header, bytes} = readPage(html), reader = new McapStreamReader({decompressHandlers: {zstd: (packed, size) => unzstd(packed, new Uint8Array(Number(size)))}});
   const tracks = new Map(header.scenes.flatMap((scene) => scene.tracks.map((track) => [`/${scene.id}/${track.name}/where`, track])));

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "duet/backends/factory.h"
-#include "duet/controllers/registry.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/rollout/rollout.h"
 
 namespace {

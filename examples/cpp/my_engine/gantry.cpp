@@ -1,6 +1,6 @@
 // An engine of one's own: the robot hangs by its pelvis in a gantry, nothing touches it, and each joint follows the
-// torque law of duet's JointCommand under the robot's own dynamics. What a controller does to the joints, apart from
-// balance.
+// torque law of duet's JointCommand under the robot's own dynamics. It shows what a controller does to the joints,
+// apart from balance.
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>

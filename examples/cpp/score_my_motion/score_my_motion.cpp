@@ -5,8 +5,8 @@
 #include <exception>
 #include <string>
 
-#include "duet/core/npz.h"
-#include "duet/core/recording.h"
+#include "duet/archives/npy/npz.h"
+#include "duet/archives/recording_file.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/retargeting.h"

@@ -1,5 +1,5 @@
 // D-STAR's arithmetic in libtorch, batched and differentiable: the same formulas as policies/dstar/runner.cpp, tensor
-// by tensor (docs/dstar-format.md). Weights by name.
+// by tensor (docs/file-formats.md). Weights by name.
 #pragma once
 
 #include <torch/torch.h>
@@ -28,7 +28,7 @@ struct ModelCondition {
 };
 
 ModelCondition encode(const DstarConfig& config, const Weights& weights, const ModelInput& input);
-// Only the phase classifier: for L_trans.
+// Runs the phase classifier alone: for L_trans.
 torch::Tensor classify(const DstarConfig& config, const Weights& weights, const ModelInput& input);
 // x (B, 5, 36), step (B) -> x0 (B, 5, 36), normalised.
 torch::Tensor denoise(const DstarConfig& config, const Weights& weights, const torch::Tensor& x,

@@ -45,7 +45,7 @@ Tensor noised(const Tensor& clean, const Tensor& step, const std::vector<double>
 
 torch::Device device_of(const std::string& name) {
   require(name == "auto" || name == "cpu" || name == "cuda",
-          fmt::format("training D-STAR: device: expected auto, cpu or cuda, found '{}'", name));
+          "training D-STAR: device: expected auto, cpu or cuda, found '{}'", name);
   if (name != "cpu" && torch::cuda::is_available()) return torch::kCUDA;
   if (name == "cuda") throw MissingError("training D-STAR: the libtorch that duet was built with finds no GPU (CUDA)");
   return torch::kCPU;
@@ -79,8 +79,8 @@ class Trainer {
         validation_windows_(list_windows(*data.validation, windows_of(run))) {
     require(!windows_.empty() && !validation_windows_.empty(), "training D-STAR: a set of demonstrations is empty");
     require(run.batch >= 8 && run.threads >= 1 && run.batch % run.threads == 0,
-            fmt::format("training D-STAR: batches of {} windows on {} threads; expected a multiple, 8 or more",
-                        run.batch, run.threads));
+            "training D-STAR: batches of {} windows on {} threads; expected a multiple, 8 or more", run.batch,
+            run.threads);
     one_thread_each();
     WindowMaker maker(data.robot, *data.train, windows_of(run));
     statistics_ = window_statistics(maker, windows_, run.seed);
@@ -176,13 +176,13 @@ class Trainer {
 
   void begin_with(const DstarNetwork& network) {
     const std::string expected = to_json_text(run_.config), found = to_json_text(network.config);
-    require(expected == found, fmt::format("training D-STAR: the network to begin with has another configuration: "
-                                           "expected {}, found {}",
-                                           expected, found));
-    require(
-        network.language == data_.language->name(),
-        fmt::format("training D-STAR: the network to begin with learnt from the language encoder '{}', this is '{}'",
-                    network.language, data_.language->name()));
+    require(expected == found,
+            "training D-STAR: the network to begin with has another configuration: "
+            "expected {}, found {}",
+            expected, found);
+    require(network.language == data_.language->name(),
+            "training D-STAR: the network to begin with learnt from the language encoder '{}', this is '{}'",
+            network.language, data_.language->name());
     weights_.assign(network.weights);
     statistics_ = {network.frame_mean, network.frame_deviation, network.plan_mean, network.plan_deviation};
   }

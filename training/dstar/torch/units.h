@@ -11,7 +11,7 @@
 
 namespace duet {
 
-// Of the same memory.
+// A tensor over the matrix's own memory.
 torch::Tensor view(Eigen::MatrixXf& matrix, at::IntArrayRef shape);
 // Standard normal numbers.
 torch::Tensor normal_noise(at::IntArrayRef shape, Random& random);

@@ -20,7 +20,7 @@ class WeightBlock {
   [[nodiscard]] const std::vector<TensorShape>& shapes() const { return shapes_; }
   static std::size_t count(const TensorShape& shape);
 
-  // Of the same memory; with `learn` as leaves that gather gradients.
+  // Tensors over the block's own memory; with `learn` as leaves that gather gradients.
   [[nodiscard]] Weights views(bool learn);
   [[nodiscard]] std::map<std::string, duet::Tensor> tensors() const;
   // Weights uniform within +-sqrt(1.5 / inputs), positions within +-0.05, biases 0, norms 1; what ends a residual

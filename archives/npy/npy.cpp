@@ -1,0 +1,272 @@
+#include "duet/archives/npy/npy.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <type_traits>
+
+#include "duet/archives/npy/npy_header.h"
+#include "duet/core/half.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+
+namespace duet {
+namespace {
+
+template <typename T>
+T read_value(const char* at, bool swapped) {
+  char bytes[sizeof(T)];
+  std::memcpy(bytes, at, sizeof(T));
+  if (swapped) std::reverse(bytes, bytes + sizeof(T));
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return value;
+}
+
+// `read(at)` for each of `count` items of `item` bytes.
+template <typename Value, typename Read>
+std::vector<Value> read_items(std::string_view data, std::size_t count, std::size_t item, const Read& read) {
+  std::vector<Value> values;
+  values.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) values.push_back(read(data.data() + i * item));
+  return values;
+}
+
+// The values that stand from `at` on, as an iterator that a vector is made of without being filled with zeros before.
+template <typename Stored, typename Value>
+struct StoredValues {
+  using iterator_category = std::random_access_iterator_tag;
+  using value_type = Value;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const Value*;
+  using reference = Value;
+
+  const char* at = nullptr;
+
+  Value operator*() const {
+    Stored stored;
+    std::memcpy(&stored, at, sizeof(Stored));
+    return static_cast<Value>(stored);
+  }
+  StoredValues& operator++() {
+    at += sizeof(Stored);
+    return *this;
+  }
+  StoredValues operator+(difference_type n) const { return {at + n * static_cast<difference_type>(sizeof(Stored))}; }
+  difference_type operator-(const StoredValues& other) const {
+    return (at - other.at) / static_cast<difference_type>(sizeof(Stored));
+  }
+  bool operator==(const StoredValues&) const = default;
+};
+
+template <typename Stored, typename Value>
+std::vector<Value> read_as(std::string_view data, std::size_t count, bool swapped) {
+  if constexpr (!std::is_same_v<Stored, std::uint64_t>) {
+    if (!swapped) {  // most files: in one pass over memory
+      const StoredValues<Stored, Value> first{data.data()};
+      return std::vector<Value>(first, first + static_cast<std::ptrdiff_t>(count));
+    }
+  }
+  return read_items<Value>(data, count, sizeof(Stored), [swapped](const char* at) {
+    const Stored stored = read_value<Stored>(at, swapped);
+    if constexpr (std::is_same_v<Stored, std::uint64_t>)
+      if (stored > static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()))
+        throw InputError(fmt::format("expected integers below 2^63, found {}", stored));
+    return static_cast<Value>(stored);
+  });
+}
+
+void append_utf8(std::string& text, char32_t code) {
+  const auto tail = [&](int shift) { text += static_cast<char>(0x80 | ((code >> shift) & 0x3f)); };
+  if (code < 0x80) {
+    text += static_cast<char>(code);
+  } else if (code < 0x800) {
+    text += static_cast<char>(0xc0 | (code >> 6));
+    tail(0);
+  } else if (code < 0x10000) {
+    text += static_cast<char>(0xe0 | (code >> 12));
+    tail(6), tail(0);
+  } else {
+    text += static_cast<char>(0xf0 | (code >> 18));
+    tail(12), tail(6), tail(0);
+  }
+}
+
+bool is_code_point(char32_t code) { return code <= 0x10ffff && (code < 0xd800 || code > 0xdfff); }
+
+std::vector<std::string> read_unicode(std::string_view data, std::size_t count, std::size_t characters, bool swapped) {
+  return read_items<std::string>(data, count, 4 * characters, [=](const char* at) {
+    std::u32string codes(characters, U'\0');
+    for (std::size_t c = 0; c < characters; ++c) codes[c] = read_value<std::uint32_t>(at + 4 * c, swapped);
+    codes.resize(codes.find_last_not_of(U'\0') + 1);  // npos + 1 == 0
+    std::string text;
+    for (const char32_t code : codes) {
+      if (!is_code_point(code))
+        throw InputError(fmt::format("expected Unicode characters, found {:#x}", static_cast<std::uint32_t>(code)));
+      append_utf8(text, code);
+    }
+    return text;
+  });
+}
+
+std::vector<std::string> read_bytes(std::string_view data, std::size_t count, std::size_t length) {
+  return read_items<std::string>(data, count, length, [=](const char* at) {
+    const std::string_view text(at, length);
+    return std::string(text.substr(0, text.find_last_not_of('\0') + 1));
+  });
+}
+
+NpyArray::Values read_values(const NpyType& type, std::string_view data, std::size_t count) {
+  const bool swapped = type.big_endian != (std::endian::native == std::endian::big);
+  switch (type.kind) {
+    case 'f':
+      if (type.size == 2)
+        return read_items<double>(data, count, type.size, [swapped](const char* at) {
+          return number_of_half(read_value<std::uint16_t>(at, swapped));
+        });
+      if (type.size == 4) return read_as<float, double>(data, count, swapped);
+      return read_as<double, double>(data, count, swapped);
+    case 'i':
+      if (type.size == 1) return read_as<std::int8_t, std::int64_t>(data, count, swapped);
+      if (type.size == 2) return read_as<std::int16_t, std::int64_t>(data, count, swapped);
+      if (type.size == 4) return read_as<std::int32_t, std::int64_t>(data, count, swapped);
+      return read_as<std::int64_t, std::int64_t>(data, count, swapped);
+    case 'b':
+    case 'u':
+      if (type.size == 1) return read_as<std::uint8_t, std::int64_t>(data, count, swapped);
+      if (type.size == 2) return read_as<std::uint16_t, std::int64_t>(data, count, swapped);
+      if (type.size == 4) return read_as<std::uint32_t, std::int64_t>(data, count, swapped);
+      return read_as<std::uint64_t, std::int64_t>(data, count, swapped);
+    case 'U':
+      return read_unicode(data, count, type.size / 4, swapped);
+    default:
+      return read_bytes(data, count, type.size);
+  }
+}
+
+// Values in Fortran order -> C order.
+template <typename Value>
+std::vector<Value> to_row_major(std::vector<Value> values, const std::vector<std::size_t>& shape) {
+  if (shape.size() < 2 || values.empty()) return values;
+  std::vector<Value> ordered;
+  ordered.reserve(values.size());
+  std::vector<std::size_t> index(shape.size(), 0), stride(shape.size(), 1);
+  for (std::size_t d = 1; d < shape.size(); ++d) stride[d] = stride[d - 1] * shape[d - 1];
+  for (std::size_t source = 0; ordered.size() < values.size();) {
+    ordered.push_back(std::move(values[source]));
+    for (std::size_t d = shape.size(); d-- > 0;) {  // the next index, the last dimension fastest
+      source += stride[d];
+      if (++index[d] < shape[d]) break;
+      source -= stride[d] * shape[d];
+      index[d] = 0;
+    }
+  }
+  return ordered;
+}
+
+template <typename T>
+void append_little_endian(std::string& bytes, T value) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) std::reverse(raw, raw + sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+std::string header_text(std::string_view type, const std::vector<std::size_t>& shape) {
+  std::string sizes;
+  for (const std::size_t size : shape) sizes += fmt::format("{}{}", sizes.empty() ? "" : " ", size) + ",";
+  if (shape.size() > 1) sizes.pop_back();
+  std::string dictionary = fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", type, sizes);
+  constexpr std::size_t kPrefix = 10, kAlignment = 64;  // magic, version, length; NumPy aligns the data
+  while ((kPrefix + dictionary.size() + 1) % kAlignment != 0) dictionary += ' ';
+  dictionary += '\n';
+  std::string header("\x93NUMPY\x01\x00", 8);
+  append_little_endian(header, static_cast<std::uint16_t>(dictionary.size()));
+  return header + dictionary;
+}
+
+template <typename Value>
+std::string number_bytes(std::string_view type, const NpyArray& array, const std::vector<Value>& values) {
+  std::string bytes = header_text(type, array.shape);
+  bytes.reserve(bytes.size() + values.size() * sizeof(Value));
+  if constexpr (std::endian::native == std::endian::little) {  // as they stand in memory
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value));
+  } else {
+    for (const Value value : values) append_little_endian(bytes, value);
+  }
+  return bytes;
+}
+
+std::string string_bytes(const NpyArray& array, const std::vector<std::string>& values) {
+  std::vector<std::u32string> decoded;
+  decoded.reserve(values.size());
+  std::size_t longest = 1;  // NumPy has no string type of length 0
+  for (const std::string& value : values) longest = std::max(longest, decoded.emplace_back(decode_utf8(value)).size());
+  if (values.size() > kMaxEntryBytes / 4 / longest)
+    throw InputError(fmt::format("{} strings of up to {} characters are above 1 GiB", values.size(), longest));
+  std::string bytes = header_text(fmt::format("<U{}", longest), array.shape);
+  for (std::u32string& codes : decoded) {
+    codes.resize(longest, U'\0');
+    for (const char32_t code : codes) append_little_endian(bytes, static_cast<std::uint32_t>(code));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::size_t checked_count(const std::vector<std::size_t>& shape, std::size_t limit) {
+  std::size_t count = 1;
+  for (const std::size_t size : shape) {
+    // Every size counts, also beside a 0: nothing that is read later may overflow an index.
+    if (size > limit || (size != 0 && count > limit / size))
+      throw InputError(fmt::format("shape {} is above the limit of {} values", shape_text(shape), limit));
+    if (size != 0) count *= size;
+  }
+  return std::find(shape.begin(), shape.end(), std::size_t{0}) == shape.end() ? count : 0;
+}
+
+NpyArray parse_npy(std::string_view bytes) {
+  if (bytes.size() > kMaxEntryBytes) throw InputError("above 1 GiB");
+  const NpyHeader header = parse_npy_header(bytes);
+  const bool text = header.type.kind == 'U' || header.type.kind == 'S';
+  const std::size_t count = checked_count(header.shape, text ? kMaxArrayStrings : kMaxArrayValues);
+  const std::string_view data = bytes.substr(header.data_begin);
+  // No overflow: the type's size is at most 2^32 and the count at most 2^27.
+  if (data.size() != count * header.type.size)
+    throw InputError(fmt::format("shape {} of {}-byte values needs {} bytes of data, found {}",
+                                 shape_text(header.shape), header.type.size, count * header.type.size, data.size()));
+  NpyArray array{header.shape, read_values(header.type, data, count)};
+  if (header.fortran_order)
+    std::visit([&](auto& values) { values = to_row_major(std::move(values), array.shape); }, array.values);
+  return array;
+}
+
+std::string npy_bytes(const NpyArray& array) {
+  if (const auto* strings = std::get_if<std::vector<std::string>>(&array.values)) {
+    checked_count(array.shape, kMaxArrayStrings);
+    return string_bytes(array, *strings);
+  }
+  checked_count(array.shape, kMaxArrayValues);
+  if (const auto* integers = std::get_if<std::vector<std::int64_t>>(&array.values))
+    return number_bytes("<i8", array, *integers);
+  return number_bytes("<f8", array, std::get<std::vector<double>>(array.values));
+}
+
+std::u32string decode_utf8(std::string_view text) {
+  std::u32string codes;
+  for (std::size_t i = 0; i < text.size();) {
+    const std::optional<CodePoint> point = code_point_at(text, i);
+    if (!point || point->code == U'\0')
+      throw std::invalid_argument(fmt::format("expected UTF-8 text without NUL, found byte {:#04x} at {}",
+                                              static_cast<unsigned char>(text[i]), i));
+    codes += point->code;
+    i += point->length;
+  }
+  return codes;
+}
+
+}  // namespace duet

@@ -1,0 +1,249 @@
+#include "duet/cluster/work_shard.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "duet/cluster/attempt.h"
+#include "duet/cluster/crash_note.h"
+#include "duet/cluster/planned_run.h"
+#include "duet/cluster/training_jobs.h"
+#include "duet/core/file.h"
+#include "duet/core/parallel.h"
+#include "duet/core/require.h"
+#include "duet/execution/runner.h"
+#include "duet/experiment/work/run_work.h"
+#include "duet/rows/merge/merge_files.h"
+#include "duet/rows/row_identity.h"
+#include "duet/rows/row_scan.h"
+
+namespace duet {
+namespace {
+
+// The rows of all workers of a shard, each read once: workers look at them as they grow.
+class ShardRows {
+ public:
+  ShardRows(const PlannedRun& run, std::int64_t shard) : run_(run), shard_(shard) {}
+
+  // Those that were not there at the last look.
+  void look(const std::function<void(const EpisodeRow&)>& each) {
+    for (const std::string& path : rows_files(run_.path(), shard_)) {
+      Read& read = read_[path];
+      LineFile lines(path, read.bytes);
+      while (const std::optional<std::string_view> line = lines.next()) {
+        each(row_of(*line, path, ++read.lines));
+        read.bytes += line->size() + 1;
+      }
+    }
+  }
+
+ private:
+  struct Read {
+    std::uint64_t bytes = 0;
+    int lines = 0;
+  };
+
+  [[nodiscard]] EpisodeRow row_of(std::string_view line, const std::string& path, int number) const {
+    const std::string& hash = run_.info().suite_hash;
+    try {
+      EpisodeRow row = scan_row(line).row;
+      if (row.suite_hash != hash)
+        throw InputError(fmt::format("a row of suite hash {:.12}, expected {:.12}", row.suite_hash, hash));
+      return row;
+    } catch (const InputError& error) {
+      throw InputError(
+          fmt::format("{}:{}: {}; remove the file, and its episodes run again", path, number, error.what()));
+    }
+  }
+
+  const PlannedRun& run_;
+  std::int64_t shard_;
+  std::map<std::string, Read> read_;  // by path
+};
+
+// The history of a shard's earlier attempts, which says what is left to do.
+struct ShardHistory {
+  std::map<std::string, Outcome> outcomes;                  // by key: of the row that stands
+  std::map<std::string, std::vector<std::string>> crashes;  // key -> signals
+  std::map<std::string, int> losses;
+};
+
+ShardHistory history_of(const PlannedRun& run, std::int64_t shard, ShardRows& rows) {
+  ShardHistory history;
+  const std::int64_t now = file_system_time(run.path());
+  rows.look([&](const EpisodeRow& row) { note_outcome(row.key, row.outcome, history.outcomes); });
+  for (const AttemptRecord& attempt : read_attempts(run.path(), shard)) {
+    for (const AttemptRecord::Crash& crash : attempt.crashes) history.crashes[crash.key].push_back(crash.signal);
+    const bool lost = attempt.end.empty() && attempt.crashes.empty() && !may_be_alive(attempt, now, kSilence);
+    for (const std::string& key : attempt.open) history.losses[key] += lost ? 1 : 0;
+  }
+  return history;
+}
+
+// Why no worker is to try again; empty where one is.
+std::string poison_of(const std::string& key, const ShardHistory& history) {
+  if (const auto crashes = history.crashes.find(key);
+      crashes != history.crashes.end() && std::ssize(crashes->second) >= kMostCrashes)
+    return fmt::format("killed its worker {} times: {}", crashes->second.size(), fmt::join(crashes->second, ", "));
+  if (const auto losses = history.losses.find(key); losses != history.losses.end() && losses->second >= kMostLosses)
+    return fmt::format("{} workers were killed while they were at it (SIGKILL, as where memory is short)",
+                       losses->second);
+  return "";
+}
+
+class ShardWorker {
+ public:
+  ShardWorker(const std::string& path, std::int64_t number, const WorkOptions& options, const StopSign& stop)
+      : run_(path, options.allow_programs),
+        number_(number),
+        shard_(shard_of(run_.plan(), number)),
+        options_(options),
+        stop_(stop) {
+    if (keys_digest(run_.episodes(), shard_.begin, shard_.end, run_.suite(), run_.identity(), run_.bodies()) !=
+        shard_.keys)
+      throw InputError(
+          fmt::format("{}/plan.json: shard {}: the keys of its episodes are not those of the plan", path, number));
+    history_ = history_of(run_, number, rows_);
+    if (run_.suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
+  }
+
+  WorkSummary work(Progress& progress) {
+    const std::vector<std::int64_t> places = missing_places();
+    if (places.empty()) return std::move(summary_);
+    run_.load_clips(places.front(), places.back() + 1);
+    AttemptWriter attempt(run_.path(), new_attempt(number_, shard_plan_digest(run_.path())));
+    note_crashes_in(attempt.descriptor());
+    try {
+      roll_out(places, attempt, progress);
+    } catch (...) {
+      note_crashes_in(-1);
+      say_end(attempt, "storage");
+      throw;
+    }
+    note_crashes_in(-1);
+    if (summary_.already_there + summary_.run < summary_.planned) summary_.end = stop_.end();
+    say_end(attempt, summary_.end == RunEnd::kComplete ? "complete" : "stopped");
+    return std::move(summary_);
+  }
+
+ private:
+  std::vector<std::int64_t> missing_places() {
+    std::vector<std::int64_t> places;
+    summary_.planned = shard_.episodes();
+    for (std::int64_t place = shard_.begin; place < shard_.end; ++place) {
+      const std::string key = run_.key_at(place);
+      if (is_there(key))
+        ++summary_.already_there;
+      else
+        places.push_back(place);
+    }
+    return places;
+  }
+
+  // A time-out runs again.
+  [[nodiscard]] bool is_there(const std::string& key) const {
+    const auto known = history_.outcomes.find(key);
+    if (known == history_.outcomes.end()) return false;
+    return has_ended(known->second) || (known->second == Outcome::kError && !options_.retry_errors);
+  }
+
+  // Whether another worker has made a row of it since this one began.
+  bool is_done_by_others(const std::string& key) {
+    const std::lock_guard lock(mutex_);
+    rows_.look([&](const EpisodeRow& row) { new_.insert(row.key); });
+    if (!new_.contains(key)) return false;
+    ++summary_.already_there;
+    return true;
+  }
+
+  void roll_out(const std::vector<std::int64_t>& places, AttemptWriter& attempt, Progress& progress) {
+    progress.start(fmt::format("shard {} ({})", number_, shard_.name), static_cast<int>(places.size()), "episodes");
+    // Workers of one shard begin at places of their own, and meet where others have been.
+    const std::size_t first = std::hash<std::string>()(attempt.journal()) % places.size();
+    parallel_for_each(static_cast<int>(places.size()), options_.threads, [&](int i) {
+      if (stop_.asked()) return;
+      take(places[(first + static_cast<std::size_t>(i)) % places.size()], attempt);
+      progress.advance();
+    });
+    progress.finish();
+  }
+
+  void take(std::int64_t place, AttemptWriter& attempt) {
+    const std::string key = run_.key_at(place);
+    if (is_done_by_others(key)) return;
+    const std::string poison = options_.retry_errors ? "" : poison_of(key, history_);
+    if (!poison.empty()) {
+      record(poisoned_row(place, poison), attempt, true);
+      return;
+    }
+    attempt.began(key);
+    const CrashScope scope(key);
+    try {
+      record(run_or_refuse(run_.episodes().at(place), run_.suite(), run_.identity(), run_.bodies(), trajectories_,
+                           [&] { return stop_.asked(); }),
+             attempt, false);
+    } catch (const EpisodeInterrupted&) {
+      return;  // no row: it runs again
+    }
+  }
+
+  [[nodiscard]] EpisodeRow poisoned_row(std::int64_t place, const std::string& why) const {
+    const EpisodeSpec spec = run_.episodes().at(place);
+    EpisodeRow row = row_for(spec, run_.suite(), run_.identity(), *run_.bodies().robot(spec.controller));
+    row.started_at = utc_now();
+    row.outcome = Outcome::kError;
+    row.message = why;
+    row.success = false;
+    return row;
+  }
+
+  void record(const EpisodeRow& row, AttemptWriter& attempt, bool poisoned) {
+    attempt.append(row);
+    const std::lock_guard lock(mutex_);
+    ++summary_.run;
+    ++summary_.outcomes[std::string(to_string(row.outcome))];
+    if (summary_.first_error.empty()) summary_.first_error = error_text(row);
+    summary_.poisoned += poisoned ? 1 : 0;
+  }
+
+  // A disk that is full takes no last line; all that it says is that the worker was not killed.
+  static void say_end(AttemptWriter& attempt, const std::string& how) {
+    try {
+      attempt.ended(how);
+    } catch (const StorageError&) {
+      return;
+    }
+  }
+
+  PlannedRun run_;
+  std::int64_t number_;
+  Shard shard_;
+  WorkOptions options_;
+  const StopSign& stop_;
+  ShardRows rows_{run_, number_};
+  ShardHistory history_;
+  std::set<std::string> new_;  // keys of rows that were made since this worker began, by anybody
+  std::string trajectories_;
+  std::mutex mutex_;
+  WorkSummary summary_;
+};
+
+}  // namespace
+
+WorkSummary work_shard(const std::string& run, std::int64_t shard, const WorkOptions& options, const StopSign& stop,
+                       Progress& progress) {
+  const ShardPlan plan = read_shard_plan(run);
+  static_cast<void>(shard_of(plan, shard));
+  if (plan.kind == ShardPlan::Kind::kTrainings) return work_training(run, plan, shard, options.allow_programs, stop);
+  return ShardWorker(run, shard, options, stop).work(progress);
+}
+
+}  // namespace duet

@@ -1,0 +1,167 @@
+#include "duet/controllers/catalogue/registry.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/descriptor_controller.h"
+#include "duet/controllers/guard.h"
+#include "duet/controllers/pd.h"
+#include "duet/controllers/vmc.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
+#include "duet/core/names.h"
+#include "duet/core/open_registry.h"
+#include "duet/core/require.h"
+
+namespace duet {
+namespace {
+
+using Robot = std::shared_ptr<const RobotModel>;
+
+// A controller by name: what is said of it, and how it is made once its options are known to be its own.
+struct Entry {
+  const char* name;
+  ControllerInfo (*info)(const std::string& name);
+  LoadedController (*load)(const std::string& name, Robot robot, const ControllerOptions& options);
+  LoadedFiles (*files)(const std::string& name, const ControllerOptions& options);
+};
+
+LoadedFiles no_files(const std::string&, const ControllerOptions&) { return {}; }
+
+ControllerInfo pd_info(const std::string& name) {
+  return {name, "The card's gains around the reference's joint angles, without balance", "", false, {}};
+}
+LoadedController load_pd(const std::string&, Robot robot, const ControllerOptions&) {
+  return {[robot = std::move(robot)](const ControllerOptions&) { return make_pd_controller(robot); }};
+}
+
+ControllerInfo vmc_info(const std::string& name) {
+  return {name, "Inverse dynamics with planned contact forces; balances on both feet and does not step", "", false, {}};
+}
+LoadedController load_vmc(const std::string&, Robot robot, const ControllerOptions&) {
+  return {[robot = std::move(robot)](const ControllerOptions&) { return make_vmc_controller(robot); }};
+}
+
+ControllerInfo wbc_sim_entry(const std::string&) { return wbc_sim_info(); }
+LoadedController load_wbc_sim(const std::string&, Robot robot, const ControllerOptions& options) {
+  auto network = std::make_shared<const WbcNetwork>(load_wbc_network(wbc_sim_network_path(options), *robot));
+  return {[robot = std::move(robot), network](const ControllerOptions&) {
+    return make_wbc_sim_controller(robot, network);
+  }};
+}
+
+LoadedFiles wbc_sim_files(const std::string&, const ControllerOptions& options) {
+  return {{"network", wbc_sim_network_path(options)}};
+}
+
+ControllerInfo published_info(const std::string& name) { return descriptor_info(load_descriptor(name)); }
+LoadedController load_published(const std::string& name, Robot robot, const ControllerOptions& options) {
+  const ToldLoader told = load_told(name, std::move(robot), options);
+  return {[make = told.make](const ControllerOptions& now) { return make(now, nullptr); }, told.notes};
+}
+
+constexpr Entry kControllers[] = {{"pd", pd_info, load_pd, no_files},
+                                  {"vmc", vmc_info, load_vmc, no_files},
+                                  {"wbc_sim", wbc_sim_entry, load_wbc_sim, wbc_sim_files},
+                                  {"homie", published_info, load_published, published_files},
+                                  {"twist2", published_info, load_published, published_files},
+                                  {"playground", published_info, load_published, published_files},
+                                  {"rl_gym", published_info, load_published, published_files},
+                                  {"gmt", published_info, load_published, published_files},
+                                  {"beyond_mimic", published_info, load_published, published_files},
+                                  {"holosoma", published_info, load_published, published_files},
+                                  {"holosoma_fastsac", published_info, load_published, published_files},
+                                  {"holosoma_t1", published_info, load_published, published_files},
+                                  {"falcon", published_info, load_published, published_files},
+                                  {"falcon_dec_loco", published_info, load_published, published_files},
+                                  {"unitree_rl_lab", published_info, load_published, published_files},
+                                  {"unitree_rl_mjlab", published_info, load_published, published_files},
+                                  {"rl_sar_dance", published_info, load_published, published_files}};
+// A name that is the path of an IO descriptor.
+constexpr Entry kDescriptor = {"", published_info, load_published, published_files};
+
+// One that a program has added.
+struct Registered {
+  std::string name;
+  ControllerInfo about;
+  ControllerMaker maker;
+};
+
+// The one list that changes while a program runs: what a program adds has to be found by name wherever names are read.
+OpenRegistry<Registered>& registered() {
+  static OpenRegistry<Registered> registry;
+  return registry;
+}
+
+ControllerInfo registered_info(const std::string& name) { return registered().find(name)->about; }
+LoadedController load_registered(const std::string& name, Robot robot, const ControllerOptions&) {
+  return {[name, robot = std::move(robot), maker = registered().find(name)->maker](const ControllerOptions& options) {
+    std::unique_ptr<Controller> controller = maker(robot, options);
+    require(controller != nullptr, "controller '{}': its maker made none", name);
+    return controller;
+  }};
+}
+constexpr Entry kRegistered = {"", registered_info, load_registered, no_files};
+
+std::vector<std::string> shipped_names() {
+  std::vector<std::string> names;
+  for (const Entry& entry : kControllers) names.emplace_back(entry.name);
+  return names;
+}
+
+const Entry& find_entry(const std::string& name) {
+  if (name.ends_with(".yaml")) return kDescriptor;
+  for (const Entry& entry : kControllers)
+    if (name == entry.name) return entry;
+  if (registered().find(name) != nullptr) return kRegistered;
+  throw std::invalid_argument(unknown_name_message("controller", name, controller_names()));
+}
+
+}  // namespace
+
+std::vector<ControllerInfo> controllers() {
+  std::vector<ControllerInfo> infos;
+  for (const Entry& entry : kControllers) infos.push_back(entry.info(entry.name));
+  for (const Registered* entry : registered().all()) infos.push_back(entry->about);
+  return infos;
+}
+
+std::vector<std::string> controller_names() {
+  std::vector<std::string> names = shipped_names();
+  for (const Registered* entry : registered().all()) names.push_back(entry->name);
+  return names;
+}
+
+void register_controller(const ControllerInfo& info, ControllerMaker make) {
+  require(make != nullptr, "controller '{}': expected a function that makes it, found none", info.name);
+  registered().add("controller", {info.name, info, std::move(make)}, shipped_names());
+}
+
+ControllerInfo controller_info(const std::string& name) { return find_entry(name).info(name); }
+
+LoadedFiles controller_files(const std::string& name, const ControllerOptions& options) {
+  return find_entry(name).files(name, options);
+}
+
+void check_controller_options(const ControllerInfo& info, const ControllerOptions& options) {
+  std::vector<std::string> known;
+  for (const ControllerOption& option : info.options) known.push_back(option.name);
+  check_options("controller", info.name, options, known);
+}
+
+std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                            const ControllerOptions& options) {
+  return load_controller(name, robot, options).make(options);
+}
+
+LoadedController load_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                 const ControllerOptions& options) {
+  require(robot != nullptr, "make_controller: no robot");
+  const Entry& entry = find_entry(name);
+  check_controller_options(entry.info(name), options);
+  const LoadedController loaded = entry.load(name, robot, options);
+  return {[robot, make = loaded.make](const ControllerOptions& now) { return make_guarded(make(now), robot); },
+          loaded.notes};
+}
+
+}  // namespace duet

@@ -1,0 +1,49 @@
+// Every controller by name: those that ship with duet, and those that a program adds. Thread-safe.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "duet/controllers/controller.h"
+#include "duet/core/loaded_file.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+// Controllers that ship with duet: "pd", "vmc", "wbc_sim", "homie", "twist2", "playground", "rl_gym", ... A name that
+// ends in ".yaml" is the path of an IO descriptor (controllers/descriptor.h) and as good as one of them.
+std::vector<ControllerInfo> controllers();
+std::vector<std::string> controller_names();
+ControllerInfo controller_info(const std::string& name);
+// Every file that such a controller loads, its card aside, in a fixed order. Throws as make_controller for a name that
+// is unknown, a descriptor that is broken and a network that is not on this machine; the files are not read.
+LoadedFiles controller_files(const std::string& name, const ControllerOptions& options = {});
+// Throws std::invalid_argument for an option that it does not have, with the nearest and all known.
+void check_controller_options(const ControllerInfo& info, const ControllerOptions& options);
+
+// Throws std::invalid_argument for an unknown name or option (with the nearest and all known) and a robot whose joints
+// are not those it was made for (by name); MissingError where its network is not on this machine (naming the places
+// looked at and the option that sets it); InputError for a network that is broken or of another kind.
+std::unique_ptr<Controller> make_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                            const ControllerOptions& options = {});
+
+// The files of a controller, loaded once for many episodes: all controllers that it makes have the files as they were.
+// An episode may have another `command` than the options that it was loaded with, and nothing else. Thread-safe.
+struct LoadedController {
+  std::function<std::unique_ptr<Controller>(const ControllerOptions& options)> make;
+  std::vector<std::string> notes{};  // sentences: what a user should know of its files
+};
+// Throws as make_controller.
+LoadedController load_controller(const std::string& name, const std::shared_ptr<const RobotModel>& robot,
+                                 const ControllerOptions& options = {});
+
+// Makes one controller per episode. The robot is never null; options are known to be those of the ControllerInfo.
+using ControllerMaker =
+    std::function<std::unique_ptr<Controller>(std::shared_ptr<const RobotModel> robot, const ControllerOptions&)>;
+// From now on `info.name` is a controller like those that ship, guarded against numbers that are not finite. Throws
+// std::invalid_argument for a name that is taken, empty or ends in ".yaml", and where `make` is empty.
+void register_controller(const ControllerInfo& info, ControllerMaker make);
+
+}  // namespace duet

@@ -1,0 +1,177 @@
+#include "duet/execution/led_episodes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <utility>
+
+#include "duet/backends/factory.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/run_identity.h"
+#include "duet/experiment/work/run_work.h"
+#include "duet/policies/language.h"
+#include "duet/rollout/act_episode.h"
+
+namespace duet {
+namespace {
+
+EpisodeRow failed_row(const std::string& message) {
+  EpisodeRow row;
+  row.outcome = Outcome::kError;
+  row.message = message;
+  return row;
+}
+
+constexpr double kWhile = 1.0;  // [s] between two looks at whether the episode is over
+
+// `asked`, or the first of `known` where none is.
+std::string one_of(const char* kind, const std::string& asked, const std::vector<std::string>& known) {
+  if (asked.empty() && !known.empty()) return known.front();
+  if (std::ranges::find(known, asked) == known.end())
+    throw std::invalid_argument(unknown_name_message(kind, asked, known));
+  return asked;
+}
+
+std::string engine_of(const Suite& suite, const std::string& asked) {
+  if (!asked.empty()) return one_of("engine", asked, suite.engines);
+  const auto runs = [](const std::string& name) { return name != kPlaybackEngine && can_run_in(name); };
+  const auto found = std::ranges::find_if(suite.engines, runs);
+  return found == suite.engines.end() ? suite.engines.front() : *found;
+}
+
+// The suite of one policy, the caller, in one engine under one controller.
+Suite narrowed(Suite suite, const LedPart& part) {
+  require_clips(suite);
+  if (!suite.references.empty())
+    throw InputError(fmt::format("{}: expected a suite of clips, found one of walking commands", suite.file));
+  suite.engines = {engine_of(suite, part.engine)};
+  suite.controllers = {controller_of(suite, one_of("controller", part.controller, controller_names_of(suite)))};
+  suite.perturbations = {
+      perturbation_of(suite, one_of("perturbation", part.perturbation, perturbation_names_of(suite)))};
+  if (!part.task.empty()) suite.tasks = {parse_task(part.task)};
+  suite.policies = {SuitePolicy{.name = kCaller, .use = kNullPolicy}};  // Bodies loads one; each episode has its own
+  suite.null_arm = false;
+  suite.record = RecordTrajectories::kNone;
+  return suite;
+}
+
+}  // namespace
+
+LedSuite::LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress)
+    : suite_(narrowed(std::move(suite), part)) {
+  if (suite_.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite_.engines.front()));
+  bodies_ = std::make_unique<Bodies>(suite_);
+  if (!bodies_->absent().empty()) throw MissingError(bodies_->absent().begin()->second);
+  identity_ = identity_of(suite_, bodies_->read());
+  identity_.policies[kCaller].clear();  // what the caller is nobody knows
+  bodies_->take_clips(prepare_clips(suite_, *bodies_->nominal(), threads, progress, {.files = &identity_.files}));
+  plan_ = std::make_unique<EpisodePlan>(suite_, *bodies_);
+}
+
+const std::shared_ptr<const RobotModel>& LedSuite::robot() const {
+  return bodies_->robot(suite_.controllers.front().name);
+}
+
+EpisodeRow LedSuite::run(int episode, const EpisodeLead& lead) const {
+  return run_episode(plan_->at(episode), suite_, identity_, robot(), "", lead);
+}
+
+std::string LedSuite::prompt(int episode) const { return std::string(task_prompt(plan_->at(episode).clip->task)); }
+
+int LedSuite::questions(int episode) const {
+  const int ticks = episode_ticks(episode_setup(plan_->at(episode), suite_, *robot()));
+  return (ticks + kTicksPerPlan - 1) / kTicksPerPlan;
+}
+
+// In a forked child the thread is not there to be waited for, and its queue may be locked for ever: they are left.
+LedEpisode::~LedEpisode() {
+  if (process_ == ::getpid()) {
+    stop();
+    return;
+  }
+  if (thread_.joinable()) thread_.detach();
+  static_cast<void>(new std::shared_ptr<PlanQueue>(std::move(queue_)));
+}
+
+void LedEpisode::require_same_process() const {
+  if (process_ == ::getpid()) return;
+  throw std::runtime_error(
+      fmt::format("the episode runs in process {}, and this is process {}, forked from it: expected episodes that this "
+                  "process has made",
+                  process_, ::getpid()));
+}
+
+void LedEpisode::start(int episode) {
+  require_same_process();
+  require(episode >= 0 && episode < suite_->size(), "episode: expected a number from 0 to {}, found {}",
+          suite_->size() - 1, episode);
+  stop();
+  stop_ = false;
+  row_.reset();
+  queue_ = PlanQueue::make({.name = kCaller, .patience = 0.0, .share = 1.0});
+  partner_ = led_ == Led::kBoth ? std::make_shared<PointTracks>() : nullptr;
+  const EpisodeLead lead{
+      .policy = queue_->maker(suite_->robot()), .stop_asked = [this] { return stop_.load(); }, .partner = partner_};
+  thread_ = std::thread([this, episode, lead, queue = queue_] {
+    try {
+      row_ = suite_->run(episode, lead);
+    } catch (const EpisodeInterrupted&) {  // it leaves no row
+    } catch (const std::bad_alloc&) {
+      row_ = failed_row("there is not enough memory for the episode");
+    } catch (const std::exception& error) {
+      row_ = failed_row(error.what());
+    }
+    queue->close("the episode is over");
+  });
+}
+
+PointTracks LedEpisode::partner_ahead() const {
+  require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
+  PointTracks ahead(kTicksPerPlan, kSmplJoints);
+  for (int i = 0; i < kTicksPerPlan; ++i)
+    ahead.frame(i) = partner_->frame(std::min(question_->tick + 1 + i, partner_->frames() - 1));
+  return ahead;
+}
+
+void LedEpisode::lead_partner(const PointTracks& ahead) {
+  require(question_ != nullptr && partner_ != nullptr, "partner: expected an episode under way in which both are led");
+  require(ahead.frames() == kTicksPerPlan && ahead.points() == kSmplJoints,
+          "partner: expected {} frames of {} joints, found {} of {}", kTicksPerPlan, kSmplJoints, ahead.frames(),
+          ahead.points());
+  require(std::ranges::all_of(ahead.data(), [](double value) { return std::isfinite(value); }),
+          "partner: expected finite numbers");
+  for (int i = 0; i < kTicksPerPlan && question_->tick + 1 + i < partner_->frames(); ++i)
+    partner_->frame(question_->tick + 1 + i) = ahead.frame(i);
+}
+
+void LedEpisode::answer(std::span<const double> numbers, int rows) {
+  require_same_process();
+  require(question_ != nullptr, "the episode is over: begin another one");
+  queue_->answer(*question_, numbers, rows);
+}
+
+std::shared_ptr<const PlanRequest> LedEpisode::next() {
+  require_same_process();
+  require(queue_ != nullptr, "the episode has not begun: begin one");
+  question_.reset();
+  std::vector<std::shared_ptr<const PlanRequest>> taken;
+  while (taken.empty() && !queue_->closed()) taken = queue_->take(kWhile);
+  if (!taken.empty()) question_ = taken.front();
+  if (taken.empty()) thread_.join();
+  return question_;
+}
+
+void LedEpisode::stop() {
+  if (process_ != ::getpid()) return;  // nothing of it runs here
+  stop_ = true;
+  if (queue_) queue_->close("the episode was stopped");
+  if (thread_.joinable()) thread_.join();
+  question_.reset();
+  row_.reset();
+}
+
+}  // namespace duet

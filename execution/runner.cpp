@@ -1,0 +1,340 @@
+#include "duet/execution/runner.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "duet/backends/factory.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/execution/run_inputs.h"
+#include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/episode_costs.h"
+#include "duet/experiment/plan/prepared_clips.h"
+#include "duet/experiment/work/run_work.h"
+#include "duet/rows/folder/environment.h"
+#include "duet/rows/json_fields.h"
+
+namespace duet {
+namespace {
+
+RunPart part_of(const RunOptions& options) {
+  RunPart part = options;
+  if (options.decide.asked()) part.policies = options.decide.policies;
+  return part;
+}
+
+// Throws for what no decision can be of.
+void check_decision_of(const RunOptions& options, const Suite& suite) {
+  if (!options.decide.asked()) return;
+  check_decision(options.decide);
+  require(options.policies.empty(), "--until-decided names the policies that run: leave --policies out");
+  if (!suite.references.empty())
+    throw InputError("--until-decided: expected a suite of clips, found one of walking commands");
+}
+
+bool plays_back(const Suite& suite, const RunOptions& options) {
+  const std::string playback(kPlaybackEngine);
+  return std::ranges::find(suite.engines, playback) != suite.engines.end() && chosen(options.engines, playback);
+}
+
+// Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
+std::map<std::string, std::string> absent_engines(const Suite& suite, const RunOptions& options) {
+  std::map<std::string, std::string> absent;
+  int present = plays_back(suite, options) ? 1 : 0;
+  for (const EngineInfo& engine : engines()) {
+    if (std::find(suite.engines.begin(), suite.engines.end(), engine.name) == suite.engines.end()) continue;
+    if (!chosen(options.engines, engine.name)) continue;
+    if (engine.available)
+      ++present;
+    else
+      absent[engine.name] = fmt::format("engine '{}' is absent: {}", engine.name, engine.reason);
+  }
+  if (present == 0 && !absent.empty()) throw MissingError(absent.begin()->second);
+  return absent;
+}
+
+// Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
+void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
+  const std::size_t policies =
+      suite.policies.size() - left_out(part_of(options).policies, policy_names_of(suite)).size();
+  if (!bodies.absent_policies().empty() && bodies.absent_policies().size() == policies)
+    throw MissingError(bodies.absent_policies().begin()->second);
+  const std::size_t wanted =
+      suite.controllers.size() - left_out(options.controllers, controller_names_of(suite)).size();
+  if (!bodies.absent().empty() && bodies.absent().size() == wanted && !plays_back(suite, options))
+    throw MissingError(bodies.absent().begin()->second);
+}
+
+std::string no_locks_warning(const std::string& folder, const std::string& reason) {
+  return fmt::format("'{}' is on a file system without locks ({}): let no other run work in it at the same time",
+                     folder, reason);
+}
+
+EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
+  row.started_at = utc_now();
+  row.robot_digest.clear();
+  row.outcome = Outcome::kUnsupported;
+  row.message = reason;
+  row.success = false;
+  return row;
+}
+
+}  // namespace
+
+EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
+                         const std::string& trajectory_folder, const std::function<bool()>& stop_asked) {
+  const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
+  const auto absent = bodies.absent().find(spec.controller);
+  if (absent != bodies.absent().end() && spec.engine != kPlaybackEngine)
+    return unsupported_row(row_for(spec, suite, identity, *robot), absent->second);
+  const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
+  if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, identity, *robot), policy.refusal);
+  return run_episode(spec, suite, identity, robot, trajectory_folder,
+                     {.policy = policy.make, .stop_asked = stop_asked});
+}
+
+namespace {
+
+// The settings under profile_digest, for people. The suite says less; another machine's engines may add other defaults.
+std::string settings_here(const Suite& suite) {
+  std::string text;
+  for (const std::string& engine : suite.engines)
+    if (engine != kPlaybackEngine && is_available(engine))
+      text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
+  return text;
+}
+
+}  // namespace
+
+RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentity& identity,
+                     const std::vector<std::string>& argv, const nlohmann::json& certificate) {
+  return {.suite = suite.name,
+          .suite_version = suite.version,
+          .suite_hash = identity.suite_hash,
+          .suite_yaml = resolved_yaml(kept.suite) + settings_here(suite),
+          .argv = argv,
+          .created_at = utc_now(),
+          .environment = capture_environment(),
+          .policies = identity.policies,
+          .controllers = identity.controllers,
+          .certificate = certificate,
+          .plan = {}};
+}
+
+namespace {
+
+// Places in the plan of those that are asked for and not in the folder yet; counts those that are.
+std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPart& part, const RunDirectory& run,
+                                            const std::function<std::string(const EpisodeSpec&)>& key_of,
+                                            const StopSign& stop, RunSummary& summary) {
+  std::vector<std::uint32_t> missing;
+  for (std::int64_t i = 0; i < plan.size(); ++i) {
+    if (i % 256 == 0 && stop.asked()) throw Stopped();
+    const EpisodeSpec spec = plan.at(i);
+    if (!belongs(spec, spec.clip->task, part)) continue;
+    if (run.size() > 0 && run.has(key_of(spec))) {
+      ++summary.already_there;
+      ++summary.there_of[spec.policy];
+    } else {
+      missing.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+  return missing;
+}
+
+std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
+  std::vector<Task> tasks;
+  tasks.reserve(clips.size());
+  for (const PairedMotion& clip : clips) tasks.push_back(clip.task);
+  return tasks;
+}
+
+// Says in the folder and in the summary what was asked for.
+void ask_for(const Suite& suite, const std::vector<Task>& clips, const RunOptions& options, RunDirectory& run,
+             RunSummary& summary) {
+  const auto count = [&](const std::vector<RunPart>& parts) { return count_episodes(suite, clips, parts); };
+  summary.planned = count({part_of(options)});
+  run.ask_for(part_of(options), count({RunPart()}), count);
+}
+
+// The actors and rules that the episodes of a plan need, and where their rows go.
+struct Rollouts {
+  const Suite& suite;
+  const RunIdentity& identity;
+  const Bodies& bodies;
+  const EpisodePlan& plan;
+  const StopSign& stop;
+  EpisodeCosts& costs;
+  int threads = 1;
+
+  [[nodiscard]] std::string key_of(const EpisodeSpec& spec) const {
+    return row_for(spec, suite, identity, *bodies.robot(spec.controller)).key;
+  }
+
+  // Those at these places of the plan.
+  void run(const std::vector<std::uint32_t>& places, RunDirectory& folder, Progress& progress,
+           RunSummary& summary) const {
+    const std::string trajectories =
+        suite.record == RecordTrajectories::kNone ? "" : inside(folder.path(), "trajectories");
+    SharedWork work(folder, stop);
+    const auto key_at = [&](int i) { return key_of(plan.at(places[i])); };
+    const auto run_at = [&](int i) {
+      const EpisodeSpec spec = plan.at(places[i]);
+      EpisodeRow row = run_or_refuse(spec, suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+      costs.ended(spec, row.wall_s);
+      progress.set_share(costs.share_done());
+      return row;
+    };
+    work.run(static_cast<int>(places.size()), threads, key_at, run_at, progress);
+    summary.run += work.done();
+    for (const auto& [outcome, count] : work.outcomes()) summary.outcomes[outcome] += count;
+    summary.already_there += work.done_by_others();
+    if (summary.first_error.empty()) summary.first_error = work.first_error();
+  }
+};
+
+// Look by look, until the policies are told apart or all clips are done. Nothing of it depends on the rows that were
+// there before but the work that they save.
+void run_until_decided(const Rollouts& rollouts, const RunOptions& options, const std::vector<std::uint32_t>& missing,
+                       Progress& progress, RunDirectory& run, RunSummary& summary) {
+  const RunPart part = part_of(options);
+  const DecisionSchedule schedule =
+      decision_schedule(rollouts.plan, part, rollouts.suite.seed, options.episodes_per_look);
+  DecidedRun decided{.decision = decide({}, schedule.rounds, {}, options.decide), .planned = summary.planned};
+  progress.start("rolling out until decided", static_cast<int>(missing.size()), "episodes at most");
+  for (std::size_t look = 0; look < schedule.looks.size() && !decided.decision.is_decided(); ++look) {
+    std::vector<std::uint32_t> places;
+    for (const std::uint32_t place : schedule.episodes[look]) {
+      if (!is_needed(rollouts.plan.at(place), decided.decision)) continue;
+      ++decided.used;
+      if (std::ranges::binary_search(missing, place)) places.push_back(place);
+    }
+    rollouts.run(places, run, progress, summary);
+    if (rollouts.stop.asked()) break;
+    decided.decision =
+        decide(rows_of_part(load_run(run.path()).rows, part), schedule.rounds,
+               {schedule.looks.begin(), schedule.looks.begin() + static_cast<long>(look) + 1}, options.decide);
+    write_file(inside(run.path(), "decision.json"), dumped(decided_run_json(decided), 2) + "\n");
+    summary.decided = decided;
+  }
+  progress.finish();
+}
+
+// The first episode of each engine, controller and arm before all others: the time that is left is known when they end.
+std::vector<std::uint32_t> pilots_first(const EpisodePlan& plan, const std::vector<std::uint32_t>& places) {
+  std::set<std::string> seen;
+  std::vector<std::uint32_t> first, rest;
+  for (const std::uint32_t place : places) {
+    const EpisodeSpec spec = plan.at(place);
+    const bool is_first = seen.insert(fmt::format("{}/{}/{}", cost_name(spec), spec.arm, spec.policy)).second;
+    (is_first ? first : rest).push_back(place);
+  }
+  first.insert(first.end(), rest.begin(), rest.end());
+  return first;
+}
+
+// Plans and runs what is missing.
+void run_missing(const Suite& suite, const RunIdentity& identity, const Bodies& bodies, const RunOptions& options,
+                 const StopSign& stop, Progress& progress, RunDirectory& run, RunSummary& summary) {
+  const EpisodePlan plan(suite, bodies);
+  EpisodeCosts costs(suite);
+  const Rollouts rollouts{suite, identity, bodies, plan, stop, costs, options.threads};
+  const auto key_of = [&](const EpisodeSpec& spec) { return rollouts.key_of(spec); };
+  const std::vector<std::uint32_t> missing = missing_episodes(plan, part_of(options), run, key_of, stop, summary);
+  for (const std::uint32_t place : missing) costs.expect(plan.at(place));
+  if (options.decide.asked()) {
+    run_until_decided(rollouts, options, missing, progress, run, summary);
+    return;
+  }
+  progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
+  progress.set_share(costs.share_done());
+  rollouts.run(pilots_first(plan, missing), run, progress, summary);
+  progress.finish();
+}
+
+}  // namespace
+
+namespace {
+
+// The suite hash says nothing of policies and engines; a folder is of those that its suite.yaml names.
+void require_names_of(const std::string& directory, const Suite& suite) {
+  const std::string path = (std::filesystem::path(directory) / "suite.yaml").string();
+  if (!has_inputs(directory)) return;  // a run that was killed before its first episode, or none
+  const Suite there = parse_suite(read_text(path), path);
+  const auto require_all = [&](const char* kind, const std::vector<std::string>& known,
+                               const std::vector<std::string>& wanted) {
+    for (const std::string& name : wanted)
+      if (!chosen(known, name))
+        throw InputError(
+            fmt::format("'{}' holds a run of the {} {}, not of '{}': choose another folder (`duet merge` "
+                        "joins two)",
+                        directory, kind, fmt::join(known, ", "), name));
+  };
+  require_all("policies", policy_names_of(there), policy_names_of(suite));
+  require_all("engines", there.engines, suite.engines);
+}
+
+// In suite.yaml, where policies have taken the place of others of their names: their options.
+void say_replaced(const std::string& directory, const Suite& suite, const std::vector<std::string>& replaced) {
+  if (replaced.empty()) return;
+  const std::string path = inside(directory, "suite.yaml");
+  const std::string before = read_text(path);
+  const Suite there = parse_suite(before, path);
+  std::string text = before;
+  for (const SuitePolicy& old : there.policies)
+    for (const SuitePolicy& now : suite.policies) {
+      if (now.name != old.name || std::ranges::find(replaced, now.name) == replaced.end()) continue;
+      for (const auto& [option, value] : now.options) {
+        const auto found = old.options.find(option);
+        if (found == old.options.end() || found->second.empty() || found->second == value) continue;
+        const std::size_t place = text.find(found->second);
+        if (place != std::string::npos) text.replace(place, found->second.size(), value);
+      }
+    }
+  if (text != before) write_file(path, text);
+}
+
+}  // namespace
+
+RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
+  require_clips(suite);
+  check_filters(options, suite);
+  check_filters(part_of(options), suite);
+  check_decision_of(options, suite);
+  RunSummary summary;
+  summary.absent_engines = absent_engines(suite, options);
+  Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
+                left_out(part_of(options).policies, policy_names_of(suite)), options.called);
+  const RunIdentity identity = identity_of(suite, bodies.read());
+  check_actors(bodies, suite, options);
+  for (const std::string& note : bodies.notes()) progress.note(note);
+  summary.absent_controllers = bodies.absent();
+  summary.absent_policies = bodies.absent_policies();
+  const KeptSuite kept = kept_suite(suite, directory, identity.files);
+  const RunInfo info = new_run_info(suite, kept, identity, options.argv, options.certificate);
+  require_names_of(directory, suite);
+  RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
+  say_replaced(directory, suite, options.replaced);
+  keep_inputs(kept, directory);
+  if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
+  const StopSign stop(options.time_limit, options.begin, options.stop_asked);
+  try {
+    if (suite.clips.files.empty()) ask_for(suite, tasks_of_own_clips(suite), options, run, summary);
+    const PrepareOptions prepare{.keep_in = directory, .stop = &stop, .files = &identity.files};
+    std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress, prepare);
+    if (!suite.clips.files.empty()) ask_for(suite, tasks_of(clips), options, run, summary);
+    bodies.take_clips(std::move(clips));
+    run_missing(suite, identity, bodies, options, stop, progress, run, summary);
+  } catch (const Stopped&) {
+    summary.end = stop.end();
+    return summary;
+  }
+  if (summary.already_there + summary.run < summary.planned) summary.end = stop.end();
+  if (run.is_finished()) remove_prepared_clips(directory);
+  return summary;
+}
+
+}  // namespace duet

@@ -1,0 +1,192 @@
+#include "duet/experiment/plan/bodies.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+#include "duet/experiment/plan/trust.h"
+#include "duet/experiment/suite/suite_names.h"
+#include "duet/policies/on_other_body.h"
+#include "duet/robots/joint_map.h"
+#include "duet/robots/origin.h"
+#include "duet/rows/episode_row.h"
+
+namespace duet {
+namespace {
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// A policy that ships or was registered.
+PolicyLoader by_name(const std::string& use) {
+  return [use](std::shared_ptr<const RobotModel> robot, const PolicyOptions& options) {
+    return policy_maker(use, std::move(robot), options);
+  };
+}
+
+// Clips and policies are of the nominal robot: one without any of its joints would be told nothing.
+void require_joints_of(const RobotModel& nominal, const RobotModel& robot, const std::string& controller) {
+  const std::vector<std::string> known = nominal.joint_names();
+  const auto is_known = [&](const RobotJoint& joint) { return contains(known, joint.name); };
+  if (known.empty() || robot.joints.empty() || std::ranges::any_of(robot.joints, is_known)) return;
+  throw InputError(
+      fmt::format("controller '{}' runs on robot '{}', which has no joint in common with '{}', the robot of "
+                  "the clips: expected a suite with 'robot: {}'",
+                  controller, robot.name, nominal.name, robot.name));
+}
+
+bool is_simulated(const Suite& suite) {
+  return std::ranges::any_of(suite.engines, [](const std::string& engine) { return engine != kPlaybackEngine; });
+}
+
+// Requires what every episode of the suite needs of the robot's card: now, not after the physics of the first one.
+void require_parts_of(const Suite& suite, const RobotModel& robot, const std::string& card) {
+  std::vector<std::string> lacks;
+  if (suite.references.empty()) {
+    for (const char* track : {"head", "lhand", "rhand", "torso", "lshoulder", "rshoulder"})
+      if (!robot.tracks.contains(track)) lacks.push_back(fmt::format("tracks: {}", track));
+    for (const char* hand : {"left_hand", "right_hand"})
+      if (std::ranges::find(robot.keypoints, hand, &Keypoint::name) == robot.keypoints.end())
+        lacks.push_back(fmt::format("keypoints: {}", hand));
+    if (robot.pairs.empty()) lacks.emplace_back("pairs");
+  }
+  if (robot.feet.empty() && is_simulated(suite)) lacks.emplace_back("shapes with sole: true");
+  if (lacks.empty()) return;
+  throw InputError(fmt::format("{}: robot '{}': expected what suite '{}' needs of a robot, found no {}", card,
+                               robot.name, suite.name, fmt::join(lacks, ", ")));
+}
+
+// Its descriptor was read with the suite, and is now.
+void require_same_facts(const SuiteController& controller) {
+  const ControllerInfo then = about(controller), now = controller_info(controller.use);
+  const auto names = [](const ControllerInfo& info) {
+    std::vector<std::string> list;
+    for (const ControllerOption& option : info.options) list.push_back(option.name);
+    return list;
+  };
+  if (then.robot != now.robot || then.walks != now.walks || names(then) != names(now))
+    throw InputError(fmt::format("{}: was replaced since the suite was read: begin again", controller.use));
+}
+
+}  // namespace
+
+std::string contact_limits_of(const Suite& suite) {
+  return suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits;
+}
+
+std::string card_of(const Suite& suite, const SuiteController& controller) {
+  if (!suite.robot.empty()) return suite.robot;
+  const std::string robot = about(controller).robot;
+  return robot.empty() ? default_card_path() : card_path(robot);
+}
+
+Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
+               const std::vector<std::string>& skipped_policies, const std::map<std::string, PolicyLoader>& called) {
+  require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
+  const DigestReads reads(read_);
+  if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(contact_limits_of(suite));
+  add(suite.robot.empty() ? default_card_path() : suite.robot);
+  for (const SuiteController& controller : suite.controllers) {
+    if (contains(skipped_controllers, controller.name)) continue;
+    try {
+      load_controller_of(suite, controller);
+    } catch (const MissingError& error) {
+      absent_[controller.name] = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
+    }
+  }
+  for (const SuitePolicy& policy : suite.policies) {
+    if (policy.name == kNullPolicy || contains(skipped_policies, policy.name)) continue;
+    const auto own = called.find(policy.name);
+    add_policy(policy, own == called.end() ? by_name(policy.use) : own->second);
+  }
+  for (const std::string& control : suite.controls)
+    if (!contains(skipped_policies, control)) add_policy(SuitePolicy{control}, by_name(control));
+  add_policy(SuitePolicy{kNullPolicy}, by_name(kNullPolicy));
+}
+
+// Made once to see whether it can be.
+void Bodies::load_controller_of(const Suite& suite, const SuiteController& controller) {
+  require_same_facts(controller);
+  const std::size_t place = add(card_of(suite, controller));
+  const std::shared_ptr<const RobotModel>& robot = bodies_[place].robot;
+  if (suite.references.empty()) require_joints_of(*nominal(), *robot, controller.name);
+  require_parts_of(suite, *robot, card_of(suite, controller));
+  LoadedController loaded = load_controller(controller.use, robot, controller.options);
+  static_cast<void>(loaded.make(controller.options));
+  take_notes(loaded.notes);
+  for (const Perturbation& perturbation : suite.perturbations) check_perturbation(perturbation, *robot);
+  controllers_[controller.name] = std::move(loaded);
+  place_[controller.name] = place;
+}
+
+// Maps a policy made for the nominal body, by the joints' names, to a body that it does not fit. Its files were read
+// for the nominal body a moment ago; where they were not, they are broken, and what was thrown goes on.
+void Bodies::map_policy(const std::string& name, std::size_t place) {
+  const PolicyMaker& make = policies_.at({name, 0}).make;
+  if (place == 0 || !make) throw;
+  policies_.at({name, place}).make = [make, made_for = nominal(), body = bodies_[place].robot] {
+    return on_other_body(make(), made_for, *body);
+  };
+}
+
+void Bodies::add_policy(const SuitePolicy& policy, const PolicyLoader& load) {
+  for (std::size_t place = 0; place < bodies_.size(); ++place) {
+    PolicyOnBody& entry = policies_[{policy.name, place}];
+    try {
+      entry.make = load(bodies_[place].robot, policy.options);
+    } catch (const MissingError& error) {
+      entry.refusal = fmt::format("policy '{}' is absent: {}", policy.name, error.what());
+      absent_policies_[policy.name] = entry.refusal;
+    } catch (const InputError&) {
+      map_policy(policy.name, place);
+    } catch (const std::invalid_argument&) {
+      map_policy(policy.name, place);
+    }
+  }
+}
+
+std::size_t Bodies::add(const std::string& card) {
+  const auto found = std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& body) { return body.card == card; });
+  if (found != bodies_.end()) return static_cast<std::size_t>(found - bodies_.begin());
+  bodies_.push_back({card, load_shared_robot(card), {}});
+  take_notes(robot_notes(card));
+  return bodies_.size() - 1;
+}
+
+void Bodies::take_notes(const std::vector<std::string>& notes) {
+  for (const std::string& note : notes)
+    if (!contains(notes_, note)) notes_.push_back(note);
+}
+
+void Bodies::take_clips(std::vector<PairedMotion> clips) {
+  for (std::size_t i = 1; i < bodies_.size(); ++i) {
+    bodies_[i].clips = clips;
+    for (PairedMotion& clip : bodies_[i].clips)
+      if (clip.robot.frames() > 0) clip.robot = on_body(clip.robot, *bodies_[i].robot);
+  }
+  bodies_.front().clips = std::move(clips);
+}
+
+std::size_t Bodies::place(const std::string& controller) const {
+  const auto found = place_.find(controller);
+  return found == place_.end() ? 0 : found->second;
+}
+
+const std::shared_ptr<const RobotModel>& Bodies::robot(const std::string& controller) const {
+  return bodies_[place(controller)].robot;
+}
+
+const std::vector<PairedMotion>& Bodies::clips(const std::string& controller) const {
+  return bodies_[place(controller)].clips;
+}
+
+const PolicyOnBody& Bodies::policy(const std::string& controller, const std::string& policy) const {
+  return policies_.at({policy, place(controller)});
+}
+
+}  // namespace duet

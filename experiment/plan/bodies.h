@@ -1,0 +1,93 @@
+// The robot that each controller of a suite was made for, the clips and the policies on that robot, and what this
+// machine cannot run. Each card, each network and the table of limits is loaded once, here, for all episodes. Immutable
+// once the clips are there; shared by threads.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/core/digest.h"
+#include "duet/experiment/suite/suite.h"
+#include "duet/metrics/contact_limits.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/policies/catalogue/registry.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+// A policy on a body: what makes it, or why it cannot be there.
+struct PolicyOnBody {
+  PolicyMaker make;
+  std::string refusal;  // its files are not on this machine; empty where it can
+};
+
+// The table that contacts with a solid partner are held against.
+std::string contact_limits_of(const Suite& suite);
+
+// The card of the robot that one of the suite's controllers runs on. Throws MissingError where it is not there.
+std::string card_of(const Suite& suite, const SuiteController& controller);
+
+class Bodies {
+ public:
+  // Throws as load_robot for the suite's own card and for a card that is broken, as policy_maker where a policy does
+  // not fit nominal() or its files are broken, and InputError for a file that was replaced since the suite was read.
+  // InputError too for programs that are not allowed. A controller or policy whose files are not on this machine is
+  // absent, not an error; those in `skipped` are not looked at. `called`: how policies are made that the caller brings,
+  // by their names in the suite.
+  explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
+                  const std::vector<std::string>& skipped_policies = {},
+                  const std::map<std::string, PolicyLoader>& called = {});
+
+  // Puts the clips, retargeted to nominal(), on every body. Once.
+  void take_clips(std::vector<PairedMotion> clips);
+
+  // That clips are retargeted to: the suite's robot, or the one that ships with duet.
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& nominal() const { return bodies_.front().robot; }
+  // The controller with what it has loaded. Throws std::out_of_range for one that is absent or was skipped.
+  [[nodiscard]] const LoadedController& controller(const std::string& name) const { return controllers_.at(name); }
+  // None where no partner is solid.
+  [[nodiscard]] const std::optional<ContactLimits>& limits() const { return limits_; }
+  // Digests of the files that were loaded, of the bytes that are used.
+  [[nodiscard]] const FileDigests& read() const { return read_; }
+  // Sentences of what was loaded, each once: what of a URDF is not simulated, where two files of a controller disagree.
+  [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  // The robot of a controller of the suite; nominal() for one that is absent.
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot(const std::string& controller) const;
+  [[nodiscard]] const std::vector<PairedMotion>& clips(const std::string& controller) const;
+  // Controllers of the suite that cannot run here, with the reason.
+  [[nodiscard]] const std::map<std::string, std::string>& absent() const { return absent_; }
+  // Policies of the suite that cannot run here, with the reason.
+  [[nodiscard]] const std::map<std::string, std::string>& absent_policies() const { return absent_policies_; }
+  // The policy on the body of a controller. Throws std::out_of_range for a policy that was skipped.
+  [[nodiscard]] const PolicyOnBody& policy(const std::string& controller, const std::string& policy) const;
+
+ private:
+  struct Body {
+    std::string card;
+    std::shared_ptr<const RobotModel> robot;
+    std::vector<PairedMotion> clips;
+  };
+  std::size_t add(const std::string& card);
+  void take_notes(const std::vector<std::string>& notes);
+  void load_controller_of(const Suite& suite, const SuiteController& controller);
+  void add_policy(const SuitePolicy& policy, const PolicyLoader& load);
+  // Called while an exception is handled; throws it again where there is nothing to map.
+  void map_policy(const std::string& name, std::size_t place);
+  [[nodiscard]] std::size_t place(const std::string& controller) const;
+
+  std::vector<Body> bodies_;                  // the nominal first
+  std::map<std::string, std::size_t> place_;  // of a controller's body
+  std::map<std::string, LoadedController> controllers_;
+  std::optional<ContactLimits> limits_;
+  FileDigests read_;
+  std::vector<std::string> notes_;
+  std::map<std::string, std::string> absent_, absent_policies_;
+  std::map<std::pair<std::string, std::size_t>, PolicyOnBody> policies_;  // by name and body
+};
+
+}  // namespace duet

@@ -1,0 +1,71 @@
+// The clips of a suite, retargeted and ready to roll out: synthesised or read, one PairedMotion each.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "duet/archives/npy/npz.h"
+#include "duet/core/digest.h"
+#include "duet/experiment/suite/suite.h"
+#include "duet/motion/paired_motion.h"
+#include "duet/motion/plausibility.h"
+#include "duet/retarget/options.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+class Progress;
+class StopSign;
+
+struct PrepareOptions {
+  std::string keep_in = {};  // a run folder that keeps the clips as each is finished (experiment/plan/prepared_clips.h)
+  const StopSign* stop = nullptr;  // asked before each clip
+  // Digests that the files' must be (RunIdentity::files), for those that it has; InputError for another one.
+  const FileDigests* files = nullptr;
+};
+
+// The kind of motion that an NPZ holds, by its key `schema`. Throws InputError for anything else.
+enum class MotionFile { kClip, kPaired, kRecording };
+MotionFile kind_of(const Npz& npz);
+
+struct LoadedMotion {
+  PairedMotion motion;
+  std::vector<std::string> notes;  // what a clip's reader should know (motion/plausibility.h)
+};
+
+// A clip, padded and retargeted, or a paired motion; `other_role`: with the robot in the place of the other person.
+// Throws InputError; for a recording with what is needed instead, and for a paired motion that is to be padded or to
+// change roles.
+LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const PairOptions& options,
+                              Implausible implausible = Implausible::kRefused, const ClipPadding& pad = {},
+                              bool other_role = false);
+
+// Clips whose task the suite runs, in a fixed order (task, then index or file). Retargets on `threads` threads; what
+// there is to know of them is noted on `progress`. Throws InputError where none remains, Stopped
+// (experiment/work/stop_sign.h) where it was asked to stop.
+std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
+                                        const PrepareOptions& options = {});
+
+// Clips that are no suite's: `per_task` of each task, for training. People stand 2.5 to 5.5 s before the act, half of
+// them frozen in its first frame as padded recordings are.
+std::vector<PairedMotion> synthetic_clips(const RobotModel& robot, const PairOptions& pair,
+                                          const std::vector<Task>& tasks, int per_task, std::uint64_t seed, int threads,
+                                          Progress& progress, Likeness like = Likeness::kRehearsed);
+
+PairOptions pair_options(const Suite& suite);
+
+// Clips that are given take the place of the suite's; a task without clips is left out. None: the suite's own stay.
+// Throws std::invalid_argument for a suite of walking commands, and as find_clip_files.
+void use_clips(const std::vector<std::string>& paths, Suite& suite);
+
+// The files that find_motion_files gives, but of a folder that is a data set (docs/datasets.md) its people alone.
+std::vector<std::string> find_clip_files(const std::vector<std::string>& paths);
+// Whether a folder is a data set that `duet dataset` made.
+bool is_dataset(const std::string& folder);
+
+// NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not
+// there or where nothing is found.
+std::vector<std::string> find_motion_files(const std::vector<std::string>& paths);
+
+}  // namespace duet

@@ -1,0 +1,253 @@
+#include "duet/experiment/plan/episode.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "duet/core/random.h"
+#include "duet/core/require.h"
+#include "duet/experiment/plan/episode_tags.h"
+#include "duet/experiment/suite/suite_names.h"
+#include "duet/report/studies/walk_table.h"
+#include "duet/robots/robot_cards.h"
+
+namespace duet {
+namespace {
+
+// Whether playback under one controller is playback under all; asks what the suite says, not what this machine has.
+bool one_playback(const Suite& suite) {
+  const auto robot = [&](const SuiteController& controller) {
+    if (!suite.robot.empty()) return suite.robot;
+    const std::string made_for = about(controller).robot;
+    return made_for.empty() ? default_robot() : made_for;
+  };
+  const SuiteController& first = suite.controllers.front();
+  return std::all_of(suite.controllers.begin(), suite.controllers.end(), [&](const SuiteController& controller) {
+    return robot(controller) == robot(first) && start_mode(suite, controller) == start_mode(suite, first);
+  });
+}
+
+const PairedMotion& next_of_task(const std::vector<PairedMotion>& clips, const PairedMotion& clip,
+                                 const std::string& policy) {
+  const auto own = static_cast<std::size_t>(&clip - clips.data());
+  for (std::size_t i = 1; i < clips.size(); ++i) {
+    const PairedMotion& other = clips[(own + i) % clips.size()];
+    if (other.task == clip.task) return other;
+  }
+  throw InputError(
+      fmt::format("policy '{}' sees the partner of another clip: expected two clips of {} or more, found one", policy,
+                  to_string(clip.task)));
+}
+
+// Engine, controller and perturbation of all episodes.
+std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
+  std::vector<EpisodeSpec> combinations;
+  const bool once = one_playback(suite);
+  for (const std::string& engine : suite.engines) {
+    for (const SuiteController& controller : suite.controllers) {
+      const bool playback = engine == kPlaybackEngine;
+      if (playback && once && controller.name != suite.controllers.front().name) continue;
+      EpisodeSpec combination;
+      combination.engine = engine;
+      combination.controller = controller.name;
+      if (playback) combinations.push_back(combination);
+      if (playback) continue;
+      for (const Perturbation& perturbation : suite.perturbations) {
+        combination.perturbation = perturbation.name;
+        combination.perturbation_tags = RowTags(tags_of(perturbation));
+        combinations.push_back(combination);
+      }
+    }
+  }
+  return combinations;
+}
+
+std::vector<EpisodeArm> arms_of(const Suite& suite) {
+  std::vector<EpisodeArm> arms;
+  for (const SuitePolicy& policy : suite.policies)
+    if (policy.name != kNullPolicy)
+      arms.push_back({policy.name, policy.shuffled_partner ? "shuffled" : "main", policy.shuffled_partner});
+  for (const std::string& control : suite.controls) arms.push_back({control, "control"});
+  if (suite.null_arm) arms.push_back({kNullPolicy, "null"});
+  return arms;
+}
+
+}  // namespace
+
+bool chosen(const std::vector<std::string>& names, std::string_view name) {
+  return names.empty() || std::ranges::find(names, name) != names.end();
+}
+
+bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine || is_available(engine); }
+
+StartMode start_mode(const Suite& suite, const SuiteController& controller) {
+  switch (suite.start) {
+    case SuiteStart::kClip:
+      return StartMode::kClip;
+    case SuiteStart::kApproach:
+      return StartMode::kApproach;
+    case SuiteStart::kAct:
+      return StartMode::kAct;
+    case SuiteStart::kSimToReal:
+      return StartMode::kSimToReal;
+    case SuiteStart::kAuto:
+      break;
+  }
+  return about(controller).walks ? StartMode::kApproach : StartMode::kAct;
+}
+
+EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part)
+    : suite_(suite),
+      bodies_(bodies),
+      suite_id_(suite.name + "@" + suite.version),
+      combinations_(combinations_of(suite)),
+      arms_(arms_of(suite)) {
+  const std::vector<PairedMotion>& clips = bodies.clips(suite.controllers.front().name);
+  require_sane_size(suite, static_cast<std::int64_t>(clips.size()));
+  for (const EpisodeArm& arm : arms_)
+    for (const PairedMotion& clip : clips)
+      if (arm.shuffled) static_cast<void>(next_of_task(clips, clip, arm.policy));
+  std::erase_if(combinations_, [&](const EpisodeSpec& spec) {
+    return !chosen(part.engines, spec.engine) || !chosen(part.controllers, spec.controller) ||
+           (spec.engine != kPlaybackEngine && !chosen(part.perturbations, spec.perturbation));
+  });
+  std::erase_if(arms_, [&](const EpisodeArm& arm) { return arm.name != "null" && !chosen(part.policies, arm.policy); });
+  for (std::size_t i = 0; i < clips.size(); ++i)
+    if (chosen(part.tasks, to_string(clips[i].task))) clips_.push_back(i);
+  if (!part.is_whole() && size() == 0)
+    throw InputError(fmt::format("{}: no episode is in what was asked for", suite.file));
+}
+
+std::int64_t EpisodePlan::size() const {
+  return static_cast<std::int64_t>(combinations_.size() * arms_.size() * clips_.size()) * suite_.episodes_per_clip;
+}
+
+EpisodeSpec EpisodePlan::at(std::int64_t i) const {
+  const auto arms = static_cast<std::int64_t>(arms_.size()), count = static_cast<std::int64_t>(clips_.size());
+  const std::int64_t per_clip = arms * suite_.episodes_per_clip;
+  const EpisodeArm& arm = arms_[i % arms];
+  EpisodeSpec spec = combinations_[i / (per_clip * count)];
+  spec.bodies = &bodies_;
+  const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller);
+  spec.clip = &clips[clips_[i / per_clip % count]];
+  spec.episode = static_cast<int>(i / arms % suite_.episodes_per_clip);
+  spec.seen = arm.shuffled ? &next_of_task(clips, *spec.clip, arm.policy) : nullptr;
+  spec.policy = arm.policy;
+  spec.arm = arm.name;
+  spec.seed = seed(*spec.clip, spec.episode, "episode");
+  spec.perturbation_seed = seed(*spec.clip, spec.episode, "perturbation");
+  return spec;
+}
+
+std::uint64_t EpisodePlan::seed(const PairedMotion& clip, int episode, const char* stream) const {
+  return suite_.seed + stream_key({suite_id_, to_string(clip.task), clip.clip_id, std::to_string(episode), stream});
+}
+
+std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies) {
+  const EpisodePlan plan(suite, bodies);
+  std::vector<EpisodeSpec> all;
+  for (std::int64_t i = 0; i < plan.size(); ++i) all.push_back(plan.at(i));
+  return all;
+}
+
+std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known) {
+  std::vector<std::string> names;
+  for (const std::string& name : known)
+    if (!chosen(filter, name)) names.push_back(name);
+  return names;
+}
+
+void check_filters(const RunPart& part, const Suite& suite) {
+  const auto check = [](const std::vector<std::string>& filter, const std::vector<std::string>& known,
+                        const char* kind) {
+    for (const std::string& name : filter)
+      require(std::ranges::find(known, name) != known.end(), "the suite has no {} '{}'; it has: {}", kind, name,
+              fmt::join(known, ", "));
+  };
+  std::vector<std::string> tasks;
+  for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
+  check(part.engines, suite.engines, "engine");
+  check(part.controllers, controller_names_of(suite), "controller");
+  check(part.policies, policy_names_of(suite), "policy");
+  check(part.tasks, tasks, "task");
+  check(part.perturbations, perturbation_names_of(suite), "perturbation");
+}
+
+bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
+  return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller) &&
+         (spec.arm == "null" || chosen(part.policies, spec.policy)) && chosen(part.tasks, to_string(task)) &&
+         (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation));
+}
+
+std::vector<Task> tasks_of_own_clips(const Suite& suite) {
+  if (!suite.references.empty()) return std::vector<Task>(suite.references.size(), Task::kHug);
+  std::vector<Task> tasks;
+  const std::size_t per_task = suite.clips.synth_per_task * suite.clips.copies();
+  for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
+  return tasks;
+}
+
+std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
+  std::int64_t total = 0;
+  for (EpisodeSpec spec : combinations_of(suite)) {
+    for (const EpisodeArm& arm : arms_of(suite)) {
+      spec.policy = arm.policy;
+      spec.arm = arm.name;
+      total += std::count_if(clips.begin(), clips.end(), [&](Task task) {
+        return std::any_of(parts.begin(), parts.end(), [&](const RunPart& part) { return belongs(spec, task, part); });
+      });
+    }
+  }
+  return total * suite.episodes_per_clip;
+}
+
+void require_sane_size(const Suite& suite, std::int64_t clips) {
+  const std::size_t combinations = combinations_of(suite).size();
+  const double episodes = static_cast<double>(combinations) * static_cast<double>(arms_of(suite).size()) *
+                          static_cast<double>(clips) * suite.episodes_per_clip;
+  if (episodes > static_cast<double>(kMostEpisodes))
+    throw InputError(fmt::format("{}: expected at most {} episodes, found {:.0f} ({} clips, {} episodes per clip)",
+                                 suite.file, kMostEpisodes, episodes, clips, suite.episodes_per_clip));
+}
+
+namespace {
+
+std::string digest_of(const std::map<std::string, std::string>& digests, const std::string& name) {
+  const auto found = digests.find(name);
+  return found == digests.end() ? "" : found->second;
+}
+
+}  // namespace
+
+EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& run, const RobotModel& robot) {
+  EpisodeRow row;
+  row.suite = suite.name;
+  row.suite_version = suite.version;
+  row.suite_hash = run.suite_hash;
+  row.task = suite.references.empty() ? std::string(to_string(spec.clip->task)) : std::string(kWalkRows);
+  row.clip = spec.clip->clip_id;
+  row.episode = spec.episode;
+  row.seed = spec.seed;
+  row.engine = spec.engine;
+  if (spec.engine != kPlaybackEngine) {
+    row.engine_profile = suite.profile.name;
+    row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
+  }
+  row.controller = spec.controller;
+  row.controller_digest = digest_of(run.controllers, spec.controller);
+  row.policy = spec.policy;
+  row.policy_digest = digest_of(run.policies, spec.policy);
+  row.detectors = kDetectorsVersion;
+  row.perturbation = spec.perturbation;
+  row.arm = spec.arm;
+  row.robot_digest = robot.digest;
+  const bool known = spec.perturbation == kCleanName || !spec.perturbation_tags.empty();
+  row.tags =
+      RowTags(episode_tags(known ? spec.perturbation_tags.map() : tags_of(perturbation_of(suite, spec.perturbation)),
+                           suite, *spec.clip, spec.policy));
+  row.key = episode_key(row);
+  return row;
+}
+
+}  // namespace duet

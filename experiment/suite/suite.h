@@ -1,0 +1,145 @@
+// A suite: what is run, frozen and versioned. Strict YAML (docs/file-formats.md, "Suite"): an unknown key or name is
+// refused with file, line and the nearest known one. Results are comparable only within name@version.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "duet/backends/scene.h"
+#include "duet/controllers/controller.h"
+#include "duet/core/episode_tags.h"
+#include "duet/core/task.h"
+#include "duet/experiment/suite/profile.h"
+#include "duet/experiment/suite/suite_names.h"
+#include "duet/experiment/suite/suite_reference.h"
+#include "duet/metrics/detector.h"
+#include "duet/motion/synthesis/synthesis.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/policy.h"
+#include "duet/policies/scheduler.h"
+#include "duet/rollout/perturbations/perturbation.h"
+
+namespace duet {
+
+// Adds one copy of each synthesised clip, with this hand and contact height; all else is drawn as for its index.
+struct ClipVariant {
+  std::string name;  // follows the clip's id; once per suite
+  std::optional<Side> side{};
+  std::optional<double> target_height{};  // [m]
+  std::optional<double> distance{};       // of the roots at the start [m]
+  std::optional<ActOutcome> outcome{};    // of people only
+};
+
+// Gives what the variant asks for to the options of its clip.
+void vary(const ClipVariant& variant, SynthesisOptions& options);
+// What rows hold of it: side and height.
+Tags tags_of(const ClipVariant& variant);
+
+// How long both people stand as in the first and the last frame of each clip around it.
+struct ClipPadding {
+  double before = 0.0, after = 0.0;  // [s]
+
+  [[nodiscard]] bool any() const { return before > 0.0 || after > 0.0; }
+};
+
+struct SuiteClips {
+  int synth_per_task = 0;  // synthesised clips of each task, or
+  int synth_per_file = 0;  // of each task so many for each of its files, beside these
+  std::uint64_t synth_seed = 42;
+  Likeness synth_like = Likeness::kRehearsed;
+  bool synth_tracked = false;           // as a depth camera sees them (motion/people/tracked_clip.h)
+  std::vector<std::string> files;       // clips or paired motions (NPZ)
+  bool given = false;                   // the files are yet to be given (`duet run --clips`)
+  std::vector<ClipVariant> variants{};  // of synthesised clips; none: each as it is drawn
+  ClipPadding pad{};
+  ClipRoles roles = ClipRoles::kOwn;
+
+  // How often each clip is there: in each variant, in each role.
+  [[nodiscard]] std::size_t copies() const;
+};
+
+// A controller as a suite names it: one of duet's, or an IO descriptor, with options, under a name of its own.
+struct SuiteController {
+  std::string name;        // in rows and tables; once per suite
+  std::string use = name;  // for make_controller
+  ControllerOptions options = {};
+  std::optional<ControllerInfo> about = {};  // as it was when the suite was read; none: of a suite that no file said
+};
+
+// A policy as a suite names it, in the same way.
+struct SuitePolicy {
+  std::string name;        // in rows and tables; once per suite
+  std::string use = name;  // for policy_maker
+  PolicyOptions options = {};
+  std::string prompt = {};        // the language command; empty: the task's own (task_prompt)
+  bool shuffled_partner = false;  // sees the partner of another clip of the task: whether it looks at its partner
+  Tags tags = {};                 // of its rows (core/episode_tags.h); no part of what it is
+};
+
+struct Suite {
+  std::string name, version;
+  std::string file;  // where it came from, for messages
+  std::uint64_t seed = 10000;
+  SuiteClips clips;
+  std::vector<SuiteReference> references = {};  // where there are any: in the place of clips, tasks and policies
+  std::vector<Task> tasks;
+  std::vector<std::string> engines;
+  std::vector<SuiteController> controllers;
+  std::vector<SuitePolicy> policies;
+  std::vector<Perturbation> perturbations = {Perturbation{}};  // of engines; playback has none
+  int episodes_per_clip = 1;
+  SuiteStart start = SuiteStart::kAuto;
+  double start_radius = 1.0;  // of `approach` [m]
+  PartnerMode partner = PartnerMode::kGhost;
+  int fuse_ticks = kTicksPerPlan;                             // SchedulerOptions
+  double max_root_speed = SchedulerOptions{}.max_root_speed;  // [m/s]
+  Profile profile;                                            // step and solver settings of the suite's engines
+  DetectorVersion detector = DetectorVersion::kRobot;
+  ThresholdSet thresholds = ThresholdSet::kPaper;
+  std::string contact_limits;                   // table; empty: the one that ships with duet
+  std::string robot;                            // card; empty: of each controller the one it was made for
+  std::map<std::string, std::string> retarget;  // pair option -> value
+  std::map<std::string, std::string> readings;  // "family.option" -> reading
+  double wall_limit = 120.0;                    // per episode [s]
+  RecordTrajectories record = RecordTrajectories::kNone;
+  bool null_arm = true;
+  std::vector<std::string> controls = {};  // scripted control arms (policies/controls/control_policy.h)
+  bool allow_programs =
+      false;  // the user's word, never a file's: policies may start programs (experiment/plan/trust.h)
+};
+
+using Overrides =
+    std::vector<std::pair<std::string, std::string>>;  // dotted key -> value, as `-s clips.synth.per_task=3`
+
+// The facts known of a controller: those that the suite was read with, or those known now.
+ControllerInfo about(const SuiteController& controller);
+
+// Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it is
+// playback's.
+const SuiteController& controller_of(const Suite& suite, const std::string& name);
+// The null arm's policy always is, too.
+SuitePolicy policy_of(const Suite& suite, const std::string& name);
+Perturbation perturbation_of(const Suite& suite, const std::string& name);
+std::vector<std::string> controller_names_of(const Suite& suite);
+std::vector<std::string> policy_names_of(const Suite& suite);
+std::vector<std::string> perturbation_names_of(const Suite& suite);
+
+// Takes the tags from all that has some; they are no part of what the suite runs.
+void clear_tags(Suite& suite);
+
+// Throws InputError where the suite's clips are still to be given, saying how.
+void require_clips(const Suite& suite);
+
+// Throws InputError: file, line, key, expected, found.
+Suite load_suite(const std::string& path, const Overrides& overrides = {});
+Suite parse_suite(const std::string& yaml, const std::string& name, const Overrides& overrides = {});
+
+// All keys written out, in a fixed order: what a run directory keeps. Settings of engines are those that the profile
+// says; the rest is an engine's own (resolved_settings).
+std::string resolved_yaml(const Suite& suite);
+
+}  // namespace duet

@@ -1,0 +1,56 @@
+// Demonstrations for D-STAR: synthesised clips through PAIR and A.4.4, seen as the robot would follow them exactly and
+// as it followed them in an engine. No suite that ships draws its clips from these seeds (a test of ShippedSuites).
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "duet/experiment/suite/suite.h"
+#include "duet/experiment/work/progress.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/policies/policy.h"
+#include "duet/training/dstar/demonstrations.h"
+
+namespace duet {
+
+struct DemonstrationClips {
+  Likeness like = Likeness::kRehearsed;
+  int per_task = 0;
+};
+
+struct DemonstrationOptions {
+  std::vector<DemonstrationClips> clips = {{Likeness::kRehearsed, 80}, {Likeness::kPeople, 400}};
+  std::uint64_t seed = 880001;
+  std::string pair_mode = "best";          // of PAIR (docs/retargeting.md)
+  int starts = 2;                          // of each clip, drawn as A.4.4 has it
+  StartMode start = StartMode::kApproach;  // or kSimToReal: Algorithm 7, whose starts are all the same
+  int followed = 200;  // clips of each kind and task whose first start is also followed in the engine
+  std::string engine = "mujoco", controller = "wbc_sim";  // empty engine: kinematic only
+  std::string controller_network;                         // its option `network`; empty: the one it has by itself
+  int threads = 1;
+  // The actor: the demonstration itself, also seen as it is, or a policy, on the clips that are followed; then the
+  // robot is seen where the policy takes it, and what it was meant to do stays (DAgger: Ross et al. 2011).
+  std::string policy = "replay";
+  PolicyOptions policy_options = {};
+};
+
+inline constexpr std::uint64_t kDemonstrationSeed = 880001, kValidationSeed = 890001;
+
+// "80 clips of each task and 400 like people (seed 880001), retargeted by best, 2 starts of each, up to 200 of a kind
+// followed in mujoco under wbc_sim by replay".
+std::string origin_of(const DemonstrationOptions& options);
+
+// A rollout in which the robot fell is kept up to a second before the fall, and dropped where less than two seconds are
+// left. Returns nothing where `stop` said so in between. Throws what prepare_clips and make_controller throw, and
+// MissingError for an engine that is not there.
+std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                                    const DemonstrationOptions& options, Progress& progress,
+                                                    const std::function<bool()>& stop);
+
+// "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
+std::string split_text(const Suite& suite, int threads, Progress& progress);
+
+}  // namespace duet

@@ -1,0 +1,51 @@
+#include "duet/experiment/work/stop_sign.h"
+
+#include <utility>
+
+#include "duet/experiment/work/interrupt.h"
+
+namespace duet {
+namespace {
+
+constexpr double kGlance = 0.05;  // [s] between two looks at the sign
+
+}  // namespace
+
+RunEnd StopSign::end() const {
+  switch (interrupt()) {
+    case Interrupt::kInterrupted:
+      return RunEnd::kInterrupted;
+    case Interrupt::kTerminated:
+      return RunEnd::kTerminated;
+    case Interrupt::kNone:
+      break;
+  }
+  if (stop_asked_ && stop_asked_()) return RunEnd::kInterrupted;
+  const double elapsed = std::chrono::duration<double>(Clock::now() - begin_).count();
+  return limit_ > 0.0 && elapsed > limit_ ? RunEnd::kTimeLimit : RunEnd::kComplete;
+}
+
+StopWatch::StopWatch(const StopSign& sign, double grace, std::function<void(RunEnd)> act)
+    : sign_(sign), act_(std::move(act)), thread_([this, grace] { watch(grace); }) {}
+
+StopWatch::~StopWatch() {
+  {
+    const std::lock_guard lock(mutex_);
+    over_ = true;
+  }
+  released_.notify_all();
+  thread_.join();
+}
+
+bool StopWatch::released_after(double seconds) {
+  std::unique_lock lock(mutex_);
+  return released_.wait_for(lock, std::chrono::duration<double>(seconds), [this] { return over_; });
+}
+
+void StopWatch::watch(double grace) {
+  while (!sign_.asked())
+    if (released_after(kGlance)) return;
+  if (!released_after(grace)) act_(sign_.end());
+}
+
+}  // namespace duet

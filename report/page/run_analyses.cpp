@@ -1,0 +1,137 @@
+#include "duet/report/page/run_analyses.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+#include "duet/core/names.h"
+#include "duet/report/page/foot_plots.h"
+#include "duet/report/page/report_parts.h"
+#include "duet/report/ranking/policy_table.h"
+#include "duet/report/studies/controller_table.h"
+#include "duet/report/studies/degradation.h"
+#include "duet/report/studies/interaction_table.h"
+#include "duet/report/studies/level_table.h"
+#include "duet/report/studies/people_table.h"
+#include "duet/report/studies/reactivity.h"
+#include "duet/report/studies/training_table.h"
+#include "duet/report/studies/walk_table.h"
+
+namespace duet {
+namespace {
+
+Analysis engines_with_plot(const RunTables& tables) {
+  Analysis analysis = engine_analysis(tables.engines, tables.certificate);
+  if (tables.engines.engines.size() > 1)
+    analysis.drawing = engine_plot_html(tables.engines) +
+                       "<p>Dots: success in each engine with its interval; bar: the mean over engines, on the shade of "
+                       "its interval.</p>\n";
+  return analysis;
+}
+
+Analysis controllers_with_steps(const RunTables& tables) {
+  Analysis analysis = controller_analysis(controller_table(tables.rows));
+  analysis.plots = {
+      {.title = "Steps",
+       .note = "The lowest point of each sole over the ground, one episode of each controller that walks.",
+       .plots = foot_plots(tables.rows, tables.file)}};
+  return analysis;
+}
+
+// The use of an analysis where robots walk by command.
+enum class Walking { kPrinted, kWritten, kLeftOut };
+
+struct ListedAnalysis {
+  std::string_view name;
+  Analysis (*make)(const RunTables& tables);
+  Walking walking;
+  bool after_run;  // printed at the end of a run, too
+};
+
+constexpr ListedAnalysis kAnalyses[] = {
+    {kBoardName, [](const RunTables& run) { return board_analysis(run.board); }, Walking::kLeftOut, true},
+    {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
+     Walking::kWritten, true},
+    {"interaction", [](const RunTables& run) { return interaction_analysis(interaction_table(run.rows)); },
+     Walking::kLeftOut, true},
+    {"engines", engines_with_plot, Walking::kWritten, true},
+    {"controllers", controllers_with_steps, Walking::kWritten, true},
+    {"policies", [](const RunTables& run) { return policy_analysis(policy_table(run.rows)); }, Walking::kLeftOut,
+     false},
+    {"degradation", [](const RunTables& run) { return degradation_analysis(degradation(run.rows)); }, Walking::kLeftOut,
+     false},
+    {"reactivity", [](const RunTables& run) { return reactivity_analysis(reactivity_table(run.rows)); },
+     Walking::kLeftOut, false},
+    {"contacts", [](const RunTables& run) { return contact_analysis(run.contacts); }, Walking::kWritten, true},
+    {"people", [](const RunTables& run) { return people_analysis(people_table(run.rows)); }, Walking::kWritten, true},
+    {"trainings", [](const RunTables& run) { return training_analysis(training_table(run.rows)); }, Walking::kLeftOut,
+     true},
+    {"levels", [](const RunTables& run) { return level_analysis(level_tables(run.rows)); }, Walking::kPrinted, true},
+    {"walking", [](const RunTables& run) { return walk_analysis(walk_table(run.rows)); }, Walking::kPrinted, true},
+};
+
+bool has_walking(const RunTables& tables) {
+  return std::ranges::any_of(tables.rows, [](const EpisodeRow& row) { return row.task == kWalkRows; });
+}
+
+}  // namespace
+
+RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlohmann::json& certificate, RowFile file,
+                     const BoardSuite& suite) {
+  RunTables tables{.rows = std::move(rows),
+                   .file = std::move(file),
+                   .metrics = std::move(metrics),
+                   .certificate = certificate,
+                   .leaderboard = {},
+                   .engines = {},
+                   .contacts = {},
+                   .board = {}};
+  tables.leaderboard = leaderboard(tables.rows);
+  tables.engines = cross_engine(tables.rows, tables.metrics.drifting, {.file = tables.file});
+  tables.contacts = contact_table(tables.rows);
+  tables.board = board(tables.rows, tables.contacts, suite);
+  return tables;
+}
+
+std::vector<Analysis> run_analyses(const RunTables& tables, Extent extent) {
+  const bool walking = has_walking(tables);
+  if (tables.rows.empty()) return {run_analysis(tables, kLeaderboardName)};
+  std::vector<Analysis> analyses;
+  for (const ListedAnalysis& listed : kAnalyses) {
+    if ((extent == Extent::kRun && !listed.after_run) || (walking && listed.walking == Walking::kLeftOut)) continue;
+    Analysis analysis = listed.make(tables);
+    analysis.in_terminal = !walking || listed.walking == Walking::kPrinted;
+    if (!analysis.empty()) analyses.push_back(std::move(analysis));
+  }
+  return analyses;
+}
+
+Analysis run_analysis(const RunTables& tables, std::string_view name) {
+  for (const ListedAnalysis& listed : kAnalyses)
+    if (listed.name == name) return listed.make(tables);
+  throw std::invalid_argument(unknown_name_message("table", std::string(name), run_analysis_names()));
+}
+
+std::vector<std::string> run_analysis_names() {
+  std::vector<std::string> names;
+  for (const ListedAnalysis& listed : kAnalyses) names.emplace_back(listed.name);
+  return names;
+}
+
+std::string run_text(const std::vector<Analysis>& analyses) {
+  std::vector<std::string> parts;
+  for (const Analysis& analysis : analyses)
+    if (analysis.in_terminal) parts.push_back(terminal_text(analysis));
+  return fmt::format("{}", fmt::join(parts, "\n"));
+}
+
+std::string run_screen(const RunTables& tables, const std::vector<Analysis>& analyses,
+                       const std::vector<std::string>& notes) {
+  if (!tables.rows.empty() && !has_walking(tables)) return board_screen(tables.board, notes);
+  std::string text;
+  for (const std::string& note : notes) text += "> " + note + "\n\n";
+  return text + run_text(analyses);
+}
+
+}  // namespace duet

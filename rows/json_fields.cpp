@@ -1,0 +1,140 @@
+#include "duet/rows/json_fields.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "duet/core/json.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/text.h"
+
+namespace duet {
+
+nlohmann::json number_or_null(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json numbers_or_null(const std::map<std::string, double>& values) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [name, value] : values) json[name] = number_or_null(value);
+  return json;
+}
+
+nlohmann::json json_of(const Interval& interval) {
+  return nlohmann::json::array({number_or_null(interval.low), number_or_null(interval.high)});
+}
+
+JsonFields::JsonFields(const nlohmann::json& json, std::string what) : json_(json), what_(std::move(what)) {
+  if (!json.is_object()) throw InputError(fmt::format("{}: expected an object, found {}", what_, json.type_name()));
+}
+
+const nlohmann::json& JsonFields::at(const std::string& key) {
+  asked_.insert(key);
+  const auto found = json_.find(key);
+  if (found == json_.end()) throw InputError(fmt::format("{}: key '{}' is missing", what_, key));
+  return *found;
+}
+
+bool JsonFields::has(const std::string& key) {
+  asked_.insert(key);
+  return json_.contains(key);
+}
+
+std::string JsonFields::text(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_string()) wrong_type(key, "a string", value);
+  return value.get<std::string>();
+}
+
+bool JsonFields::boolean(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_boolean()) wrong_type(key, "true or false", value);
+  return value.get<bool>();
+}
+
+std::int64_t JsonFields::integer(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_number_integer()) wrong_type(key, "a whole number", value);
+  return value.get<std::int64_t>();
+}
+
+std::uint64_t JsonFields::unsigned_integer(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_number_unsigned()) wrong_type(key, "a whole number of at least 0", value);
+  return value.get<std::uint64_t>();
+}
+
+int JsonFields::count(const std::string& key) {
+  const std::int64_t value = integer(key);
+  if (value < 0 || value > std::numeric_limits<int>::max())
+    throw InputError(fmt::format("{}: key '{}': expected a whole number of at least 0, found {}", what_, key, value));
+  return static_cast<int>(value);
+}
+
+double JsonFields::number(const std::string& key) { return number_of(key, at(key), false); }
+
+double JsonFields::number_or_nan(const std::string& key) { return number_of(key, at(key), true); }
+
+const nlohmann::json& JsonFields::list(const std::string& key) {
+  const nlohmann::json& value = at(key);
+  if (!value.is_array())
+    throw InputError(fmt::format("{}: key '{}': expected a list, found {}", what_, key, value.type_name()));
+  return value;
+}
+
+std::map<std::string, double> JsonFields::numbers(const std::string& key, bool null_is_nan) {
+  const nlohmann::json& object = at(key);
+  if (!object.is_object()) wrong_type(key, "an object", object);
+  std::map<std::string, double> numbers;
+  for (const auto& [name, value] : object.items()) {
+    numbers[name] = number_of(fmt::format("{}.{}", key, name), value, null_is_nan);
+  }
+  return numbers;
+}
+
+std::map<std::string, bool> JsonFields::booleans(const std::string& key) {
+  const nlohmann::json& object = at(key);
+  if (!object.is_object()) wrong_type(key, "an object", object);
+  std::map<std::string, bool> booleans;
+  for (const auto& [name, value] : object.items()) {
+    if (!value.is_boolean()) wrong_type(fmt::format("{}.{}", key, name), "true or false", value);
+    booleans[name] = value.get<bool>();
+  }
+  return booleans;
+}
+
+std::map<std::string, std::string, std::less<>> JsonFields::texts(const std::string& key) {
+  const nlohmann::json& object = at(key);
+  if (!object.is_object()) wrong_type(key, "an object", object);
+  std::map<std::string, std::string, std::less<>> texts;
+  for (const auto& [name, value] : object.items()) {
+    if (!value.is_string()) wrong_type(fmt::format("{}.{}", key, name), "a text", value);
+    texts.emplace(name, value.get<std::string>());
+  }
+  return texts;
+}
+
+void JsonFields::refuse_unknown() const {
+  for (const auto& [key, value] : json_.items()) {
+    if (asked_.contains(key)) continue;
+    const std::vector<std::string> known(asked_.begin(), asked_.end());
+    throw InputError(fmt::format("{}: {}", what_, unknown_name_message("key", key, known)));
+  }
+}
+
+void JsonFields::wrong_type(const std::string& key, std::string_view expected, const nlohmann::json& found) const {
+  constexpr std::size_t kShownValue = 40;
+  throw InputError(fmt::format("{}: key '{}': expected {}, found {}", what_, shown(key), expected,
+                               shown(dumped(found), kShownValue)));
+}
+
+double JsonFields::number_of(const std::string& key, const nlohmann::json& value, bool null_is_nan) const {
+  if (null_is_nan && value.is_null()) return std::numeric_limits<double>::quiet_NaN();
+  if (!value.is_number()) wrong_type(key, null_is_nan ? "a number or null" : "a number", value);
+  return value.get<double>();
+}
+
+}  // namespace duet

@@ -1,0 +1,68 @@
+// The way from a rollout to an episode row: verdicts of the detectors, controller diagnostics, the 18 metrics of the
+// executed motion.
+#pragma once
+
+#include "duet/experiment/suite/suite.h"
+#include "duet/metrics/readings.h"
+#include "duet/rollout/act_episode.h"
+#include "duet/rows/episode_row.h"
+
+namespace duet {
+
+// References that the executed act is held against: the people of the clip and the reshaped one, over the frames that
+// the act had before the episode ended.
+struct ActSource {
+  HumanMotion partner;   // H_p as in the clip, whatever the perturbation made of it
+  HumanMotion reactor;   // H_s
+  PointTracks reshaped;  // empty: not known
+};
+ActSource act_source(const Recording& recording, const RolloutSetup& setup);
+
+// How a suite judges.
+struct ScoringRules {
+  DetectorVersion detector = DetectorVersion::kRobot;  // whose verdict is the headline
+  ThresholdSet thresholds = ThresholdSet::kPaper;
+  Readings readings = {};
+  bool feet = false;  // whether the row has their trace
+};
+
+// Fills what follows from the motion alone: outcome, success, verdicts, traces, and into `row.metrics` onsets,
+// diagnostics and the 18. Success is false for every outcome but ok.
+void score_recording(const Recording& recording, const ActSource& source, const ScoringRules& rules,
+                     const RobotModel& robot, EpisodeRow& row);
+
+// The same of a rollout, and what was measured while it ran: contacts, forces, faults, times of plans, state hash.
+void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
+                   const RobotModel& robot, EpisodeRow& row);
+
+// Scores an episode that a commanded velocity led: success where the robot was upright to the end, how it walked, and
+// how it followed.
+void score_walk(const Rollout& rollout, const SuiteReference& reference, const RobotModel& robot, EpisodeRow& row);
+
+// Names in `row.metrics` of what is measured at the physics' rate.
+std::vector<std::string> measured_metrics();
+
+// Root and hands, ten times a second: what tells when two engines part.
+StateTrace state_trace(const Recording& recording, const RobotModel& robot);
+
+// Heights of the soles, 25 times a second. Empty for a robot whose soles are not on two links.
+FootTrace foot_trace(const Recording& recording, const RobotModel& robot);
+
+// The executed motion in the place of the retargeted one, over the act (A.4.4 changes what is before and after): the 18
+// metrics then say what the engine and the controller cost. As many frames as the act had before the episode ended.
+PairedMotion executed_act(const Recording& recording, const ActSource& source, const RobotModel& robot);
+
+// SHA-256 over the states at 50 Hz.
+std::string state_hash(const Recording& recording);
+
+Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);
+
+Readings readings_of(const Suite& suite);
+
+// Frames that figures of a motion need: third differences at both ends.
+inline constexpr int kShortestScored = 8;
+// Those of the values that are finite.
+void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out);
+void add_finite(const std::map<std::string, double>& values, NamedNumbers& out);
+
+}  // namespace duet

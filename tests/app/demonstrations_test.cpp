@@ -1,0 +1,133 @@
+// Demonstrations for D-STAR, made small.
+#include "duet/experiment/training/demonstrations.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <vector>
+
+#include "tests/experiment/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+DemonstrationOptions small_options() {
+  DemonstrationOptions options;
+  options.clips = {{Likeness::kRehearsed, 3}};
+  options.pair_mode = "paper";
+  options.starts = 2;
+  options.followed = 1;
+  options.engine = "playback";  // the robot is where it is told to be: nobody falls
+  options.controller = "pd";
+  options.threads = 2;
+  return options;
+}
+
+DemonstrationSet made(const DemonstrationOptions& options) {
+  Progress quiet(Progress::Style::kQuiet);
+  return *make_demonstrations(test::g1(), options, quiet, [] { return false; });
+}
+
+std::map<std::string, int> takes_by_clip(const DemonstrationSet& set) {
+  std::map<std::string, int> takes;
+  for (const Demonstration& entry : set.list) ++takes[entry.clip_id];
+  return takes;
+}
+
+TEST(MakeDemonstrations, EveryStartAsItIsAndTheFirstOfSomeClipsAsItIsFollowed) {
+  const std::map<std::string, int> takes = takes_by_clip(made(small_options()));
+  EXPECT_EQ(takes.size(), 18U);
+  for (const auto& [clip, count] : takes) EXPECT_EQ(count, clip.ends_with("0000") ? 3 : 2) << clip;
+}
+
+TEST(MakeDemonstrations, AnotherPolicyIsSeenOnlyOnTheClipsThatAreFollowed) {
+  DemonstrationOptions options = small_options();
+  options.policy = "replay_dense";
+  const DemonstrationSet set = made(options);
+  EXPECT_THAT(takes_by_clip(set), ::testing::SizeIs(6));
+  const DemonstrationSet own = made(small_options());
+  EXPECT_EQ(set.list.front().digest, own.list.front().digest);
+  // The wanted motion stays, whoever acted.
+  EXPECT_EQ(set.wanted.col(10), own.wanted.col(10));
+}
+
+TEST(MakeDemonstrations, MoreThreadsAndMoreClipsChangeNoneOfThem) {
+  DemonstrationOptions options = small_options();
+  const DemonstrationSet first = made(options);
+  options.threads = 1;
+  options.clips.front().per_task = 4;
+  const DemonstrationSet second = made(options);
+  ASSERT_EQ(first.list[1].clip_id, second.list[1].clip_id);
+  const int frames = first.list[1].frames;
+  EXPECT_EQ(first.observed.middleCols(first.list[1].begin, frames),
+            second.observed.middleCols(second.list[1].begin, frames));
+}
+
+TEST(MakeDemonstrations, TheirOriginSaysHowTheyWereMade) {
+  DemonstrationOptions options = small_options();
+  EXPECT_EQ(made(options).origin,
+            "3 clips of each task (seed 880001), retargeted by paper, 2 starts of each, 1 of a kind followed in "
+            "playback under "
+            "pd by replay");
+  options.controller = "wbc_sim";
+  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (braced) by replay"));  // its default, by name
+  options.controller_network = "student";
+  EXPECT_THAT(origin_of(options), testing::EndsWith("under wbc_sim (student) by replay"));
+  options.starts = 1;
+  options.engine = "";
+  EXPECT_EQ(origin_of(options),
+            "3 clips of each task (seed 880001), retargeted by paper, 1 start of each, none followed");
+  options.clips.push_back({Likeness::kPeople, 40});
+  options.pair_mode = "best";
+  EXPECT_EQ(
+      origin_of(options),
+      "3 clips of each task and 40 like people (seed 880001), retargeted by best, 1 start of each, none followed");
+}
+
+TEST(MakeDemonstrations, ForTheRealRobotAreThoseOfAlgorithm7) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.start = StartMode::kSimToReal;
+  const DemonstrationSet set = made(options);
+  EXPECT_EQ(
+      set.origin,
+      "3 clips of each task (seed 880001), retargeted by paper, 1 start of each for the real robot (Algorithm 7), none "
+      "followed");
+  const Demonstration& first = set.list.front();
+  // Arms down, all the way up to 16 frames before the act.
+  EXPECT_EQ(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 16).q.tail(14));
+  EXPECT_NE(set.reference(0).q.tail(14), set.reference(first.phases.act_begin - 8).q.tail(14));
+}
+
+TEST(MakeDemonstrations, PeopleWaitForNoLengthThatCouldBeCounted) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.clips = {{Likeness::kPeople, 6}};
+  const DemonstrationSet set = made(options);
+  std::vector<int> begins;
+  for (const Demonstration& entry : set.list) begins.push_back(entry.phases.act_begin);
+  const auto [shortest, longest] = std::ranges::minmax(begins);
+  EXPECT_GE(shortest, 125);  // 2.5 s
+  EXPECT_GT(longest - shortest, 75);
+}
+
+TEST(MakeDemonstrations, BothKindsOfClipsAreInOneSet) {
+  DemonstrationOptions options = small_options();
+  options.engine = "";
+  options.starts = 1;
+  options.clips = {{Likeness::kRehearsed, 1}, {Likeness::kPeople, 2}};
+  EXPECT_THAT(made(options).list, ::testing::SizeIs(18));
+}
+
+TEST(MakeDemonstrations, StoppedTheyAreNone) {
+  Progress quiet(Progress::Style::kQuiet);
+  EXPECT_FALSE(make_demonstrations(test::g1(), small_options(), quiet, [] { return true; }).has_value());
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,34 @@
+#include "duet/app/reference_pages.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+
+#include "duet/backends/factory.h"
+#include "duet/core/file.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+// A page of the engines is whole where all of them are.
+bool can_be_made(const std::string& name) {
+  const std::vector<EngineInfo> all = engines();
+  return name != "engine-options" || std::ranges::all_of(all, &EngineInfo::available);
+}
+
+TEST(ReferencePages, TheFilesAreWhatTheTablesSay) {
+  for (const std::string& name : reference_page_names()) {
+    if (!can_be_made(name)) continue;
+    EXPECT_EQ(read_file(std::string(DUET_SOURCE_DIR) + "/docs/reference/" + name + ".md"), reference_page(name))
+        << "`./run reference` writes docs/reference/" << name << ".md anew";
+  }
+}
+
+TEST(ReferencePages, AnUnknownOneIsRefusedWithTheNearest) {
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([] { reference_page("suite-key"); }),
+              testing::HasSubstr("did you mean 'suite-keys'"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,220 @@
+#include "duet/archives/npy/npz.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <limits>
+
+#include "duet/archives/npy/npy.h"
+#include "duet/archives/zip/zip.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+
+Npz some_archive() {
+  Npz npz;
+  npz.set("positions", std::vector<double>{0.0, 1.5, -2.0, 1e300, -0.0, 5e-324}, {2, 3});
+  npz.set("indices", std::vector<std::int64_t>{-1, 0, std::numeric_limits<std::int64_t>::max()}, {3});
+  npz.set("names", std::vector<std::string>{"left", "", "Gruß 你好 🙂"});
+  npz.set_number("rate_hz", 50.0);
+  npz.set_integer("version", 2);
+  npz.set_text("task", "hug");
+  return npz;
+}
+
+Npz reopened(const Npz& npz) { return Npz::parse(npz.bytes(), "a.npz"); }
+
+TEST(Npy, NumbersOfHalfPrecisionAreRead) {
+  for (const bool big_endian : {false, true}) {
+    std::string header =
+        fmt::format("{{'descr': '{}f2', 'fortran_order': False, 'shape': (5,), }}\n", big_endian ? '>' : '<');
+    std::string bytes =
+        "\x93NUMPY\x01" + std::string(1, '\0') + static_cast<char>(header.size()) + std::string(1, '\0') + header;
+    for (const unsigned half : {0x3c00U, 0xc000U, 0x0001U, 0x7bffU, 0x8000U}) {
+      const char low = static_cast<char>(half & 0xff), high = static_cast<char>(half >> 8);
+      bytes += big_endian ? std::string{high, low} : std::string{low, high};
+    }
+    EXPECT_EQ(std::get<std::vector<double>>(parse_npy(bytes).values),
+              (std::vector<double>{1.0, -2.0, 0x1p-24, 65504.0, 0.0}));
+  }
+}
+
+TEST(Npz, ANumberIsOneWhateverItsShape) {
+  Npz npz;
+  npz.set("fps", std::vector<double>{30.0}, {1, 1});
+  npz.set("two", std::vector<double>{30.0, 60.0}, {2});
+  EXPECT_EQ(npz.number("fps"), 30.0);
+  EXPECT_THROW((void)npz.number("two"), InputError);
+  EXPECT_EQ(npz.number_or_text("fps"), 30.0);
+  npz.set_text("words", "29.97");
+  npz.set_text("none", "thirty");
+  EXPECT_EQ(npz.number_or_text("words"), 29.97);
+  EXPECT_THROW((void)npz.number("words"), InputError);
+  EXPECT_THROW((void)npz.number_or_text("none"), InputError);
+}
+
+TEST(Npz, ReturnsWhatWasWritten) {
+  const Npz npz = reopened(some_archive());
+  EXPECT_EQ(npz.keys(), (std::vector<std::string>{"indices", "names", "positions", "rate_hz", "task", "version"}));
+  const std::vector<double> positions = npz.numbers("positions", {2, 3});
+  EXPECT_EQ(positions, (std::vector<double>{0.0, 1.5, -2.0, 1e300, -0.0, 5e-324}));
+  EXPECT_TRUE(std::signbit(positions[4]));
+  EXPECT_EQ(npz.integers("indices", {3}), (std::vector<std::int64_t>{-1, 0, std::numeric_limits<std::int64_t>::max()}));
+  EXPECT_EQ(npz.strings("names", {-1}), (std::vector<std::string>{"left", "", "Gruß 你好 🙂"}));
+  EXPECT_EQ(npz.number("rate_hz"), 50.0);
+  EXPECT_EQ(npz.integer("version"), 2);
+  EXPECT_EQ(npz.number("version"), 2.0);  // integers are numbers
+  EXPECT_EQ(npz.text("task"), "hug");
+  EXPECT_TRUE(npz.contains("task"));
+  EXPECT_FALSE(npz.contains("tasks"));
+}
+
+TEST(Npz, ReturnsTracks) {
+  PointTracks tracks(4, 24);
+  for (std::size_t i = 0; i < tracks.data().size(); ++i) tracks.data()[i] = 0.1 * static_cast<double>(i);
+  Npz npz;
+  npz.set("partner", tracks);
+  EXPECT_EQ(reopened(npz).tracks("partner", 24), tracks);
+  EXPECT_EQ(reopened(npz).tracks("partner", -1), tracks);
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).tracks("partner", 22); }),
+            "'a.npz': array 'partner': expected shape (any, 22, 3), found (4, 24, 3)");
+}
+
+TEST(Npz, EmptyArraysAndEmptyArchivesAreKept) {
+  Npz npz;
+  EXPECT_TRUE(reopened(npz).keys().empty());
+  npz.set("contacts", std::vector<double>{}, {0, 3});
+  npz.set("messages", std::vector<std::string>{});
+  EXPECT_EQ(reopened(npz).array("contacts").shape, (std::vector<std::size_t>{0, 3}));
+  EXPECT_TRUE(reopened(npz).strings("messages", {0}).empty());
+}
+
+TEST(Npz, SavesToAFile) {
+  const test::ScratchFolder folder;
+  some_archive().save(folder / "runs/a.npz");
+  const Npz npz = Npz::load(folder / "runs/a.npz");
+  EXPECT_EQ(npz.name(), folder / "runs/a.npz");
+  EXPECT_EQ(npz.bytes(), some_archive().bytes());
+}
+
+TEST(Npz, SameArraysGiveTheSameBytesInEveryTimeZone) {
+  const std::string bytes = some_archive().bytes();
+  setenv("TZ", "Asia/Kathmandu", 1);
+  tzset();
+  EXPECT_EQ(some_archive().bytes(), bytes);
+  unsetenv("TZ");
+  tzset();
+}
+
+TEST(Npz, OneElementCountsAsScalar) {
+  Npz npz;
+  npz.set("rate", std::vector<double>{30.0}, {1});
+  npz.set("pair", std::vector<double>{1.0, 2.0}, {2});
+  npz.set("gender", std::vector<std::string>{"female"});
+  EXPECT_EQ(npz.number("rate"), 30.0);
+  EXPECT_EQ(npz.text("gender"), "female");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.number("pair"); }),
+            "'(new archive)': array 'pair': expected shape (), found (2,)");
+}
+
+TEST(NpzGetters, NameWhatIsMissingOrOfAnotherKind) {
+  const Npz npz = reopened(some_archive());
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.number("fps"); }),
+            "'a.npz': no array 'fps'. It has: indices, names, positions, rate_hz, task, version");
+  EXPECT_EQ(thrown_message<InputError>([&] {
+              (void)npz.numbers("positions", {-1, 4});
+            }),
+            "'a.npz': array 'positions': expected shape (any, 4), found (2, 3)");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.numbers("positions", {6}); }),
+            "'a.npz': array 'positions': expected shape (6,), found (2, 3)");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.numbers("names", {3}); }),
+            "'a.npz': array 'names': expected numbers, found strings");
+  EXPECT_EQ(thrown_message<InputError>([&] {
+              (void)npz.integers("positions", {2, 3});
+            }),
+            "'a.npz': array 'positions': expected integers, found numbers");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)npz.text("version"); }),
+            "'a.npz': array 'version': expected strings, found integers");
+}
+
+TEST(NpzGetters, NameTheFirstIndexThatIsNotFinite) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  Npz npz;
+  npz.set("a", std::vector<double>{0, 1, 2, 3, 4, 5, 6, 7, 8, nan, nan, 11}, {2, 3, 2});
+  npz.set("b", std::vector<double>{0, -infinity}, {2});
+  npz.set_number("c", nan);
+  EXPECT_EQ(thrown_message<InputError>([&] {
+              (void)reopened(npz).numbers("a", {2, 3, 2});
+            }),
+            "'a.npz': array 'a': expected finite numbers, found nan at index (1, 1, 1)");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).numbers("b", {2}); }),
+            "'a.npz': array 'b': expected finite numbers, found -inf at index (1,)");
+  EXPECT_EQ(thrown_message<InputError>([&] { (void)reopened(npz).number("c"); }),
+            "'a.npz': array 'c': expected finite numbers, found nan at index ()");
+}
+
+TEST(NpzSet, RefusesWhatCannotBeWritten) {
+  Npz npz;
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] {
+              npz.set("a", std::vector<double>(5), {2, 3});
+            }),
+            "array 'a': shape (2, 3) needs 6 values, found 5");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { npz.set_number("", 1.0); }),
+            "an array of an archive needs a name");
+  for (const std::string& bad : {std::string("a\0b", 3), std::string("\xff"), std::string("\xc3"),
+                                 std::string("\xc0\xaf"), std::string("\xed\xa0\x80"), std::string("\xe0\x80\x80")})
+    EXPECT_THROW(npz.set_text("a", bad), std::invalid_argument) << bad;
+  EXPECT_TRUE(npz.keys().empty());
+}
+
+TEST(Zip, KeepsOrderNamesAndContent) {
+  const std::vector<ZipEntry> entries = {{"b", "two"}, {"a/ü", std::string(100000, 'x')}, {"c", ""}};
+  std::vector<ZipEntry> found;
+  read_zip(zip_bytes(entries), "z", {1 << 20, 1 << 20}, [&](const std::string& entry, const std::string& content) {
+    found.push_back({entry, content});
+  });
+  ASSERT_EQ(found.size(), entries.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    EXPECT_EQ(found[i].name, entries[i].name);
+    EXPECT_EQ(found[i].content, entries[i].content);
+  }
+}
+
+std::string zip_refusal(const std::vector<ZipEntry>& entries, const ZipLimits& limits) {
+  return thrown_message<InputError>(
+      [&] { read_zip(zip_bytes(entries), "z", limits, [](const auto&, const auto&) {}); });
+}
+
+TEST(Zip, RefusesAnEntryAboveTheLimit) {
+  EXPECT_EQ(zip_refusal({{"a", std::string(1001, 'x')}}, {1000, 10000}), "'z': entry 'a': above 1000 bytes");
+}
+
+TEST(Zip, RefusesEntriesThatAreTooLargeTogether) {
+  const std::vector<ZipEntry> three = {{"a", std::string(900, 'x')}, {"b", std::string(900, 'x')}, {"c", "yy"}};
+  EXPECT_EQ(zip_refusal(three, {1000, 1800}), "'z': expected entries of at most 1800 bytes together, found more");
+  EXPECT_EQ(zip_refusal(three, {1000, 1802}), "(nothing was thrown)");
+}
+
+// The directory at the end says 1 byte where 900 are: what comes out counts.
+TEST(Zip, CountsWhatComesOutAndNotOnlyWhatIsClaimed) {
+  std::string bytes = zip_bytes({{"a", std::string(900, 'x')}, {"b", std::string(900, 'x')}});
+  for (std::size_t at = bytes.find("PK\x01\x02"); at != std::string::npos; at = bytes.find("PK\x01\x02", at + 1))
+    bytes.replace(at + 24, 4, std::string("\x01\x00\x00\x00", 4));
+  EXPECT_NE(thrown_message<InputError>([&] {
+              read_zip(bytes, "z", {1000, 1000}, [](const auto&, const auto&) {});
+            }),
+            "");
+}
+
+TEST(Zip, RefusesAnArchiveOfTooManyEntries) {
+  EXPECT_EQ(zip_refusal({{"a", ""}, {"b", ""}, {"c", ""}}, {.entry_bytes = 1, .total_bytes = 1, .entries = 2}),
+            "'z': expected at most 2 entries, found 3");
+}
+
+}  // namespace
+}  // namespace duet

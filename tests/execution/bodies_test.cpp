@@ -1,0 +1,179 @@
+#include "duet/experiment/plan/bodies.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/core/require.h"
+#include "duet/execution/runner.h"
+#include "duet/experiment/plan/episode.h"
+#include "duet/policies/observation_history.h"
+#include "duet/policies/on_other_body.h"
+#include "duet/robots/joint_map.h"
+#include "duet/scoring/scoring.h"
+#include "tests/experiment/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::HasSubstr;
+
+// The G1 without its waist roll and with its first two joints exchanged.
+RobotModel other_body(const RobotModel& g1) {
+  RobotModel body = g1;
+  std::swap(body.joints[0], body.joints[1]);
+  body.joints.back().name = "tail_joint";
+  body.neutral = Eigen::VectorXd::LinSpaced(body.dof(), 1.0, 2.0);
+  return body;
+}
+
+TEST(OnBody, SameJointsAreTheMotionToTheBit) {
+  const auto robot = test::g1();
+  const PairedMotion clip = test::paired(Task::kWave, *robot);
+  const RobotMotion same = on_body(clip.robot, *robot);
+  EXPECT_EQ(same.q, clip.robot.q);
+  EXPECT_EQ(same.joint_names, clip.robot.joint_names);
+}
+
+TEST(OnBody, JointsGoByNameOthersStayAtNeutral) {
+  const auto robot = test::g1();
+  const RobotMotion motion = test::paired(Task::kWave, *robot).robot;
+  const RobotModel body = other_body(*robot);
+  const RobotMotion moved = on_body(motion, body);
+  EXPECT_EQ(moved.joint_names, body.joint_names());
+  EXPECT_EQ(moved.q.row(0), motion.q.row(1));
+  EXPECT_EQ(moved.q.row(1), motion.q.row(0));
+  EXPECT_EQ(moved.q.row(7), motion.q.row(7));
+  EXPECT_EQ(moved.q.bottomRows(1), Eigen::RowVectorXd::Constant(motion.frames(), body.neutral.tail(1)[0]));
+  EXPECT_EQ(moved.root.size(), motion.root.size());
+}
+
+TEST(Bodies, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
+  Suite suite = test::playback_suite();
+  suite.policies = {{.name = "a", .use = "null"}, {.name = "b", .use = "null"}};
+  std::vector<std::string> made;
+  const auto loader = [&](const std::string& name) -> PolicyLoader {
+    return [&made, name](const std::shared_ptr<const RobotModel>& robot, const PolicyOptions&) -> PolicyMaker {
+      return [&made, name, robot] {
+        made.push_back(name);
+        return make_policy("null", robot);
+      };
+    };
+  };
+  const Bodies bodies(suite, {}, {}, {{"a", loader("first")}, {"b", loader("second")}});
+  for (const char* name : {"b", "a", "null"}) static_cast<void>(bodies.policy("pd", name).make());
+  EXPECT_EQ(made, (std::vector<std::string>{"second", "first"}));
+}
+
+TEST(Bodies, ControllersOfOneBodyShareItAndItsClips) {
+  Suite suite = test::playback_suite();
+  suite.controllers = {SuiteController{"pd"}, SuiteController{"vmc"}};
+  Bodies bodies(suite);
+  EXPECT_EQ(bodies.robot("pd"), bodies.robot("vmc"));
+  EXPECT_EQ(bodies.robot("pd"), bodies.nominal());
+  bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
+  EXPECT_EQ(&bodies.clips("pd"), &bodies.clips("vmc"));
+  EXPECT_EQ(bodies.clips("pd").size(), 1U);
+  EXPECT_TRUE(bodies.absent().empty());
+}
+
+// Wants what it is told to, and remembers what it saw.
+class Mirror final : public Policy {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "mirror"; }
+  void reset(const EpisodeContext& context) override { start = context.start; }
+  Anchors act(const Observation& observation) override {
+    seen = observation.now().robot;
+    Anchors anchors;
+    anchors.fill({seen.X_WB, wanted});
+    return anchors;
+  }
+  RobotState start, seen;
+  Eigen::VectorXd wanted;
+};
+
+TEST(OnOtherBody, JointsGoByNameBothWays) {
+  const auto robot = test::g1();
+  const RobotModel body = other_body(*robot);
+  auto mirror = std::make_unique<Mirror>();
+  Mirror& policy = *mirror;
+  policy.wanted = Eigen::VectorXd::LinSpaced(robot->dof(), 0.0, 28.0);
+  const auto moved = on_other_body(std::move(mirror), robot, body);
+  EpisodeContext context;
+  context.start = body.standing_state();
+  context.start.q = Eigen::VectorXd::LinSpaced(body.dof(), 100.0, 128.0);
+  context.start.v = -context.start.q;
+  moved->reset(context);
+  EXPECT_EQ(policy.start.q[0], 101.0);
+  EXPECT_EQ(policy.start.q[1], 100.0);
+  EXPECT_EQ(policy.start.q[28], robot->neutral[28]);  // a joint that the body lacks
+  EXPECT_EQ(policy.start.v[0], -101.0);
+  EXPECT_EQ(policy.start.v[28], 0.0);
+  ObservationHistory history;
+  history.add({Eigen::Matrix<double, 3, 24>::Zero(), context.start});
+  for (const Reference& reference : moved->plan(history.at(0))) {
+    EXPECT_EQ(reference.q[0], 1.0);
+    EXPECT_EQ(reference.q[1], 0.0);
+    EXPECT_EQ(reference.q[28], body.neutral[28]);  // a joint that only the body has
+  }
+  EXPECT_EQ(policy.seen.q, policy.start.q);
+  EXPECT_EQ(moved->name(), "mirror");
+}
+
+TEST(OnOtherBody, OfStrangersIsRefused) {
+  const auto robot = test::g1();
+  RobotModel body = *robot;
+  for (RobotJoint& joint : body.joints) joint.name += "_of_another";
+  EXPECT_THAT(
+      test::thrown_message<std::invalid_argument>([&] { on_other_body(std::make_unique<Mirror>(), robot, body); }),
+      HasSubstr("policy 'mirror'"));
+}
+
+TEST(Bodies, PerturbationsAreCheckedOnEveryBody) {
+  Suite suite = test::playback_suite();
+  suite.perturbations = {test::perturbation("{push: {link: nowhere}}")};
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { const Bodies bodies(suite); }), HasSubstr("nowhere"));
+}
+
+TEST(Plan, PerturbationsAreAnAxisOfEnginesAndNotOfPlayback) {
+  Suite suite = test::playback_suite();
+  suite.engines = {"playback", "mujoco"};
+  suite.perturbations = {Perturbation{}, default_perturbation("push"), default_perturbation("delay")};
+  Bodies bodies(suite);
+  bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
+  std::map<std::string, int> count;
+  std::set<std::string> keys;
+  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
+    ++count[spec.engine + " " + spec.perturbation + " " + spec.arm];
+    keys.insert(row_for(spec, suite, {"hash"}, *bodies.nominal()).key);
+    EXPECT_NE(spec.seed, spec.perturbation_seed);
+  }
+  EXPECT_EQ(count, (std::map<std::string, int>{{"playback clean main", 1},
+                                               {"playback clean null", 1},
+                                               {"mujoco clean main", 1},
+                                               {"mujoco clean null", 1},
+                                               {"mujoco push main", 1},
+                                               {"mujoco push null", 1},
+                                               {"mujoco delay main", 1},
+                                               {"mujoco delay null", 1}}));
+  EXPECT_EQ(keys.size(), 8U);
+}
+
+TEST(FootTrace, HeightsAreOfTheSolesLowestPoints) {
+  const auto robot = test::g1();
+  Recording recording;
+  for (int t = 0; t < 5; ++t) {
+    recording.robot.push_back(robot->standing_state());
+    recording.robot.back().X_WB.p.z() += 0.1 * t;
+  }
+  const FootTrace trace = foot_trace(recording, *robot);
+  EXPECT_EQ(trace.left_mm, (std::vector<int>{0, 200, 400}));  // every second frame, standing on the ground at first
+  EXPECT_EQ(trace.right_mm, trace.left_mm);
+  // The right hip bent forward lifts the right foot alone.
+  recording.robot[2].q[robot->joint_index("right_hip_pitch_joint")] -= 0.8;
+  const FootTrace lifted = foot_trace(recording, *robot);
+  EXPECT_EQ(lifted.left_mm, trace.left_mm);
+  EXPECT_GT(lifted.right_mm[1], trace.right_mm[1] + 50);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,185 @@
+#include "duet/execution/led_episodes.h"
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include <limits>
+
+#include "duet/core/require.h"
+#include "duet/execution/run_episode.h"
+#include "duet/policies/catalogue/registry.h"
+#include "tests/experiment/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::HasSubstr;
+
+std::shared_ptr<const LedSuite> led(const LedPart& part = {}) {
+  Progress quiet(Progress::Style::kQuiet);
+  return std::make_shared<const LedSuite>(test::playback_suite(), part, 1, quiet);
+}
+
+// The null arm's answer to a question.
+std::vector<double> holding(const PlanRequest& request, const RobotModel& robot) {
+  const Pose& X = request.standing;
+  std::vector<double> numbers;
+  for (int row = 0; row < kAnchors; ++row) {
+    numbers.insert(numbers.end(), {X.p.x(), X.p.y(), X.p.z(), X.R.w(), X.R.x(), X.R.y(), X.R.z()});
+    numbers.insert(numbers.end(), robot.neutral.data(), robot.neutral.data() + robot.dof());
+  }
+  return numbers;
+}
+
+TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  ASSERT_EQ(suite->size(), 2);
+  LedEpisode episode(suite);
+  int questions = 0;
+  for (auto request = episode.begin(1); request != nullptr; ++questions) {
+    EXPECT_EQ(request->tick, questions * kTicksPerPlan);
+    request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+  }
+  EXPECT_GT(questions, 5);
+  EXPECT_TRUE(episode.is_over());
+  ASSERT_TRUE(episode.row().has_value());
+  const EpisodeRow expected = suite->run(1, {.policy = policy_maker("null", suite->robot())});
+  EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
+  EXPECT_EQ(episode.row()->state_hash, expected.state_hash);
+  EXPECT_EQ(episode.row()->key, expected.key);
+  EXPECT_EQ(episode.row()->seed, expected.seed);
+}
+
+TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  auto episode = std::make_unique<LedEpisode>(suite);
+  const auto request = episode->begin(0);
+  const std::vector<double> plan = holding(*request, *suite->robot());
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(60);
+    const std::string said = thrown_message<std::runtime_error>([&] { episode->go_on(plan, kAnchors); });
+    const std::string begun = thrown_message<std::runtime_error>([&] { episode->begin(1); });
+    episode->stop();
+    episode.reset();
+    ::_exit(said.find("forked from it") != std::string::npos && begun == said ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_NE(episode->go_on(plan, kAnchors), nullptr);
+}
+
+TEST(LedSuite, SaysHowManyQuestionsAnEpisodeAsksAtMost) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  for (int number = 0; number < suite->size(); ++number) {
+    LedEpisode episode(suite);
+    int questions = 0;
+    for (auto request = episode.begin(number); request != nullptr; ++questions)
+      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+    EXPECT_EQ(questions, suite->questions(number));
+    EXPECT_FALSE(suite->prompt(number).empty());
+  }
+}
+
+// The partner's joints in the newest frame that a question shows.
+Eigen::MatrixXd partner_in(const PlanRequest& request) {
+  return request.frames.col(kHistoryFrames - 1).segment(3, 3 * kSmplJoints).reshaped(3, kSmplJoints);
+}
+
+TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  LedEpisode episode(suite, Led::kBoth);
+  const auto first = episode.begin(0);
+  ASSERT_NE(first, nullptr);
+  PointTracks ahead = episode.partner_ahead();
+  ASSERT_EQ(ahead.frames(), kTicksPerPlan);
+  for (int i = 0; i < kTicksPerPlan; ++i) ahead.frame(i).row(1).array() += 0.1 * (i + 1);
+  episode.lead_partner(ahead);
+  const auto second = episode.go_on(holding(*first, *suite->robot()), kAnchors);
+  ASSERT_NE(second, nullptr);
+  EXPECT_EQ(partner_in(*second), ahead.frame(kTicksPerPlan - 1));
+  const auto third = episode.go_on(holding(*second, *suite->robot()), kAnchors);  // from here on as in the clip
+  ASSERT_NE(third, nullptr);
+  EXPECT_LT((partner_in(*third) - partner_in(*first)).cwiseAbs().maxCoeff(), 0.5);
+}
+
+TEST(LedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  std::vector<Eigen::MatrixXd> alone, both;
+  for (auto* seen : {&alone, &both}) {
+    LedEpisode episode(suite, seen == &both ? Led::kBoth : Led::kRobot);
+    for (auto request = episode.begin(1); request != nullptr;) {
+      seen->push_back(request->frames);
+      if (seen == &both) episode.lead_partner(episode.partner_ahead());
+      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+    }
+    EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
+  }
+  EXPECT_EQ(alone, both);
+}
+
+TEST(LedEpisode, RefusesToLeadAPartnerWhereItCannot) {
+  LedEpisode alone(led());
+  ASSERT_NE(alone.begin(0), nullptr);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { alone.lead_partner({}); }),
+            "partner: expected an episode under way in which both are led");
+  LedEpisode both(led(), Led::kBoth);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { static_cast<void>(both.partner_ahead()); }),
+            "partner: expected an episode under way in which both are led");
+  ASSERT_NE(both.begin(0), nullptr);
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { both.lead_partner(PointTracks(3, kSmplJoints)); }),
+            "partner: expected 10 frames of 24 joints, found 3 of 24");
+  PointTracks ahead = both.partner_ahead();
+  ahead.at(4, 7).x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { both.lead_partner(ahead); }),
+            "partner: expected finite numbers");
+}
+
+TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
+  const std::shared_ptr<const LedSuite> suite = led();
+  LedEpisode episode(suite);
+  const auto first = episode.begin(0);
+  ASSERT_NE(first, nullptr);
+  ASSERT_NE(episode.go_on(holding(*first, *suite->robot()), kAnchors), nullptr);
+  const auto again = episode.begin(0);
+  ASSERT_NE(again, nullptr);
+  EXPECT_EQ(again->tick, 0);
+  EXPECT_EQ(again->frames, first->frames);
+  episode.stop();
+  EXPECT_TRUE(episode.is_over());
+  EXPECT_FALSE(episode.row().has_value());
+}
+
+TEST(LedEpisode, RefusesWhatItCannotLead) {
+  LedEpisode episode(led());
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.next(); }), "the episode has not begun: begin one");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.begin(2); }),
+            "episode: expected a number from 0 to 1, found 2");
+  EXPECT_EQ(thrown_message<std::invalid_argument>([&] { episode.answer({}, kAnchors); }),
+            "the episode is over: begin another one");
+  ASSERT_NE(episode.begin(0), nullptr);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([&] { episode.answer(std::vector<double>(10), kAnchors); }),
+              HasSubstr("policy 'caller': plan: expected (5, 36) or (100, 36) numbers, found 5 rows and 10 numbers"));
+}
+
+TEST(LedSuite, RefusesNamesThatTheSuiteDoesNotHave) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.engine = "mujoco"}); }),
+              HasSubstr("unknown engine 'mujoco'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.controller = "vmc"}); }),
+              HasSubstr("unknown controller 'vmc'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.perturbation = "ice"}); }),
+              HasSubstr("unknown perturbation 'ice'"));
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.task = "waltz"}); }), HasSubstr("'waltz'"));
+}
+
+TEST(LedSuite, ChoosesATask) {
+  const std::shared_ptr<const LedSuite> suite = led({.task = "handshake"});
+  ASSERT_EQ(suite->size(), 1);
+  EXPECT_EQ(suite->at(0).clip->task, Task::kHandshake);
+}
+
+}  // namespace
+}  // namespace duet

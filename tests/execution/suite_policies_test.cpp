@@ -1,0 +1,335 @@
+// Policies of a suite: options, prompts, partners of other clips, and those that are not on this machine.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+
+#include "duet/backends/factory.h"
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/execution/runner.h"
+#include "duet/experiment/plan/bodies.h"
+#include "duet/experiment/plan/episode.h"
+#include "duet/experiment/plan/run_identity.h"
+#include "duet/experiment/plan/trust.h"
+#include "duet/policies/catalogue/registry.h"
+#include "duet/rollout/act_episode.h"
+#include "tests/experiment/fixtures.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+
+Suite with_policies(const std::string& list) {
+  return parse_suite(
+      "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\ntasks: [wave]\n"
+      "engines: [playback]\ncontrollers: [pd]\npolicies: " +
+          list + "\nstart: act\n",
+      "p.yaml");
+}
+
+std::string refusal(const std::string& list) {
+  return test::thrown_message<InputError>([&] { with_policies(list); });
+}
+
+bool has_dstar() {
+  const std::vector<std::string> names = policy_names();
+  return std::find(names.begin(), names.end(), "dstar") != names.end();
+}
+
+TEST(SuitePolicies, ANameIsAPolicyWithoutOptions) {
+  const Suite suite = with_policies("[replay, replay_dense]");
+  EXPECT_EQ(policy_names_of(suite), (std::vector<std::string>{"replay", "replay_dense"}));
+  EXPECT_EQ(suite.policies[1].use, "replay_dense");
+  EXPECT_FALSE(suite.policies[1].shuffled_partner);
+  EXPECT_THAT(resolved_yaml(suite), HasSubstr("\npolicies: [replay, replay_dense]\n"));
+}
+
+TEST(SuitePolicies, AMappingSetsPromptAndPartner) {
+  const Suite suite =
+      with_policies("[replay, {name: blind, use: replay, prompt: 'say \"hi\" \\ now', partner: shuffled}]");
+  ASSERT_EQ(suite.policies.size(), 2U);
+  EXPECT_EQ(suite.policies[1].use, "replay");
+  EXPECT_EQ(suite.policies[1].prompt, "say \"hi\" \\ now");
+  EXPECT_TRUE(suite.policies[1].shuffled_partner);
+  const Suite again = parse_suite(resolved_yaml(suite), "again.yaml");
+  EXPECT_EQ(again.policies[1].prompt, suite.policies[1].prompt);
+  EXPECT_EQ(resolved_yaml(again), resolved_yaml(suite));
+  EXPECT_NE(identity_of(suite.policies[1]).digest,
+            identity_of(with_policies("[replay, {name: blind, use: replay}]").policies[1]).digest);
+}
+
+TEST(SuitePolicies, WhatIsWrongIsNamedWithItsLine) {
+  EXPECT_THAT(refusal("[replya]"), AllOf(HasSubstr("p.yaml:8"), HasSubstr("did you mean 'replay'")));
+  EXPECT_THAT(refusal("[replay, replay]"), HasSubstr("'replay' is there twice"));
+  EXPECT_THAT(refusal("[{use: replay}]"), HasSubstr("name"));
+  EXPECT_THAT(refusal("[{name: 'a b', use: replay}]"), HasSubstr("letters, digits"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, parnter: own}]"), HasSubstr("partner"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, partner: other}]"),
+              HasSubstr("partner: expected 'own' or 'shuffled', found 'other'"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, options: {a: 1}}]"), HasSubstr("policy 'x': expected no option"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, network: a.st}]"), HasSubstr("expected no option, found 'network'"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, options: [1]}]"), HasSubstr("expected a mapping"));
+  EXPECT_THAT(refusal("[{name: x, use: replay, options: {network: a}, network: b}]"), HasSubstr("network once"));
+  EXPECT_THAT(refusal("[{name: 'null', use: replay}]"), HasSubstr("name of the control arm"));
+  EXPECT_THAT(refusal("[]"), HasSubstr("at least one policy"));
+}
+
+std::string process_descriptor(const std::string& name, const std::string& how = "command: [/bin/false]\n") {
+  return "schema: duet.policy/1\nname: " + name + "\nabout: a test\nkind: process\n" + how;
+}
+
+TEST(SuitePolicies, TheNameOfADescriptorIsWhatTablesShowUnlessTheSuiteNamesIt) {
+  const test::ScratchFolder folder;
+  write_file(folder / "file.yaml", process_descriptor("mywave"));
+  EXPECT_EQ(with_policies("[" + (folder / "file.yaml") + "]").policies.at(0).name, "mywave");
+  EXPECT_EQ(with_policies("[{name: other, use: " + (folder / "file.yaml") + "}]").policies.at(0).name, "other");
+  const Suite suite = with_policies("[" + (folder / "file.yaml") + "]");
+  EXPECT_EQ(parse_suite(resolved_yaml(suite), "again.yaml").policies.at(0).name, "mywave");
+  write_file(folder / "same.yaml", process_descriptor("mywave"));
+  EXPECT_THAT(refusal("[" + (folder / "file.yaml") + ", " + (folder / "same.yaml") + "]"),
+              HasSubstr("'mywave' is there twice; names tell rows apart ({name: ..., use: ...} gives another)"));
+  write_file(folder / "spaces.yaml", process_descriptor("my wave"));
+  EXPECT_THAT(
+      refusal("[" + (folder / "spaces.yaml") + "]"),
+      HasSubstr(
+          "spaces.yaml: name: expected letters, digits and _ . + - only, none of + and - first, found 'my wave'"));
+  EXPECT_THAT(refusal("[" + (folder / "nowhere.yaml") + "]"), HasSubstr("nowhere.yaml"));
+}
+
+TEST(SuitePolicies, TheNameOfAControllersDescriptorIsWhatTablesShow) {
+  const test::ScratchFolder folder;
+  std::string text = read_file(std::string(DUET_SOURCE_DIR) + "/controllers/descriptors/homie.yaml");
+  text.replace(text.find("name: homie"), 11, "name: mine\n");
+  write_file(folder / "file.yaml", text);
+  const Suite suite = parse_suite(
+      "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\ntasks: [wave]\n"
+      "engines: [playback]\ncontrollers: [" +
+          (folder / "file.yaml") + "]\npolicies: [replay]\n",
+      "p.yaml");
+  EXPECT_EQ(suite.controllers.at(0).name, "mine");
+}
+
+TEST(SuitePolicies, NullNeedsNoQuotes) {
+  for (const char* word : {"[null]", "['null']", "[~, replay]"}) {
+    const Suite suite = with_policies(word);
+    EXPECT_EQ(suite.policies.at(0).name, "null");
+    EXPECT_EQ(resolved_yaml(parse_suite(resolved_yaml(suite), "again.yaml")), resolved_yaml(suite));
+  }
+}
+
+TEST(SuitePolicies, ProgramsThatAreNotAllowedAreRefusedByNameAndNothingIsMade) {
+  const test::ScratchFolder folder;
+  write_file(folder / "evil.yaml", process_descriptor("evil", "command: [/bin/sh, -c, \"touch PWNED\"]\n"));
+  write_file(folder / "far.yaml", process_descriptor("far", "socket: example.org:7000\n"));
+  Suite suite = with_policies("[" + (folder / "evil.yaml") + ", " + (folder / "far.yaml") + ", replay]");
+  const std::string message = test::thrown_message<InputError>([&] { Bodies bodies(suite); });
+  EXPECT_THAT(message,
+              HasSubstr("expected --allow-programs, or a folder in DUET_TRUSTED_FOLDERS, for: policy 'evil' of " +
+                        (folder / "evil.yaml") + " runs '/bin/sh -c touch PWNED' in '"));
+  EXPECT_THAT(message, HasSubstr("; policy 'far' of " + (folder / "far.yaml") + " connects to 'example.org:7000'"));
+  EXPECT_NO_THROW(Bodies(suite, {}, {"evil", "far"}));  // what is not run needs no leave
+  suite.allow_programs = true;
+  EXPECT_NO_THROW(Bodies{suite});
+}
+
+TEST(SuitePolicies, ATrustedFolderAllowsWhatLiesInItAndNoLinkToIt) {
+  const test::ScratchFolder trusted, other;
+  std::filesystem::create_directory(trusted / "deep");
+  write_file(trusted / "deep/mine.yaml", process_descriptor("mine"));
+  write_file(other / "mine.yaml", process_descriptor("mine"));
+  std::filesystem::create_symlink(trusted / "deep/mine.yaml", other / "link.yaml");
+  std::filesystem::create_symlink(other / "mine.yaml", trusted / "link.yaml");
+  setenv("DUET_TRUSTED_FOLDERS", (":relative:" + (trusted / "")).c_str(), 1);
+  EXPECT_TRUE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  EXPECT_FALSE(in_trusted_folder(other / "mine.yaml"));
+  EXPECT_FALSE(in_trusted_folder(other / "link.yaml"));    // its program would run in the other folder
+  EXPECT_FALSE(in_trusted_folder(trusted / "link.yaml"));  // somebody else's text
+  EXPECT_FALSE(in_trusted_folder(trusted / "nowhere.yaml"));
+  EXPECT_NO_THROW(Bodies(with_policies("[" + (trusted / "deep/mine.yaml") + "]")));
+  setenv("DUET_TRUSTED_FOLDERS", (trusted / "deep").c_str(), 1);
+  EXPECT_TRUE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  setenv("DUET_TRUSTED_FOLDERS", (trusted / "dee").c_str(), 1);
+  EXPECT_FALSE(in_trusted_folder(trusted / "deep/mine.yaml"));
+  unsetenv("DUET_TRUSTED_FOLDERS");
+  EXPECT_FALSE(in_trusted_folder(trusted / "deep/mine.yaml"));
+}
+
+TEST(SuitePolicies, NetworksAreFoundFromTheSuitesFolderAndCountByContent) {
+  if (!has_dstar()) GTEST_SKIP() << "not run: policy dstar absent";
+  const test::ScratchFolder folder;
+  const auto read = [&](const std::string& file, const std::string& policy) {
+    write_file(folder / file,
+               "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\nengines: [playback]\n"
+               "controllers: [pd]\npolicies: [" +
+                   policy + "]\n");
+    return load_suite(folder / file);
+  };
+  write_file(folder / "a.net", "one");
+  write_file(folder / "b.net", "one");
+  const Suite a = read("a.yaml", "{name: d, use: dstar, network: a.net}");
+  EXPECT_EQ(a.policies[0].options.at("network"), folder / "a.net");
+  const Suite b = read("b.yaml", "{name: d, use: dstar, options: {network: b.net}}");
+  EXPECT_EQ(identity_of(a.policies[0]).digest, identity_of(b.policies[0]).digest);
+  write_file(folder / "a.net", "two");
+  EXPECT_NE(identity_of(a.policies[0]).digest, identity_of(b.policies[0]).digest);
+}
+
+TEST(SuitePolicies, LibrariesOfRetrievalCountByContentToo) {
+  const test::ScratchFolder folder;
+  write_file(folder / "windows.st", "one");
+  write_file(folder / "p.yaml",
+             "schema: duet.suite/1\nname: p\nversion: 1.0.0\nclips: {synth: {per_task: 2}}\nengines: [playback]\n"
+             "controllers: [pd]\npolicies: [{name: r, use: retrieval, options: {library: windows.st}}]\n");
+  const Suite suite = load_suite(folder / "p.yaml");
+  EXPECT_EQ(suite.policies[0].options.at("library"), folder / "windows.st");
+  const std::string before = identity_of(suite.policies[0]).digest;
+  write_file(folder / "windows.st", "two");
+  EXPECT_NE(identity_of(suite.policies[0]).digest, before);
+}
+
+TEST(SuitePolicies, APolicyWhoseNetworkIsNotHereIsAbsentAndOthersGoOn) {
+  if (!has_dstar()) GTEST_SKIP() << "not run: policy dstar absent";
+  const Suite suite = with_policies("[replay, {name: d, use: dstar, network: /nowhere/net.safetensors}]");
+  Progress quiet(Progress::Style::kQuiet);
+  const test::ScratchFolder folder;
+  const RunSummary summary = run_suite(suite, folder / "run", {}, quiet);
+  EXPECT_THAT(summary.absent_policies.at("d"), HasSubstr("policy 'd' is absent"));
+  EXPECT_EQ(summary.outcomes.at("unsupported"), 2);
+  EXPECT_EQ(summary.outcomes.at("ok"), 4);
+  RunOptions only;
+  only.policies = {"d"};
+  EXPECT_THAT(test::thrown_message<MissingError>([&] { run_suite(suite, folder / "other", only, quiet); }),
+              HasSubstr("policy 'd' is absent"));
+}
+
+TEST(SuitePolicies, EveryBodyHasAMakerOfEveryPolicy) {
+  const Bodies bodies(with_policies("[replay, {name: second, use: replay}]"), {}, {"replay"});
+  EXPECT_EQ(bodies.policy("pd", "second").make()->name(), "replay");
+  EXPECT_EQ(bodies.policy("pd", "null").make()->name(), "null");
+  EXPECT_NE(bodies.policy("pd", "second").make(), bodies.policy("pd", "second").make());
+  EXPECT_THROW(static_cast<void>(bodies.policy("pd", "replay")), std::out_of_range);
+}
+
+// Remembers what it saw; a plan that may be left out.
+class Watcher final : public Policy {
+ public:
+  [[nodiscard]] std::string_view name() const override { return "watcher"; }
+  void reset(const EpisodeContext& context) override {
+    prompt = context.prompt;
+    start_ = {context.start.X_WB, context.start.q};
+  }
+  Anchors act(const Observation& observation) override {
+    seen.push_back(observation.now().partner);
+    Anchors anchors;
+    anchors.fill(start_);
+    return anchors;
+  }
+  std::vector<Eigen::Matrix<double, 3, 24>> seen;
+  std::string prompt;
+
+ private:
+  Reference start_;
+};
+
+Rollout watch(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
+              Policy& policy) {
+  return play_back(episode_setup(spec, suite, *robot), policy);
+}
+
+class ShuffledPartner : public ::testing::Test {
+ protected:
+  void take_clips(int count) {
+    std::vector<PairedMotion> clips;
+    for (int i = 0; i < count; ++i) {
+      SynthesisOptions options;
+      options.index = i;
+      clips.push_back(retarget(synthesize(Task::kWave, options), *robot_));
+    }
+    bodies_.take_clips(std::move(clips));
+  }
+
+  Suite suite_ = with_policies("[replay, {name: blind, use: replay, partner: shuffled}]");
+  std::shared_ptr<const RobotModel> robot_ = test::g1();
+  Bodies bodies_{suite_};
+};
+
+TEST_F(ShuffledPartner, IsThatOfTheNextClipOfTheTask) {
+  take_clips(2);
+  const std::vector<PairedMotion>& clips = bodies_.clips("pd");
+  int shuffled = 0;
+  for (const EpisodeSpec& spec : plan_episodes(suite_, bodies_)) {
+    EXPECT_EQ(spec.arm, spec.policy == "blind" ? "shuffled" : spec.policy == "null" ? "null" : "main");
+    if (spec.policy != "blind") {
+      EXPECT_EQ(spec.seen, nullptr);
+      continue;
+    }
+    ++shuffled;
+    EXPECT_EQ(spec.seen, spec.clip == &clips[0] ? &clips[1] : &clips[0]);
+    EXPECT_EQ(row_for(spec, suite_, {"hash"}, *robot_).arm, "shuffled");
+  }
+  EXPECT_EQ(shuffled, 2);
+}
+
+TEST_F(ShuffledPartner, IsRefusedWhereATaskHasOneClip) {
+  take_clips(1);
+  EXPECT_EQ(test::thrown_message<InputError>([&] { plan_episodes(suite_, bodies_); }),
+            "policy 'blind' sees the partner of another clip: expected two clips of wave or more, found one");
+}
+
+TEST_F(ShuffledPartner, IsSeenByThePolicyAlone) {
+  take_clips(2);
+  EpisodeSpec spec{&bodies_.clips("pd")[0], "playback", "pd", "blind", "shuffled", 0, 1};
+  Watcher own, other;
+  const Rollout plain = watch(spec, suite_, robot_, own);
+  spec.seen = &bodies_.clips("pd")[1];
+  const Rollout shuffled = watch(spec, suite_, robot_, other);
+  EXPECT_EQ(plain.recording.partner, shuffled.recording.partner);
+  EXPECT_EQ(plain.state_hash, shuffled.state_hash);
+  ASSERT_EQ(own.seen.size(), other.seen.size());
+  EXPECT_GT((own.seen.front() - other.seen.front()).norm(), 1e-3);
+}
+
+// The policy sees another clip's partner, relative to the robot, as it would in that clip's own episode.
+TEST_F(ShuffledPartner, StandsToTheRobotAsInItsOwnClip) {
+  take_clips(2);
+  const std::vector<PairedMotion>& clips = bodies_.clips("pd");
+  const EpisodeSpec there{&clips[1], "playback", "pd", "replay", "main", 0, 1};
+  EpisodeSpec here{&clips[0], "playback", "pd", "blind", "shuffled", 0, 1};
+  here.seen = &clips[1];
+  const RolloutSetup original = episode_setup(there, suite_, *robot_), moved = episode_setup(here, suite_, *robot_);
+  const Pose &from = original.reference.motion.root.front(), &to = moved.reference.motion.root.front();
+  constexpr double kRounding = 1e-9;  // [m]
+  for (const int joint : {static_cast<int>(kPelvis), static_cast<int>(kRightHand)}) {
+    const Eigen::Vector3d p_W = clips[1].partner.joints.at(original.reference.clip_frame, joint);
+    const Eigen::Vector3d wanted = yaw_rotation(yaw_of(from.R)).conjugate() * (p_W - from.p);
+    const Eigen::Vector3d found = yaw_rotation(yaw_of(to.R)).conjugate() * (moved.seen_partner.at(0, joint) - to.p);
+    EXPECT_NEAR((wanted - found).head<2>().norm(), 0.0, kRounding);
+    EXPECT_EQ(moved.seen_partner.at(0, joint).z(), p_W.z());
+  }
+}
+
+TEST_F(ShuffledPartner, PromptIsTheTasksUnlessTheSuiteSaysAnother) {
+  take_clips(2);
+  const EpisodeSpec spec{&bodies_.clips("pd")[0], "playback", "pd", "replay", "main", 0, 1};
+  Watcher watcher;
+  watch(spec, suite_, robot_, watcher);
+  EXPECT_EQ(watcher.prompt, "wave to the person");
+  suite_.policies[0].prompt = "hug them";
+  watch(spec, suite_, robot_, watcher);
+  EXPECT_EQ(watcher.prompt, "hug them");
+}
+
+TEST(SuitePolicies, AnOptionThatIsNoValueIsRefusedWithItsLine) {
+  EXPECT_THAT(refusal("\n  - replay\n  - {name: blind, use: replay,\n     options: {prompt: [1]}}"),
+              HasSubstr("p.yaml:11: policy: options.prompt: expected one value, found"));
+}
+
+}  // namespace
+}  // namespace duet

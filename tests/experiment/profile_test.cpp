@@ -1,0 +1,116 @@
+#include "duet/experiment/suite/profile.h"
+
+#include <gmock/gmock.h>
+
+#include "duet/backends/factory.h"
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/experiment/plan/run_identity.h"
+#include "duet/experiment/suite/suite.h"
+#include "duet/robots/yaml_section.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+std::string refusal(const std::string& yaml) {
+  return thrown_message<InputError>([&] { read_profile(parse_yaml(yaml, "p.yaml"), "p.yaml"); });
+}
+
+TEST(Profile, TheShippedOnesNameEveryEngineAndLoad) {
+  const std::vector<std::string> names = profile_names();
+  for (const char* name : {"parity", "fast", "accurate"}) {
+    ASSERT_THAT(names, Contains(name));
+    const Profile profile = load_profile(name);
+    EXPECT_EQ(profile.name, name);
+    EXPECT_FALSE(profile.about.empty());
+    for (const char* engine : {"mujoco", "bullet", "ode", "simbody", "dart"})
+      EXPECT_TRUE(profile.engines.count(engine));
+  }
+  EXPECT_EQ(load_profile("parity").settings("dart").dt, 0.002);
+}
+
+TEST(Profile, ErrorsNameFileLineExpectedAndFound) {
+  EXPECT_THAT(refusal("name: p\nengines:\n  mujocco: {dt: 0.002}\n"),
+              AllOf(HasSubstr("p.yaml:3"), HasSubstr("'mujoco'")));
+  EXPECT_THAT(refusal("name: p\nengines:\n  ode: {dt: 0.003}\n"),
+              AllOf(HasSubstr("p.yaml:3"), HasSubstr("divides 0.02")));
+  EXPECT_THAT(refusal("name: p\nengines:\n  ode: {dt: fast}\n"), HasSubstr("found 'fast'"));
+  EXPECT_THAT(refusal("name: p\nengines:\n  ode: 3\n"), HasSubstr("expected a mapping"));
+  EXPECT_THAT(refusal("name: p\nengines: []\n"), HasSubstr("expected a mapping"));
+  EXPECT_THAT(refusal("schema: duet.profile/9\nname: p\nengines: {}\n"), HasSubstr("duet.profile/1"));
+  EXPECT_THAT(refusal("name: p\nenginess: {}\n"), HasSubstr("enginess"));
+}
+
+TEST(Profile, OptionsOfAPresentEngineAreChecked) {
+  for (const EngineInfo& engine : engines()) {
+    if (!engine.available) continue;
+    EXPECT_THAT(refusal("name: p\nengines:\n  " + engine.name + ": {no_such_option: 1}\n"),
+                AllOf(HasSubstr("p.yaml:3"), HasSubstr("no_such_option"), HasSubstr(engine.name)));
+  }
+}
+
+TEST(Profile, AnUnknownNameIsRefusedWithTheNearest) {
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { load_profile("paritty"); }), HasSubstr("'parity'"));
+}
+
+TEST(Profile, AFileWithoutSchemaIsNoProfile) {
+  const test::ScratchFolder folder;
+  const std::string path = folder / "suite.yaml";
+  write_file(path, "name: x\n");
+  EXPECT_THAT(thrown_message<InputError>([&] { load_profile(path); }), HasSubstr("duet.profile/1"));
+}
+
+TEST(Profile, TheDigestIsOfWhatHoldsNotOfWhatIsWritten) {
+  for (const EngineInfo& engine : engines()) {
+    if (!engine.available || engine_module(engine.name).options.empty()) continue;
+    const EngineOption& option = engine_module(engine.name).options.front();
+    const EngineSettings silent, written{0.002, {{option.name, option.value}}}, slower{0.004, {}};
+    EXPECT_EQ(settings_digest(engine.name, silent), settings_digest(engine.name, written));
+    EXPECT_NE(settings_digest(engine.name, silent), settings_digest(engine.name, slower));
+  }
+}
+
+constexpr const char* kSuite = R"(
+schema: duet.suite/1
+name: s
+version: 1.0.0
+clips: {synth: {per_task: 1}}
+engines: [mujoco, ode]
+controllers: [vmc]
+policies: [replay]
+)";
+
+TEST(Profile, OfASuiteReadsBackFromItsResolvedText) {
+  const Suite suite = parse_suite(std::string(kSuite) + "profile: fast\n", "s.yaml");
+  EXPECT_EQ(suite.profile.settings("ode").dt, 0.004);
+  const Suite again = parse_suite(resolved_yaml(suite), "again.yaml");
+  EXPECT_EQ(again.profile.name, "fast");
+  EXPECT_EQ(again.profile.settings("ode").dt, 0.004);
+  EXPECT_EQ(suite_hash(again), suite_hash(suite));
+}
+
+TEST(Profile, DtOfASuiteIsThatOfAllItsEngines) {
+  const Suite suite = parse_suite(std::string(kSuite) + "dt: 0.001\n", "s.yaml");
+  EXPECT_EQ(suite.profile.settings("mujoco").dt, 0.001);
+  EXPECT_EQ(suite.profile.settings("ode").dt, 0.001);
+  EXPECT_NE(suite_hash(suite), suite_hash(parse_suite(kSuite, "s.yaml")));
+}
+
+TEST(Profile, EnginesAllAreThoseThatAreThere) {
+  std::string text = kSuite;
+  text.replace(text.find("[mujoco, ode]"), 13, "all");
+  const Suite suite = parse_suite(text, "s.yaml");
+  std::vector<std::string> expected = {"playback"};
+  for (const EngineInfo& engine : engines())
+    if (engine.available) expected.push_back(engine.name);
+  EXPECT_EQ(suite.engines, expected);
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,289 @@
+#include "duet/report/ranking/board.h"
+
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+#include "duet/report/page/report_parts.h"
+#include "duet/report/ranking/leaderboard.h"
+#include "duet/statistics/by_clip.h"
+#include "tests/rows/rows.h"
+
+namespace duet {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+using Rows = std::vector<EpisodeRow>;
+
+const PolicyRoles kRoles = {{"replay", {ArmRole::kOracle, "knows the motion"}},
+                            {"omni", {ArmRole::kControl, "does not read the task"}}};
+
+struct Arm {
+  std::string policy;
+  std::string successes;  // a digit a clip
+  std::string arm = "main", engine = "mujoco", controller = "vmc";
+};
+
+void add(const Arm& of, Rows& rows) {
+  for (std::size_t i = 0; i < of.successes.size(); ++i) {
+    EpisodeRow row = test::episode(of.policy, "hug", 0, of.successes[i] == '1', of.arm);
+    row.clip = "hug_" + std::to_string(i);
+    row.engine = of.engine;
+    row.controller = of.controller;
+    row.key = episode_key(row);
+    rows.push_back(row);
+  }
+}
+
+Board board_of(const std::vector<Arm>& arms) {
+  Rows rows;
+  for (const Arm& arm : arms) add(arm, rows);
+  return board(rows, {}, {.roles = kRoles});
+}
+
+std::string times(int count, char digit) { return std::string(static_cast<std::size_t>(count), digit); }
+
+std::string verdict_of(const Board& board) {
+  std::string text;
+  for (const std::string& sentence : board_verdict(board)) text += sentence + "\n";
+  return text;
+}
+
+std::vector<std::string> policies_of(const std::vector<BoardRow>& rows) {
+  std::vector<std::string> names;
+  for (const BoardRow& row : rows) names.push_back(row.policy);
+  return names;
+}
+
+TEST(Board, RanksCompetitorsAlone) {
+  const Board made = board_of({{"replay", times(40, '1')},
+                               {"a", times(20, '1') + times(20, '0')},
+                               {"b", times(30, '1') + times(10, '0')},
+                               {"omni", times(38, '1') + times(2, '0')},
+                               {"null", times(40, '0'), "null"},
+                               {"b_shuffled", times(40, '0'), "shuffled"}});
+  EXPECT_THAT(policies_of(made.rows), ElementsAre("b", "a"));
+  EXPECT_THAT(policies_of(made.references), ElementsAre("replay", "omni", "b_shuffled", "null"));
+  EXPECT_EQ(made.rows[1].rank, 2U);
+  EXPECT_EQ(made.references[0].rank, 0U);
+  const std::string verdict = verdict_of(made);
+  EXPECT_THAT(verdict, StartsWith("vmc with b is best of 2 competitors: 75.0 ["));
+  EXPECT_THAT(verdict, HasSubstr("For reference, vmc with replay (knows the motion): 100.0 ["));
+  // The lift is that over the best control, which wins here.
+  EXPECT_THAT(verdict, HasSubstr("It does not win against the best control, vmc with omni (does not read the task): "
+                                 "-20.0 ["));
+}
+
+TEST(Board, TheLiftIsOverTheNullArmWhereNoOtherControlIs) {
+  const Board made = board_of({{"a", times(36, '1') + times(4, '0')}, {"null", times(40, '0'), "null"}});
+  EXPECT_THAT(verdict_of(made), AllOf(StartsWith("vmc with a: 90.0 ["),
+                                      HasSubstr("Its lift over the best control, vmc with null (stands still), is "
+                                                "+90.0 ["),
+                                      HasSubstr("over 40 clips (exact paired test by clip: p < 0.001)")));
+  EXPECT_THAT(verdict_of(board_of({{"a", times(40, '1')}})), HasSubstr("No control was run beside it"));
+}
+
+TEST(Board, TheControllersAreRankedWhereNoPolicyCompetes) {
+  const Board made = board_of({{.policy = "replay", .successes = times(40, '1'), .controller = "wbc"},
+                               {.policy = "replay", .successes = times(20, '1') + times(20, '0')}});
+  EXPECT_TRUE(made.of_oracles);
+  EXPECT_THAT(verdict_of(made),
+              StartsWith("wbc with replay (knows the motion) is best of 2 arms that know the motion"));
+}
+
+TEST(Board, OnlyControlsAreNoCompetition) {
+  const Board made = board_of({{"null", times(40, '0'), "null"}});
+  EXPECT_TRUE(made.rows.empty());
+  EXPECT_THAT(board_verdict(made), ElementsAre("Nothing competes here: every arm is a control."));
+  EXPECT_FALSE(board_analysis(made).empty());
+}
+
+TEST(BoardVerdict, FewClipsSayNothingHoweverTheyFall) {
+  for (int clips = 1; clips < kFewestClips; ++clips) {
+    const std::string verdict = verdict_of(board_of({{"a", times(clips, '1')}, {"b", times(clips, '0')}}));
+    EXPECT_THAT(verdict, AllOf(StartsWith("Too few clips to rank 2 competitors: vmc with a has 100.0 ["),
+                               Not(HasSubstr("ahead")), Not(HasSubstr("best of"))));
+  }
+  EXPECT_THAT(verdict_of(board_of({{"a", times(30, '1')}, {"b", times(30, '0')}})),
+              HasSubstr("It is ahead of vmc with b"));
+}
+
+TEST(BoardVerdict, OneIsOne) {
+  const std::string verdict = verdict_of(board_of({{"a", "1"}, {"b", "0"}}));
+  EXPECT_THAT(verdict, AllOf(HasSubstr("(mujoco, 1 episode)"), HasSubstr("over 1 clip ("), HasSubstr("1 is too few"),
+                             Not(HasSubstr("1 episodes")), Not(HasSubstr("1 clips"))));
+}
+
+TEST(BoardVerdict, ATieIsATie) {
+  const Board made = board_of({{"a", times(40, '1')}, {"b", times(40, '1')}, {"c", times(40, '0')}});
+  EXPECT_EQ(made.rows[0].rank, 1U);
+  EXPECT_EQ(made.rows[1].rank, 1U);
+  EXPECT_EQ(made.rows[2].rank, 3U);
+  EXPECT_THAT(verdict_of(made), StartsWith("vmc with a is level with another at the head of 3 competitors, 100.0 ["));
+  EXPECT_THAT(verdict_of(made), HasSubstr("cannot be told apart from vmc with b"));
+}
+
+TEST(BoardVerdict, ALeadThatTheExactTestDoesNotSeeIsNone) {
+  // 36 of 40 against 33: six to three clips, p = .51.
+  const std::string a = times(36, '1') + times(4, '0'), b = times(30, '1') + times(6, '0') + "1110";
+  const Board made = board_of({{"a", a}, {"b", b}});
+  EXPECT_NEAR(made.lead->p, mcnemar_exact(6, 3), 1e-12);
+  EXPECT_THAT(verdict_of(made), AllOf(StartsWith("vmc with a has the most successes of 2 competitors"),
+                                      HasSubstr("these clips do not decide between the two")));
+}
+
+// The test and the interval are two approximations of one truth: where they differ, nobody reads "p = .03" beside "not
+// decided" without the reason.
+TEST(BoardVerdict, WhereTestAndIntervalDifferASentenceSaysWhich) {
+  BoardDifference of{.other = "b", .difference = 0.1, .interval = {0.02, 0.2}, .clips = 40, .p = 0.03};
+  EXPECT_EQ(told(of, 0.95), Told::kAhead);
+  of.interval.low = -0.01;
+  EXPECT_EQ(told(of, 0.95), Told::kTestAlone);
+  Board made = board_of({{"a", times(36, '1') + times(4, '0')}, {"b", times(30, '1') + times(6, '0') + "1110"}});
+  made.lead = of;
+  made.lift = of;
+  EXPECT_THAT(verdict_of(made), AllOf(HasSubstr("do not decide between the two; the exact test alone would"),
+                                      HasSubstr("holds 0, and both are asked for"), HasSubstr("p = 0.03")));
+  of.interval.low = 0.02;
+  of.p = 0.06;
+  made.lead = of;
+  EXPECT_EQ(told(of, 0.95), Told::kIntervalAlone);
+  EXPECT_THAT(verdict_of(made), HasSubstr("do not decide between the two; the interval alone would"));
+  of.interval.low = -0.01;
+  made.lead = made.lift = of;
+  EXPECT_THAT(verdict_of(made), Not(HasSubstr("alone would")));
+  of.clips = 29;
+  of.p = 0.001;
+  EXPECT_EQ(told(of, 0.95), Told::kTooFewClips);
+}
+
+TEST(BoardVerdict, EnginesAndRolesOfAClipAreOneClip) {
+  Rows rows;
+  for (const char* engine : {"bullet", "dart", "mujoco", "ode", "simbody"}) {
+    for (const char* role : {"", "-A"}) {
+      for (const bool first : {true, false}) {
+        Rows some;
+        add({.policy = first ? "a" : "b",
+             .successes = (first ? "111111" : "000111") + times(29, '1'),
+             .engine = engine},
+            some);
+        for (EpisodeRow& row : some) {
+          test::set_tag(row, kRecordingTag, row.clip);
+          row.clip += role;
+        }
+        rows.insert(rows.end(), some.begin(), some.end());
+      }
+    }
+  }
+  const Board made = board(rows, {});
+  EXPECT_EQ(made.lead->clips, 35);
+  EXPECT_NEAR(made.lead->p, 0.25, 1e-12);  // three clips, not thirty episodes
+  // Ten episodes a clip, all good: no surer than 35 clips.
+  EXPECT_NEAR(made.rows[0].interval.low, wilson(35, 35).low, 1e-12);
+}
+
+TEST(BoardVerdict, AnEngineMattersWhereTheTestSaysSo) {
+  const auto with = [](const std::string& ode) {
+    return verdict_of(board_of({{.policy = "a", .successes = times(40, '1')},
+                                {.policy = "a", .successes = ode, .engine = "ode"},
+                                {.policy = "b", .successes = times(40, '0')},
+                                {.policy = "b", .successes = times(40, '0'), .engine = "ode"}}));
+  };
+  EXPECT_THAT(with(times(38, '1') + "00"), HasSubstr("95.0 % (ode) to 100.0 % (mujoco): no more than chance gives"));
+  EXPECT_THAT(with(times(20, '1') + times(20, '0')), HasSubstr("50.0 % (ode) to 100.0 % (mujoco): more than chance"));
+  EXPECT_THAT(with(times(40, '1')), HasSubstr("It has 100.0 % in each of the 2 engines."));
+}
+
+TEST(BoardVerdict, NamesTheEnginesThatAnotherWins) {
+  const std::string verdict =
+      verdict_of(board_of({{.policy = "a", .successes = times(40, '1')},
+                           {.policy = "a", .successes = times(30, '1') + times(10, '0'), .engine = "ode"},
+                           {.policy = "b", .successes = times(20, '1') + times(20, '0')},
+                           {.policy = "b", .successes = times(35, '1') + times(5, '0'), .engine = "ode"}}));
+  EXPECT_THAT(verdict, HasSubstr("another has more successes in 1 of them (ode)"));
+}
+
+TEST(BoardVerdict, EpisodesThatFellAreNoSuccessInAnyColumn) {
+  Rows rows;
+  add({"a", times(40, '1')}, rows);
+  for (EpisodeRow& row : rows) {
+    row.verdicts.resize(1);
+    row.verdicts[0].version = row.verdicts[0].thresholds = "paper";
+    row.verdicts[0].success = true;
+    row.outcome = Outcome::kFell;
+    row.fell = true;
+  }
+  EXPECT_EQ(board(rows, {}).rows[0].mean, 0.0);
+  for (const LeaderboardEntry& entry : leaderboard(rows)) {
+    EXPECT_EQ(entry.success, 0.0);
+    EXPECT_EQ(entry.other_success.at("paper/paper"), 0.0);
+  }
+}
+
+TEST(BoardVerdict, EndsWithASuiteThatOnlyBearsTheName) {
+  Rows rows;
+  add({"a", times(40, '1')}, rows);
+  const Board made = board(rows, {}, {.label = "tiny 1.0.0, NOT it", .warning = "tiny 1.0.0 is NOT it.", .roles = {}});
+  EXPECT_EQ(board_verdict(made).back(), "tiny 1.0.0 is NOT it.");
+  const Analysis analysis = board_analysis(made);
+  EXPECT_EQ(analysis.title, "Board: tiny 1.0.0, NOT it");
+  for (const std::string& text : {analysis_markdown(analysis), analysis_csv(analysis), analysis_latex(analysis),
+                                  analysis_json(analysis).dump(), verdict_html(made), board_screen(made, {})})
+    EXPECT_THAT(text, HasSubstr("tiny 1.0.0 is NOT it."));
+}
+
+TEST(BoardScreen, FitsATerminalWhateverIsRun) {
+  std::vector<Arm> arms;
+  for (int i = 0; i < 40; ++i)
+    for (const char* engine : {"bullet", "mujoco"})
+      arms.push_back({.policy = "policy_of_a_rather_long_name_" + std::to_string(i),
+                      .successes = times(i, '1') + times(40 - i, '0'),
+                      .engine = engine,
+                      .controller = "a_controller_of_a_long_name"});
+  for (const char* policy : {"replay", "omni"})
+    for (const char* engine : {"bullet", "mujoco"})
+      arms.push_back({policy, times(40, '1'), "main", engine, "a_controller_of_a_long_name"});
+  Board made = board_of(arms);
+  made.suite.warning = times(300, 'x');
+  const std::string text = board_screen(made, {times(500, 'n'), "a note\nof two lines", "another", "and one more"});
+  std::istringstream lines(text);
+  std::size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) EXPECT_LE(line.size(), kScreenColumns) << line;
+  EXPECT_LE(count, kScreenLines);
+  EXPECT_THAT(text, AllOf(HasSubstr("replay (knows the motion)"), HasSubstr("more (--tables)"), HasSubstr("39")));
+}
+
+TEST(BoardScreen, ShowsEveryRowWhereThereIsRoom) {
+  const std::string text =
+      board_screen(board_of({{"a", times(40, '1')}, {"b", times(40, '0')}, {"null", times(40, '0'), "null"}}), {});
+  EXPECT_THAT(text, AllOf(HasSubstr("\n  1  a "), HasSubstr("\n  2  b "), HasSubstr("\n  -  null (stands still) "),
+                          Not(HasSubstr("more (--tables)"))));
+}
+
+Board with_contacts(long over) {
+  BoardRow row{.controller = "wbc_sim", .policy = "dstar", .perturbation = "clean", .arm = "main", .rank = 1};
+  row.rates.resize(1);
+  row.rates[0].engine = "mujoco";
+  row.contact = BoardContact{.episodes = 5, .touched = 4, .over = over, .worst_ratio = 0.5};
+  return {.rows = {row}};
+}
+
+TEST(BoardHtml, OnlyTouchesOverALimitAreMarked) {
+  EXPECT_THAT(board_html(with_contacts(0)), Not(HasSubstr("class=\"over\"")));
+  EXPECT_THAT(board_html(with_contacts(1)), HasSubstr("<td data-v=\"1\" class=\"over\">1 of 4"));
+}
+
+TEST(BoardHtml, ReferencesHaveNoRank) {
+  const std::string html = board_html(board_of({{"a", times(40, '1')}, {"null", times(40, '0'), "null"}}));
+  EXPECT_THAT(html, HasSubstr("<tr class=\"control\"><td class=\"l rank\" data-v=\"\">"));
+  EXPECT_THAT(html, HasSubstr("null (stands still)"));
+  EXPECT_THAT(html, HasSubstr("data-policy=\"null arm\""));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,166 @@
+#include "duet/report/studies/controller_table.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "duet/core/require.h"
+#include "tests/report/figures.h"
+#include "tests/rows/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::engine_episode;
+using test::figure;
+using test::thrown_message;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+EpisodeRow controlled(const std::string& engine, const std::string& controller, int number, double hf_ratio) {
+  EpisodeRow row = engine_episode(engine, "replay", number, true, controller);
+  row.metrics = {{"hf_ratio", hf_ratio},        {"hf_ratio_reference", 0.125}, {"dof_jerk", 800.0},
+                 {"dof_jerk_reference", 200.0}, {"root_jerk", 50.0},           {"root_jerk_reference", 25.0},
+                 {"root_error", 0.25},          {"root_angle_error", 7.5},     {"dof_error", 0.0625},
+                 {"dof_velocity_error", 0.5}};
+  return row;
+}
+
+std::vector<EpisodeRow> two_controllers() {
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 6; ++i) {
+    rows.push_back(controlled("mujoco", "vmc", i, 0.25 + 0.0625 * (i % 2)));
+    rows.push_back(controlled("bullet", "wbc_sim", i, 0.5));
+  }
+  return rows;
+}
+
+std::string text_of(const ControllerTable& table) { return analysis_markdown(controller_analysis(table)); }
+
+TEST(ControllerTable, MeansAreOverEpisodesWithTheirInterval) {
+  const ControllerTable table = controller_table(two_controllers());
+  ASSERT_EQ(table.entries.size(), 2U);
+  const ControllerEntry& vmc = table.entries[0];
+  EXPECT_EQ(vmc.controller, "vmc");
+  EXPECT_EQ(vmc.engine, "mujoco");
+  EXPECT_EQ(vmc.n, 6);
+  const Estimate& after = vmc.figures.at("hf_ratio");
+  EXPECT_EQ(after.n, 6);
+  EXPECT_DOUBLE_EQ(after.mean, 0.28125);
+  EXPECT_LE(after.interval.low, after.mean);
+  EXPECT_GE(after.interval.high, after.mean);
+  EXPECT_LT(after.interval.low, after.interval.high);
+  EXPECT_DOUBLE_EQ(vmc.figures.at("hf_ratio_reference").mean, 0.125);
+  EXPECT_DOUBLE_EQ(table.entries[1].figures.at("hf_ratio").interval.high, 0.5);  // all the same: no width
+}
+
+TEST(ControllerTable, OneClipHasNoInterval) {
+  const ControllerTable table =
+      controller_table({controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)});
+  EXPECT_DOUBLE_EQ(table.entries[0].figures.at("hf_ratio").mean, 0.375);
+  EXPECT_TRUE(std::isnan(table.entries[0].figures.at("hf_ratio").interval.low));
+  EXPECT_THAT(text_of(table), HasSubstr("    0.375 |"));
+}
+
+TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  rows[0].outcome = Outcome::kFell;
+  rows[2].outcome = Outcome::kDiverged;
+  rows[4].outcome = Outcome::kError;
+  rows[6].fell = true;  // ended well but on the ground
+  const ControllerEntry entry = controller_table(rows).entries[0];
+  EXPECT_EQ(entry.n, 6);
+  EXPECT_EQ(entry.survived, 2);
+  EXPECT_DOUBLE_EQ(entry.survival.low, wilson(2, 6).low);
+}
+
+TEST(ControllerTable, FaultsAndSafeStopsAreCounted) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  rows[0].faults.actions = 3;
+  rows[2].faults = {.observations = 40, .actions = 0, .stopped = true};
+  const ControllerTable table = controller_table(rows);
+  EXPECT_EQ(table.entries[0].faulty, 2);
+  EXPECT_EQ(table.entries[0].stopped, 1);
+  EXPECT_EQ(table.entries[1].faulty, 0);
+  EXPECT_THAT(text_of(table), HasSubstr("2 (1 stopped)"));
+}
+
+TEST(ControllerTable, EpisodesThatCouldNotRunAreInNoFigure) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  for (int i = 0; i < 3; ++i) {
+    rows.push_back(engine_episode("mujoco", "replay", i, false, "homie"));
+    rows.back().outcome = Outcome::kUnsupported;
+  }
+  const ControllerTable table = controller_table(rows);
+  const ControllerEntry& homie = table.entries[0];
+  EXPECT_EQ(homie.controller, "homie");
+  EXPECT_EQ(homie.n, 0);
+  EXPECT_EQ(homie.unsupported, 3);
+  EXPECT_TRUE(std::isnan(homie.figures.at("hf_ratio").mean));
+  EXPECT_THAT(text_of(table), HasSubstr("3 episodes could not run on this machine"));
+}
+
+TEST(ControllerTable, PlaybackAndOtherArmsAreLeftOut) {
+  std::vector<EpisodeRow> rows = {controlled("playback", "vmc", 0, 0.1), controlled("mujoco", "vmc", 0, 0.1)};
+  rows.back().arm = "null";
+  EXPECT_TRUE(controller_table(rows).entries.empty());
+  EXPECT_EQ(text_of(controller_table(rows)), "No episode ran under a controller in a physics engine.\n");
+  EXPECT_EQ(controller_analysis({}).figures.size(), 0U);
+}
+
+TEST(ControllerTable, CleanComesBeforePerturbationsAndTheyAreNamed) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  EXPECT_THAT(text_of(controller_table(rows)),
+              AllOf(HasSubstr("Perturbation clean."), Not(HasSubstr("| Perturbation |"))));
+  EpisodeRow pushed = controlled("bullet", "wbc_sim", 0, 0.75);
+  pushed.perturbation = "a_push";
+  rows.insert(rows.begin(), pushed);
+  const ControllerTable table = controller_table(rows);
+  ASSERT_EQ(table.entries.size(), 3U);
+  EXPECT_EQ(table.entries[2].perturbation, "a_push");
+  EXPECT_THAT(text_of(table), HasSubstr("| Perturbation "));
+}
+
+TEST(ControllerTable, ThePapersRowsStandBesideOursAndSaySo) {
+  const ControllerTable table = controller_table(two_controllers());
+  const std::string text = text_of(table);
+  EXPECT_THAT(text, AllOf(HasSubstr("the paper's"), HasSubstr("D-STAR"), HasSubstr("another experiment")));
+  EXPECT_THAT(text, AllOf(HasSubstr("0.614"), HasSubstr("52.6"), HasSubstr("0.446")));
+  const Analysis analysis = controller_analysis(table);
+  const auto printed = [&](const char* policy, const char* controller, const char* name) {
+    return figure(analysis, {.source = "paper", .controller = controller, .policy = policy, .name = name});
+  };
+  EXPECT_EQ(printed("D-STAR", "WBC-Sim", "hf_ratio").value, 0.614);
+  EXPECT_EQ(printed("DP", "WBC-Sim", "dof_jerk_reference").value, 180.0);
+  EXPECT_EQ(printed("DP", "TWIST2", "dof_velocity_error").unit, "rad/s");
+}
+
+TEST(ControllerTable, FiguresAreOfEachControllerAndEngine) {
+  const Analysis analysis = controller_analysis(controller_table(two_controllers()));
+  const Figure ratio =
+      figure(analysis, {.engine = "mujoco", .controller = "vmc", .perturbation = "clean", .name = "hf_ratio"});
+  EXPECT_EQ(ratio.n, 6);
+  EXPECT_DOUBLE_EQ(ratio.value, 0.28125);
+  EXPECT_LT(ratio.interval.low, ratio.interval.high);
+  const Figure survival = figure(analysis, {.engine = "bullet", .controller = "wbc_sim", .name = "survival"});
+  EXPECT_EQ(survival.k, 6);
+  EXPECT_DOUBLE_EQ(survival.value, 1.0);
+}
+
+TEST(ControllerTable, OrderOfRowsDoesNotMatter) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  const std::string before = analysis_csv(controller_analysis(controller_table(rows)));
+  std::reverse(rows.begin(), rows.end());
+  EXPECT_EQ(analysis_csv(controller_analysis(controller_table(rows))), before);
+}
+
+TEST(ControllerTable, TheSameEpisodeTwiceIsRefused) {
+  std::vector<EpisodeRow> rows = two_controllers();
+  rows.push_back(rows.front());
+  EXPECT_THAT(thrown_message<InputError>([&] { controller_table(rows); }), HasSubstr("is there twice"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,167 @@
+#include "duet/report/studies/human_agreement.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "duet/core/file.h"
+#include "duet/report/tables/analysis.h"
+#include "tests/rows/rows.h"
+#include "tests/support.h"
+
+namespace duet {
+namespace {
+
+using test::thrown_message;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// Eight episodes of clips of their own: the headline sees success in the first four; the set `strict` in two of them.
+std::vector<EpisodeRow> eight_rows() {
+  std::vector<EpisodeRow> rows;
+  for (int i = 0; i < 8; ++i) {
+    EpisodeRow row = test::episode("dstar", "hug", 3 * i, i < 4);
+    for (const auto& [set, successes] : {std::pair("paper", 4), std::pair("strict", 2)}) {
+      Verdict& verdict = row.verdicts.emplace_back();
+      verdict.version = "robot";
+      verdict.thresholds = set;
+      verdict.success = i < successes;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+// A letter per episode: y, n, u, or - for no answer.
+Rater rater(const std::string& name, const std::string& letters, const std::vector<EpisodeRow>& rows) {
+  Rater made{.name = name, .file = name + ".csv", .answers = {}};
+  for (std::size_t i = 0; i < letters.size(); ++i)
+    if (letters[i] != '-')
+      made.answers[rows[i].key] = letters[i] == 'y' ? Answer::kYes : letters[i] == 'n' ? Answer::kNo : Answer::kUnsure;
+  return made;
+}
+
+const DetectorAgreement& detector(const HumanAgreement& agreement, const std::string& name) {
+  return *std::ranges::find(agreement.detectors, name, &DetectorAgreement::detector);
+}
+
+TEST(HumanAgreement, OfRatersWhoAgreeWithTheHeadlineIsWhole) {
+  const std::vector<EpisodeRow> rows = eight_rows();
+  const std::string seen = "yyyynnnn";
+  const HumanAgreement found =
+      human_agreement(rows, {rater("anna", seen, rows), rater("ben", seen, rows), rater("carla", seen, rows)});
+  EXPECT_EQ(found.pairs.size(), 3U);
+  for (const RaterPair& pair : found.pairs) EXPECT_DOUBLE_EQ(pair.kappa.value, 1.0);
+  EXPECT_DOUBLE_EQ(found.all.value, 1.0);
+  EXPECT_TRUE(found.disputes.empty());
+  EXPECT_DOUBLE_EQ(detector(found, "headline").majority.value, 1.0);
+  // Two of the four that people see: 6 of 8 agreed, half by chance.
+  const DetectorAgreement& strict = detector(found, "robot/strict");
+  EXPECT_DOUBLE_EQ(strict.majority.value, 0.5);
+  EXPECT_EQ(strict.sensitivity.k, 2);
+  EXPECT_EQ(strict.sensitivity.n, 4);
+  EXPECT_DOUBLE_EQ(strict.specificity.rate, 1.0);
+  EXPECT_LT(strict.specificity.interval.low, 0.6);  // of four clips
+}
+
+TEST(HumanAgreement, DisputesAndMajorities) {
+  const std::vector<EpisodeRow> rows = eight_rows();
+  const HumanAgreement found = human_agreement(
+      rows, {rater("anna", "yyyynnn-", rows), rater("ben", "yyuynnn-", rows), rater("carla", "ynnynny-", rows)});
+  EXPECT_EQ(found.episodes, 7);
+  EXPECT_EQ(found.yes, 3);  // the third has one of each
+  EXPECT_EQ(found.no, 3);
+  ASSERT_EQ(found.disputes.size(), 3U);
+  EXPECT_EQ(found.disputes[1].row->key, rows[2].key);
+  EXPECT_THAT(found.disputes[1].answers, ElementsAre("yes", "unsure", "no"));
+  EXPECT_EQ(detector(found, "headline").majority.n, 6);
+  EXPECT_EQ(detector(found, "headline").raters[1].n, 6);  // ben's unsure is left out
+  const nlohmann::json disputes = disputes_json(found);
+  EXPECT_EQ(disputes.at(1).at("episode"), rows[2].key);
+  EXPECT_EQ(disputes.at(1).at("answers").at("ben"), "unsure");
+}
+
+TEST(HumanAgreement, AnEpisodeThatFellIsNoSuccessOfAnyDetector) {
+  std::vector<EpisodeRow> rows = eight_rows();
+  rows[0].outcome = Outcome::kFell;
+  rows[0].success = false;
+  const HumanAgreement found = human_agreement(rows, {rater("anna", "yyyynnnn", rows)});
+  EXPECT_EQ(detector(found, "robot/paper").sensitivity.k, 3);
+}
+
+TEST(HumanAgreement, WhatIsNotAnsweredCountsForNobody) {
+  const std::vector<EpisodeRow> rows = eight_rows();
+  const HumanAgreement found = human_agreement(rows, {rater("anna", "yyyy----", rows), rater("ben", "--yynnnn", rows)});
+  EXPECT_EQ(found.pairs.at(0).kappa.n, 2);
+  EXPECT_TRUE(std::isnan(found.pairs[0].kappa.value));  // both say yes to both
+  EXPECT_EQ(found.all.n, 0);
+  const std::string text = terminal_text(human_agreement_analysis(found));
+  EXPECT_THAT(text, AllOf(HasSubstr("Rater anna answered 4 of 8 episodes."), HasSubstr("anna, ben")));
+  const HumanAgreement apart = human_agreement(rows, {rater("anna", "yy------", rows), rater("ben", "--nn----", rows)});
+  EXPECT_EQ(apart.pairs.at(0).kappa.n, 0);
+  EXPECT_TRUE(std::isnan(apart.pairs[0].kappa.value));
+  EXPECT_THROW(human_agreement(rows, {}), std::invalid_argument);
+}
+
+class RatingFiles : public testing::Test {
+ protected:
+  std::string file(const std::string& name, const std::string& text) {
+    write_file(folder_ / name, text);
+    return folder_ / name;
+  }
+  std::string refused(const std::vector<std::string>& files) {
+    return thrown_message<InputError>([&] { read_ratings(files, rows_, "runs/a"); });
+  }
+  std::string refused_text(const std::string& text) { return refused({file("a.csv", text)}); }
+  [[nodiscard]] std::string line(std::size_t episode, const std::string& rest) const {
+    return rows_[episode].key + "," + rest + "\n";
+  }
+  const std::vector<EpisodeRow> rows_ = eight_rows();
+  const std::string header_ = "episode,rater,answer\n";
+  test::ScratchFolder folder_;
+};
+
+TEST_F(RatingFiles, AreReadAsThePageAndASpreadsheetWriteThem) {
+  const std::string page = file("a.csv", header_ + line(0, "\"Anna, B.\",yes") + line(1, "\"Anna, B.\",unsure"));
+  const std::string sheet = file("b.csv",
+                                 "\xef\xbb\xbf"
+                                 "episode;rater;answer\r\n" +
+                                     rows_[2].key + ";Ben;no\r\n;;\r\n");
+  const std::vector<Rater> raters = read_ratings(std::vector{page, sheet}, rows_, "runs/a");
+  ASSERT_EQ(raters.size(), 2U);
+  EXPECT_EQ(raters[0].name, "Anna, B.");
+  EXPECT_EQ(raters[0].answers.at(rows_[1].key), Answer::kUnsure);
+  EXPECT_EQ(raters[1].answers.at(rows_[2].key), Answer::kNo);
+}
+
+TEST_F(RatingFiles, AreRefusedWithFileAndLine) {
+  EXPECT_THAT(refused_text(""), AllOf(HasSubstr("a.csv"), HasSubstr("expected the header 'episode,rater,answer'")));
+  EXPECT_THAT(refused_text("key,answer\n"), HasSubstr("found 'key,answer'"));
+  EXPECT_THAT(refused_text(header_), HasSubstr("a.csv': expected a line for each answer, found none"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna,yes") + "0123,anna,yes\n"),
+              HasSubstr("a.csv': line 3: expected an episode of 'runs/a', found '0123'"));
+  EXPECT_THAT(refused_text(header_ + "0123,anna,yes\n4567,anna,no\n"),
+              HasSubstr("these are ratings of another run: of their episodes none is in 'runs/a'"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna,yess")),
+              HasSubstr("line 2: unknown answer 'yess': did you mean 'yes'?"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna,")), HasSubstr("line 2: unknown answer ''"));
+  EXPECT_THAT(refused_text(header_ + line(0, ",yes")), HasSubstr("line 2: expected the rater's name, found nothing"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna")),
+              HasSubstr("line 2: expected 3 fields (episode, rater, answer), found 2"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna,yes") + line(1, "ben,yes")),
+              HasSubstr("line 3: expected the answers of one rater, 'anna', found 'ben'"));
+  EXPECT_THAT(refused_text(header_ + line(0, "anna,yes") + line(0, "anna,no")), HasSubstr("is answered already"));
+  EXPECT_THAT(refused({folder_ / "none.csv"}), HasSubstr("none.csv"));
+}
+
+TEST_F(RatingFiles, ARaterHasOneFile) {
+  const std::string a = file("a.csv", header_ + line(0, "anna,yes"));
+  const std::string b = file("b.csv", header_ + line(1, "anna,no"));
+  EXPECT_THAT(refused({a, b}),
+              AllOf(HasSubstr("b.csv': expected another rater than in '"), HasSubstr("found 'anna' again")));
+  EXPECT_THAT(refused({a, a}), HasSubstr("found 'anna' again"));
+}
+
+}  // namespace
+}  // namespace duet

@@ -1,0 +1,94 @@
+// The table of the rule interaction: who succeeds beside the detectors of before, and what failed episodes lack.
+#include "duet/report/studies/interaction_table.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/report/figures.h"
+#include "tests/report/policy_rows.h"
+
+namespace duet {
+namespace {
+
+using test::add_episodes;
+using test::figure;
+using testing::HasSubstr;
+
+Verdict ruled(bool success, const NamedFlags& parts, const NamedNumbers& values = {}) {
+  Verdict verdict;
+  verdict.version = "interaction";
+  verdict.thresholds = "act";
+  verdict.success = success;
+  verdict.parts = parts;
+  verdict.values = values;
+  return verdict;
+}
+
+// Adds episodes of one task whose verdicts of the rule are these.
+void add_judged(const std::string& policy, const std::string& task, const std::string& arm, int first,
+                const std::vector<Verdict>& verdicts, std::vector<EpisodeRow>& rows) {
+  std::string successes;
+  for (const Verdict& verdict : verdicts) successes += verdict.success ? '1' : '0';
+  const std::size_t begin = rows.size();
+  add_episodes({.policy = policy, .arm = arm, .task = task, .successes = successes, .first = first}, rows);
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    rows[begin + i].verdicts.push_back(verdicts[i]);
+    Verdict& before = rows[begin + i].verdicts.emplace_back();
+    before.version = "robot";
+    before.thresholds = "paper";
+    before.success = true;
+  }
+}
+
+std::vector<EpisodeRow> judged_rows() {
+  const Verdict right = ruled(true, {{"act", true}, {"touch", true}, {"reply", true}}, {{"lead_s", -0.2}});
+  const Verdict hasty = ruled(false, {{"act", true}, {"touch", false}, {"reply", false}}, {{"lead_s", 0.8}});
+  const Verdict idle = ruled(false, {{"act", false}, {"touch", false}, {"reply", true}});
+  const Verdict unknown = ruled(false, {{"judged", false}});
+  std::vector<EpisodeRow> rows;
+  add_judged("omni", "wave", "control", 0, {hasty, hasty, idle, unknown}, rows);
+  add_judged("dstar", "wave", "main", 0, {right, right, hasty, idle}, rows);
+  add_judged("dstar", "hug", "main", 4, {right, idle}, rows);
+  add_judged("null", "wave", "null", 0, {idle, idle, idle, idle}, rows);
+  return rows;
+}
+
+TEST(InteractionTable, SaysWhichConditionFailedEpisodesLack) {
+  const InteractionTable table = interaction_table(judged_rows());
+  ASSERT_EQ(table.entries.size(), 7U);  // three arms, of each all tasks and every one
+  const InteractionEntry& dstar = table.entries[0];
+  EXPECT_EQ(dstar.key.policy, "dstar") << "the best arm first";
+  EXPECT_EQ(dstar.task, "all");
+  EXPECT_EQ(dstar.success.k, 3);
+  EXPECT_EQ(dstar.success.n, 6);
+  EXPECT_EQ(dstar.before.k, 6);
+  EXPECT_EQ(dstar.failed, (std::map<std::string, long>{{"act", 2}, {"touch", 3}, {"reply", 1}}));
+  EXPECT_EQ(dstar.led, 4);
+  EXPECT_EQ(dstar.false_starts, 1);
+  EXPECT_EQ(table.entries[1].task, "hug");
+  EXPECT_EQ(table.entries[1].success.k, 1);
+  const auto omni = std::ranges::find(table.entries, "omni", [](const InteractionEntry& e) { return e.key.policy; });
+  ASSERT_NE(omni, table.entries.end());
+  EXPECT_EQ(omni->unjudged, 1);
+  EXPECT_EQ(omni->failed.at("touch"), 3);
+}
+
+TEST(InteractionTable, PrintsAndListsThem) {
+  const Analysis analysis = interaction_analysis(interaction_table(judged_rows()));
+  const std::string text = analysis_markdown(analysis);
+  EXPECT_THAT(text, HasSubstr("What failed episodes lack"));
+  EXPECT_THAT(text, HasSubstr("omni (control arm)"));
+  EXPECT_THAT(text, HasSubstr("Not judged"));
+  EXPECT_EQ(figure(analysis, {.policy = "omni", .task = "wave", .of = "reply", .name = "failed"}).value, 2.0);
+  EXPECT_EQ(figure(analysis, {.policy = "omni", .task = "wave", .name = "not_judged"}).value, 1.0);
+  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "all", .name = "success"}).k, 3);
+  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "all", .of = "robot/paper", .name = "success"}).k, 6);
+}
+
+TEST(InteractionTable, IsOfRunsThatTheRuleJudged) {
+  std::vector<EpisodeRow> rows;
+  add_episodes({}, rows);
+  EXPECT_TRUE(interaction_analysis(interaction_table(rows)).empty());
+}
+
+}  // namespace
+}  // namespace duet
