@@ -17,12 +17,14 @@ TRIALS = 5
 
 
 def job_seconds():
-    """Seconds by output."""
+    """Seconds by output, of those that the build still has."""
+    listed = subprocess.run(("ninja", "-C", BUILD, "-t", "targets", "all"), check=True, stdout=subprocess.PIPE, text=True)
+    outputs = {line.split(": ")[0] for line in listed.stdout.splitlines()}
     seconds = {}
     with open(os.path.join(BUILD, ".ninja_log"), encoding="utf-8") as file:
         for line in file:
             fields = line.rstrip("\n").split("\t")
-            if len(fields) == 5:
+            if len(fields) == 5 and fields[3] in outputs:
                 seconds[fields[3]] = (int(fields[1]) - int(fields[0])) / 1000
     return seconds
 

@@ -169,7 +169,9 @@ void check_filters(const RunPart& part, const Suite& suite) {
   for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
   check(part.engines, suite.engines, "engine");
   check(part.controllers, controller_names_of(suite), "controller");
-  check(part.policies, policy_names_of(suite), "policy");
+  std::vector<std::string> policies = policy_names_of(suite);
+  policies.insert(policies.end(), suite.controls.begin(), suite.controls.end());
+  check(part.policies, policies, "policy");
   check(part.tasks, tasks, "task");
   check(part.perturbations, perturbation_names_of(suite), "perturbation");
 }

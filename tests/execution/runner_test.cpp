@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 
 #include "duet/backends/factory.h"
 #include "duet/controllers/catalogue/registry.h"
@@ -167,6 +168,18 @@ TEST(Runner, FiltersThatTheSuiteDoesNotHaveAreRefused) {
       HasSubstr("the suite has no task 'hug'"));
   options.tasks = {"wave"};
   EXPECT_EQ(run(test::playback_suite(), folder / "run", options).planned, 2);
+}
+
+TEST(Runner, ControlsAreChosenByNameAsPoliciesAre) {
+  const test::ScratchFolder folder;
+  Suite suite = test::playback_suite();
+  suite.controls = {"omni", "raised"};
+  RunOptions options;
+  options.policies = {"raised"};
+  run(suite, folder / "run", options);
+  std::set<std::string> arms;
+  for (const EpisodeRow& row : load_run(folder / "run").rows) arms.insert(row.policy);
+  EXPECT_EQ(arms, (std::set<std::string>{"null", "raised"}));
 }
 
 TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
