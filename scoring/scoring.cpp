@@ -17,6 +17,7 @@
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/roles.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 namespace {
@@ -123,7 +124,10 @@ Verdict interaction_verdict(const Recording& recording, const ActSource& source,
   Verdict verdict;
   verdict.version = to_string(DetectorVersion::kInteraction);
   verdict.thresholds = to_string(ThresholdSet::kAct);
-  if (const std::string why_not = cannot_judge(task, evidence); !why_not.empty()) {
+  std::string why_not = cannot_judge(task, evidence);
+  if (why_not.empty() && row.engine == kPlaybackEngine && definition_of(task).interaction.touch != Touch::kNone)
+    why_not = "playback has no physics, so that nothing touches";
+  if (!why_not.empty()) {
     verdict.parts["judged"] = false;
     if (row.message.empty()) row.message = "cannot be judged under `interaction`: " + why_not;
     return verdict;

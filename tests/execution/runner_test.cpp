@@ -182,6 +182,20 @@ TEST(Runner, ControlsAreChosenByNameAsPoliciesAre) {
   EXPECT_EQ(arms, (std::set<std::string>{"null", "raised"}));
 }
 
+TEST(Runner, ATouchInPlaybackCannotBeJudgedByTheRuleInteraction) {
+  const test::ScratchFolder folder;
+  Suite suite = test::playback_suite();
+  suite.detector = DetectorVersion::kInteraction;
+  run(suite, folder / "run");
+  for (const EpisodeRow& row : load_run(folder / "run").rows) {
+    const bool touches = row.task == "handshake";
+    EXPECT_EQ(row.message.starts_with("cannot be judged under `interaction`: playback has no physics"), touches);
+    if (touches) {
+      EXPECT_EQ(row.success, false);
+    }
+  }
+}
+
 TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
   const auto robot = test::g1();
   PairedMotion clip = test::paired(Task::kWave, *robot);
