@@ -26,7 +26,7 @@ std::size_t checked_categories(const std::vector<std::span<const int>>& raters, 
   }
   require(weights.empty() || weights.size() == subjects, "kappa: expected a weight for each of {} subjects, found {}",
           subjects, weights.size());
-  return static_cast<std::size_t>(largest + 1);
+  return static_cast<std::size_t>(largest) + 1;
 }
 
 double weight_of(std::span<const double> weights, std::size_t subject) {

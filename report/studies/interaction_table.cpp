@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "duet/report/tables/cells.h"
 #include "duet/rows/groups/distinct_episodes.h"
@@ -182,11 +183,11 @@ InteractionTable interaction_table(const std::vector<EpisodeRow>& rows, double l
   InteractionTable table{.level = level, .entries = {}};
   if (!judged) return table;
   std::vector<std::vector<InteractionEntry>> found;
+  found.reserve(arms.size());
   for (const auto& [key, episodes] : arms) found.push_back(entries_of(key, episodes, level));
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.front().success.rate > b.front().success.rate; });
-  for (std::vector<InteractionEntry>& entries : found)
-    for (InteractionEntry& entry : entries) table.entries.push_back(std::move(entry));
+  for (std::vector<InteractionEntry>& entries : found) std::ranges::move(entries, std::back_inserter(table.entries));
   return table;
 }
 
