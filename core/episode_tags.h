@@ -1,4 +1,4 @@
-// What tables know of an episode beside its names: values by name, as text. A suite says them, or they follow from what
+// Values by name, as text, that tables know of an episode beside its names. A suite says them, or they follow from what
 // it runs; a row holds them from where it is made. Names of perturbations, policies and clips are parsed by nobody.
 #pragma once
 
@@ -18,7 +18,7 @@ inline std::string row_tag(std::string_view of, std::string_view name) {
   return std::string(of).append(".").append(name);
 }
 
-// Of a perturbation: its kinds ("push", "jitter+dropout"); where it is one value that is 0 in a clean episode, that
+// A perturbation's kinds ("push", "jitter+dropout"); where it is one value that is 0 in a clean episode, that
 // value in SI units, its unit, which value it is ("push", "partner.shift_s"), and the other values of its kind.
 inline constexpr std::string_view kKindsTag = "perturbation.kinds", kFamilyTag = "perturbation.family",
                                   kSizeTag = "perturbation.size", kUnitTag = "perturbation.unit",
@@ -33,8 +33,8 @@ struct PerturbationSize {
   std::string beside;  // the kind's other values: "duration: 1, every: 4"
 };
 
-// Of a clip: who its people are; the clip that shows the same recording in the other role, where there is one before
-// it; what a variant asks for.
+// A clip's tags: who its people are; the clip that shows the same recording in the other role, where there is one
+// before it; what a variant asks for.
 inline constexpr std::string_view kPeopleTag = "clip.people", kRecordingTag = "clip.recording", kSideTag = "clip.side",
                                   kHeightTag = "clip.target_height";
 inline constexpr std::string_view kRecordedPeople = "recorded", kSyntheticPeople = "synthetic";

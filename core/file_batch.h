@@ -18,7 +18,7 @@ class FileBatch {
   FileBatch(const FileBatch&) = delete;
   FileBatch& operator=(const FileBatch&) = delete;
 
-  // As write_file(), but that the file has not its name yet. What was written for the same path before is replaced.
+  // As write_file(), but that the file has not its name yet. A second one for the same path replaces the first.
   void write(const std::string& path, std::string_view bytes);
   // Throws StorageError; the files before the one that it names are in place then.
   void put_in_place();

@@ -38,7 +38,7 @@ std::map<std::string, Tags> synthetic_clips(const Suite& suite) {
   return clips;
 }
 
-// What the clips of rows were, from their suite and the ids that it gives.
+// The tags of the rows' clips, from their suite and the ids that it gives.
 class ClipTags {
  public:
   ClipTags(const Suite& suite, const std::vector<EpisodeRow>& rows)
@@ -63,7 +63,7 @@ class ClipTags {
   }
 
  private:
-  // What set_reactor calls a clip in which the robot takes the other person's place.
+  // The names that set_reactor gives a clip in which the robot takes the other person's place.
   static std::vector<std::string> other_roles(const std::string& id) {
     std::vector<std::string> others = {id + "-A", id + "-B"};
     if (id.ends_with("-A") || id.ends_with("-B")) others.push_back(id.substr(0, id.size() - 2));

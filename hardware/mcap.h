@@ -26,7 +26,7 @@ struct McapChannel {
 // zstd.
 enum class McapChunks { kNone, kOneMessage, kZstd };
 
-// One owner, one thread. What write(), flush() and finish() say once they go on saying; error() is the system's reason.
+// One owner, one thread. A failure of write(), flush() or finish() stays; error() is the system's reason.
 class McapWriter {
  public:
   // Makes `path`; throws StorageError where it is there already or cannot be made.

@@ -73,7 +73,7 @@ void RobotGuard::receive(const PlannerMessage& message, double now) {
   const bool taken = planner_order_.takes(message.sequence, now);
   count_streams();
   if (!taken) return;
-  // What the limiter refuses does not keep the planner alive: the last good command grows old.
+  // A command that the limiter refuses does not keep the planner alive: the last good command grows old.
   if (!limiter_.refusal(message.command, limiter_state_)) next_.planner_at = now;
   planner_ = message;
   planner_is_new_ = true;

@@ -30,7 +30,7 @@ struct GuardSetup {
   bool has_battery = false;                         // its charge is reported, and an unknown one holds
 };
 
-// What a planner sends. `sequence` rises (hardware/stream_order.h).
+// A planner's message. `sequence` rises (hardware/stream_order.h).
 struct PlannerMessage {
   std::uint64_t sequence = 0;
   MotionCommand command;

@@ -176,7 +176,7 @@ class ContactSafety {
 
 // For result rows: "human.peak_n", "human.settled_n", "human.impulse_ns", "human.worst_ratio", "human.limits_verified"
 // (0 or 1) and, for each region that was touched, "human.<region>." with "peak_n", "quasi_static_n", "transient_n",
-// "settled_n", "impulse_ns", "pressure_n_cm2", "worst_ratio". What is absent in the result is absent here.
+// "settled_n", "impulse_ns", "pressure_n_cm2", "worst_ratio". A figure that the result lacks is absent here.
 std::map<std::string, double> contact_forces(const ContactSafetyResult& result);
 
 // Headline figures by catalogue name: contact_peak_force, contact_quasi_static_force, contact_impulse,

@@ -11,7 +11,7 @@
 namespace duet {
 namespace {
 
-// What is wrong with a tag; "" for nothing.
+// The fault of a tag; "" for none.
 std::string tag_fault(std::string_view of, const std::string& name, const YAML::Node& value) {
   if (!is_plain_name(name)) return plain_name_message(name);
   if (std::ranges::find(kDerivedTags, row_tag(of, name)) != kDerivedTags.end())

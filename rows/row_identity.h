@@ -32,7 +32,7 @@ struct FieldDifference {
   std::string first, second;  // the values as JSON; "nothing" where one has no such field; a long one is cut
 };
 
-// Of all fields that repeat (episode_row.h); the others tell when and how fast an episode ran. NaN equals NaN; two
+// The differences in fields that repeat (episode_row.h); others tell when and how fast it ran. NaN equals NaN; two
 // values of numbers are equal where they are the same number. Tags are compared where both rows have some: rows from
 // before there were any have none.
 std::vector<FieldDifference> row_differences(const EpisodeRow& first, const EpisodeRow& second);

@@ -27,7 +27,7 @@ LabelledPeople people_of(const InteractionClip& clip, const std::string& label) 
   return {at_rate(clip.a), at_rate(clip.b), label};
 }
 
-// Of any label: a clip needs a task to be made, which nothing here looks at.
+// People of any label: a clip needs a task to be made, which nothing here looks at.
 LabelledPeople read_others(const PeopleFormat& format, const ClipPlace& place, const PeopleOptions& given) {
   PeopleOptions options = given;
   options.output_rate_hz = 50.0;

@@ -45,21 +45,21 @@ struct ClipSource {
   bool other_role = false;
 };
 
-// What a suite's own clip is made with, as its rows say it.
+// The tags of a suite's own clip, as its rows say them.
 Tags tags_of(const SyntheticClip& clip) {
   Tags tags = {{std::string(kPeopleTag), std::string(kSyntheticPeople)}};
   if (clip.variant != nullptr) tags.merge(tags_of(*clip.variant));
   return tags;
 }
 
-// Who the people of a file are, by what its clip says that made it. A paired motion has tags of its own.
+// The kind of a file's people, by what its clip says that made it. A paired motion has tags of its own.
 void add_people(const Npz& npz, PairedMotion& motion) {
   if (kind_of(npz) != MotionFile::kClip) return;
   const bool synthetic = is_synthesised(get_texts(npz, "source"));
   motion.tags.insert_or_assign(std::string(kPeopleTag), synthetic ? kSyntheticPeople : kRecordedPeople);
 }
 
-// Of the people, whoever of the two the robot replaces.
+// The people's, whoever of the two the robot replaces.
 std::string people_digest(const PairedMotion& clip) {
   const auto digest = [](const HumanMotion& motion) {
     Sha256 sha256;

@@ -1,4 +1,4 @@
-// What rows hold beside names (core/episode_tags.h), made of the suite's values with the row.
+// The values that rows hold beside names (core/episode_tags.h), made of the suite's values with the row.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace duet {
 // std::invalid_argument for names that are not in the suite.
 Tags with_named_tags(Tags of_perturbation, const Suite& suite, const std::string& clip, const std::string& policy);
 
-// Of an episode, with those of its clip.
+// An episode's tags, with those of its clip.
 Tags episode_tags(Tags of_perturbation, const Suite& suite, const PairedMotion& clip, const std::string& policy);
 
 }  // namespace duet

@@ -36,7 +36,7 @@ struct ClipVariant {
 
 // Gives what the variant asks for to the options of its clip.
 void vary(const ClipVariant& variant, SynthesisOptions& options);
-// What rows hold of it: side and height.
+// The tags that rows hold of it: side and height.
 Tags tags_of(const ClipVariant& variant);
 
 // How long both people stand as in the first and the last frame of each clip around it.

@@ -52,7 +52,7 @@ struct BoardDifference {
   double p = 1.0;     // sign_flip_exact
 };
 
-// What may be said of it: fewer clips than kFewestClips say nothing, however they fall. A lead takes both the exact
+// The claim that it allows: fewer clips than kFewestClips say nothing, however they fall. A lead takes both the exact
 // test and the interval; where one alone sees it, a sentence says which does not.
 enum class Told { kAhead, kApart, kTestAlone, kIntervalAlone, kTooFewClips };  // kApart: not told apart, or behind
 Told told(const BoardDifference& difference, double level);

@@ -40,7 +40,7 @@ std::string too_few(const BoardDifference& of) {
                      kFewestClips);
 }
 
-// What a reader may take for a lead where there is none, as the end of a sentence.
+// The reason why a difference is no lead, as the end of a sentence.
 std::string why_no_lead(const BoardDifference& of, double level) {
   const Told word = told(of, level);
   if (word == Told::kTestAlone)

@@ -1,4 +1,4 @@
-// What perturbations cost a policy: success under each beside the clean episodes of the same run, paired episode by
+// The cost of perturbations to a policy: success under each beside clean episodes of the same run, paired episode by
 // episode, and as curves over the sizes that rows' tags say (core/episode_tags.h), with the supplement's Table S9
 // beside them. Every engine alone, playback too; the null arm is left out.
 #pragma once

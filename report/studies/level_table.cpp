@@ -24,7 +24,7 @@ bool passes(const EpisodeRow& row) {
   return headline_success(row) && (command <= 0.0 || metric("speed_forward") >= 0.5 * command);
 }
 
-// Of the row's perturbation or clip.
+// The tag of the row's perturbation or clip.
 std::optional<LevelName> level_of(std::string_view word, std::string_view part, const EpisodeRow& row) {
   const double level = row.tags.number(row_tag(part, word));
   constexpr double kHighest = 999'999.0;  // kWholeTags
@@ -32,7 +32,7 @@ std::optional<LevelName> level_of(std::string_view word, std::string_view part, 
   return LevelName{static_cast<int>(level), row.tags.text(row_tag(part, std::string(word) + "_name"))};
 }
 
-// Of its perturbation or of its clip, whichever is higher.
+// The level of its perturbation or of its clip, whichever is higher.
 std::optional<LevelName> level_of_row(std::string_view word, const EpisodeRow& row) {
   const std::optional<LevelName> perturbed = level_of(word, kOfPerturbation, row), clip = level_of(word, kOfClip, row);
   if (perturbed && clip) return std::max(*perturbed, *clip);

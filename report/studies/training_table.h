@@ -1,5 +1,5 @@
 // One method, several trainings: policies to which the suite gives one tag `method` and different tags `seed` are
-// networks of one method that learnt with other seeds. What each training achieves, their mean and spread, and every
+// networks of one method that learnt with other seeds. Each training's success, their mean and spread, and every
 // method against every other where both trainings and clips are random effects (results/statistics/crossed_effects.h):
 // a difference that another seed would turn round is none. The main arm only; nothing depends on the order of rows.
 #pragma once

@@ -35,7 +35,7 @@ struct Perturbation {
 // not 0 in a clean episode (a friction, a scale).
 std::optional<PerturbationSize> size_of(const Perturbation& perturbation);
 
-// What rows hold of it: its tags, its kinds and its size. Of the clean arm nothing but its tags.
+// The tags that rows hold: its own, its kinds and its size. The clean arm has nothing but its own.
 Tags tags_of(const Perturbation& perturbation);
 
 // The kinds that may be named alone, with their defaults: one table (rollout/perturbation_kinds.h).

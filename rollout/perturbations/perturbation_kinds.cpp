@@ -190,7 +190,7 @@ bool is_default(const PerturbationKind& kind, const std::string& name, const std
   return row != kind.rows.end() && row->fallback == text;
 }
 
-// Of a kind with several such values one alone may differ from a clean episode, and no other value.
+// In a kind with several such values one alone may differ from a clean episode, and no other value.
 std::optional<PerturbationSize> size_in(const PerturbationKind& kind, const Perturbation& of) {
   const bool several = kind.axes.size() > 1;
   std::optional<PerturbationSize> size;

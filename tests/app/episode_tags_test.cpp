@@ -1,4 +1,4 @@
-// What rows hold beside names: from the suite's values where they are made, and from the run's suite where they are
+// The values that rows hold beside names: from the suite where they are made, and from the run's suite where they are
 // from before there were tags.
 #include "duet/experiment/plan/episode_tags.h"
 

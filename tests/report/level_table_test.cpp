@@ -16,7 +16,7 @@ using test::figures_like;
 using testing::AllOf;
 using testing::HasSubstr;
 
-// Of a perturbation or a clip.
+// A perturbation's or a clip's.
 Tags rung(std::string_view of, const std::string& word, int number, const std::string& name) {
   return {{row_tag(of, word), std::to_string(number)}, {row_tag(of, word + "_name"), name}};
 }

@@ -165,7 +165,7 @@ std::string size_text(const std::string& item) {
   return size ? fmt::format("{} {} {} ({})", size->family, size->x, size->unit, size->beside) : "none";
 }
 
-// What it does is its size, whatever it is called.
+// Its value is its size, whatever it is called.
 TEST(PerturbationSize, IsItsOneValueThatACleanEpisodeLacks) {
   EXPECT_EQ(size_text("{name: push_60n, push: {force: 5}}"), "push 5 N (duration: 1, every: 4)");
   EXPECT_EQ(size_text("{name: jitter_9m, jitter: {sigma: 0.01}}"), "jitter 0.01 m ()");
