@@ -3,8 +3,8 @@
 
   ./run mutants [SEED] [COUNT] [ROOM...]     (builds first; SEED 1, COUNT 40, all rooms)
 
-A changed file is compiled with the command of its build in a scratch folder (build/mutants) and linked in front of the
-room's library; the source tree and the build are only read. Then the tests of its room run, quick suites first, and
+A changed file is compiled with the command of its build and linked in front of the room's library, in folders of its own
+within the build (a program finds the tree's files only from there); all else of tree and build is only read. Then the tests of its room run, quick suites first, and
 among them those that include the file's header. A test that fails, a crash and a run out of its time limit have noticed
 the change.
 
@@ -100,6 +100,12 @@ def suite_times(log):
 class Trials:
     def __init__(self, build, scratch, quick):
         self.build, self.scratch, self.quick, self.lock = build, scratch, quick, threading.Lock()
+
+    def folder(self, worker):
+        """Where a worker compiles and links: in the build, where its programs find the files of the tree."""
+        folder = pathlib.Path(self.build.folder) / 'mutants' / f'worker{worker}'
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
 
     def baseline(self, room):
         """Processor seconds of the tests of a room, which have to pass unchanged, and {suite: milliseconds}."""
@@ -297,7 +303,6 @@ def ask(mutants, arguments, trials, report):
     known, iterator, taking = equivalents(), iter(mutants), threading.Lock()
 
     def work(folder):
-        folder.mkdir(parents=True, exist_ok=True)
         while True:
             with taking:
                 wanted = report.asked() + work.pending < arguments.count and not work.failed
@@ -317,7 +322,7 @@ def ask(mutants, arguments, trials, report):
 
     work.pending, work.failed = 0, False
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-        for done in [pool.submit(work, trials.scratch / f'worker{i}') for i in range(arguments.jobs)]:
+        for done in [pool.submit(work, trials.folder(i)) for i in range(arguments.jobs)]:
             done.result()
 
 
@@ -348,9 +353,8 @@ def main():
     scratch.mkdir(parents=True, exist_ok=True)
     settled = ['noticed', 'nocompile', 'same'] + ['unnoticed', 'SURVIVED'] * (arguments.quick and not arguments.again)
     trials, report = Trials(build, scratch, arguments.quick), Report(scratch, arguments.seed, settled)
-    (scratch / 'worker0').mkdir(exist_ok=True)
     for path in list(dict.fromkeys(m.path for m in mutants))[:arguments.control]:
-        if complaint := trials.control(path, scratch / 'worker0'):
+        if complaint := trials.control(path, trials.folder(0)):
             report.say(complaint)
             return 1
     began = time.monotonic()
