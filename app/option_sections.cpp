@@ -6,9 +6,9 @@
 #include "duet/app/synth_options.h"
 #include "duet/backends/factory.h"
 #include "duet/controllers/catalogue/registry.h"
-#include "duet/experiment/training/train_options.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/external_policy.h"
+#include "duet/training/setup/train_options.h"
 
 namespace duet {
 namespace {

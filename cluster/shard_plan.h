@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/experiment/training/train_options.h"
+#include "duet/training/setup/train_options.h"
 
 namespace duet {
 

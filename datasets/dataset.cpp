@@ -24,8 +24,8 @@
 #include "duet/metrics/grounding.h"
 #include "duet/metrics/object_metrics.h"
 #include "duet/metrics/retargeting.h"
-#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_files.h"
+#include "duet/people/formats/people_formats.h"
 #include "duet/retarget/pair.h"
 #include "duet/rows/json_fields.h"
 

@@ -24,7 +24,7 @@ struct DatasetRobot {
 
 struct DatasetPlan {
   std::vector<std::string> inputs;  // files and folders, as the user names them
-  std::string format = {};          // of motion/people/people_format.h; empty: recognised
+  std::string format = {};          // of people/people_format.h; empty: recognised
   PeopleOptions people = {};
   CurationOptions curation = {};
   Annotations annotations = {};

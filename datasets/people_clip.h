@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/source_clip.h"
+#include "duet/people/formats/people_formats.h"
 
 namespace duet {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/people/formats/people_formats.h"
+#include "duet/people/formats/people_formats.h"
 
 namespace duet {
 

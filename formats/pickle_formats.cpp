@@ -4,13 +4,13 @@
 
 #include <algorithm>
 
+#include "duet/archives/pickle/motion_pickle.h"
+#include "duet/archives/pickle/pickle_fields.h"
 #include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
 #include "duet/formats/file_arrays.h"
 #include "duet/formats/link_motion.h"
-#include "duet/formats/motion_pickle.h"
-#include "duet/formats/pickle_fields.h"
 #include "duet/formats/pickle_output.h"
 #include "duet/robots/kinematics.h"
 

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "duet/hardware/mcap.h"
+#include "duet/archives/mcap.h"
 #include "duet/hardware/robot_guard.h"
 
 namespace duet {

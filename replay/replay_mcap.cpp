@@ -10,9 +10,9 @@
 #include <system_error>
 #include <utility>
 
+#include "duet/archives/mcap.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/hardware/mcap.h"
 #include "duet/motion/human_motion.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"

@@ -1,4 +1,4 @@
-// A replay as MCAP for Foxglove, by hardware/mcap.h: bodies are told once, and where they are at each frame. Told anew
+// A replay as MCAP for Foxglove, by archives/mcap.h: bodies are told once, and where they are at each frame. Told anew
 // at each frame, as one scene, they take some twenty times as much.
 #pragma once
 

@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/hardware/log_recording.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/diagnostics.h"
 #include "duet/metrics/onset.h"
 #include "duet/report/tables/text_table.h"
 #include "duet/robots/robot_cards.h"
+#include "duet/scoring/executed_mask.h"
 #include "duet/scoring/scoring.h"
 
 namespace duet {

@@ -9,7 +9,7 @@
 #include "duet/app/benchmarks/benchmark.h"
 #include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/scoring/detector_confusion.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 
 namespace duet::cli {
 namespace {

@@ -25,7 +25,7 @@
 #include "duet/metrics/detector_catalogue.h"
 #include "duet/metrics/readings.h"
 #include "duet/motion/layouts/joint_layout.h"
-#include "duet/motion/people/formats/people_formats.h"
+#include "duet/people/formats/people_formats.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/policy.h"
 #include "duet/retarget/options.h"

@@ -1,5 +1,5 @@
 // Demonstrations for D-STAR, made small.
-#include "duet/experiment/training/demonstrations.h"
+#include "duet/training/setup/demonstrations.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Sensitivity and specificity over recordings with labels: what counts where, and what `duet bench detectors` says.
-#include "duet/scoring/detector_confusion.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // People in the robot's place: who counts, and what `duet score --people` prints of them.
-#include "duet/scoring/people_conditions.h"
+#include "duet/datasets/labelled/people_conditions.h"
 
 #include <gmock/gmock.h>
 

@@ -6,11 +6,11 @@
 #include <map>
 #include <set>
 
+#include "duet/archives/mcap.h"
 #include "duet/archives/npy/npz.h"
 #include "duet/archives/recording_file.h"
 #include "duet/core/json.h"
 #include "duet/core/require.h"
-#include "duet/hardware/mcap.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/replay/detector_trace.h"

@@ -7,8 +7,8 @@
 #include <sstream>
 #include <string>
 
+#include "duet/archives/pickle/motion_pickle.h"
 #include "duet/core/file.h"
-#include "duet/formats/motion_pickle.h"
 #include "duet/nn/load_network.h"
 #include "tests/controllers/walk.h"
 #include "tests/support.h"

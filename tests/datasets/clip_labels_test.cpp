@@ -1,4 +1,4 @@
-#include "duet/datasets/clip_labels.h"
+#include "duet/datasets/labelled/clip_labels.h"
 
 #include <gmock/gmock.h>
 

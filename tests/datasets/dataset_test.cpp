@@ -331,7 +331,7 @@ TEST_F(Dataset, TheCardNamesSourcesTablesAndCautions) {
   EXPECT_EQ(manifest[0]["clip"], "h1");
 }
 
-// The key and the words are those of motion/people/alignment.cpp.
+// The key and the words are those of people/alignment.cpp.
 TEST(DatasetCard, SaysHowManyClipsHaveAnEstimatedSharedFrame) {
   std::vector<DatasetEntry> entries = {{.clip = "a", .status = ClipStatus::kKept},
                                        {.clip = "b", .status = ClipStatus::kKept}};

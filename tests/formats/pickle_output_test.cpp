@@ -5,10 +5,10 @@
 
 #include <cstdlib>
 
+#include "duet/archives/pickle/pickle_fields.h"
 #include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/formats/pickle_fields.h"
 #include "duet/formats/robot_motion_format.h"
 #include "tests/formats/known_motion.h"
 #include "tests/support.h"

@@ -2,12 +2,12 @@
 #include <filesystem>
 #include <fstream>
 
-#include "duet/formats/motion_pickle.h"
+#include "duet/archives/pickle/motion_pickle.h"
 #include "duet/motion/bvh/bvh.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/object_shape.h"
+#include "duet/people/formats/people_formats.h"
 #include "tests/archives/pickle_bytes.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"

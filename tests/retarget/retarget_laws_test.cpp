@@ -1,12 +1,13 @@
-// Laws of mode `best`: a motion that is cropped, shifted, mirrored or moved in the world gives the same robot, cropped,
-// shifted, mirrored or moved; joints keep their speeds; a person who stands upright becomes a robot that does.
+// Laws of mode `best` (tests/retarget/retarget_laws.h); joints keep their speeds; a person who stands upright becomes a
+// robot that does.
+#include "tests/retarget/retarget_laws.h"
+
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "duet/metrics/grounding.h"
-#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/retarget/joint_speeds.h"
 #include "duet/retarget/pair.h"
@@ -18,7 +19,8 @@
 namespace duet {
 namespace {
 
-constexpr double kSame = 0.1;  // most that a joint may differ by [rad]
+using test::expect_laws;
+using test::farthest;
 
 const RobotModel& t1() {
   static const RobotModel model = load_robot(card_path("t1"));
@@ -26,60 +28,6 @@ const RobotModel& t1() {
 }
 
 InteractionClip clip_of_task(Task task) { return synthesize(task, {.seed = 42}); }
-
-InteractionClip cropped(InteractionClip clip, int frames) {
-  for (HumanMotion* motion : {&clip.a, &clip.b}) *motion = slice(*motion, frames, motion->frames());
-  clip.phases = {std::max(clip.phases.act_begin - frames, 0), std::max(clip.phases.act_end - frames, 0)};
-  clip.contacts.clear();
-  return clip;
-}
-
-InteractionClip moved(InteractionClip clip, double yaw, const Eigen::Vector3d& p) {
-  const Eigen::Quaterniond R(yaw_rotation(yaw));
-  for (HumanMotion* motion : {&clip.a, &clip.b}) {
-    for (int t = 0; t < motion->frames(); ++t) {
-      for (int joint = 0; joint < kSmplJoints; ++joint)
-        motion->joints.at(t, joint) = (R * Eigen::Vector3d(motion->joints.at(t, joint)) + p).eval();
-    }
-    for (Eigen::Quaterniond& rotation : motion->rotations) rotation = (R * rotation).normalized();
-  }
-  return clip;
-}
-
-Eigen::MatrixXd joints_of(const InteractionClip& clip, const RobotModel& robot) {
-  return retarget(clip, robot, pair_options_of(PairMode::kBest)).robot.q;
-}
-
-// The mirror image of a motion's joints, by the names of left and right.
-Eigen::MatrixXd mirrored_joints(const RobotModel& robot, const Eigen::MatrixXd& q) {
-  const auto counterpart = [](std::string name) {
-    for (const auto& [from, to] :
-         {std::pair{"left", "right"}, {"right", "left"}, {"Left", "Right"}, {"Right", "Left"}}) {
-      const std::size_t at = name.find(from);
-      if (at != std::string::npos) return name.replace(at, std::string(from).size(), to);
-    }
-    return name;
-  };
-  Eigen::MatrixXd out(q.rows(), q.cols());
-  for (int j = 0; j < robot.dof(); ++j) {
-    const int other = robot.joint_index(counterpart(robot.joints[static_cast<std::size_t>(j)].name));
-    out.row(j) = mirror_sign(robot, other) * q.row(other);
-  }
-  return out;
-}
-
-double farthest(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) { return (a - b).cwiseAbs().maxCoeff(); }
-
-void expect_laws(const InteractionClip& clip, const RobotModel& robot) {
-  SCOPED_TRACE(clip.id + " on " + robot.name);
-  const Eigen::MatrixXd q = joints_of(clip, robot);
-  for (const int frames : {1, 5})
-    EXPECT_LT(farthest(q.rightCols(q.cols() - frames), joints_of(cropped(clip, frames), robot)), kSame) << frames;
-  const Eigen::MatrixXd later = joints_of(padded(clip, 0.3, 0.0), robot);
-  EXPECT_LT(farthest(q, later.rightCols(q.cols())), kSame);
-  EXPECT_LT(farthest(q, mirrored_joints(robot, joints_of(mirrored(clip), robot))), kSame);
-  EXPECT_LT(farthest(q, joints_of(moved(clip, 2.1, {3.0, -1.5, 0.0}), robot)), kSame);
-}
 
 // Largest angle of the line from pelvis to head with the vertical. [rad]
 double lean_of(const RobotModel& robot, const RobotMotion& motion) {
@@ -102,20 +50,6 @@ TEST(RetargetLaws, HoldOverSyntheticClipsOfAllTasks) {
 
 TEST(RetargetLaws, HoldOnARobotWithOtherArms) {
   for (const Task task : {Task::kHandshake, Task::kWave}) expect_laws(clip_of_task(task), t1());
-}
-
-TEST(RetargetLaws, HoldOverARecording) {
-  const std::string file = test::shared_file("data/k3hi/k3hi-shaking-1.npz");
-  if (file.empty()) GTEST_SKIP() << "not run: data/k3hi absent";
-  const std::vector<std::string> paths = {file};
-  PeopleOptions options;
-  options.task = Task::kHandshake;
-  const PeopleFormat& format = find_people_format(paths);
-  InteractionClip clip = read_source_clip(format, format.find(paths, options).front(), options).clip;
-  for (HumanMotion* motion : {&clip.a, &clip.b}) *motion = resample(*motion, 50.0);
-  clip.phases = {};
-  clip.contacts.clear();
-  expect_laws(clip, test::g1());
 }
 
 TEST(RetargetLaws, NoJointIsQuickerThanItsLimit) {

@@ -1,34 +1,18 @@
 #include "duet/robots/origin.h"
 
-#include "duet/formats/robot_motion_format.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_cards.h"
 #include "tests/robots/fixtures.h"
+#include "tests/robots/moved_t1.h"
 
 namespace duet {
 namespace {
 
+using test::MovedT1;
 using test::replaced;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-// The T1 whose root is a link without mass, so far from the trunk: its origin is anywhere.
-struct MovedT1 {
-  test::ScratchFolder folder;
-  std::string card = folder / "t1.yaml";
-
-  explicit MovedT1(const Eigen::Vector3d& trunk, const std::string& fall = "fall: {height: 0.38, cos_tilt: 0.7}") {
-    const std::string source = DUET_SOURCE_DIR "/robots/t1/";
-    write_file(card, replaced(replaced(read_file(source + "t1.yaml"), "base: Trunk", "base: floor"),
-                              "fall: {height: 0.38, cos_tilt: 0.7}", fall));
-    write_file(folder / "t1.urdf",
-               replaced(read_file(source + "t1.urdf"), "<link name=\"Trunk\">",
-                        fmt::format("<link name=\"floor\"/><joint name=\"lift\" type=\"fixed\"><parent link=\"floor\"/>"
-                                    "<child link=\"Trunk\"/><origin xyz=\"{} {} {}\"/></joint><link name=\"Trunk\">",
-                                    trunk.x(), trunk.y(), trunk.z())));
-  }
-};
 
 const RobotModel& t1() {
   static const RobotModel model = load_robot(DUET_SOURCE_DIR "/robots/t1/t1.yaml");
@@ -84,24 +68,6 @@ TEST(Origin, HeightsOfTheCardAreOfTheOriginWhereItIsAboveThem) {
   EXPECT_NEAR(load_robot(MovedT1({0.0, 0.0, -0.6}, "fall: {height: 0.98, cos_tilt: 0.7}").card).fall.height,
               0.38 - drop, 1e-9);
   EXPECT_EQ(load_robot(MovedT1({0.0, 0.0, 0.7}).card).fall.height, 0.38);  // no height of an origin in the floor
-}
-
-TEST(Origin, MotionsInFilesAreOfTheUrdfsOrigin) {
-  const MovedT1 moved({0.1, 0.0, 0.7});
-  const RobotModel robot = load_robot(moved.card);
-  RobotMotion motion{.rate_hz = 50.0, .joint_names = robot.joint_names(), .root = {}, .q = {}};
-  motion.q = robot.neutral.replicate(1, 4);
-  for (int t = 0; t < 4; ++t)
-    motion.root.push_back(
-        {Eigen::Quaterniond(Eigen::AngleAxisd(0.3 * t, Eigen::Vector3d::UnitZ())), {0.1 * t, 0, 0.6}});
-  write_robot_motion(motion, robot, robot_motion_format("gmr"), moved.folder / "m.pkl");
-  const RobotMotion read = read_robot_motion(moved.folder / "m.pkl", robot, {}, "gmr").motion;
-  const RobotMotion raw =
-      read_robot_motion(moved.folder / "m.pkl", with_origin_at(robot, urdf_origin(robot)), {}, "gmr").motion;
-  for (int t = 0; t < 4; ++t) {
-    EXPECT_LT((read.root[t].p - motion.root[t].p).norm(), 1e-6);
-    EXPECT_LT((raw.root[t].p - motion.root[t] * urdf_origin(robot)).norm(), 1e-6);
-  }
 }
 
 TEST(Origin, WithoutAPelvisIsBetweenTheHipsAndWithoutLegsRefusedBelowTheSoles) {

@@ -20,9 +20,9 @@
 #include "duet/datasets/phase_errors.h"
 #include "duet/datasets/source_facts.h"
 #include "duet/experiment/work/interrupt.h"
-#include "duet/motion/people/formats/people_formats.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"
+#include "duet/people/formats/people_formats.h"
 
 namespace duet::cli {
 namespace {

@@ -17,7 +17,7 @@
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/formats/robot_motion_format.h"
-#include "duet/motion/people/formats/people_formats.h"
+#include "duet/people/formats/people_formats.h"
 #include "duet/rollout/play_back.h"
 
 namespace duet::cli {

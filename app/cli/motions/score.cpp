@@ -10,9 +10,9 @@
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
+#include "duet/datasets/labelled/people_conditions.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/scoring/motion_scores.h"
-#include "duet/scoring/people_conditions.h"
 #include "duet/scoring/recording_scores.h"
 
 namespace duet::cli {

@@ -13,7 +13,6 @@
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/scratch_folder.h"
-#include "duet/execution/guarded_episode.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/execution/runner.h"
 #include "duet/experiment/plan/clips.h"
@@ -23,6 +22,7 @@
 #include "duet/experiment/work/interrupt.h"
 #include "duet/experiment/work/run_work.h"
 #include "duet/hardware/dds/twin_over_dds.h"
+#include "duet/hardware/guarded_episode.h"
 #include "duet/hardware/twin_in_process.h"
 
 namespace duet::cli {

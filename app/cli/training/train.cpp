@@ -8,10 +8,10 @@
 #include "duet/app/command.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/experiment/training/train_options.h"
-#include "duet/experiment/training/training_motions.h"
 #include "duet/experiment/work/interrupt.h"
 #include "duet/robots/robot_model.h"
+#include "duet/training/setup/train_options.h"
+#include "duet/training/setup/training_motions.h"
 #include "duet/training/train_wbc.h"
 
 namespace duet::cli {

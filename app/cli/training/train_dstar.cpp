@@ -10,12 +10,12 @@
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/experiment/plan/shipped_suites.h"
-#include "duet/experiment/training/demonstrations.h"
-#include "duet/experiment/training/train_options.h"
 #include "duet/experiment/work/interrupt.h"
 #include "duet/policies/dstar/network.h"
 #include "duet/training/dstar/retrieval.h"
 #include "duet/training/dstar/trainer.h"
+#include "duet/training/setup/demonstrations.h"
+#include "duet/training/setup/train_options.h"
 
 namespace duet::cli {
 namespace {

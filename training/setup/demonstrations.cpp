@@ -1,0 +1,175 @@
+#include "duet/training/setup/demonstrations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "duet/backends/factory.h"
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/controllers/controller.h"
+#include "duet/core/parallel.h"
+#include "duet/core/random.h"
+#include "duet/experiment/plan/clips.h"
+#include "duet/motion/clip_digest.h"
+#include "duet/policies/catalogue/registry.h"
+#include "duet/policies/phase_adaptation.h"
+#include "duet/rollout/act_episode.h"
+#include "duet/rows/episode_row.h"
+
+namespace duet {
+namespace {
+
+constexpr std::size_t kBeforeFall = 50;  // frames
+constexpr int kShortest = 100;
+
+// One motion to be followed, beside its partner.
+struct Take {
+  const PairedMotion* clip = nullptr;
+  AdaptedMotion adapted;
+  PointTracks partner;
+  std::vector<RobotState> followed;  // in the engine, while it was upright
+};
+
+Take take_of(const PairedMotion& clip, const RobotModel& robot, StartMode start, std::uint64_t seed) {
+  Take take;
+  take.clip = &clip;
+  take.adapted = adapt_by_phase(clip.robot, clip.phases, robot, {.start = start}, seed);
+  const int begin = take.adapted.clip_frame, frames = take.adapted.motion.frames();
+  take.partner = clip.partner.joints.slice(begin, begin + frames);
+  return take;
+}
+
+ControllerOptions controller_options(const DemonstrationOptions& options) {
+  if (options.controller_network.empty()) return {};
+  return {{"network", options.controller_network}};
+}
+
+void follow(Take& take, const std::shared_ptr<const RobotModel>& robot, const DemonstrationOptions& options,
+            const PolicyMaker& make_policy, const LoadedController& make_controller) {
+  const std::unique_ptr<Policy> policy = make_policy();
+  RolloutSetup setup;
+  setup.clip = take.clip;
+  setup.reference = take.adapted;
+  setup.start = robot->standing_state(take.adapted.motion.root.front());
+  setup.fall = robot->fall;
+  Rollout rollout;
+  if (options.engine == kPlaybackEngine) {
+    rollout = play_back(setup, *policy);
+  } else {
+    Scene scene;
+    scene.robot = robot;
+    scene.human = make_human_body(bone_lengths(take.clip->partner));
+    const std::unique_ptr<Backend> backend = make_backend(options.engine, scene);
+    rollout = roll_out(setup, *backend, *make_controller.make(controller_options(options)), *policy);
+  }
+  take.followed = std::move(rollout.recording.robot);
+  if (rollout.recording.outcome == Outcome::kOk) return;
+  take.followed.resize(std::max<std::size_t>(take.followed.size(), kBeforeFall) - kBeforeFall);
+}
+
+// The first frames of a motion.
+RobotMotion begin_of(const RobotMotion& motion, int frames) {
+  return {motion.rate_hz,
+          motion.joint_names,
+          {motion.root.begin(), motion.root.begin() + frames},
+          motion.q.leftCols(frames)};
+}
+
+void add(const Take& take, bool as_it_is, DemonstrationSet& set) {
+  const Demonstration entry{take.clip->clip_id, clip_digest(*take.clip), take.clip->task, take.adapted.phases};
+  const RobotMotion& motion = take.adapted.motion;
+  if (as_it_is) set.add(entry, states_of(motion), motion, take.partner);
+  const int frames = std::min(static_cast<int>(take.followed.size()), motion.frames());
+  if (frames < kShortest) return;
+  set.add(entry, {take.followed.begin(), take.followed.begin() + frames}, begin_of(motion, frames),
+          take.partner.slice(0, frames));
+}
+
+struct Demonstrators {
+  const std::shared_ptr<const RobotModel>& robot;
+  const DemonstrationOptions& options;
+  const PolicyMaker& make_policy;
+  const LoadedController& make_controller;  // empty where no engine follows
+  Progress& progress;
+  const std::function<bool()>& stop;
+};
+
+// Adds the takes of one task; false where it was stopped.
+bool demonstrate(Task task, const DemonstrationClips& kind, const PairOptions& pair, const Demonstrators& by,
+                 DemonstrationSet& set) {
+  const DemonstrationOptions& options = by.options;
+  const bool itself = options.policy == "replay";
+  const int per_task = itself ? kind.per_task : std::min(kind.per_task, options.followed);
+  const int starts = itself ? options.starts : 1;
+  const std::vector<PairedMotion> clips =
+      synthetic_clips(*by.robot, pair, {task}, per_task, options.seed, options.threads, by.progress, kind.like);
+  std::vector<std::optional<Take>> made(clips.size() * starts);
+  by.progress.start(fmt::format("demonstrating {}", to_string(task)), static_cast<int>(made.size()), "takes");
+  parallel_for_each(static_cast<int>(made.size()), options.threads, [&](int i) {
+    if (by.stop()) return;
+    const PairedMotion& clip = clips[i / starts];
+    made[i] = take_of(clip, *by.robot, options.start, stream_key({"take", clip.clip_id, std::to_string(i % starts)}));
+    const bool followed = !options.engine.empty() && i % starts == 0 && i / starts < options.followed;
+    if (followed) follow(*made[i], by.robot, options, by.make_policy, by.make_controller);
+    by.progress.advance();
+  });
+  by.progress.finish();
+  if (by.stop()) return false;
+  for (std::optional<Take>& take : made) {
+    add(*take, itself, set);
+    take.reset();
+  }
+  return true;
+}
+
+// The network's name, also where it is the controller's default; "" for a controller that has none.
+std::string controller_network_of(const DemonstrationOptions& options) {
+  if (!options.controller_network.empty()) return options.controller_network;
+  for (const ControllerOption& option : controller_info(options.controller).options)
+    if (option.name == "network") return option.fallback;
+  return "";
+}
+
+}  // namespace
+
+std::string origin_of(const DemonstrationOptions& options) {
+  std::string clips;
+  for (const auto& [like, per_task] : options.clips)
+    clips += fmt::format("{}{}{}{}", clips.empty() ? "" : " and ", per_task, clips.empty() ? " clips of each task" : "",
+                         like == Likeness::kPeople ? " like people" : "");
+  clips += fmt::format(" (seed {}), retargeted by {}, {} start{} of each{}", options.seed, options.pair_mode,
+                       options.starts, options.starts == 1 ? "" : "s",
+                       options.start == StartMode::kSimToReal ? " for the real robot (Algorithm 7)" : "");
+  if (options.engine.empty()) return clips + ", none followed";
+  const std::string network = controller_network_of(options);
+  return fmt::format("{}, {} of a kind followed in {} under {}{} by {}", clips, options.followed, options.engine,
+                     options.controller, network.empty() ? "" : fmt::format(" ({})", network), options.policy);
+}
+
+std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const RobotModel>& robot,
+                                                    const DemonstrationOptions& options, Progress& progress,
+                                                    const std::function<bool()>& stop) {
+  const PolicyMaker maker = policy_maker(options.policy, robot, options.policy_options);
+  const bool simulated = !options.engine.empty() && options.engine != kPlaybackEngine;
+  const LoadedController controller =
+      simulated ? load_controller(options.controller, robot, controller_options(options)) : LoadedController();
+  const PairOptions pair = make_pair_options({{"mode", options.pair_mode}});
+  DemonstrationSet set;
+  set.robot_digest = robot->digest;
+  set.origin = origin_of(options);
+  for (const DemonstrationClips& kind : options.clips)
+    for (const Task task : kPaperTasks)  // one at a time: hours of clips and takes are gigabytes
+      if (!demonstrate(task, kind, pair, {robot, options, maker, controller, progress, stop}, set)) return std::nullopt;
+  return set;
+}
+
+std::string split_text(const Suite& suite, int threads, Progress& progress) {
+  const auto robot = load_shared_robot(suite.robot);
+  std::string text = fmt::format("# The clips of {} {}: never learnt from.\n", suite.name, suite.version);
+  for (const PairedMotion& clip : prepare_clips(suite, *robot, threads, progress))
+    text += fmt::format("{}  {}\n", clip_digest(clip), clip.clip_id);
+  return text;
+}
+
+}  // namespace duet
