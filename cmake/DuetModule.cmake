@@ -3,6 +3,7 @@
 # duet_add_test(<room> SOURCES ... LINK ... [HEADERS ...] [SHARDS n] [SERIAL]): the GoogleTest program <room>_test, which
 #   ctest runs as <room>, or in SHARDS parts side by side (<room>/0, ...), each TEST once; HEADERS are compiled once for
 #   all of its sources, beside those that every test has.
+# duet_add_tool(<name> SOURCES ... LINK ...): a program beside the tests that a person or a test runs.
 # duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `dev`).
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
@@ -92,6 +93,9 @@ function(duet_add_module room)
   add_library(duet::${room} ALIAS duet_${room})
 endfunction()
 
+# What is timed is in the rooms.
+set(DUET_TEST_OPTIMISATION $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
+
 function(duet_add_test room)
   cmake_parse_arguments(ARG "SERIAL" "SHARDS" "SOURCES;LINK;HEADERS" ${ARGN})
   find_package(GTest REQUIRED)
@@ -99,8 +103,7 @@ function(duet_add_test room)
   target_link_libraries(${room}_test PRIVATE duet_flags duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
   target_include_directories(${room}_test PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/<room>/..."
   target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  # What is timed is in the rooms.
-  target_compile_options(${room}_test PRIVATE $<IF:$<BOOL:${DUET_SANITIZE}>,-O0,$<$<CONFIG:Release>:-O1>>)
+  target_compile_options(${room}_test PRIVATE ${DUET_TEST_OPTIMISATION})
   # Half of a test's compilation. The rooms themselves have none: clang-tidy cannot read those of GCC.
   target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h> ${ARG_HEADERS})
   # A process a program, not a TEST: starting 3,700 of them took longer than what they test. The longest begin first.
@@ -117,6 +120,16 @@ function(duet_add_test room)
     set_tests_properties(${name} PROPERTIES TIMEOUT 1800 RUN_SERIAL "${ARG_SERIAL}" COST ${ARG_SHARDS}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${shard}")
   endforeach()
+endfunction()
+
+function(duet_add_tool name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  find_package(GTest REQUIRED)
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE duet_flags duet_options ${ARG_LINK} GTest::gtest)  # fixtures are those of tests
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_compile_definitions(${name} PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_compile_options(${name} PRIVATE ${DUET_TEST_OPTIMISATION})
 endfunction()
 
 function(duet_add_fuzzer name)

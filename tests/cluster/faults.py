@@ -93,10 +93,14 @@ def kill_node(trials):
 
 
 def restart_controller(trials):
-    """Restart of slurmctld while workers work."""
+    """Restart of slurmctld while workers work. Jobs that it has not saved are killed as nobody's: it saves them first."""
     run = trials.plan("restart-controller")
     trials.submit(run)
     trials.wait_for_rows(run)
+    state, at_work = trials.nodes.folder + "/state/job_state", time.time()
+    for line in trials.nodes.queue():
+        trials.nodes.command("scontrol", "update", "JobId=" + line.split()[0], "Comment=changed", check=False)
+    trials.nodes.wait_for(lambda: os.path.exists(state) and os.path.getmtime(state) > at_work, 60, "a saved state")
     slurm.kill_hard(slurm.pid_in(trials.nodes.folder + "/slurmctld.pid"))
     time.sleep(1)
     trials.nodes.start_controller()

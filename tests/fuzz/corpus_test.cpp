@@ -84,13 +84,5 @@ TEST_P(Readers, TakeOrRefuseDamagedSamples) {
 INSTANTIATE_TEST_SUITE_P(Of, Readers, testing::ValuesIn(all_readers()),
                          [](const auto& info) { return std::string(info.param.name); });
 
-// Writes the samples into the corpus: run it by hand where a format changes.
-TEST(Corpus, DISABLED_IsWritten) {
-  for (const Reader& reader : all_readers())
-    for (const unsigned seed : {0U, 1U, 65U})
-      write_file(std::string(DUET_SOURCE_DIR "/tests/fuzz/corpus/") + reader.name + "/sample-" + std::to_string(seed),
-                 reader.sample(seed));
-}
-
 }  // namespace
 }  // namespace duet::fuzz

@@ -21,14 +21,19 @@
 #include "duet/people/formats/video_tracks.h"
 #include "tests/motion/body_files.h"
 #include "tests/motion/body_model_files.h"
+#include "tests/people/format_cases.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
 using test::BodyParameters;
+using test::format_cases;
+using test::FormatCase;
 using test::ScratchFolder;
 using test::SmallModel;
+using test::stand_in_folder;
+using test::stand_in_people;
 using test::thrown_message;
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -36,59 +41,6 @@ using ::testing::HasSubstr;
 constexpr double kSameJoint = 1e-6;  // [m], [1]
 
 using Files = std::vector<std::string>;
-
-struct FormatCase {
-  std::string name;
-  const PeopleFormat& (*format)();
-  int body_joints;
-  bool apart;  // needs an alignment
-  bool shaped;
-  double rate_hz;
-  std::optional<Axis> up;
-  // The files' contents by name, for two people.
-  std::function<std::vector<std::pair<std::string, std::string>>(const BodyParameters&, const BodyParameters&)> files;
-};
-
-std::vector<FormatCase> format_cases() {
-  using P = const BodyParameters&;
-  using Contents = std::vector<std::pair<std::string, std::string>>;
-  return {{"inter-x", inter_x_format, 21, false, true, 120.0, Axis::kPlusY,
-           [](P a, P b) {
-             return Contents{{"P1.npz", test::inter_x_npz(a).bytes()}, {"P2.npz", test::inter_x_npz(b, true).bytes()}};
-           }},
-          {"interhuman-raw", interhuman_raw_format, 21, false, true, 60.0, Axis::kPlusZ,
-           [](P a, P b) {
-             return Contents{{"7.pkl", test::interhuman_pickle(a, b)}};
-           }},
-          {"amass", amass_format, 21, true, true, 120.0, Axis::kPlusZ,
-           [](P a, P b) {
-             return Contents{{"a_poses.npz", test::amass_poses_npz(a).bytes()},
-                             {"b_stageii.npz", test::amass_stageii_npz(b).bytes()}};
-           }},
-          {"motion-x", motion_x_format, 21, true, true, 30.0, std::nullopt,
-           [](P a, P b) {
-             return Contents{{"a.npy", test::motion_x_npy(a)}, {"b.npy", test::motion_x_npy(b)}};
-           }},
-          {"phuma-human", phuma_human_format, 21, true, false, 30.0, Axis::kPlusY,
-           [](P a, P b) {
-             return Contents{{"a.npy", test::phuma_npy(a)}, {"b.npy", test::phuma_npy(b)}};
-           }},
-          {"gvhmr", gvhmr_format, 21, true, true, 30.0, Axis::kPlusY,
-           [](P a, P b) {
-             return Contents{{"a.pt", test::gvhmr_pt(a)}, {"b.pt", test::gvhmr_pt(b)}};
-           }},
-          {"wham", wham_format, 23, true, true, 30.0, Axis::kPlusY,
-           [](P a, P b) {
-             return Contents{{"wham_output.pkl", test::wham_pkl({{0, 0, a}, {3, 0, b}})}};
-           }},
-          {"4d-humans", four_d_humans_format, 23, true, true, 30.0, std::nullopt,
-           [](P a, P b) {
-             return Contents{{"video.pkl", test::phalp_pkl({{1, 0, a}, {2, 0, b}}, a.frames)}};
-           }},
-          {"inter-x-h5", inter_x_h5_format, 21, false, false, 30.0, Axis::kPlusY, [](P a, P b) {
-             return Contents{{"train.h5", test::inter_x_h5("G001T000A001R000", a, b)}};
-           }}};
-}
 
 // Files of a case in a folder of its own.
 class Written {
@@ -297,34 +249,6 @@ TEST(BodyFormats, PicklesThatNameAClassAreRefused) {
 }
 
 // ---- stand-ins for everybody ------------------------------------------------------------
-
-constexpr int kStandInFrames = 7, kStandInFramesOfMatrices = 4;  // a few kB each
-
-// Two people who stand 0.8 m apart, face each other and hold their right hands out, in a format's own axes.
-std::pair<BodyParameters, BodyParameters> stand_in_people(const FormatCase& which) {
-  double tilt = 0.0;  // of the model's y in the file, about x
-  if (which.up == Axis::kPlusZ) tilt = 0.5 * std::numbers::pi;
-  if (which.name == "4d-humans") tilt = std::numbers::pi;  // the camera's y points down
-  const Eigen::Quaterniond U(Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitX()));
-  const Eigen::Quaterniond ahead(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitY()));
-  const int frames = which.name == "4d-humans" ? kStandInFramesOfMatrices : kStandInFrames;
-  return {
-      test::standing_parameters(frames, U * ahead, U * Eigen::Vector3d(-0.4, 0.9, 0.1), which.body_joints),
-      test::standing_parameters(frames, U * ahead.conjugate(), U * Eigen::Vector3d(0.4, 0.9, 0.1), which.body_joints)};
-}
-
-std::string stand_in_folder(const FormatCase& which) {
-  const std::string folder = DUET_SOURCE_DIR "/examples/data/people/" + which.name;
-  return which.name == "inter-x" ? folder + "/G001T000A001R000" : folder;
-}
-
-// By hand, where a layout changes.
-TEST(BodyFormats, DISABLED_StandInsAreWritten) {
-  for (const FormatCase& which : format_cases()) {
-    const auto [a, b] = stand_in_people(which);
-    for (const auto& [name, bytes] : which.files(a, b)) write_file(stand_in_folder(which) + "/" + name, bytes);
-  }
-}
 
 // The table asks each format in turn: none takes the files of another.
 TEST(BodyFormats, TheTableFindsEachByItsStandIn) {
