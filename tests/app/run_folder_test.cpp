@@ -229,8 +229,10 @@ TEST_F(RunFolder, ClosedStreamsDoNotEndTheProgram) {
 TEST_F(RunFolder, SignalsAndTheTimeLimitAreHeardWhileClipsArePreparedAndTheRunGoesOn) {
   write_suite("[hug, handshake, high_five, wave, bend, fly_kiss]", 40);
   for (const auto& [signal, code] : std::map<std::string, int>{{"HUP", 75}, {"TERM", 75}, {"INT", 130}}) {
-    const Ended ended =
-        bash("$D run $o/suite.yaml -o $o/run -j1 -q >/dev/null & p=$!; sleep 0.3; kill -" + signal + " $p; wait $p");
+    const Ended ended = bash(
+        "ready() { ls $o/run/prepared 2>/dev/null | wc -l; }; n=$(ready); $D run $o/suite.yaml -o $o/run -j1 -q "
+        ">/dev/null & p=$!; until [ $(ready) -gt $n ] || ! kill -0 $p; do sleep 0.01; done; kill -" +
+        signal + " $p; wait $p");
     EXPECT_EQ(ended.code, code) << signal << ended.text;
   }
   EXPECT_EQ(bash("$D run $o/suite.yaml --time-limit 0.2 -o $o/run -j1 -q").code, 75);
