@@ -69,10 +69,7 @@ std::vector<std::string> listing_names();
 void add_doctor(CLI::App& app, Session& session);
 void add_list(CLI::App& app, Session& session);
 void add_synth(CLI::App& app, Session& session);
-void add_import(CLI::App& app, Session& session);
-void add_convert(CLI::App& app, Session& session);
 void add_retarget(CLI::App& app, Session& session);
-void add_dataset(CLI::App& app, Session& session);  // `dataset inspect`, `curate`, `retarget`, `convert`, ...
 void add_score(CLI::App& app, Session& session);
 void add_run(CLI::App& app, Session& session);
 void add_report(CLI::App& app, Session& session);
@@ -83,19 +80,12 @@ void add_compare(CLI::App& app, Session& session);
 void add_check(CLI::App& app, Session& session);
 void add_bless(CLI::App& app, Session& session);
 void add_policy_check(CLI::App& app, Session& session);  // `policy check`
-void add_plan(CLI::App& app, Session& session);
-void add_work(CLI::App& app, Session& session);
-void add_submit(CLI::App& app, Session& session);
-void add_status(CLI::App& app, Session& session);
-void add_merge(CLI::App& app, Session& session);
 void add_publish(CLI::App& app, Session& session);
 void add_validate(CLI::App& app, Session& session);
 void add_verify(CLI::App& app, Session& session);
 void add_bench(CLI::App& app, Session& session);
-void add_train(CLI::App& app, Session& session);
 void add_completion(CLI::App& app, Session& session);
 void add_man(CLI::App& app, Session& session);
 void add_walk(CLI::App& app, Session& session);
-void add_train_dstar(CLI::App& train, Session& session);  // below `train`: one command per policy, and `split`
 
 }  // namespace duet::cli

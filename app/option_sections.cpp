@@ -8,7 +8,6 @@
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/training/setup/train_options.h"
 
 namespace duet {
 namespace {
@@ -67,11 +66,6 @@ std::vector<OptionSection> engine_option_sections() {
 
 std::vector<OptionSection> synth_option_sections() {
   return {{"synth", field_rows(synthesis_fields(), SynthesisOptions())}};
-}
-
-std::vector<OptionSection> train_option_sections() {
-  return {{"wbc", field_rows(wbc_training_fields(), WbcTraining())},
-          {"dstar", field_rows(policy_training_fields(), PolicyTraining())}};
 }
 
 }  // namespace duet

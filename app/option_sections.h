@@ -1,4 +1,4 @@
-// The options of controllers, policies and engines, of synthesis and of training: the rows of their tables, for
+// The options of controllers, policies and engines and of synthesis: the rows of their tables, for
 // `duet list` and docs/reference.
 #pragma once
 
@@ -18,6 +18,5 @@ std::vector<OptionSection> controller_option_sections();  // of those that ship,
 std::vector<OptionSection> policy_option_sections();      // likewise, and of descriptors by their kind
 std::vector<OptionSection> engine_option_sections();      // of the engines that are there
 std::vector<OptionSection> synth_option_sections();
-std::vector<OptionSection> train_option_sections();
 
 }  // namespace duet

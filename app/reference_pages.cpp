@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "duet/app/option_sections.h"
+#include "duet/app/part.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/experiment/suite_file/suite_keys.h"
@@ -137,7 +138,7 @@ std::string train_options_page() {
   return option_page("Options of training", "train-options",
                      "For `duet train wbc`, and for `duet train dstar`, its variants and `retrieval`; as "
                      "`--round-clips 120`.",
-                     train_option_sections());
+                     in_parts(&Part::option_lists, "train-options")());
 }
 
 std::string row_fields_page() {
@@ -174,18 +175,27 @@ constexpr PageMaker kPages[] = {{"suite-keys", suite_page},
                                 {"train-options", train_options_page},
                                 {"row-fields", row_fields_page}};
 
+// A page of a part has nothing to show where the part is absent.
+bool is_here(const PageMaker& page) {
+  return page.make != train_options_page || in_parts(&Part::option_lists, page.name) != nullptr;
+}
+
 }  // namespace
 
 std::vector<std::string> reference_page_names() {
   std::vector<std::string> names;
   names.reserve(std::size(kPages));
-  for (const PageMaker& page : kPages) names.emplace_back(page.name);
+  for (const PageMaker& page : kPages)
+    if (is_here(page)) names.emplace_back(page.name);
   return names;
 }
 
 std::string reference_page(const std::string& name) {
-  for (const PageMaker& page : kPages)
-    if (name == page.name) return page.make();
+  for (const PageMaker& page : kPages) {
+    if (name != page.name) continue;
+    if (!is_here(page)) throw MissingError(missing_part_message(fmt::format("`duet list {}`", name), "training"));
+    return page.make();
+  }
   throw std::invalid_argument(unknown_name_message("reference page", name, reference_page_names()));
 }
 

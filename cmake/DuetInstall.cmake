@@ -2,30 +2,51 @@
 # program, and the packages that CMake and pkg-config find (docs/using-duet.md).
 include(CMakePackageConfigHelpers)
 
-# Rooms that others may link; app is the program's own.
+# Rooms that others may link; app is for programs that add a part to `duet` (parts/CMakeLists.txt).
 set(rooms ${DUET_ROOMS})
 list(REMOVE_ITEM rooms app)
 set(libraries ${rooms})
 list(TRANSFORM libraries PREPEND duet_)
+set(program_library "")
+if(TARGET duet_app)
+  set(program_library duet_app)
+endif()
 
+# The core and the rooms of parts are two components and two exports, so that the core can be installed alone.
+set(core_libraries ${libraries})
+set(part_libraries "")
+foreach(part IN LISTS DUET_PARTS)
+  foreach(room IN LISTS DUET_ROOMS_OF_${part})
+    list(APPEND part_libraries duet_${room})
+  endforeach()
+endforeach()
+list(REMOVE_ITEM core_libraries ${part_libraries})
 add_library(duet_library INTERFACE)
-target_link_libraries(duet_library INTERFACE ${libraries})
+target_link_libraries(duet_library INTERFACE ${core_libraries})
 set_target_properties(duet_library PROPERTIES EXPORT_NAME duet)
 add_library(duet::duet ALIAS duet_library)
-
-install(TARGETS ${libraries} duet_library duet_options EXPORT duetTargets
+install(TARGETS ${core_libraries} ${program_library} duet_library duet_options EXPORT duetTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/duet)
 install(EXPORT duetTargets NAMESPACE duet:: DESTINATION ${package} COMPONENT library)
+if(part_libraries)
+  install(TARGETS ${part_libraries} EXPORT duetPartTargets
+          ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT parts)
+  install(EXPORT duetPartTargets NAMESPACE duet:: DESTINATION ${package} COMPONENT parts)
+endif()
 
 # Headers that only files of their own room include: an engine's adapter, kernels, steps of one implementation.
 set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|hardware/dds)/|motion/synthesis/(people_stage|render|stage)\\.h$|_parts\\.h$|kernels?_body\\.h$|/(kernel_(types|frame|ground|object)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
-foreach(room IN LISTS rooms)
+foreach(room IN LISTS rooms ITEMS app)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${room}/*.h)
   list(FILTER headers EXCLUDE REGEX "${internal}")
+  set(component library)
+  if(duet_${room} IN_LIST part_libraries)
+    set(component parts)
+  endif()
   foreach(header IN LISTS headers)
     cmake_path(GET header PARENT_PATH folder)
-    install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/duet/${folder} COMPONENT library)
+    install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/duet/${folder} COMPONENT ${component})
   endforeach()
 endforeach()
 
@@ -52,6 +73,8 @@ if(TARGET duet)
 endif()
 
 set(DUET_INSTALLED_ROOMS ${rooms})
+set(DUET_INSTALLED_PARTS ${part_libraries})
+list(TRANSFORM DUET_INSTALLED_PARTS REPLACE "^duet_" "duet::")
 configure_package_config_file(cmake/duetConfig.cmake.in ${PROJECT_BINARY_DIR}/package/duetConfig.cmake
                               INSTALL_DESTINATION ${package})
 # Until 1.0 each minor version may break what the one before it promised.

@@ -4,6 +4,8 @@
 #   ctest runs as <room>, or in SHARDS parts side by side (<room>/0, ...), each TEST once; HEADERS are compiled once for
 #   all of its sources, beside those that every test has.
 # duet_add_tool(<name> SOURCES ... LINK ...): a program beside the tests that a person or a test runs.
+# duet_add_part(<name> SOURCES ... LINK ...): what parts/<name> adds to the program (app/part.h), the library duet_part_<name>.
+# duet_add_program(): the program `duet` with the parts of DUET_PARTS.
 # duet_add_fuzzer(<name> SOURCES ... LINK ...): a libFuzzer program (preset `dev`).
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(fmt REQUIRED)
@@ -21,24 +23,33 @@ if(DUET_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${DUET_CCACHE})
 endif()
 
-# What everybody who includes duet's headers needs.
-add_library(duet_options INTERFACE)
-# "duet/<room>/<header>.h" means the same inside the tree as it does outside, where the headers are installed under such
-# a folder.
-file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
-file(CREATE_LINK ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/include/duet SYMBOLIC)
-target_include_directories(duet_options INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
-                                                  $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-target_compile_features(duet_options INTERFACE cxx_std_20)
-target_link_libraries(duet_options INTERFACE Eigen3::Eigen fmt::fmt Threads::Threads)
-# Eigen aligns by the widest instruction set that it may use: a program that may use wider ones than duet (-march=native)
-# has to lay out the types of duet's headers as duet does.
-target_compile_definitions(duet_options INTERFACE $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
-if(NOT PROJECT_IS_TOP_LEVEL)
-  target_compile_definitions(duet_options INTERFACE $<BUILD_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+# The folder of the sources: this one is included by the parts' own project (parts/CMakeLists.txt), too.
+cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH DUET_SOURCES)
+
+if(TARGET duet::options)
+  # Beside an installed core: of this tree's headers only those of rooms that are built here are seen.
+  set(DUET_BESIDE_CORE TRUE)
+  include_directories(${PROJECT_BINARY_DIR}/include)
+else()
+  # What everybody who includes duet's headers needs.
+  add_library(duet_options INTERFACE)
+  # "duet/<room>/<header>.h" means the same inside the tree as it does outside, where the headers are installed under such
+  # a folder.
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/include/duet SYMBOLIC)
+  target_include_directories(duet_options INTERFACE $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+                                                    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(duet_options INTERFACE cxx_std_20)
+  target_link_libraries(duet_options INTERFACE Eigen3::Eigen fmt::fmt Threads::Threads)
+  # Eigen aligns by the widest instruction set that it may use: a program that may use wider ones than duet (-march=native)
+  # has to lay out the types of duet's headers as duet does.
+  target_compile_definitions(duet_options INTERFACE $<INSTALL_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+  if(NOT PROJECT_IS_TOP_LEVEL)
+    target_compile_definitions(duet_options INTERFACE $<BUILD_INTERFACE:EIGEN_MAX_ALIGN_BYTES=16>)
+  endif()
+  set_target_properties(duet_options PROPERTIES EXPORT_NAME options)
+  add_library(duet::options ALIAS duet_options)
 endif()
-set_target_properties(duet_options PROPERTIES EXPORT_NAME options)
-add_library(duet::options ALIAS duet_options)
 
 # How duet itself is compiled; nobody who links it inherits this. Contraction is off so that the same source gives the
 # same bits whatever the optimiser chooses; wider instruction sets appear only in kernel files that dispatch at run time.
@@ -81,11 +92,20 @@ function(duet_unite target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ${DUET_UNITY} UNITY_BUILD_MODE GROUP)
 endfunction()
 
+function(duet_show_headers folder)  # where only some rooms' headers are seen, those of this folder
+  if(DUET_BESIDE_CORE)
+    cmake_path(GET folder PARENT_PATH above)
+    file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/include/duet/${above})
+    file(CREATE_LINK ${DUET_SOURCES}/${folder} ${PROJECT_BINARY_DIR}/include/duet/${folder} SYMBOLIC)
+  endif()
+endfunction()
+
 function(duet_add_module room)
   cmake_parse_arguments(ARG "COLD" "" "SOURCES;LINK" ${ARGN})
+  duet_show_headers(${room})
   add_library(duet_${room} STATIC ${ARG_SOURCES})
   duet_unite(duet_${room})
-  target_link_libraries(duet_${room} PUBLIC duet_options ${ARG_LINK} PRIVATE $<BUILD_INTERFACE:duet_flags>)
+  target_link_libraries(duet_${room} PUBLIC duet::options ${ARG_LINK} PRIVATE $<BUILD_INTERFACE:duet_flags>)
   if(ARG_COLD)
     target_compile_options(duet_${room} PRIVATE $<$<CONFIG:Release>:-O1>)
   endif()
@@ -100,9 +120,9 @@ function(duet_add_test room)
   cmake_parse_arguments(ARG "SERIAL" "SHARDS" "SOURCES;LINK;HEADERS" ${ARGN})
   find_package(GTest REQUIRED)
   add_executable(${room}_test ${ARG_SOURCES})
-  target_link_libraries(${room}_test PRIVATE duet_flags duet_options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
-  target_include_directories(${room}_test PRIVATE ${PROJECT_SOURCE_DIR})  # "tests/<room>/..."
-  target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${room}_test PRIVATE duet_flags duet::options ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_include_directories(${room}_test PRIVATE ${DUET_SOURCES})  # "tests/<room>/..."
+  target_compile_definitions(${room}_test PRIVATE DUET_SOURCE_DIR="${DUET_SOURCES}")
   target_compile_options(${room}_test PRIVATE ${DUET_TEST_OPTIMISATION})
   # Half of a test's compilation. The rooms themselves have none: clang-tidy cannot read those of GCC.
   target_precompile_headers(${room}_test PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Geometry> <fmt/format.h> ${ARG_HEADERS})
@@ -116,7 +136,7 @@ function(duet_add_test room)
     if(ARG_SHARDS GREATER 1)
       set(name ${room}/${shard})
     endif()
-    add_test(NAME ${name} COMMAND ${room}_test --gtest_print_time=1 WORKING_DIRECTORY ${PROJECT_SOURCE_DIR})
+    add_test(NAME ${name} COMMAND ${room}_test --gtest_print_time=1 WORKING_DIRECTORY ${DUET_SOURCES})
     set_tests_properties(${name} PROPERTIES TIMEOUT 1800 RUN_SERIAL "${ARG_SERIAL}" COST ${ARG_SHARDS}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${shard}")
   endforeach()
@@ -126,17 +146,83 @@ function(duet_add_tool name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   find_package(GTest REQUIRED)
   add_executable(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE duet_flags duet_options ${ARG_LINK} GTest::gtest)  # fixtures are those of tests
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
-  target_compile_definitions(${name} PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_libraries(${name} PRIVATE duet_flags duet::options ${ARG_LINK} GTest::gtest)  # fixtures are those of tests
+  target_include_directories(${name} PRIVATE ${DUET_SOURCES})
+  target_compile_definitions(${name} PRIVATE DUET_SOURCE_DIR="${DUET_SOURCES}")
   target_compile_options(${name} PRIVATE ${DUET_TEST_OPTIMISATION})
 endfunction()
 
 function(duet_add_fuzzer name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(fuzz_${name} ${ARG_SOURCES})
-  target_link_libraries(fuzz_${name} PRIVATE duet_flags duet_options ${ARG_LINK})
-  target_include_directories(fuzz_${name} PRIVATE ${PROJECT_SOURCE_DIR})
-  target_compile_definitions(fuzz_${name} PRIVATE DUET_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_link_libraries(fuzz_${name} PRIVATE duet_flags duet::options ${ARG_LINK})
+  target_include_directories(fuzz_${name} PRIVATE ${DUET_SOURCES})
+  target_compile_definitions(fuzz_${name} PRIVATE DUET_SOURCE_DIR="${DUET_SOURCES}")
   target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
 endfunction()
+
+function(duet_add_part name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  find_package(CLI11 REQUIRED)
+  duet_show_headers(parts/${name})
+  add_library(duet_part_${name} STATIC ${ARG_SOURCES})
+  duet_unite(duet_part_${name})
+  # Words and arguments: what takes time is in the rooms.
+  target_compile_options(duet_part_${name} PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_link_libraries(duet_part_${name} PUBLIC duet::app ${ARG_LINK} CLI11::CLI11 PRIVATE duet_flags)
+endfunction()
+
+function(duet_add_program)
+  set(DUET_PART_HEADERS "")
+  set(DUET_PART_CALLS "")
+  set(libraries duet::app)
+  foreach(part IN LISTS DUET_PARTS)
+    string(APPEND DUET_PART_HEADERS "#include \"duet/parts/${part}/part.h\"\n")
+    list(APPEND DUET_PART_CALLS "duet::${part}_part()")
+    list(APPEND libraries duet_part_${part})
+  endforeach()
+  list(JOIN DUET_PART_CALLS ", " DUET_PART_CALLS)
+  find_package(CLI11 REQUIRED)
+  configure_file(${DUET_SOURCES}/cmake/duet_main.cpp.in ${PROJECT_BINARY_DIR}/duet_main.cpp @ONLY)
+  add_executable(duet ${PROJECT_BINARY_DIR}/duet_main.cpp)
+  target_compile_options(duet PRIVATE $<$<CONFIG:Release>:-O1>)
+  target_link_libraries(duet PRIVATE duet_flags ${libraries} CLI11::CLI11)
+  set_target_properties(duet PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
+endfunction()
+
+# Rooms in include order, and of which part each is (cmake/rooms.txt): DUET_ROOMS_OF_core, DUET_ROOMS_OF_robot, ...; the
+# names of the parts: DUET_ALL_PARTS.
+file(STRINGS ${DUET_SOURCES}/cmake/rooms.txt lines REGEX "^[a-z]+:|^\\[[a-z]+")
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${DUET_SOURCES}/cmake/rooms.txt)
+set(DUET_ALL_PARTS "")
+foreach(line IN LISTS lines)
+  if(line MATCHES "^\\[([a-z]+)( needs ([a-z ]+))?\\]$")
+    set(part ${CMAKE_MATCH_1})
+    string(REPLACE " " ";" DUET_NEEDS_OF_${part} "${CMAKE_MATCH_3}")
+    list(APPEND DUET_ALL_PARTS ${part})
+    set(DUET_ROOMS_OF_${part} "")
+  else()
+    string(REGEX REPLACE ":.*" "" room "${line}")
+    list(APPEND DUET_ROOMS_OF_${part} ${room})
+  endif()
+endforeach()
+list(REMOVE_ITEM DUET_ALL_PARTS core)
+set(DUET_PARTS "" CACHE STRING "Parts that are built beside the core (parts/): ${DUET_ALL_PARTS}, or `all`")
+set(asked ${DUET_PARTS})
+if("all" IN_LIST asked)
+  set(asked ${DUET_ALL_PARTS})
+endif()
+foreach(part IN LISTS asked)
+  if(NOT part IN_LIST DUET_ALL_PARTS)
+    list(JOIN DUET_ALL_PARTS ", " known)
+    message(FATAL_ERROR "DUET_PARTS: expected some of ${known}, or `all`, found '${part}'")
+  endif()
+  list(APPEND asked ${DUET_NEEDS_OF_${part}})
+endforeach()
+# In the order of the rooms, each with what it needs; hides the entry of the cache.
+set(DUET_PARTS ${DUET_ALL_PARTS})
+foreach(part IN LISTS DUET_ALL_PARTS)
+  if(NOT part IN_LIST asked)
+    list(REMOVE_ITEM DUET_PARTS ${part})
+  endif()
+endforeach()

@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt)
-folders=("${rooms[@]}" tests docs suites profiles examples cmake)
+folders=("${rooms[@]}" parts tests docs suites profiles examples cmake)
 bad=0
 missing() { echo "$1: cites '$2', which is not there"; bad=1; }
 

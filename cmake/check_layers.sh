@@ -7,22 +7,42 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-declare -A may
+declare -A may part_of needs
 rooms=()
-while IFS=': ' read -r room others; do
-  case $room in [a-z]*) rooms+=("$room"); may[$room]="$room $others" ;; esac
+while read -r line; do
+  case $line in
+    '['*) read -ra words <<<"${line//[][]/}"; part=${words[0]} needs[$part]=" core ${words[*]:2} $part " ;;
+    [a-z]*:*) room=${line%%:*} rooms+=("${line%%:*}"); may[$room]=" $room ${line#*:} " part_of[$room]=$part ;;
+  esac
 done <cmake/rooms.txt
 bad=0
-for room in "${!may[@]}"; do
-  [ -d "$room" ] || continue
-  while IFS=: read -r file line text; do
-    target=${text#*\"duet/} target=${target%%/*}
-    case " ${may[$room]} " in
-      *" $target "*) ;;
-      *) echo "$file:$line: $room may not include $target ($text)"; bad=1 ;;
-    esac
-  done < <(grep -rnE '^#include "duet/[a-z]+/' "$room" --include='*.h' --include='*.cpp' || true)
+for room in "${rooms[@]}"; do
+  for other in ${may[$room]}; do
+    [[ ${needs[${part_of[$room]}]} == *" ${part_of[$other]:-none} "* ]] ||
+      { echo "cmake/rooms.txt: $room (${part_of[$room]}) may not include $other (${part_of[$other]:-no room})"; bad=1; }
+  done
 done
+check_includes() {  # check_includes FOLDER WORDS: its files include of duet what lies in these folders
+  local file line text target
+  while IFS=: read -r file line text; do
+    target=${text#*\"duet/}
+    [[ $target == parts/* ]] && target=${target#parts/} target=parts/${target%%/*} || target=${target%%/*}
+    [[ $2 == *" $target "* ]] || { echo "$file:$line: $1 may not include $target ($text)"; bad=1; }
+  done < <(grep -rnE '^#include "duet/[a-z]+/' "$1" --include='*.h' --include='*.cpp' || true)
+}
+for room in "${rooms[@]}"; do check_includes "$room" "${may[$room]}"; done
+for part in "${!needs[@]}"; do  # what adds a part to the program
+  words=" parts/$part "
+  for room in "${rooms[@]}"; do [[ ${needs[$part]} != *" ${part_of[$room]} "* ]] || words+="$room "; done
+  [ "$part" = core ] || check_includes "parts/$part" "$words"
+done
+# Tests of the core's rooms are built without the parts, but for those of the program and of all readers (tests/fuzz).
+words= room_tests=()
+for room in "${rooms[@]}"; do
+  [[ ${part_of[$room]} != core ]] || { words+=" $room "; [ "$room" = app ] || [ ! -d "tests/$room" ] || room_tests+=("tests/$room"); }
+done
+for folder in "${room_tests[@]}"; do check_includes "$folder" "$words"; done
+rooms+=(parts)
 vendor() {  # vendor FOLDER PATTERN: headers that match PATTERN appear only in FOLDER
   local hits
   hits=$(grep -rnE "^#include [<\"]($2)" "${rooms[@]}" --include='*.h' --include='*.cpp' 2>/dev/null | grep -vE "^$1/" || true)

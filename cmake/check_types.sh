@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt)
+mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt) && rooms+=(parts)
 [ $# -eq 0 ] || rooms=("$@")
 
 # "NAMESPACE::NAME FILE:LINE" for each type that a header defines at the level of a namespace: clang-format leaves these

@@ -74,6 +74,7 @@ program_package() {
 library_package() {
   local root=$out/libduet-dev
   cmake --install "$build" --prefix "$root/usr" --component library >/dev/null
+  cmake --install "$build" --prefix "$root/usr" --component parts >/dev/null
   mkdir -p "$root/DEBIAN"
   local packages="Depends: duet (= $version), libeigen3-dev, libfmt-dev, libtbb-dev, libssl-dev, nlohmann-json3-dev, libyaml-cpp-dev, libprotobuf-dev, libonnx-dev"
   packages+=", libsqlite3-dev, zlib1g-dev, libzstd-dev, libzip-dev, liburdfdom-dev, libconsole-bridge-dev, libtinyxml-dev, pkg-config"

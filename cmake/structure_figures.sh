@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt)
+mapfile -t rooms < <(sed -n 's/^\([a-z]*\):.*/\1/p' cmake/rooms.txt) && rooms+=(parts)
 sources() { find "${rooms[@]}" \( -name '*.h' -o -name '*.cpp' \) -print; }
 # Product files in which a text stands, by a pattern; the file that others are counted from is left to the reader.
 files_with() { sources | xargs grep -lE "$1" | sort; }
@@ -15,7 +15,7 @@ echo "circles of units: $circles"
 
 # Where a controller's act() is called: controllers wrap one another, hardware/walker commands over the wire and steps
 # no engine, benchmarks time it alone.
-loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers|app/benchmarks)/|^hardware/walker\.cpp$')
+loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers/|app/benchmarks/|parts/[a-z]*/[a-z]*_benchmark\.cpp)|^hardware/walker\.cpp$')
 echo "places that step a robot under a controller: $(wc -l <<<"$loops")"
 indented <<<"$loops"
 
@@ -48,3 +48,6 @@ for room in "${rooms[@]}"; do
   now_all=$((now_all + now)) then_all=$((then_all + ${then:-0}))
 done
 printf '  %-12s %8d %s\n' all "$now_all" "${commit:+$then_all}"
+core=0
+for room in $(sed -n '/^\[core\]/,/^\[[^c]/s/^\([a-z]*\):.*/\1/p' cmake/rooms.txt); do core=$((core + $(lines_now "$room"))); done
+printf '  %-12s %8d (without the parts: rooms that they have, and parts/)\n' core "$core"

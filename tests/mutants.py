@@ -15,9 +15,8 @@ minute), and the tests of every room that links it run too: a changed engine, li
 DUET_ENGINES and DUET_PROGRAM. Only then it has survived.
 
 What is not drawn: headers; lines of `for (`, `require(`, `throw` and `fmt::` (loops that run out of an array and words of
-messages); app/benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
-runs it. A change that gives
-the same machine code, or that stands in tests/mutants_equivalent.txt with its reason, is counted apart.
+messages); benchmarks and the engines' bare loops (what they give is time); code for libtorch and the command that
+runs it. A change that gives the same machine code, or that stands in tests/mutants_equivalent.txt with its reason, is counted apart.
 
 The draw depends on the seed and on the lines alone, so that a commit elsewhere leaves it as it is. A second call with the
 same seed goes on where the first ended; it asks again only what survived, and gives both shares. Report:

@@ -9,14 +9,14 @@ import sys
 import typing
 
 with open(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), 'cmake', 'rooms.txt'), encoding='utf-8') as rooms:
-    ROOMS = [line.split(':')[0] for line in rooms if line[0].isalpha()]
+    ROOMS = [line.split(':')[0] for line in rooms if line[0].isalpha()] + ['parts']
 OPERATORS = [(r' < ', ' <= '), (r' <= ', ' < '), (r' > ', ' >= '), (r' >= ', ' > '), (r' \+ ', ' - '), (r' - ', ' + '),
              (r' \* ', ' + '), (r' / ', ' * '), (r' \+= ', ' -= '), (r' -= ', ' += '), (r' && ', ' || '),
              (r' \|\| ', ' && '), (r' == ', ' != '), (r' != ', ' == '), (r'std::max\(', 'std::min('),
              (r'std::min\(', 'std::max('), (r'\b0\.5\b', '0.6'), (r'return true;', 'return false;'),
              (r'return false;', 'return true;'), (r'if \(!', 'if ('), (r'\[0\]', '[1]')]
 SKIPPED_LINES = ('require(', 'throw ', 'fmt::', '#', 'template', 'for (', 'using ', 'typedef', 'static_assert')
-SKIPPED_FILES = ('app/benchmarks/', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'cli/train_dstar.cpp')
+SKIPPED_FILES = ('app/benchmarks/', '_benchmark.cpp', '/bare_loop.cpp', '/torch/', 'libtorch_peer.cpp', 'libtorch_network.cpp', 'parts/training/train_dstar.cpp')
 EQUIVALENT = 'tests/mutants_equivalent.txt'
 OUTPUT = re.compile(r'(?<= -o )\S+')
 

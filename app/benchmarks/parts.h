@@ -9,15 +9,12 @@
 namespace duet {
 
 void add_pair_benchmarks(std::vector<Benchmark>& list);
-void add_dataset_benchmarks(std::vector<Benchmark>& list);
 void add_metrics_benchmarks(std::vector<Benchmark>& list);
 void add_kinematics_benchmarks(std::vector<Benchmark>& list);
 void add_backend_benchmarks(std::vector<Benchmark>& list);
 void add_nn_benchmarks(std::vector<Benchmark>& list);
 void add_policy_benchmarks(std::vector<Benchmark>& list);
 void add_runner_benchmarks(std::vector<Benchmark>& list);
-void add_scale_benchmarks(std::vector<Benchmark>& list);
-void add_wbc_benchmarks(std::vector<Benchmark>& list);
 
 // A figure with the least or the largest value that it is to reach.
 BenchmarkFigure at_least(const std::string& name, double value, const std::string& unit, double target);

@@ -4,8 +4,7 @@
 #include <ctime>
 
 #include "duet/app/benchmarks/benchmark.h"
-#include "duet/app/cli/bench_detectors.h"
-#include "duet/app/command.h"
+#include "duet/app/part.h"
 #include "duet/app/version.h"
 #include "duet/core/names.h"
 #include "duet/core/parallel.h"
@@ -19,7 +18,6 @@ namespace {
 struct BenchArguments {
   std::vector<std::string> names;
   BenchmarkOptions options;
-  DetectorArguments detectors;
   bool gate = false;
 };
 
@@ -59,7 +57,7 @@ std::string line(const BenchmarkFigure& figure) {
 void run_bench(Session& session, const BenchArguments& arguments) {
   check_names(arguments.names);
   if (arguments.names == std::vector<std::string>{"detectors"})
-    return run_bench_detectors(session, arguments.detectors, arguments.options.threads);
+    throw MissingError(missing_part_message("`duet bench detectors`", "data"));
   nlohmann::json json = {{"context", capture_environment()}, {"benchmarks", nlohmann::json::array()}};
   json["context"]["duet_version"] = duet_version();
   json["context"]["machine"] = describe_machine();
@@ -105,8 +103,11 @@ void add_bench(CLI::App& app, Session& session) {
       ->check(CLI::Range(0.001, 3600.0));
   add_threads(command, arguments->options.threads, "threads of the scaling figures");
   command->add_flag("--gate", arguments->gate, "exit code 1 where a figure does not reach its target");
-  add_detector_options(*command, arguments->detectors);
-  command->callback([&session, arguments] { run_bench(session, *arguments); });
+  const Instead of_part = added_by_part("bench", *command);
+  command->callback([&session, arguments, of_part] {
+    if (!of_part(session, {.words = arguments->names, .threads = arguments->options.threads}))
+      run_bench(session, *arguments);
+  });
 }
 
 }  // namespace duet::cli

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "duet/app/command.h"
+#include "duet/app/part.h"
 #include "duet/app/version.h"
 #include "duet/backends/factory.h"
 #include "duet/controllers/catalogue/registry.h"
@@ -17,16 +17,9 @@
 #include "duet/robots/robot_cards.h"
 #include "duet/robots/robot_model.h"
 #include "duet/rows/folder/environment.h"
-#include "duet/training/dstar/trainer.h"
 
 namespace duet::cli {
 namespace {
-
-struct Finding {
-  std::string part;
-  bool present = false;
-  std::string detail;
-};
 
 Finding robot_finding(const RobotCardFile& card) {
   const std::string part = "robot " + card.name;
@@ -80,9 +73,8 @@ std::vector<Finding> findings() {
   list.push_back({"PAIR kernels", true, kernels});
   add_robots(list);
   for (const ControllerInfo& info : controllers()) list.push_back(controller_finding(info));
-  list.push_back({"training of policies", can_train_dstar(),
-                  can_train_dstar() ? "libtorch with " + training_blas()
-                                    : "built without libtorch; `./run train dstar` builds a program with it"});
+  for (const Part& part : parts())
+    if (part.findings != nullptr) std::ranges::move(part.findings(), std::back_inserter(list));
   list.push_back(viewer_finding());
   list.push_back({"machine", true, describe_machine()});
   return list;

@@ -8,24 +8,22 @@
 #include "duet/app/benchmarks/benchmark.h"
 #include "duet/app/command.h"
 #include "duet/app/option_sections.h"
+#include "duet/app/part.h"
 #include "duet/app/reference_pages.h"
 #include "duet/backends/factory.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/datasets/curation.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite/profile.h"
 #include "duet/experiment/suite_file/suite_keys.h"
-#include "duet/formats/robot_motion_format.h"
 #include "duet/io/channel.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/detector_catalogue.h"
 #include "duet/metrics/readings.h"
 #include "duet/motion/layouts/joint_layout.h"
-#include "duet/people/formats/people_formats.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/policy.h"
 #include "duet/retarget/options.h"
@@ -40,11 +38,6 @@
 namespace duet::cli {
 namespace {
 
-struct Listed {
-  std::string name, detail;
-  std::vector<std::string> options = {};  // a line each
-  nlohmann::json more = {};               // keys besides, for machines
-};
 using Listing = std::function<std::vector<Listed>()>;
 
 bool is_of_the_paper(Task task) { return std::ranges::find(kPaperTasks, task) != kPaperTasks.end(); }
@@ -129,15 +122,6 @@ std::vector<Listed> list_readings() {
   return list;
 }
 
-std::vector<Listed> list_people_formats() {
-  std::vector<Listed> list;
-  for (const PeopleFormat& format : people_formats())
-    list.push_back(
-        {std::string(format.name),
-         fmt::format("{}{}", format.what, format.licence.empty() ? "" : fmt::format("; licence {}", format.licence))});
-  return list;
-}
-
 std::vector<Listed> list_joint_layouts() {
   std::vector<Listed> list;
   for (const std::string& name : joint_layout_names()) {
@@ -163,10 +147,9 @@ nlohmann::json field_json(const Row& row) {
 }
 
 // "mujoco.iterations": of whom, and the option.
-template <std::vector<OptionSection> sections()>
-std::vector<Listed> list_options() {
+std::vector<Listed> listed_options(const std::vector<OptionSection>& sections) {
   std::vector<Listed> list;
-  for (const OptionSection& section : sections())
+  for (const OptionSection& section : sections)
     for (const FieldRow& row : section.rows)
       list.push_back(
           {section.name + "." + row.name,
@@ -175,6 +158,11 @@ std::vector<Listed> list_options() {
            {},
            {{"of", section.name}, {"default", row.fallback}, {"values", row.values}, {"meaning", row.meaning}}});
   return list;
+}
+
+template <std::vector<OptionSection> sections()>
+std::vector<Listed> list_options() {
+  return listed_options(sections());
 }
 
 std::vector<Listed> list_pair_options() {
@@ -226,14 +214,6 @@ std::vector<Listed> list_row_fields() {
     }
     list.push_back(std::move(entry));
   }
-  return list;
-}
-
-std::vector<Listed> list_curation_criteria() {
-  std::vector<Listed> list;
-  for (const CriterionInfo& info : curation_criteria())
-    list.push_back({std::string(info.name), fmt::format("{}: {} {} {:g} {}", to_string(info.gate), info.title,
-                                                        info.at_most ? "at most" : "at least", info.limit, info.unit)});
   return list;
 }
 
@@ -290,24 +270,6 @@ std::vector<Listed> list_robots() {
   return list;
 }
 
-std::vector<Listed> list_robot_formats() {
-  std::vector<Listed> list;
-  for (const RobotMotionFormat& format : robot_motion_formats()) {
-    const bool written = format.write != nullptr;
-    Listed entry{format.name, fmt::format("{}; {}", written ? "read and written" : "read", format.about)};
-    entry.options = {format.holds, fmt::format("looked up in {}; licence: {}", format.evidence, format.licence)};
-    entry.more = {{"written", written},
-                  {"quaternion", to_string(format.layout.quaternion)},
-                  {"joints", to_string(format.layout.joints)},
-                  {"angles", to_string(format.layout.angles)},
-                  {"metres", format.layout.metres},
-                  {"rate_hz", format.layout.rate_hz},
-                  {"holds_rate", format.holds_rate}};
-    list.push_back(std::move(entry));
-  }
-  return list;
-}
-
 std::vector<Listed> list_suites() {
   std::vector<Listed> list;
   for (const std::string& name : shipped_suite_names()) {
@@ -324,40 +286,57 @@ std::vector<Listed> list_benchmarks() {
   return list;
 }
 
-const std::vector<std::pair<std::string, Listing>>& listings() {
-  static const std::vector<std::pair<std::string, Listing>> table = {
-      {"tasks", list_tasks},
-      {"detectors", list_detectors},
-      {"engines", list_engines},
-      {"engine-options", list_options<engine_option_sections>},
-      {"profiles", list_profiles},
-      {"controllers", list_controllers},
-      {"controller-options", list_options<controller_option_sections>},
-      {"channels", list_channels},
-      {"suites", list_suites},
-      {"suite-keys", list_suite_keys},
-      {"perturbations", list_perturbations},
-      {"policies", list_policies},
-      {"policy-options", list_options<policy_option_sections>},
-      {"metrics", list_metrics},
-      {"readings", list_readings},
-      {"pair-options", list_pair_options},
-      {"synth-options", list_options<synth_option_sections>},
-      {"train-options", list_options<train_option_sections>},
-      {"people-formats", list_people_formats},
-      {"joint-layouts", list_joint_layouts},
-      {"curation-criteria", list_curation_criteria},
-      {"robots", list_robots},
-      {"row-fields", list_row_fields},
-      {"benchmarks", list_benchmarks},
-      {"robot-formats", list_robot_formats},
+struct ListPlace {
+  std::string name;
+  Listing own;       // empty: a part's
+  std::string part;  // whose
+};
+
+// In the order of help.
+const std::vector<ListPlace>& list_places() {
+  static const std::vector<ListPlace> table = {
+      {"tasks", list_tasks, {}},
+      {"detectors", list_detectors, {}},
+      {"engines", list_engines, {}},
+      {"engine-options", list_options<engine_option_sections>, {}},
+      {"profiles", list_profiles, {}},
+      {"controllers", list_controllers, {}},
+      {"controller-options", list_options<controller_option_sections>, {}},
+      {"channels", list_channels, {}},
+      {"suites", list_suites, {}},
+      {"suite-keys", list_suite_keys, {}},
+      {"perturbations", list_perturbations, {}},
+      {"policies", list_policies, {}},
+      {"policy-options", list_options<policy_option_sections>, {}},
+      {"metrics", list_metrics, {}},
+      {"readings", list_readings, {}},
+      {"pair-options", list_pair_options, {}},
+      {"synth-options", list_options<synth_option_sections>, {}},
+      {"train-options", {}, "training"},
+      {"people-formats", {}, "data"},
+      {"joint-layouts", list_joint_layouts, {}},
+      {"curation-criteria", {}, "data"},
+      {"robots", list_robots, {}},
+      {"row-fields", list_row_fields, {}},
+      {"benchmarks", list_benchmarks, {}},
+      {"robot-formats", {}, "data"},
   };
   return table;
 }
 
+// Empty where the part is absent whose list it is.
+Listing listing_of(const ListPlace& place) {
+  if (place.own) return place.own;
+  if (const auto sections = in_parts(&Part::option_lists, place.name))
+    return [sections] { return listed_options(sections()); };
+  return in_parts(&Part::lists, place.name);
+}
+
 void run_list(const Session& session, const std::string& what) {
-  for (const auto& [name, listing] : listings()) {
-    if (name != what) continue;
+  for (const ListPlace& place : list_places()) {
+    if (place.name != what) continue;
+    const Listing listing = listing_of(place);
+    if (!listing) throw MissingError(missing_part_message(fmt::format("`duet list {}`", what), place.part));
     nlohmann::json json = nlohmann::json::array();
     std::string text;
     for (const Listed& entry : listing()) {
@@ -377,7 +356,8 @@ void run_list(const Session& session, const std::string& what) {
 
 std::vector<std::string> listing_names() {
   std::vector<std::string> names;
-  for (const auto& [name, listing] : listings()) names.push_back(name);
+  for (const ListPlace& place : list_places())
+    if (listing_of(place)) names.push_back(place.name);
   return names;
 }
 

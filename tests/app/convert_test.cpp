@@ -1,4 +1,4 @@
-#include "duet/app/convert.h"
+#include "duet/parts/data/convert.h"
 
 #include <gmock/gmock.h>
 

@@ -1,16 +1,13 @@
-// duet score: motions and recordings, without physics: the 18 retargeting metrics, diagnostics, detectors; with
-// --people how many of the people in recordings whose act is known meet the rule `interaction`.
+// duet score: motions and recordings, without physics: the 18 retargeting metrics, diagnostics, detectors.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <optional>
 
-#include "duet/app/cli/people_arguments.h"
-#include "duet/app/command.h"
+#include "duet/app/part.h"
 #include "duet/core/naming_file.h"
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/datasets/labelled/people_conditions.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/scoring/motion_scores.h"
 #include "duet/scoring/recording_scores.h"
@@ -21,9 +18,7 @@ namespace {
 struct ScoreArguments {
   std::vector<std::string> inputs, readings;
   std::string card, thresholds = "paper";
-  bool each = false, as_is = false, all_detectors = false, all_readings = false, people = false;
-  std::string labels;
-  PeopleArguments of_people;
+  bool each = false, as_is = false, all_detectors = false, all_readings = false;
   int threads = default_threads();
 };
 
@@ -120,28 +115,7 @@ std::string recordings_text(const std::vector<RecordingScore>& recordings, bool 
   return text;
 }
 
-void score_people(const Session& session, const ScoreArguments& arguments) {
-  LabelledClips clips{
-      .paths = arguments.inputs, .format = arguments.of_people.format, .people = people_options(arguments.of_people)};
-  if (!arguments.labels.empty()) clips.labels = read_clip_labels(arguments.labels);
-  clips.threads = arguments.threads;
-  Progress progress(session.progress());
-  const PeopleVerdicts verdicts = judge_people(clips, [&](int done, int of) {
-    if (done == 1) progress.start("judging", of, "clips");
-    progress.advance();
-  });
-  progress.finish();
-  if (!verdicts.unread.empty())
-    note(session, fmt::format("{} clips cannot be read and count nowhere; --each says why", verdicts.unread.size()));
-  if (verdicts.still > 0) note(session, fmt::format("{} people stand still and count nowhere", verdicts.still));
-  std::string text = markdown_table(people_conditions_table(verdicts));
-  if (arguments.each) text += "\n" + markdown_table(people_failures_table(verdicts));
-  print(session, text, people_conditions_json(verdicts));
-}
-
 void run_score(Session& session, const ScoreArguments& arguments) {
-  require(arguments.people || arguments.labels.empty(), "--labels is for --people");
-  if (arguments.people) return score_people(session, arguments);
   const ScoreOptions options = options_of(arguments);
   const Scores scores = score_files(session, arguments, options);
   const MetricReadings& readings = options.readings.metrics;
@@ -184,14 +158,11 @@ void add_score(CLI::App& app, Session& session) {
   command->add_flag("--each", arguments->each,
                     "a table for each motion too; of people each whom the rule judges wrongly");
   command->add_flag("--as-is", arguments->as_is, "take clips however implausible their people are");
-  CLI::App& people =
-      *command->add_option_group("people", "recordings of two people of any format, in the robot's place");
-  people.add_flag("--people", arguments->people,
-                  "of recordings whose act is known: who meets which condition of the rule `interaction`");
-  people.add_option("--labels", arguments->labels, "CSV \"clip,label\" (default: the recordings' own labels)");
-  add_people_options(people, arguments->of_people);
+  const Instead of_part = added_by_part("score", *command);
   add_threads(command, arguments->threads);
-  command->callback([&session, arguments] { run_score(session, *arguments); });
+  command->callback([&session, arguments, of_part] {
+    if (!of_part(session, {arguments->inputs, arguments->each, arguments->threads})) run_score(session, *arguments);
+  });
 }
 
 }  // namespace duet::cli

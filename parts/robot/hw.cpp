@@ -1,0 +1,368 @@
+// duet hw: listen to a robot, guard it, plan for it, stop it; each says first what it will do. duet replay-log.
+#include <fmt/format.h>
+
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <random>
+
+#include "duet/core/require.h"
+#include "duet/hardware/dds/robot_side.h"
+#include "duet/hardware/guard_link.h"
+#include "duet/hardware/guard_loop.h"
+#include "duet/hardware/guard_message.h"
+#include "duet/hardware/lock_step.h"
+#include "duet/hardware/person_input.h"
+#include "duet/hardware/real_time.h"
+#include "duet/hardware/robot_config.h"
+#include "duet/hardware/run_log.h"
+#include "duet/parts/robot/hw_episodes.h"
+#include "duet/parts/robot/hw_partner.h"
+#include "duet/parts/robot/hw_status.h"
+#include "duet/parts/robot/part.h"
+
+namespace duet::cli {
+namespace {
+
+constexpr double kPlanPeriod = 0.02;  // [s]
+constexpr double kSaidEvery = 3.0;    // what is missing [s]
+constexpr const char* kNotSafetyRated =
+    "This software is not safety-rated. It replaces neither gantry nor emergency stop nor spotter.";
+volatile std::sig_atomic_t asked_to_end = 0;
+
+struct HardwareArguments {
+  std::string config, socket = "duet-guard.socket", log, command = "0,0,0", person_socket = "duet-person.socket",
+                      pose_socket = "duet-pose.socket", walker, walker_network;
+  double seconds = 5.0;
+  int velocity_port = 0;
+  bool lock_step = false;
+  ClipEpisodeArguments episode;
+};
+
+// Not experiment/work/interrupt.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to
+// finish.
+void end_on_signals() {
+  asked_to_end = 0;
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) std::signal(signal, [](int) { asked_to_end = 1; });
+}
+
+std::string where(const RobotConfig& config) {
+  return fmt::format("{} '{}', domain {} on {}", config.twin ? "twin" : "robot", config.permission.robot,
+                     config.permission.domain, config.permission.interface);
+}
+
+RobotSideOptions side_options(const HardwareArguments& arguments, bool commands) {
+  RobotSideOptions options;
+  options.commands = commands;
+  options.velocity_port = arguments.velocity_port;
+  options.pose_socket = arguments.pose_socket;
+  return options;
+}
+
+std::optional<PersonInput> person_input(const RobotConfig& config, const HardwareArguments& arguments) {
+  if (!config.has_camera) return std::nullopt;
+  return PersonInput(DatagramSocket::at_path(arguments.person_socket), config.X_BC);
+}
+
+void listen_for(Session& session, const HardwareArguments& arguments, bool with_planner) {
+  const RobotConfig config = read_robot_config(arguments.config);
+  note(session,
+       fmt::format("listens to {} for {} s; {}. Nothing is written to it: no writer is made.", where(config),
+                   arguments.seconds,
+                   with_planner ? fmt::format("takes a planner's commands at '{}' and limits them", arguments.socket)
+                                : "reads only"));
+  const GuardSetup setup = guard_setup(config, true);
+  std::unique_ptr<RunLog> log;  // its thread has no priority
+  if (!arguments.log.empty()) log = std::make_unique<RunLog>(arguments.log, setup);
+  note(session, real_time_text());
+  RobotSide side(config, side_options(arguments, false));
+  RobotGuard guard(setup, side.connection(), side.executor());
+  std::optional<PersonInput> person = person_input(config, arguments);
+  std::optional<DatagramSocket> planner;
+  if (with_planner) planner.emplace(DatagramSocket::at_path(arguments.socket));
+  end_on_signals();
+  const double begin = monotonic_seconds();
+  run_guard(guard, side.connection(), planner ? &*planner : nullptr, setup.limiter.dt, [&](double now) {
+    if (person) person->poll(now, guard);
+    if (log) log->add(guard);
+    return asked_to_end == 0 && now - begin < arguments.seconds;
+  });
+  print(session, status_text(guard, monotonic_seconds() - begin), status_json(guard));
+  if (guard.status().states == 0) throw MissingError(fmt::format("no state of {} has come", where(config)));
+}
+
+// A word for a person to type; not a secret.
+std::string new_word() {
+  constexpr const char* kWords[] = {"kestrel", "heron", "plover", "osprey", "dunlin", "linnet", "avocet", "merlin"};
+  std::random_device random;
+  return fmt::format("{}-{:03d}", kWords[random() % std::size(kWords)], random() % 1000);
+}
+
+ArmingFacts facts_for(const RobotConfig& config, const GuardSetup& setup, const HardwareArguments& arguments,
+                      const RunLog& log) {
+  ArmingFacts facts;
+  facts.permission = config.permission;
+  facts.twin = config.twin;
+  facts.executor = config.executor;
+  facts.odometry = config.odometry;
+  facts.asked_to_arm = true;
+  facts.contact_limits = setup.limiter.contact_limits;
+  facts.log_is_open = log.good();
+  facts.free_log_bytes =
+      static_cast<double>(std::filesystem::space(std::filesystem::absolute(arguments.log).parent_path()).available);
+  facts.shown_nonce = new_word();
+  facts.shown_at = monotonic_seconds();
+  return facts;
+}
+
+// Follows the guard until it has stopped for good; says each change of state.
+class ArmedRun {
+ public:
+  ArmedRun(Session& session, RobotGuard& guard, RobotSide& side, RunLog& log, ArmingFacts facts)
+      : session_(session), guard_(guard), side_(side), log_(log), facts_(std::move(facts)) {}
+
+  bool go_on() {
+    log_.add(guard_);
+    const GuardStatus& status = guard_.status();
+    const SafetyState state = status.safety.state;
+    if (state != last_) {
+      note(session_, fmt::format("{} ({})", safety_state_name(state), stop_cause_name(status.safety.cause)));
+      last_ = state;
+      said_at_ = status.input.now;
+    }
+    if (state == SafetyState::kListen && !armed_) say_what_is_missing(status);
+    if (state == SafetyState::kReady && !armed_) try_to_arm(status);
+    if (asked_to_end != 0 && !status.order.writes) return false;
+    if (asked_to_end != 0) guard_.stop();
+    // Damped to the end: the operator's stop comes back to listening, everything else is a fault.
+    return state != SafetyState::kFault && !(armed_ && !status.order.writes && state == SafetyState::kListen) &&
+           refusal_.empty();
+  }
+  [[nodiscard]] const std::string& refusal() const { return refusal_; }
+
+ private:
+  // Now and then while it waits: nobody else says why.
+  void say_what_is_missing(const GuardStatus& status) {
+    if (status.safety.missing.empty() || status.input.now - said_at_ < kSaidEvery) return;
+    said_at_ = status.input.now;
+    note(session_, fmt::format("listen (lately missing: {})", status.safety.missing));
+  }
+  void try_to_arm(const GuardStatus& status) {
+    facts_.now = monotonic_seconds();  // as the word's age is told, whatever clock the guard ticks by
+    facts_.remote_key_held = status.input.now - status.input.dead_man_at < 0.1;
+    facts_.reported_mode_machine = guard_.reading().mode_machine;
+    facts_.executor_complaint = side_.executor().complaint();
+    refusal_ = arming_refusal(facts_);
+    if (!refusal_.empty()) return;
+    guard_.arm();
+    armed_ = true;
+  }
+
+  Session& session_;
+  RobotGuard& guard_;
+  RobotSide& side_;
+  RunLog& log_;
+  ArmingFacts facts_;
+  SafetyState last_ = SafetyState::kOffline;
+  double said_at_ = 0.0;  // by the guard's clock [s]
+  bool armed_ = false;
+  std::string refusal_;
+};
+
+std::string executed_text(const RobotConfig& config, const GuardSetup& setup) {
+  const RobotModel& robot = *setup.limiter.robot;
+  return executed_channels_text(executed_channels(config.executor, robot, setup.limiter.executed.joints), robot);
+}
+
+// Null where none is asked for.
+std::unique_ptr<Walker> walker_for(const HardwareArguments& arguments, const GuardSetup& setup) {
+  if (arguments.walker.empty()) return nullptr;
+  ControllerOptions options;
+  if (!arguments.walker_network.empty()) options["network"] = arguments.walker_network;
+  return std::make_unique<Walker>(arguments.walker, options, setup.limiter.robot);
+}
+
+void run_arm(Session& session, const HardwareArguments& arguments) {
+  const RobotConfig config = read_robot_config(arguments.config);
+  const GuardSetup setup = guard_setup(config, false);
+  RunLog log(arguments.log, setup);
+  ArmingFacts facts = facts_for(config, setup, arguments, log);
+  note(session,
+       fmt::format("{}\nguards {}: damps it, stands it up at start, follows the planner at '{}' at A while R1 is "
+                   "held, logs to '{}'. Ctrl-C damps it.\n{}\ntype '{}' within {} s to arm:",
+                   kNotSafetyRated, where(config), arguments.socket, arguments.log, executed_text(config, setup),
+                   facts.shown_nonce, kNonceTime));
+  std::getline(std::cin, facts.typed_nonce);
+  facts.now = monotonic_seconds();
+  facts.reported_mode_machine = config.permission.mode_machine;  // not heard yet: asked again when it is
+  facts.remote_key_held = true;
+  if (const std::string refusal = arming_refusal(facts); !refusal.empty()) throw InputError("not armed: " + refusal);
+  DatagramSocket planner = DatagramSocket::at_path(arguments.socket);
+  if (arguments.lock_step)
+    ask_for_sharp_timers();
+  else
+    note(session, real_time_text());
+  RobotSide side(config, side_options(arguments, true));
+  LockStepWire stepped(side.connection());
+  RobotGuard guard(setup, arguments.lock_step ? static_cast<RobotWire&>(stepped) : side.connection(), side.executor());
+  const std::unique_ptr<Walker> walker = walker_for(arguments, setup);
+  if (walker != nullptr) guard.let_walk(*walker);
+  std::optional<PersonInput> person = person_input(config, arguments);
+  ArmedRun run(session, guard, side, log, facts);
+  ReportSender reports(arguments.socket);
+  end_on_signals();
+  const auto after_tick = [&](double now) {
+    if (person) person->poll(now, guard);
+    return run.go_on();
+  };
+  if (arguments.lock_step)
+    run_guard_in_lock_step(guard, stepped, &planner, setup.limiter.dt,
+                           {after_tick, [&] { return reports.after_tick(guard); }});
+  else
+    run_guard(guard, side.connection(), &planner, setup.limiter.dt, [&](double now) {
+      (void)reports.after_tick(guard);
+      return after_tick(now);
+    });
+  if (!run.refusal().empty()) throw InputError("not armed: " + run.refusal());
+  print(session,
+        fmt::format("{}; log '{}', {} ticks left out; {} messages were old, {} streams began anew",
+                    safety_state_name(guard.status().safety.state), arguments.log, log.dropped(),
+                    guard.status().old_messages, guard.status().restarts),
+        status_json(guard));
+  if (guard.status().safety.state == SafetyState::kFault) session.exit_code = kExitGate;
+}
+
+// The first `size` bytes of `message`.
+void tell(DatagramSocket& guard, const std::string& socket, const GuardBuffer& message, std::size_t size) {
+  if (!guard.send(std::span<const std::byte>(message).first(size)))
+    throw std::runtime_error(fmt::format("the guard at '{}' has gone", socket));
+}
+
+void run_plan(Session& session, const HardwareArguments& arguments) {
+  if (!arguments.episode.clip.empty()) return run_clip_episode(session, arguments.episode, arguments.socket);
+  const std::shared_ptr<const RobotModel> robot = load_shared_robot();
+  PlannerMessage message;
+  message.command.root = parse_velocity_command(arguments.command, HardwareLimits{}.height);
+  message.command.q = robot->neutral;
+  note(session,
+       fmt::format("asks the guard at '{}' for {} (forward, left [m/s], turn [rad/s]) with the arms in the neutral "
+                   "pose for {} s, then for standing still. The guard limits it.",
+                   arguments.socket, arguments.command, arguments.seconds));
+  DatagramSocket guard = DatagramSocket::to_path(arguments.socket);
+  GuardBuffer buffer;
+  end_on_signals();
+  const double begin = monotonic_seconds();
+  long sent = 0;
+  message.sequence = static_cast<std::uint64_t>(begin * 1e6);
+  for (double now = begin; asked_to_end == 0 && now - begin < arguments.seconds + 1.0; now = monotonic_seconds()) {
+    if (now - begin > arguments.seconds) message.command.root = {0.0, 0.0, 0.0, message.command.root.height};
+    message.command.stamp = now;
+    ++message.sequence;
+    tell(guard, arguments.socket, buffer, encode(message, buffer));
+    ++sent;
+    std::this_thread::sleep_for(std::chrono::duration<double>(kPlanPeriod));
+  }
+  print(session, fmt::format("{} commands sent", sent), {{"sent", sent}});
+}
+
+void run_stop(Session& session, const HardwareArguments& arguments) {
+  note(session, fmt::format("asks the guard at '{}' to damp the robot", arguments.socket));
+  DatagramSocket guard = DatagramSocket::to_path(arguments.socket);
+  GuardBuffer buffer;
+  tell(guard, arguments.socket, buffer, encode_stop(buffer));
+  print(session, "asked", {{"asked", true}});
+}
+
+using HardwareCommand = void (*)(Session&, const HardwareArguments&);
+
+CLI::App* add_one(CLI::App& hardware, Session& session, const std::shared_ptr<HardwareArguments>& arguments,
+                  const std::string& name, const std::string& description, const std::string& example,
+                  HardwareCommand command) {
+  CLI::App* app = add_command(hardware, session, name, description, example);
+  app->callback([&session, arguments, command] { command(session, *arguments); });
+  return app;
+}
+
+void add_config(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("config", arguments.config, "configuration of the robot or twin (YAML)")->required();
+}
+
+void add_socket(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("--socket", arguments.socket, "local socket of the guard")->capture_default_str();
+}
+
+void add_seconds(CLI::App* app, HardwareArguments& arguments) {
+  app->add_option("--seconds", arguments.seconds, "how long")->capture_default_str()->check(CLI::Range(0.1, 86400.0));
+}
+
+void run_replay(Session& session, const std::string& path) {
+  const LogReplay replay = replay_log(path);
+  print(session,
+        fmt::format("{}: {} ticks, {} with another output{}; the log {}", path, replay.ticks, replay.different,
+                    replay.dropped == 0 ? "" : fmt::format(" ({} ticks are not in it)", replay.dropped),
+                    replay.whole ? "is whole" : "was cut off"),
+        {{"ticks", replay.ticks},
+         {"different", replay.different},
+         {"dropped", replay.dropped},
+         {"whole", replay.whole},
+         {"events", replay.events}});
+  if (replay.different > 0) session.exit_code = kExitDeterminism;
+}
+
+}  // namespace
+
+void add_hardware(CLI::App& app, Session& session) {
+  CLI::App* hardware =
+      app.add_subcommand("hw", "a real G1, or its twin: check, dry-run, arm, run, stop (not safety-rated)");
+  hardware->require_subcommand(1);
+  const auto arguments = std::make_shared<HardwareArguments>();
+  CLI::App* check =
+      add_one(*hardware, session, arguments, "check", "listen to it and say what is missing; writes nothing",
+              "duet hw check examples/hardware/twin.yaml",
+              [](Session& s, const HardwareArguments& a) { listen_for(s, a, false); });
+  CLI::App* dry = add_one(*hardware, session, arguments, "dry-run",
+                          "the whole guard with a planner, but without a writer: nothing can reach the robot",
+                          "duet hw dry-run examples/hardware/twin.yaml --seconds 20",
+                          [](Session& s, const HardwareArguments& a) { listen_for(s, a, true); });
+  CLI::App* arm = add_one(*hardware, session, arguments, "arm", "guard it: the process that alone commands it",
+                          "duet hw arm examples/hardware/twin.yaml --log run.mcap --velocity-port 15001", run_arm);
+  CLI::App* plan = add_one(*hardware, session, arguments, "run", "ask the guard for a velocity, for a time",
+                           "duet hw run --command 0.2,0,0 --seconds 5", run_plan);
+  CLI::App* stop =
+      add_one(*hardware, session, arguments, "stop", "ask the guard to damp the robot", "duet hw stop", run_stop);
+  for (CLI::App* listens : {check, dry, arm}) add_config(listens, *arguments);
+  for (CLI::App* talks : {dry, arm, plan, stop}) add_socket(talks, *arguments);
+  for (CLI::App* lasts : {check, dry, plan}) add_seconds(lasts, *arguments);
+  for (CLI::App* logs : {check, dry}) logs->add_option("--log", arguments->log, "log to make (MCAP)");
+  arm->add_option("--log", arguments->log, "log to make (MCAP)")->required();
+  arm->add_option("--velocity-port", arguments->velocity_port,
+                  "UDP port of 127.0.0.1 that takes a twin's velocities (executor 'twin')")
+      ->check(CLI::Range(1, 65535));
+  for (CLI::App* sees : {check, dry, arm}) {
+    sees->add_option("--person-socket", arguments->person_socket,
+                     "local socket where a camera's estimator sends (configuration with 'camera')")
+        ->capture_default_str();
+    sees->add_option("--pose-socket", arguments->pose_socket,
+                     "local socket where a tracker sends the base's pose (odometry 'external')")
+        ->capture_default_str();
+  }
+  add_play_partner(*hardware, session);
+  arm->add_option("--walker", arguments->walker, "controller that keeps it on its feet (homie, wbc_sim, ...)");
+  arm->add_option("--network", arguments->walker_network, "of the walker");
+  arm->add_flag("--lock-step", arguments->lock_step, "by the clock of a twin that waits for each command");
+  plan->add_option("--command", arguments->command, "\"vx,vy,wz\" [m/s, m/s, rad/s]")->capture_default_str();
+  add_clip_options(*plan, arguments->episode);
+  add_hardware_episodes(*hardware, session);
+}
+
+void add_replay_log(CLI::App& app, Session& session) {
+  CLI::App* command = add_command(app, session, "replay-log",
+                                  "pass a run's log through the limiter again: the same bits, or exit code 5",
+                                  "duet replay-log run.mcap");
+  const auto path = std::make_shared<std::string>();
+  command->add_option("log", *path, "log of `duet hw arm` or `dry-run` (MCAP)")->required();
+  command->callback([&session, path] { run_replay(session, *path); });
+}
+
+}  // namespace duet::cli

@@ -1,0 +1,371 @@
+#include "duet/parts/robot/hw_episodes.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/core/clock.h"
+#include "duet/core/file.h"
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/scratch_folder.h"
+#include "duet/execution/run_inputs.h"
+#include "duet/execution/runner.h"
+#include "duet/experiment/plan/clips.h"
+#include "duet/experiment/plan/run_identity.h"
+#include "duet/experiment/plan/shipped_suites.h"
+#include "duet/experiment/suite_file/suite_actors.h"
+#include "duet/experiment/work/interrupt.h"
+#include "duet/experiment/work/run_work.h"
+#include "duet/hardware/dds/twin_over_dds.h"
+#include "duet/hardware/guarded_episode.h"
+#include "duet/hardware/twin_in_process.h"
+
+namespace duet::cli {
+namespace {
+
+enum class TwinClock { kInProcess, kLockStep, kRealTime };
+const std::vector<std::string> kClockNames = {"in-process", "lock-step", "real-time"};
+
+struct EpisodesArguments {
+  std::string config, suite, walker, engine = "mujoco", clock = "lock-step", output;
+  std::vector<std::string> overrides;
+  int limit = 0;
+  double noise = 1.0;
+};
+
+TwinClock parse_clock(const std::string& name) {
+  for (std::size_t k = 0; k < kClockNames.size(); ++k)
+    if (kClockNames[k] == name) return static_cast<TwinClock>(k);
+  throw std::invalid_argument(unknown_name_message("clock of the twin", name, kClockNames));
+}
+
+// Sensor noise of a robot of this kind, as far as published training noise and data sheets go; scaled by --noise.
+TwinOptions noisy_twin(double share, const std::string& engine, int mode_machine, std::uint64_t seed) {
+  TwinOptions twin;
+  twin.place_noise = share * 0.002;
+  twin.speed_noise = share * 0.02;
+  twin.joint_noise = share * 0.002;
+  twin.joint_speed_noise = share * 0.1;
+  twin.gyro_noise = share * 0.05;
+  twin.acceleration_noise = share * 0.1;
+  twin.tilt_noise = share * 0.01;
+  twin.engine = engine;
+  twin.mode_machine = mode_machine;
+  twin.seed = seed;
+  return twin;
+}
+
+const SuiteController& walker_of(const Suite& suite, const std::string& name) {
+  return name.empty() ? suite.controllers.front() : controller_of(suite, name);
+}
+
+// The state that all episodes of a command share.
+class TwinEpisodes {
+ public:
+  TwinEpisodes(const TwinEpisodes&) = delete;  // it points into its own suite
+  TwinEpisodes& operator=(const TwinEpisodes&) = delete;
+  TwinEpisodes(Session& session, const EpisodesArguments& arguments)
+      : session_(session),
+        arguments_(arguments),
+        clock_(parse_clock(arguments.clock)),
+        config_(read_robot_config(arguments.config)),
+        suite_(read_suite(arguments)),
+        bodies_(suite_),
+        walker_(walker_of(suite_, arguments.walker)) {
+    if (!config_.twin)
+      throw InputError(fmt::format("{}: expected a twin's configuration (twin: true)", arguments.config));
+    if (!config_.permission.allow_motion)
+      throw InputError(fmt::format("{}: it does not allow motion: 'allow_motion' is not true", arguments.config));
+    if (const auto absent = bodies_.absent().find(walker_.name); absent != bodies_.absent().end())
+      throw MissingError(absent->second);
+    make_walker_ = Walker::load(walker_.use, walker_.options, bodies_.robot(walker_.name));
+    identity_ = identity_of(suite_, bodies_.read());
+    const KeptSuite kept = kept_suite(suite_, arguments.output, identity_.files);
+    const RunInfo info = new_run_info(suite_, kept, identity_, session.argv, {});
+    rows_.emplace(RunDirectory::open(arguments.output, info));
+    keep_inputs(kept, arguments.output);
+  }
+
+  void run() {
+    say_first();
+    Progress progress(session_.progress());
+    bodies_.take_clips(prepare_clips(suite_, *bodies_.nominal(), 1, progress, {.files = &identity_.files}));
+    const EpisodePlan plan(suite_, bodies_);
+    int done = 0;
+    for (std::int64_t i = 0; i < plan.size() && interrupt() == Interrupt::kNone; ++i) {
+      const EpisodeSpec spec = plan.at(i);
+      if (spec.engine != arguments_.engine || spec.controller != walker_.name || spec.perturbation != kCleanName)
+        continue;
+      if (arguments_.limit > 0 && done >= arguments_.limit) break;
+      try {
+        run_both(spec, done++);
+      } catch (const EpisodeInterrupted&) {  // it leaves no row
+        break;
+      }
+    }
+    print_result();
+  }
+
+ private:
+  static Suite read_suite(const EpisodesArguments& arguments) {
+    Overrides overrides;
+    for (const std::string& text : arguments.overrides) overrides.push_back(split_assignment(text));
+    overrides.emplace_back("engines", fmt::format("[{}]", arguments.engine));
+    return load_suite(suite_file(arguments.suite), overrides);
+  }
+
+  void say_first() const {
+    note(
+        session_,
+        fmt::format("rolls out each episode of {} {} twice under '{}': in {}, and over a twin with {} behind it ({}, "
+                    "domain {}), behind the guard of '{}' whose log goes to '{}'. The twin is armed by this program; a "
+                    "robot cannot be.",
+                    suite_.name, suite_.version, walker_.name, arguments_.engine, arguments_.engine, arguments_.clock,
+                    config_.permission.domain, arguments_.config, arguments_.output));
+  }
+
+  [[nodiscard]] std::string path(int index, const char* ending) const {
+    return (std::filesystem::path(arguments_.output) / fmt::format("episode-{:03d}{}", index, ending)).string();
+  }
+
+  [[nodiscard]] GuardSetup setup() const { return guard_setup(config_, false); }
+
+  std::unique_ptr<GuardLink> make_link(const EpisodeSpec& spec, std::unique_ptr<Walker> walker, RunLog& log) const {
+    const TwinOptions twin =
+        noisy_twin(arguments_.noise, arguments_.engine, config_.permission.mode_machine, spec.seed);
+    if (clock_ == TwinClock::kInProcess) return std::make_unique<TwinInProcess>(setup(), twin, std::move(walker), &log);
+    const TwinOverDdsOptions options{.program = twin_program(),
+                                     .place = config_.place(),
+                                     .twin = twin,
+                                     .lock_step = clock_ == TwinClock::kLockStep,
+                                     .more = {},
+                                     .socket = scratch_ / "guard.socket"};
+    return std::make_unique<TwinOverDds>(options, setup(), std::move(walker), &log);
+  }
+
+  GuardedRun run_guarded(const EpisodeSpec& spec, int index) {
+    const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
+    std::unique_ptr<Walker> walker = make_walker_();
+    GuardedOptions options;
+    options.config = config_;
+    options.steps_from = walker->steps_from();
+    options.engine = fmt::format("twin-{}", arguments_.engine);
+    options.recording = path(index, ".npz");
+    options.stop_asked = [] { return interrupt() != Interrupt::kNone; };
+    std::filesystem::remove(path(index, ".mcap"));
+    RunLog log(path(index, ".mcap"), setup());
+    const std::unique_ptr<GuardLink> link = make_link(spec, std::move(walker), log);
+    GuardedRun run = run_guarded_episode(spec, suite_, identity_, robot,
+                                         bodies_.policy(spec.controller, spec.policy).make, *link, options);
+    dropped_ += log.dropped();
+    return run;
+  }
+
+  void run_both(const EpisodeSpec& spec, int index) {
+    const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
+    const EpisodeRow simulated =
+        run_episode(spec, suite_, identity_, robot, "", {.policy = bodies_.policy(spec.controller, spec.policy).make});
+    const GuardedRun guarded = run_guarded(spec, index);
+    if (guarded.interrupted) throw EpisodeInterrupted();
+    keep(simulated);
+    keep(guarded.row);
+    episodes_.simulated.push_back(simulated);
+    episodes_.guarded.push_back(guarded.row);
+    runs_.push_back(guarded);
+    note(session_,
+         fmt::format("{:3d} {:<10} {:<8} simulator {} {}; twin {} {}{}; held {} ticks, {} reports missed, {:.1f} s in "
+                     "{:.1f} s",
+                     index, guarded.row.task, guarded.row.policy, to_string(simulated.outcome),
+                     simulated.success.value_or(false) ? "success" : "-", to_string(guarded.row.outcome),
+                     guarded.row.success.value_or(false) ? "success" : "-",
+                     guarded.row.message.empty() ? "" : " (" + guarded.row.message + ")", guarded.held_ticks,
+                     guarded.missed_reports, guarded.guard_seconds, guarded.row.wall_s));
+  }
+
+  // Nothing that is finished is lost; a row that the folder has from before stands.
+  void keep(const EpisodeRow& row) {
+    if (rows_->claim(row.key) == Claim::kMine) rows_->append(row);
+  }
+
+  [[nodiscard]] std::string by_task() const {
+    std::map<std::string, std::array<int, 3>> counts;
+    for (std::size_t i = 0; i < runs_.size(); ++i) {
+      std::array<int, 3>& count = counts[episodes_.guarded[i].task];
+      ++count[0];
+      count[1] += episodes_.simulated[i].success.value_or(false) ? 1 : 0;
+      count[2] += episodes_.guarded[i].success.value_or(false) ? 1 : 0;
+    }
+    std::string text;
+    for (const auto& [task, count] : counts)
+      text += fmt::format("  {:<10} simulator {} of {}, twin {} of {}\n", task, count[1], count[0], count[2], count[0]);
+    return text;
+  }
+
+  [[nodiscard]] std::string clamp_totals() const {
+    std::string text;
+    for (std::size_t k = 0; k < kClampReasons; ++k) {
+      long total = 0;
+      for (const GuardedRun& run : runs_) total += run.clamps[k];
+      if (total > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", kClampNames[k], total);
+    }
+    return text.empty() ? "none" : text;
+  }
+
+  void print_result() {
+    const PairedSuccess success = paired_success(episodes_);
+    double guard_seconds = 0.0, wall = 0.0;
+    int held = 0, missed = 0;
+    for (const GuardedRun& run : runs_) {
+      guard_seconds += run.guard_seconds;
+      wall += run.row.wall_s;
+      held += run.held_ticks;
+      missed += run.missed_reports;
+    }
+    const std::string executed =
+        runs_.empty() ? "nothing" : executed_mask_text(runs_.front().executed, *bodies_.nominal());
+    const std::string text = fmt::format(
+        "{}\n{}executed of the reference: {}\nclamps of the guard (its ticks): {}\n{:.1f} s of episodes in {:.1f} s of "
+        "wall time with the wait for the guard ({}); held {} of the planner's ticks, {} reports missed, {} ticks left "
+        "out of logs",
+        paired_text(success, "simulator", "twin"), by_task(), executed, clamp_totals(), guard_seconds, wall,
+        arguments_.clock, held, missed, dropped_);
+    nlohmann::json json = paired_json(success);
+    json["clock"] = arguments_.clock;
+    json["guard_seconds"] = guard_seconds;
+    json["wall_seconds"] = wall;
+    json["held_ticks"] = held;
+    json["missed_reports"] = missed;
+    print(session_, text, json);
+    if (interrupt() != Interrupt::kNone) session_.exit_code = kExitInterrupted;
+  }
+
+  Session& session_;
+  const EpisodesArguments& arguments_;
+  TwinClock clock_;
+  RobotConfig config_;
+  Suite suite_;
+  Bodies bodies_;
+  RunIdentity identity_;
+  std::optional<RunDirectory> rows_;  // the output folder: a run that `duet report` reads
+  const SuiteController& walker_;
+  ScratchFolder scratch_;  // of the guard's socket
+  std::function<std::unique_ptr<Walker>()> make_walker_;
+  PairedEpisodes episodes_;
+  std::vector<GuardedRun> runs_;
+  long dropped_ = 0;
+};
+
+void run_recording(Session& session, const std::string& log, const std::string& task, const std::string& output) {
+  std::optional<Task> known;
+  if (!task.empty()) known = parse_task(task);
+  const LoggedRun run = recording_of_log(log, known);
+  save_logged_run(run.recording, run.executed, output);
+  print(session,
+        fmt::format("{}: {} frames, outcome {}{}, {}; executed: {}; the log {}", output, run.recording.frames(),
+                    to_string(run.recording.outcome),
+                    run.recording.message.empty() ? "" : " (" + run.recording.message + ")",
+                    run.recording.partner.empty() ? "nobody was seen" : "with a person",
+                    executed_mask_text(run.executed, *load_shared_robot()), run.whole ? "is whole" : "was cut off"),
+        {{"frames", run.recording.frames()},
+         {"outcome", to_string(run.recording.outcome)},
+         {"whole", run.whole},
+         {"events", run.events}});
+}
+
+void add_recording_command(CLI::App& hardware, Session& session) {
+  struct Arguments {
+    std::string log, task, output;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = add_command(hardware, session, "recording", "a run's log as a recording that `duet score` takes",
+                                  "duet hw recording run.mcap --task wave -o run.npz");
+  command->add_option("log", arguments->log, "log of `duet hw arm` or `duet hw episodes` (MCAP)")->required();
+  command->add_option("--task", arguments->task, "that the run was of");
+  command->add_option("-o,--output", arguments->output, "recording to make (NPZ)")->required();
+  command->callback(
+      [&session, arguments] { run_recording(session, arguments->log, arguments->task, arguments->output); });
+}
+
+}  // namespace
+
+void add_hardware_episodes(CLI::App& hardware, Session& session) {
+  add_recording_command(hardware, session);
+  const auto arguments = std::make_shared<EpisodesArguments>();
+  CLI::App* command =
+      add_command(hardware, session, "episodes", "a suite's episodes over the twin beside the same in the simulator",
+                  "duet hw episodes examples/hardware/twin.yaml examples/hardware/episodes.yaml -o out/twin");
+  command->add_option("config", arguments->config, "configuration of the twin (YAML)")->required();
+  command->add_option("suite", arguments->suite, "suite (YAML)")->required();
+  command->add_option("-o,--output", arguments->output, "folder for rows, logs and recordings")->required();
+  command->add_option("--walker", arguments->walker, "controller of the suite that walks; without: its first");
+  command->add_option("--engine", arguments->engine, "behind the twin, and of the simulator")->capture_default_str();
+  command->add_option("--clock", arguments->clock, "in-process (no wire), lock-step or real-time")
+      ->capture_default_str();
+  command->add_option("--noise", arguments->noise, "of the twin's sensors, as a share of the usual")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 100.0));
+  command->add_option("-n,--limit", arguments->limit, "most episodes; 0: all")->check(CLI::Range(0, 1000000));
+  command->add_option("-s,--set", arguments->overrides, "key=value of the suite")->allow_extra_args(false);
+  command->callback([&session, arguments] {
+    catch_interrupts();
+    TwinEpisodes(session, *arguments).run();
+  });
+}
+
+void add_clip_options(CLI::App& command, ClipEpisodeArguments& arguments) {
+  command.add_option("--clip", arguments.clip,
+                     "clip or paired motion (NPZ): an episode of it, in the place of --command");
+  command.add_option("--config", arguments.config,
+                     "configuration of the robot or twin, whose limits the planner keeps");
+  command.add_option("--policy", arguments.policy, "that leads the episode")->capture_default_str();
+  command.add_option("--start", arguments.start, "of the episode: act, approach, clip")->capture_default_str();
+  command.add_option("--walker", arguments.walker, "controller that the guard walks with")->capture_default_str();
+  command.add_option("--recording", arguments.recording, "recording to make (NPZ)");
+}
+
+void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, const std::string& socket) {
+  if (arguments.config.empty()) throw InputError("--clip: expected the configuration too (--config), found none");
+  const RobotConfig config = read_robot_config(arguments.config);
+  const Suite suite = suite_of_clip(arguments.clip, arguments.policy, arguments.start, "pd");
+  Bodies bodies(suite);
+  const RunIdentity identity = identity_of(suite, bodies.read());
+  Progress progress(session.progress());
+  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, progress, {.files = &identity.files}));
+  const EpisodePlan plan(suite, bodies);
+  const EpisodeSpec spec = plan.at(0);
+  const RolloutSetup setup = episode_setup(spec, suite, *bodies.nominal());
+  note(session,
+       fmt::format(
+           "asks the guard at '{}' for {:.1f} s of '{}' ({}, policy '{}', start {}): the robot's arms follow the "
+           "reference, its root goes at most {:.2f} m/s. The guard limits it and keeps the log; afterwards the "
+           "robot is told to stand.",
+           socket, episode_ticks(setup) / kTickRate, spec.clip->clip_id, to_string(spec.clip->task), arguments.policy,
+           arguments.start, config.limits.forward));
+  SocketGuardLink link(socket);
+  GuardedOptions options;
+  options.config = config;
+  options.steps_from = least_step_speed(arguments.walker);
+  options.engine = config.twin ? "twin" : "robot";
+  options.recording = arguments.recording;
+  catch_interrupts();
+  options.stop_asked = [] { return interrupt() != Interrupt::kNone; };
+  options.watch = [&](const GuardReport& report) {
+    note(session, fmt::format("the guard: {} ({})", safety_state_name(report.state), stop_cause_name(report.cause)));
+  };
+  const GuardedRun run = run_guarded_episode(spec, suite, identity, bodies.nominal(),
+                                             bodies.policy("pd", arguments.policy).make, link, options);
+  print(session,
+        fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed; executed: {}",
+                    to_string(run.row.outcome), run.row.message.empty() ? "" : " (" + run.row.message + ")",
+                    run.row.success.value_or(false) ? "yes" : "no", run.guard_seconds, run.held_ticks,
+                    run.missed_reports, executed_mask_text(run.executed, *bodies.nominal())),
+        to_json(run.row));
+  if (run.row.outcome == Outcome::kError) session.exit_code = kExitErrors;
+}
+
+}  // namespace duet::cli
