@@ -29,8 +29,8 @@
 #include "duet/policies/plan_queue.h"
 #include "duet/python/bindings.h"
 #include "duet/report/page/run_analyses.h"
+#include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/leaderboard_rows.h"
-#include "duet/report/ranking/resolution.h"
 #include "duet/rows/json_fields.h"
 
 namespace duet::python {
@@ -211,7 +211,7 @@ std::vector<EpisodeRow> rows_of(const Run& run, const std::string& policy) {
 }
 
 TablePair comparison_of(const Run& a, const std::string& policy_a, const Run& b, const std::string& policy_b) {
-  return pair_of(comparison_analysis(compare_runs(rows_of(a, policy_a), rows_of(b, policy_b))));
+  return pair_of(comparison_analysis(rows_of(a, policy_a), rows_of(b, policy_b)));
 }
 
 std::string rows_json(const Run& run) {

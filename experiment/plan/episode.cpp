@@ -9,8 +9,8 @@
 #include "duet/core/require.h"
 #include "duet/experiment/plan/episode_tags.h"
 #include "duet/experiment/suite/suite_names.h"
-#include "duet/report/studies/walk_table.h"
 #include "duet/robots/robot_cards.h"
+#include "duet/rows/groups/row_groups.h"
 
 namespace duet {
 namespace {

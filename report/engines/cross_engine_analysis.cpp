@@ -259,9 +259,9 @@ std::string too_few_engines(const CrossEngine& result) {
 
 std::string versus(const std::string& a, const std::string& b) { return fmt::format("{} vs {}", a, b); }
 
-void add_engine_success(const EngineSuccess& success, std::vector<Figure>& into) {
-  FiguresOf figures{{.controller = success.controller, .policy = success.policy, .perturbation = success.perturbation},
-                    into};
+void add_engine_success(const EngineSuccess& success, std::vector<Estimate>& into) {
+  EstimatesOf figures{
+      {.controller = success.controller, .policy = success.policy, .perturbation = success.perturbation}, into};
   std::vector<EngineRate> rates = success.engines;
   if (success.playback.has_value()) rates.push_back(*success.playback);
   for (const EngineRate& of : rates) {
@@ -277,8 +277,8 @@ void add_engine_success(const EngineSuccess& success, std::vector<Figure>& into)
   figures.count("left_out", {}, success.left_out);
 }
 
-void add_rank_figures(const RankStability& ranks, std::vector<Figure>& into) {
-  FiguresOf figures{{.of = ranks.of}, into};
+void add_rank_figures(const RankStability& ranks, std::vector<Estimate>& into) {
+  EstimatesOf figures{{.of = ranks.of}, into};
   for (const EnginePairRanks& pair : ranks.engines) {
     figures.keys.engine = versus(pair.engine_a, pair.engine_b);
     figures.add("tau_b", pair.items, pair.tau_b);
@@ -293,17 +293,17 @@ void add_rank_figures(const RankStability& ranks, std::vector<Figure>& into) {
   figures.count("swapped", ranks.item_pairs, ranks.swapped);
 }
 
-void add_drift_figures(const CrossEngine& result, const MetricDrift& drift, std::vector<Figure>& into) {
+void add_drift_figures(const CrossEngine& result, const MetricDrift& drift, std::vector<Estimate>& into) {
   const auto metric = std::ranges::find(result.metrics, drift.metric, &MetricColumn::name);
   const std::string unit = metric == result.metrics.end() ? "" : metric->unit;
-  const FiguresOf figures{{.engine = drift.engine, .controller = drift.controller, .of = drift.metric}, into};
+  const EstimatesOf figures{{.engine = drift.engine, .controller = drift.controller, .of = drift.metric}, into};
   figures.add("playback", drift.pairs, drift.playback, kNoInterval, unit);
   figures.add("drift", drift.pairs, drift.mean, drift.interval, unit);
 }
 
-void add_parting_figures(const EngineParting& parting, std::vector<Figure>& into) {
-  const FiguresOf figures{{.engine = versus(parting.engine_a, parting.engine_b), .controller = parting.controller},
-                          into};
+void add_parting_figures(const EngineParting& parting, std::vector<Estimate>& into) {
+  const EstimatesOf figures{{.engine = versus(parting.engine_a, parting.engine_b), .controller = parting.controller},
+                            into};
   figures.add("parting_lower_quartile", parting.pairs, parting.lower_quartile, kNoInterval, "s");
   figures.add("parting_median", parting.pairs, parting.median, kNoInterval, "s");
   figures.add("parting_upper_quartile", parting.pairs, parting.upper_quartile, kNoInterval, "s");
@@ -311,8 +311,8 @@ void add_parting_figures(const EngineParting& parting, std::vector<Figure>& into
   figures.count("without_trace", {}, parting.without_trace);
 }
 
-void add_force_figures(const ForceAgreement& force, std::vector<Figure>& into) {
-  FiguresOf figures{{.engine = "all", .of = force.name}, into};
+void add_force_figures(const ForceAgreement& force, std::vector<Estimate>& into) {
+  EstimatesOf figures{{.engine = "all", .of = force.name}, into};
   figures.add("typical_force", force.episodes, force.typical, kNoInterval, force.unit);
   figures.add("force_spread", force.episodes, force.spread);
   for (const auto& [engine, ratio] : force.ratio) {
@@ -321,16 +321,16 @@ void add_force_figures(const ForceAgreement& force, std::vector<Figure>& into) {
   }
 }
 
-void add_engine_versions(const CrossEngine& result, std::vector<Figure>& into) {
+void add_engine_versions(const CrossEngine& result, std::vector<Estimate>& into) {
   for (const RunEngine& engine : result.engines) {
-    const FiguresOf figures{{.engine = engine.name}, into};
+    const EstimatesOf figures{{.engine = engine.name}, into};
     figures.word("version", engine.version);
     figures.word("profile", engine.profile);
   }
 }
 
-void add_engine_figures(const CrossEngine& result, std::vector<Figure>& into) {
-  FiguresOf{{}, into}.add("parting_distance", {}, result.parting_distance, kNoInterval, "m");
+void add_engine_figures(const CrossEngine& result, std::vector<Estimate>& into) {
+  EstimatesOf{{}, into}.add("parting_distance", {}, result.parting_distance, kNoInterval, "m");
   for (const EngineSuccess& success : result.success) add_engine_success(success, into);
   for (const RankStability& ranks : result.ranks) add_rank_figures(ranks, into);
   for (const MetricDrift& drift : result.drift) add_drift_figures(result, drift, into);
@@ -349,10 +349,10 @@ RowLabels combination_labels(const std::vector<EngineSuccess>& success) {
 Analysis engine_analysis(const CrossEngine& result, const nlohmann::json& certificate) {
   Analysis analysis{.name = "engines", .title = "Across engines", .level = result.level};
   const bool several = result.engines.size() > 1;
-  if (several || certificate.is_object()) add_engine_versions(result, analysis.figures);
+  if (several || certificate.is_object()) add_engine_versions(result, analysis.estimates);
   if (several) {
     analysis.tables = engine_tables(result);
-    add_engine_figures(result, analysis.figures);
+    add_engine_figures(result, analysis.estimates);
   } else {
     analysis.notes = {too_few_engines(result)};
   }

@@ -9,14 +9,8 @@
 #include "duet/report/page/foot_plots.h"
 #include "duet/report/page/report_parts.h"
 #include "duet/report/ranking/policy_table.h"
-#include "duet/report/studies/controller_table.h"
-#include "duet/report/studies/degradation.h"
-#include "duet/report/studies/interaction_table.h"
-#include "duet/report/studies/level_table.h"
-#include "duet/report/studies/people_table.h"
-#include "duet/report/studies/reactivity.h"
-#include "duet/report/studies/training_table.h"
-#include "duet/report/studies/walk_table.h"
+#include "duet/report/studies/studies.h"
+#include "duet/rows/groups/row_groups.h"
 
 namespace duet {
 namespace {
@@ -31,7 +25,7 @@ Analysis engines_with_plot(const RunTables& tables) {
 }
 
 Analysis controllers_with_steps(const RunTables& tables) {
-  Analysis analysis = controller_analysis(controller_table(tables.rows));
+  Analysis analysis = controller_analysis(tables.rows);
   analysis.plots = {
       {.title = "Steps",
        .note = "The lowest point of each sole over the ground, one episode of each controller that walks.",
@@ -53,22 +47,18 @@ constexpr ListedAnalysis kAnalyses[] = {
     {kBoardName, [](const RunTables& run) { return board_analysis(run.board); }, Walking::kLeftOut, true},
     {"leaderboard", [](const RunTables& run) { return leaderboard_analysis(run.leaderboard, run.metrics.all); },
      Walking::kWritten, true},
-    {"interaction", [](const RunTables& run) { return interaction_analysis(interaction_table(run.rows)); },
-     Walking::kLeftOut, true},
+    {"interaction", [](const RunTables& run) { return interaction_analysis(run.rows); }, Walking::kLeftOut, true},
     {"engines", engines_with_plot, Walking::kWritten, true},
     {"controllers", controllers_with_steps, Walking::kWritten, true},
-    {"policies", [](const RunTables& run) { return policy_analysis(policy_table(run.rows)); }, Walking::kLeftOut,
+    {"policies", [](const RunTables& run) { return policy_analysis(run.rows, run.leaderboard); }, Walking::kLeftOut,
      false},
-    {"degradation", [](const RunTables& run) { return degradation_analysis(degradation(run.rows)); }, Walking::kLeftOut,
-     false},
-    {"reactivity", [](const RunTables& run) { return reactivity_analysis(reactivity_table(run.rows)); },
-     Walking::kLeftOut, false},
-    {"contacts", [](const RunTables& run) { return contact_analysis(run.contacts); }, Walking::kWritten, true},
-    {"people", [](const RunTables& run) { return people_analysis(people_table(run.rows)); }, Walking::kWritten, true},
-    {"trainings", [](const RunTables& run) { return training_analysis(training_table(run.rows)); }, Walking::kLeftOut,
-     true},
-    {"levels", [](const RunTables& run) { return level_analysis(level_tables(run.rows)); }, Walking::kPrinted, true},
-    {"walking", [](const RunTables& run) { return walk_analysis(walk_table(run.rows)); }, Walking::kPrinted, true},
+    {"degradation", [](const RunTables& run) { return degradation_analysis(run.rows); }, Walking::kLeftOut, false},
+    {"reactivity", [](const RunTables& run) { return reactivity_analysis(run.rows); }, Walking::kLeftOut, false},
+    {"contacts", [](const RunTables& run) { return run.contacts; }, Walking::kWritten, true},
+    {"people", [](const RunTables& run) { return people_analysis(run.rows); }, Walking::kWritten, true},
+    {"trainings", [](const RunTables& run) { return training_analysis(run.rows); }, Walking::kLeftOut, true},
+    {"levels", [](const RunTables& run) { return level_analysis(run.rows); }, Walking::kPrinted, true},
+    {"walking", [](const RunTables& run) { return walk_analysis(run.rows); }, Walking::kPrinted, true},
 };
 
 bool has_walking(const RunTables& tables) {
@@ -89,8 +79,8 @@ RunTables run_tables(std::vector<EpisodeRow> rows, RunMetrics metrics, const nlo
                    .board = {}};
   tables.leaderboard = leaderboard(tables.rows);
   tables.engines = cross_engine(tables.rows, tables.metrics.drifting, {.file = tables.file});
-  tables.contacts = contact_table(tables.rows);
-  tables.board = board(tables.rows, tables.contacts, suite);
+  tables.contacts = contact_analysis(tables.rows);
+  tables.board = board(tables.rows, tables.contacts.estimates, suite);
   return tables;
 }
 

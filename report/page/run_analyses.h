@@ -29,7 +29,7 @@ struct RunTables {
   nlohmann::json certificate;  // parity certificate; null: none is attached
   std::vector<LeaderboardEntry> leaderboard;
   CrossEngine engines;
-  ContactTable contacts;
+  Analysis contacts;
   Board board;
 };
 // Throws InputError: rows of two suites or suite versions, an episode that is there twice.

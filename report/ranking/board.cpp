@@ -102,21 +102,18 @@ const EpisodeEngines* null_group(const std::map<BoardKey, EpisodeEngines>& group
   return nullptr;
 }
 
-void add_contact(const ContactTable& contacts, BoardRow& row) {
-  if (row.arm != "main") return;
-  for (const ContactGroup& group : contacts.groups) {
-    if (group.controller != row.controller || group.policy != row.policy) continue;
-    BoardContact contact;
-    contact.episodes = group.all.episodes;
-    contact.worst_ratio = std::nan("");
-    for (const RegionContacts& region : group.all.regions) {
-      if (region.region != kAnyRegion) continue;
-      contact.touched = region.touched;
-      contact.over = region.over;
-      contact.worst_ratio = region.ratio;
-    }
-    row.contact = contact;
-  }
+void add_contact(const Estimates& contacts, BoardRow& row) {
+  const auto of_any = [&](const char* name) {
+    return find_estimate(
+        contacts,
+        {.engine = "all", .controller = row.controller, .policy = row.policy, .of = kAnyRegion, .name = name});
+  };
+  const Estimate* touched = of_any("touched");
+  if (row.arm != "main" || touched == nullptr) return;
+  row.contact = BoardContact{.episodes = *touched->n,
+                             .touched = std::lround(touched->value),
+                             .over = std::lround(of_any("over")->value),
+                             .worst_ratio = of_any("ratio")->value};
 }
 
 BoardDifference difference_of(const std::map<BoardKey, EpisodeEngines>& groups, const BoardRow& a, const BoardRow& b,
@@ -201,7 +198,7 @@ Told told(const BoardDifference& difference, double level) {
   return test && interval ? Told::kAhead : test ? Told::kTestAlone : Told::kIntervalAlone;
 }
 
-Board board(const std::vector<EpisodeRow>& rows, const ContactTable& contacts, const BoardSuite& suite, double level) {
+Board board(const std::vector<EpisodeRow>& rows, const Estimates& contacts, const BoardSuite& suite, double level) {
   const std::map<BoardKey, EpisodeEngines> groups = board_groups(rows);
   std::vector<BoardRow> all;
   for (const auto& [key, episodes] : groups) {

@@ -76,8 +76,9 @@ struct Board {
   double level = 0.95;
 };
 
-// Throws InputError: rows of two suites or suite versions, an episode that is there twice.
-Board board(const std::vector<EpisodeRow>& rows, const ContactTable& contacts, const BoardSuite& suite = {},
+// `contacts`: of contact_analysis. Throws InputError: rows of two suites or suite versions, an episode that is there
+// twice.
+Board board(const std::vector<EpisodeRow>& rows, const Estimates& contacts, const BoardSuite& suite = {},
             double level = 0.95);
 
 // Sentences: which is best and whether it is told apart from the next, its lift, what the references reach, whether the

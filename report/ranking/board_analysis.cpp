@@ -181,8 +181,8 @@ TitledTable ranked_table(const Board& board) {
   return titled;
 }
 
-void add_difference_figures(const char* name, const BoardDifference& of, const Board& board, const FiguresOf& row) {
-  FiguresOf figures = row;
+void add_difference_figures(const char* name, const BoardDifference& of, const Board& board, const EstimatesOf& row) {
+  EstimatesOf figures = row;
   figures.keys.of = of.other;
   figures.add(name, of.clips, of.difference, of.interval);
   figures.add(fmt::format("{}_p", name), of.clips, of.p);
@@ -196,17 +196,17 @@ constexpr const char* word_of(ArmRole role) {
   return role == ArmRole::kOracle ? "oracle" : role == ArmRole::kControl ? "control" : "competitor";
 }
 
-void add_board_figures(const Board& board, std::vector<Figure>& into) {
-  if (!board.suite.label.empty()) FiguresOf{{}, into}.word("suite", board.suite.label);
-  for (const std::string& sentence : board_verdict(board)) FiguresOf{{}, into}.word("verdict", sentence);
+void add_board_figures(const Board& board, std::vector<Estimate>& into) {
+  if (!board.suite.label.empty()) EstimatesOf{{}, into}.word("suite", board.suite.label);
+  for (const std::string& sentence : board_verdict(board)) EstimatesOf{{}, into}.word("verdict", sentence);
   for (const BoardRow* row : all_rows(board)) {
-    const FiguresOf figures{{.engine = row->rates.size() > 1 ? "all" : row->rates.front().engine,
-                             .controller = row->controller,
-                             .policy = row->policy,
-                             .arm = row->arm,
-                             .perturbation = row->perturbation,
-                             .task = "all"},
-                            into};
+    const EstimatesOf figures{{.engine = row->rates.size() > 1 ? "all" : row->rates.front().engine,
+                               .controller = row->controller,
+                               .policy = row->policy,
+                               .arm = row->arm,
+                               .perturbation = row->perturbation,
+                               .task = "all"},
+                              into};
     figures.word("role", word_of(row->role.role));
     if (row->rank > 0) figures.count("rank", {}, static_cast<long>(row->rank));
     figures.add("mean_success", row->n, row->mean, row->interval);
@@ -296,7 +296,7 @@ Analysis board_analysis(const Board& board) {
   analysis.notes = board_verdict(board);
   if (analysis.notes.empty()) return analysis;
   analysis.tables = {ranked_table(board)};
-  add_board_figures(board, analysis.figures);
+  add_board_figures(board, analysis.estimates);
   return analysis;
 }
 

@@ -1,16 +1,18 @@
-// Two runs episode by episode: which configurations pair, the paired table of each task, interval, test and correction.
+#include "duet/report/ranking/comparison.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 #include <tuple>
 
 #include "duet/core/require.h"
-#include "duet/report/ranking/comparison_parts.h"
 #include "duet/rows/groups/distinct_episodes.h"
-#include "duet/rows/groups/row_groups.h"
+#include "duet/statistics/by_clip.h"
 
 namespace duet {
 namespace {
@@ -145,63 +147,200 @@ Family gather(const std::map<PairKey, const EpisodeRow*>& a, const std::map<Pair
   return family;
 }
 
-std::string group_name(const Group& group, const std::string& task) {
-  const auto& [engine, controller, policy, perturbation] = group;
-  const std::string condition = perturbation == "clean" ? "" : " " + perturbation;
-  return fmt::format("{}/{}/{}{} {}", engine, controller, policy, condition, task);
+constexpr long kMostNeeded = 100'000'000;
+
+// The smallest n for which the falling `detectable` is at most the difference.
+template <typename Detectable>
+long smallest_number(double difference, const Detectable& detectable) {
+  require(difference > 0.0 && difference < 1.0, "difference: expected a number in (0, 1), found {}", difference);
+  long too_few = 0, enough = 1;
+  while (enough < kMostNeeded && detectable(enough) > difference) {
+    too_few = enough;
+    enough *= 2;
+  }
+  while (enough - too_few > 1) {
+    const long middle = too_few + (enough - too_few) / 2;
+    (detectable(middle) > difference ? too_few : enough) = middle;
+  }
+  return enough;
+}
+
+std::string interval_cell(const Estimate& estimate) {
+  return fmt::format("[{:.1f}, {:.1f}]", 100.0 * estimate.interval.low, 100.0 * estimate.interval.high);
+}
+
+// "mujoco/vmc/dstar vs replay jitter_5cm hug"
+std::string group_title(const Estimate& of) {
+  const std::string condition = of.perturbation == "clean" ? "" : " " + of.perturbation;
+  return fmt::format("{}/{}/{}{} {}", of.engine, of.controller, of.policy, condition, of.task);
+}
+
+long largest(const Estimates& comparisons, std::string_view name) {
+  double value = 0.0;
+  for (const Estimate& estimate : comparisons)
+    if (estimate.name == name) value = std::max(value, estimate.value);
+  return std::lround(value);
+}
+
+std::vector<std::string> comparison_notes(const Estimates& comparisons, double level, double margin) {
+  const std::vector<PivotRow> rows = rows_of(comparisons, comparison_pivot(group_title).rows);
+  std::vector<std::string> notes = {fmt::format(
+      "Same episodes in both runs. A, B: success in %. A - B: points with Newcombe's paired {:g} % interval; by clip: "
+      "bootstrap over clips, nowhere narrower than Newcombe's over so many clips. {} p (Holm): corrected for the {} "
+      "comparisons here. MDE: the smallest difference, in points, that so many pairs with so much disagreement show in "
+      "80 % of runs. Verdict: of A; the same within the margin where the interval by clip lies within {:g} points, "
+      "else "
+      "better or worse where p (Holm) is at most {:.2g}.",
+      100.0 * level, kPairedTests, rows.size(), 100.0 * margin, 1.0 - level)};
+  std::string small;
+  for (const PivotRow& row : rows)
+    if (row.value({.name = "clips"}) < kFewestClips)
+      small.append(small.empty() ? "" : "; ").append(group_title(row.keys()));
+  if (!small.empty())
+    notes.push_back(fmt::format("Warning: fewer than {} clips in {}. A difference there is no finding by itself.",
+                                kFewestClips, small));
+  const long only_a = largest(comparisons, "unpaired_a"), only_b = largest(comparisons, "unpaired_b");
+  if (only_a > 0 || only_b > 0)
+    notes.push_back(fmt::format(
+        "Warning: episodes without a partner are left out (in one group up to {} of A and {} of B).", only_a, only_b));
+  for (const std::string& note : resolution_notes(comparisons, level, margin))
+    notes.push_back(fmt::format("Caution: {}.", note));
+  return notes;
 }
 
 }  // namespace
 
-Comparison evaluate(const PairedRows& gathered, const IntervalOptions& options) {
+void add_comparison(const PairedRows& gathered, const IntervalOptions& options, const EstimatesOf& of) {
   const PairedTable& table = gathered.pairs.table();
-  Comparison result;
-  result.pairs = table.pairs();
-  result.both = table.both;
-  result.only_a = table.only_a;
-  result.only_b = table.only_b;
-  result.neither = table.neither;
-  result.difference = table.difference();
-  result.interval = newcombe_paired(table.both, table.only_a, table.only_b, table.neither, options.level);
-  result.cluster_interval = gathered.pairs.bootstrap(options);
-  result.clips = gathered.pairs.clips();
-  result.p = gathered.pairs.p();
-  result.p_episodes = mcnemar_exact(table.only_a, table.only_b);
-  const double discordance = static_cast<double>(table.only_a + table.only_b) / static_cast<double>(result.pairs);
-  result.minimum_detectable = minimum_detectable_difference_paired(discordance, result.pairs, 1.0 - options.level);
-  result.level = options.level;
-  result.unpaired_a = gathered.unpaired_a;
-  result.unpaired_b = gathered.unpaired_b;
-  return result;
+  const long n = table.pairs();
+  const auto share = [&](const char* name, long k) {
+    of.rate(name, {.n = n, .k = k, .rate = static_cast<double>(k) / static_cast<double>(n)});
+  };
+  share("success_a", table.both + table.only_a);
+  share("success_b", table.both + table.only_b);
+  of.add("difference", n, table.difference(),
+         newcombe_paired(table.both, table.only_a, table.only_b, table.neither, options.level));
+  of.add("difference_by_clip", n, table.difference(), gathered.pairs.bootstrap(options));
+  of.count("both", n, table.both);
+  of.count("only_a", n, table.only_a);
+  of.count("only_b", n, table.only_b);
+  of.count("neither", n, table.neither);
+  of.add("p", n, gathered.pairs.p());
+  of.add("p_holm", n, std::nan(""));
+  of.add("p_episodes", n, mcnemar_exact(table.only_a, table.only_b));
+  of.count("clips", n, gathered.pairs.clips());
+  const double discordance = static_cast<double>(table.only_a + table.only_b) / static_cast<double>(n);
+  of.add("minimum_detectable", n, minimum_detectable_difference_paired(discordance, n, 1.0 - options.level));
+  of.count("unpaired_a", {}, gathered.unpaired_a);
+  of.count("unpaired_b", {}, gathered.unpaired_b);
+  of.word("verdict", "");
 }
 
-void correct_for_family(std::vector<Comparison>& comparisons) {
+PairVerdict verdict_of(double difference, const Interval& interval, double p_holm, double level, double margin) {
+  if (verdict_of(interval, margin) == PairVerdict::kSame) return PairVerdict::kSame;
+  if (std::isnan(p_holm) || p_holm > 1.0 - level) return PairVerdict::kUndecided;
+  return difference > 0.0 ? PairVerdict::kBetter : PairVerdict::kWorse;
+}
+
+void judge_family(std::string_view difference, double level, double margin, Estimates& comparisons) {
   std::vector<double> p_values;
-  p_values.reserve(comparisons.size());
-  for (const Comparison& comparison : comparisons) p_values.push_back(comparison.p);
+  for (const Estimate& estimate : comparisons)
+    if (estimate.name == "p" && !std::isnan(estimate.value)) p_values.push_back(estimate.value);
   const std::vector<double> adjusted = holm(p_values);
-  for (std::size_t i = 0; i < comparisons.size(); ++i) comparisons[i].p_holm = adjusted[i];
+  std::size_t next = 0;
+  bool is_tested = false;
+  double p_holm = std::nan("");
+  const Estimate* judged = nullptr;
+  for (Estimate& estimate : comparisons) {
+    if (estimate.name == difference) judged = &estimate;
+    if (estimate.name == "p") is_tested = !std::isnan(estimate.value);
+    if (estimate.name == "p_holm") estimate.value = p_holm = is_tested ? adjusted[next++] : std::nan("");
+    if (estimate.name == "verdict")
+      estimate.text = to_string(is_tested ? verdict_of(judged->value, judged->interval, p_holm, level, margin)
+                                          : PairVerdict::kUndecided);
+  }
 }
 
-std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
-                                     const IntervalOptions& options) {
+Pivot comparison_pivot(std::string (*title)(const Estimate& keys)) {
+  return {.title = "",
+          .rows = {{"Comparison", &Estimate::policy, true, title},
+                   {nullptr, &Estimate::engine},
+                   {nullptr, &Estimate::controller},
+                   {nullptr, &Estimate::perturbation},
+                   {nullptr, &Estimate::task}},
+          .columns = {column("Pairs", {.name = "difference"}, as_n), column("Clips", {.name = "clips"}, as_count),
+                      column("A", {.name = "success_a"}, as_share), column("B", {.name = "success_b"}, as_share),
+                      column("A - B", {.name = "difference"}, as_points),
+                      column("by clip", {.name = "difference_by_clip"}, interval_cell),
+                      column("only A", {.name = "only_a"}, as_count), column("only B", {.name = "only_b"}, as_count),
+                      column("p", {.name = "p"}, as_p), column("p (Holm)", {.name = "p_holm"}, as_p),
+                      column("McNemar p", {.name = "p_episodes"}, as_p),
+                      column("MDE", {.name = "minimum_detectable"}, as_share),
+                      column("Verdict", {.name = "verdict"}, as_word)}};
+}
+
+long needed_pairs(double discordance, double difference, double alpha) {
+  return smallest_number(difference,
+                         [&](long n) { return minimum_detectable_difference_paired(discordance, n, alpha); });
+}
+
+long needed_episodes(double rate, double difference, double alpha) {
+  return smallest_number(difference, [&](long n) { return minimum_detectable_difference(rate, n, alpha); });
+}
+
+std::vector<std::string> resolution_notes(const Estimates& comparisons, double level, double margin) {
+  std::vector<std::string> notes;
+  for (const PivotRow& row : rows_of(comparisons, comparison_pivot(group_title).rows)) {
+    const Estimate& detectable = *row.find({.name = "minimum_detectable"});
+    const std::string_view undecided = to_string(PairVerdict::kUndecided);
+    if (detectable.value <= margin || row.find({.name = "verdict"})->text != undecided) continue;
+    const double discordance =
+        (row.value({.name = "only_a"}) + row.value({.name = "only_b"})) / static_cast<double>(*detectable.n);
+    notes.push_back(fmt::format(
+        "{}: {} pairs cannot resolve {:g} points; with so much disagreement about {} would (80 % of runs)",
+        group_title(row.keys()), *detectable.n, 100.0 * margin, needed_pairs(discordance, margin, 1.0 - level)));
+  }
+  return notes;
+}
+
+std::vector<std::string> resolution_notes(const std::vector<LeaderboardEntry>& entries, double margin) {
+  std::vector<std::string> notes;
+  for (const LeaderboardEntry& entry : entries) {
+    if (entry.task != "all" || entry.arm == "null" || entry.n == 0) continue;
+    const double alpha = 1.0 - entry.level;
+    if (minimum_detectable_difference(entry.success, entry.n, alpha) <= margin) continue;
+    notes.push_back(fmt::format(
+        "{}/{}/{} {}: {} distinct episodes cannot resolve {:g} points to another arm; unpaired about {} would",
+        entry.engine, entry.controller, entry.policy, entry.perturbation, entry.n, 100.0 * margin,
+        needed_episodes(entry.success, margin, alpha)));
+  }
+  return notes;
+}
+
+Analysis comparison_analysis(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
+                             const IntervalOptions& options, double margin) {
   require_comparable(a, b);
   const RowList of_a = main_arm(a, "A");
   const RowList of_b = main_arm(b, "B");
   const Pairing pairing = pairing_of(of_a, of_b);
-  std::vector<Comparison> comparisons;
+  Estimates comparisons;
   for (const auto& [key, gathered] : gather(indexed(of_a, pairing), indexed(of_b, pairing))) {
     if (gathered.pairs.table().pairs() == 0) continue;
     const auto& [group, rank, task] = key;
-    Comparison& comparison = comparisons.emplace_back(evaluate(gathered, options));
-    comparison.group = group_name(group, task);
-    comparison.task = task;
-    std::tie(comparison.engine, comparison.controller, comparison.policy, comparison.perturbation) =
-        std::tie(group[0], group[1], group[2], group[3]);
+    const auto& [engine, controller, policy, perturbation] = group;
+    add_comparison(
+        gathered, options,
+        {{.engine = engine, .controller = controller, .policy = policy, .perturbation = perturbation, .task = task},
+         comparisons});
   }
   if (comparisons.empty()) report_nothing_pairs(of_a, of_b);
-  correct_for_family(comparisons);
-  return comparisons;
+  judge_family("difference_by_clip", options.level, margin, comparisons);
+  Analysis analysis{.name = "comparison", .title = "Comparison", .level = options.level};
+  analysis.tables = {table_of(comparisons, comparison_pivot(group_title))};
+  analysis.tables.front().notes = comparison_notes(comparisons, options.level, margin);
+  EstimatesOf{{}, analysis.estimates}.add("margin", {}, margin);
+  std::ranges::move(comparisons, std::back_inserter(analysis.estimates));
+  return analysis;
 }
 
 }  // namespace duet

@@ -1,4 +1,4 @@
-// The leaderboard: success per group with intervals beside the null arm, metrics; comparison of two runs.
+// The leaderboard: success per group with intervals beside the null arm, metrics.
 #pragma once
 
 #include <map>
@@ -45,28 +45,5 @@ inline constexpr const char* kLeaderboardName = "leaderboard";  // of its analys
 // `columns`: units of metrics. Means of metrics are too long for a terminal where there are several physics engines.
 Analysis leaderboard_analysis(const std::vector<LeaderboardEntry>& entries,
                               const std::vector<MetricColumn>& columns = {}, bool with_metrics = true);
-
-struct Comparison {
-  std::string group;  // "engine/controller/policy task"
-  long pairs = 0, both = 0, only_a = 0, only_b = 0, neither = 0;
-  double difference = 0.0;       // success of A minus success of B
-  Interval interval;             // paired Newcombe
-  Interval cluster_interval;     // bootstrap over clips, nowhere narrower than newcombe_by_clip
-  long clips = 0;                // of the pairs
-  double p = 1.0, p_holm = 1.0;  // sign_flip_exact by clip, as on the board
-  double p_episodes = 1.0;       // exact McNemar, which takes episodes of one clip for independent
-  double minimum_detectable = 0.0;
-  double level = 0.95;                  // of both intervals
-  long unpaired_a = 0, unpaired_b = 0;  // episodes of the group that the other run lacks; left out
-  // Parts of `group`; "replay vs null" where that is what is compared.
-  std::string engine = {}, controller = {}, policy = {}, perturbation = {}, task = {};
-};
-
-// Pairs rows of the main arm by task, clip, episode and the group fields they share; per task and over all. Where A and
-// B have one value each of engine, controller, policy or perturbation and the values differ, that is what is compared
-// ("mujoco/vmc/replay vs null hug"). Throws InputError where nothing pairs (it says what differs), for rows of two
-// suite versions and for an episode that is there twice.
-std::vector<Comparison> compare_runs(const std::vector<EpisodeRow>& a, const std::vector<EpisodeRow>& b,
-                                     const IntervalOptions& options = {});
 
 }  // namespace duet

@@ -111,14 +111,14 @@ std::string unit_of_metric(const std::vector<MetricColumn>& columns, const std::
 }
 
 void add_entry_figures(const LeaderboardEntry& entry, const std::vector<MetricColumn>& columns, bool with_metrics,
-                       std::vector<Figure>& into) {
-  FiguresOf figures{{.engine = entry.engine,
-                     .controller = entry.controller,
-                     .policy = entry.policy,
-                     .arm = entry.arm,
-                     .perturbation = entry.perturbation,
-                     .task = entry.task},
-                    into};
+                       std::vector<Estimate>& into) {
+  EstimatesOf figures{{.engine = entry.engine,
+                       .controller = entry.controller,
+                       .policy = entry.policy,
+                       .arm = entry.arm,
+                       .perturbation = entry.perturbation,
+                       .task = entry.task},
+                      into};
   figures.rate("success", {entry.n, entry.k, entry.success, entry.interval});
   figures.add("null_success", entry.pairs, entry.null_success);
   figures.add("lift", entry.pairs, entry.lift, entry.lift_interval);
@@ -137,7 +137,7 @@ void add_entry_figures(const LeaderboardEntry& entry, const std::vector<MetricCo
 
 Analysis leaderboard_analysis(const Entries& entries, const std::vector<MetricColumn>& columns, bool with_metrics) {
   Analysis analysis{.name = kLeaderboardName, .title = "Every engine and task"};
-  for (const LeaderboardEntry& entry : entries) add_entry_figures(entry, columns, with_metrics, analysis.figures);
+  for (const LeaderboardEntry& entry : entries) add_entry_figures(entry, columns, with_metrics, analysis.estimates);
   const std::vector<LeaderboardRow> rows = leaderboard_rows(entries);
   if (rows.empty()) {
     analysis.notes = leaderboard_notes(entries);

@@ -1,10 +1,5 @@
 #include "duet/report/ranking/policy_groups.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "duet/rows/groups/distinct_episodes.h"
 
 namespace duet {
@@ -22,7 +17,7 @@ std::map<PolicyKey, PerturbedRows> rows_of_policies(const std::vector<EpisodeRow
   std::map<PolicyKey, PerturbedRows> policies;
   for (const EpisodeRow* row : distinct_episodes(rows)) {
     if (row->arm == "null" || row->outcome == Outcome::kUnsupported) continue;
-    EpisodeRows& episodes = policies[{row->engine, row->controller, row->arm, row->policy}][row->perturbation];
+    EpisodeRows& episodes = policies[policy_key(*row)][row->perturbation];
     const auto [found, is_new] = episodes.try_emplace(episode_id(*row), row);
     if (!is_new) require_distinct(*found->second, *row);
   }
@@ -65,35 +60,16 @@ PairedDifference paired_difference(const EpisodeRows& a, const EpisodeRows& b, d
       .pairs = pairs.table().pairs(), .difference = pairs.table().difference(), .interval = pairs.of_episodes(level)};
 }
 
-RowLabels policy_labels(const std::vector<PolicyKey>& keys) {
-  LabelColumn names{"Policy", {}, true};
-  for (const PolicyKey& key : keys) names.values.push_back(policy_name(key));
-  return row_labels({label_column("Engine", keys, &PolicyKey::engine),
-                     label_column("Controller", keys, &PolicyKey::controller), names});
+PolicyKey policy_key(const EpisodeRow& row) { return {row.engine, row.controller, row.arm, row.policy}; }
+
+Estimate keys_of(const PolicyKey& key) {
+  return {.engine = key.engine, .controller = key.controller, .policy = key.policy, .arm = key.arm};
 }
 
-std::vector<std::string>& add_paper_row(const std::string& name, TitledTable& titled) {
-  std::vector<std::string>& cells = titled.table.rows.emplace_back(titled.table.label_columns, "-");
-  cells.back() = fmt::format("{} (the paper's)", name);
-  return cells;
-}
+EstimatesOf estimates_of(const PolicyKey& key, Estimates& into) { return {keys_of(key), into}; }
 
-std::string policy_name(const PolicyKey& key) {
-  return key.arm == "main" ? key.policy : fmt::format("{} ({} arm)", key.policy, key.arm);
-}
-
-std::string rate_cell(const Rate& rate) { return percent(rate.rate, rate.interval); }
-
-FiguresOf figures_of(const PolicyKey& key, std::vector<Figure>& into) {
-  return {{.engine = key.engine, .controller = key.controller, .policy = key.policy, .arm = key.arm}, into};
-}
-
-FiguresOf paper_figures_of(std::string_view policy, std::vector<Figure>& into) {
-  return {{.source = "paper", .policy = std::string(policy)}, into};
-}
-
-void add_difference(std::string_view name, const PairedDifference& difference, const FiguresOf& figures) {
-  figures.add(name, difference.pairs, difference.difference, difference.interval);
+void add_difference(std::string_view name, const PairedDifference& difference, const EstimatesOf& estimates) {
+  estimates.add(name, difference.pairs, difference.difference, difference.interval);
 }
 
 }  // namespace duet

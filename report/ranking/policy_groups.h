@@ -9,9 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/report/ranking/leaderboard_rows.h"
-#include "duet/report/tables/figure.h"
-#include "duet/report/tables/text_table.h"
+#include "duet/report/tables/estimate.h"
 #include "duet/rows/groups/row_groups.h"
 
 namespace duet {
@@ -22,6 +20,8 @@ struct PolicyKey {
   std::string engine, controller, arm, policy;  // arms in the order main, shuffled
   auto operator<=>(const PolicyKey&) const = default;
 };
+
+PolicyKey policy_key(const EpisodeRow& row);
 
 using EpisodeRows = std::map<EpisodeId, const EpisodeRow*>;
 using PerturbedRows = std::map<std::string, EpisodeRows, std::less<>>;
@@ -43,27 +43,9 @@ struct PairedDifference {
 };
 PairedDifference paired_difference(const EpisodeRows& a, const EpisodeRows& b, double level);
 
-std::string policy_name(const PolicyKey& key);  // "dstar", "dstar_shuffled (shuffled arm)"
-
-// Columns "Engine" and "Controller" as far as they differ, and "Policy"; the rest in the caption.
-RowLabels policy_labels(const std::vector<PolicyKey>& keys);
-template <typename Entry>  // with a `key`
-RowLabels labels_of(const std::vector<Entry>& entries) {
-  std::vector<PolicyKey> keys;
-  keys.reserve(entries.size());
-  for (const Entry& entry : entries) keys.push_back(entry.key);
-  return policy_labels(keys);
-}
-
-// Appends a row of the paper with `name` in the last column of labels.
-std::vector<std::string>& add_paper_row(const std::string& name, TitledTable& titled);
-
-std::string rate_cell(const Rate& rate);  // "84.9 [77.6, 90.1]", "-" without episodes
-
-// Figures of a policy.
-FiguresOf figures_of(const PolicyKey& key, std::vector<Figure>& into);
-// Those that the supplement prints of one of its policies.
-FiguresOf paper_figures_of(std::string_view policy, std::vector<Figure>& into);
-void add_difference(std::string_view name, const PairedDifference& difference, const FiguresOf& figures);
+// Keys of estimates of a policy, and estimates with these.
+Estimate keys_of(const PolicyKey& key);
+EstimatesOf estimates_of(const PolicyKey& key, Estimates& into);
+void add_difference(std::string_view name, const PairedDifference& difference, const EstimatesOf& estimates);
 
 }  // namespace duet

@@ -1,15 +1,14 @@
-#include "duet/report/studies/human_agreement.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <limits>
 #include <set>
+#include <span>
 
 #include "duet/core/require.h"
-#include "duet/report/ranking/policy_groups.h"
-#include "duet/report/tables/cells.h"
+#include "duet/report/studies/studies.h"
 #include "duet/rows/groups/row_groups.h"
+#include "duet/statistics/rater_agreement.h"
 
 namespace duet {
 namespace {
@@ -115,66 +114,72 @@ int judged_by(const std::string& detector, const EpisodeRow& row) {
   return kNone;
 }
 
-DetectorAgreement agreement_of(const std::string& detector, const RatedEpisodes& rated, double level,
-                               KappaMaker& kappas) {
+void add_kappa(const std::string& of, const Kappa& kappa, Estimates& into) {
+  const EstimatesOf estimates{{.of = of}, into};
+  estimates.add("kappa", kappa.n, kappa.value, kappa.interval);
+  estimates.add("agreed", kappa.n, kappa.agreed);
+}
+
+constexpr const char* kAllRaters = "all raters";
+constexpr const char* kMajority = "majority";
+
+std::string versus(const std::string& a, const std::string& b) { return fmt::format("{} vs {}", a, b); }
+
+// Every two, and from three on all of them: Cohen's and Fleiss'.
+void add_raters(const RatedEpisodes& rated, const std::vector<Rater>& raters, KappaMaker& kappas, Estimates& into) {
+  for (std::size_t b = 1; b < raters.size(); ++b)
+    for (std::size_t a = 0; a < b; ++a)
+      add_kappa(versus(raters[a].name, raters[b].name), kappas.of({rated.answers[a], rated.answers[b]}), into);
+  if (raters.size() > 2) add_kappa(kAllRaters, kappas.of(rated.answers), into);
+}
+
+void add_detector(const std::string& detector, const RatedEpisodes& rated, const std::vector<Rater>& raters,
+                  double level, KappaMaker& kappas, Estimates& into) {
   RatedColumn judged;
   for (const EpisodeRow* row : rated.rows) judged.push_back(judged_by(detector, *row));
-  DetectorAgreement agreement;
-  agreement.detector = detector;
-  agreement.majority = kappas.of({judged, rated.majority});
-  for (const RatedColumn& answers : rated.answers)
-    agreement.raters.push_back(kappas.of({judged, without_unsure(answers)}));
-  agreement.sensitivity = share_alike(judged, rated, kYesCategory, level);
-  agreement.specificity = share_alike(judged, rated, kNoCategory, level);
-  return agreement;
+  for (std::size_t i = 0; i < raters.size(); ++i)
+    add_kappa(versus(detector, raters[i].name), kappas.of({judged, without_unsure(rated.answers[i])}), into);
+  const std::string of = versus(detector, kMajority);
+  add_kappa(of, kappas.of({judged, rated.majority}), into);
+  const EstimatesOf estimates{{.of = of}, into};
+  estimates.rate("sensitivity", share_alike(judged, rated, kYesCategory, level));
+  estimates.rate("specificity", share_alike(judged, rated, kNoCategory, level));
 }
 
-std::vector<DisputedEpisode> disputes_of(const RatedEpisodes& rated) {
-  std::vector<DisputedEpisode> disputes;
-  for (std::size_t i = 0; i < rated.rows.size(); ++i) {
-    DisputedEpisode episode{.row = rated.rows[i], .answers = {}};
-    std::set<int> different;
-    for (const RatedColumn& column : rated.answers) {
-      episode.answers.emplace_back(column[i] == kNone ? "" : to_string(static_cast<Answer>(column[i])));
-      if (column[i] != kNone) different.insert(column[i]);
-    }
-    if (different.size() > 1) disputes.push_back(std::move(episode));
+// Estimates stand in the order of `names`, two for each.
+TitledTable raters_table(const Estimates& estimates, const std::vector<Rater>& raters, double level) {
+  std::vector<std::string> names;
+  for (std::size_t b = 1; b < raters.size(); ++b)
+    for (std::size_t a = 0; a < b; ++a) names.push_back(fmt::format("{}, {}", raters[a].name, raters[b].name));
+  if (raters.size() > 2) names.push_back(fmt::format("all {} (Fleiss)", raters.size()));
+  TitledTable titled{.title = "Raters with one another",
+                     .table = {.header = {"Raters", "n", "Same answer [%]", "Kappa"}}};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const Estimate &kappa = estimates[2 * i], &agreed = estimates[2 * i + 1];
+    titled.table.rows.push_back({names[i], as_n(kappa), as_share(agreed), as_decimals(2)(kappa)});
   }
-  return disputes;
-}
-
-std::string kappa_cell(const Kappa& kappa) { return decimals(kappa.value, kappa.interval, 2); }
-
-TitledTable raters_table(const HumanAgreement& agreement) {
-  TitledTable titled{.title = "Raters with one another"};
-  titled.table.header = {"Raters", "n", "Same answer [%]", "Kappa"};
-  const auto add = [&](const std::string& name, const Kappa& kappa) {
-    titled.table.rows.push_back({name, std::to_string(kappa.n), percent(kappa.agreed), kappa_cell(kappa)});
-  };
-  for (const RaterPair& pair : agreement.pairs) add(fmt::format("{}, {}", pair.a, pair.b), pair.kappa);
-  if (agreement.raters.size() > 2) add(fmt::format("all {} (Fleiss)", agreement.raters.size()), agreement.all);
   titled.notes = {
       fmt::format("Answers yes, no and unsure. Of pairs Cohen's kappa, of all Fleiss'; {:g} % intervals by resampling "
                   "clips. A kappa is not defined (-) where everybody gave one and the same answer.",
-                  100.0 * agreement.level)};
-  if (agreement.raters.size() == 1) titled.notes = {"One rater alone: nobody to agree with."};
+                  100.0 * level)};
+  if (raters.size() == 1) titled.notes = {"One rater alone: nobody to agree with."};
   return titled;
 }
 
-TitledTable detectors_table(const HumanAgreement& agreement) {
-  TitledTable titled{.title = "Detectors with raters"};
-  titled.table.header = {"Detector"};
-  for (const std::string& rater : agreement.raters) titled.table.header.push_back("Kappa with " + rater);
-  for (const char* column : {"Kappa with the majority", "n", "Same [%]", "Sensitivity [%]", "Specificity [%]"})
-    titled.table.header.emplace_back(column);
-  for (const DetectorAgreement& detector : agreement.detectors) {
-    std::vector<std::string>& cells = titled.table.rows.emplace_back(1, detector.detector);
-    for (const Kappa& kappa : detector.raters) cells.push_back(kappa_cell(kappa));
-    cells.push_back(kappa_cell(detector.majority));
-    cells.push_back(std::to_string(detector.majority.n));
-    cells.push_back(percent(detector.majority.agreed));
-    cells.push_back(rate_cell(detector.sensitivity));
-    cells.push_back(rate_cell(detector.specificity));
+// Of each detector two estimates for each rater, two for the majority, sensitivity and specificity follow one another.
+TitledTable detectors_table(const Estimates& estimates, const std::vector<std::string>& detectors,
+                            const std::vector<Rater>& raters, const HumanAgreement& agreement) {
+  TitledTable titled{.title = "Detectors with raters", .table = {.header = {"Detector"}}};
+  for (const Rater& rater : raters) titled.table.header.push_back("Kappa with " + rater.name);
+  for (const char* title : {"Kappa with the majority", "n", "Same [%]", "Sensitivity [%]", "Specificity [%]"})
+    titled.table.header.emplace_back(title);
+  const std::size_t majority = 2 * raters.size();
+  for (std::size_t d = 0; d < detectors.size(); ++d) {
+    const std::span<const Estimate> of = std::span(estimates).subspan(d * (majority + 4), majority + 4);
+    std::vector<std::string>& cells = titled.table.rows.emplace_back(1, detectors[d]);
+    for (std::size_t i = 0; i <= majority; i += 2) cells.push_back(as_decimals(2)(of[i]));
+    cells.insert(cells.end(), {as_n(of[majority]), as_share(of[majority + 1]), as_percent(of[majority + 2]),
+                               as_percent(of[majority + 3])});
   }
   titled.notes = {fmt::format(
       "A majority is more than half of those who answered: {} yes, {} no, {} without one. Unsure and no "
@@ -184,35 +189,33 @@ TitledTable detectors_table(const HumanAgreement& agreement) {
   return titled;
 }
 
-TitledTable disputes_table(const HumanAgreement& agreement) {
-  TitledTable titled{.title = fmt::format("Episodes in dispute ({})", agreement.disputes.size())};
-  titled.table.header = {"Episode", "Task", "Clip"};
-  titled.table.label_columns = 3;
-  titled.table.header.insert(titled.table.header.end(), agreement.raters.begin(), agreement.raters.end());
-  for (const DisputedEpisode& episode : agreement.disputes) {
-    std::vector<std::string> cells = {episode.row->key.substr(0, 16), episode.row->task, episode.row->clip};
-    for (const std::string& answer : episode.answers) cells.push_back(answer.empty() ? "-" : answer);
+std::string answer_text(int category) {
+  return category == kNone ? "" : std::string(to_string(static_cast<Answer>(category)));
+}
+
+// Episodes that not all who answered gave the same answer, by task, clip and episode.
+TitledTable disputes_table(const RatedEpisodes& rated, const std::vector<Rater>& raters, nlohmann::json& list) {
+  TitledTable titled{.title = "", .table = {.header = {"Episode", "Task", "Clip"}, .rows = {}, .label_columns = 3}};
+  for (const Rater& rater : raters) titled.table.header.push_back(rater.name);
+  for (std::size_t i = 0; i < rated.rows.size(); ++i) {
+    const EpisodeRow& row = *rated.rows[i];
+    std::vector<std::string> cells = {row.key.substr(0, 16), row.task, row.clip};
+    nlohmann::json answers = nlohmann::json::object();
+    std::set<std::string> different;
+    for (std::size_t k = 0; k < raters.size(); ++k) {
+      const std::string answer = answer_text(rated.answers[k][i]);
+      cells.push_back(answer.empty() ? "-" : answer);
+      if (answer.empty()) continue;
+      answers[raters[k].name] = answer;
+      different.insert(answer);
+    }
+    if (different.size() < 2) continue;
     titled.table.rows.push_back(std::move(cells));
+    list.push_back({{"episode", row.key}, {"task", row.task}, {"clip", row.clip}, {"answers", std::move(answers)}});
   }
-  if (agreement.disputes.empty()) titled.notes = {"All who answered an episode gave it the same answer."};
+  titled.title = fmt::format("Episodes in dispute ({})", titled.table.rows.size());
+  if (titled.table.rows.empty()) titled.notes = {"All who answered an episode gave it the same answer."};
   return titled;
-}
-
-void add_kappa(const std::string& of, const Kappa& kappa, std::vector<Figure>& into) {
-  FiguresOf figures{Figure{.of = of}, into};
-  figures.add("kappa", kappa.n, kappa.value, kappa.interval);
-  figures.add("agreed", kappa.n, kappa.agreed);
-}
-
-void add_detector_figures(const DetectorAgreement& detector, const std::vector<std::string>& raters,
-                          std::vector<Figure>& into) {
-  for (std::size_t i = 0; i < raters.size(); ++i)
-    add_kappa(fmt::format("{} vs {}", detector.detector, raters[i]), detector.raters[i], into);
-  const std::string of = detector.detector + " vs majority";
-  add_kappa(of, detector.majority, into);
-  FiguresOf figures{Figure{.of = of}, into};
-  figures.rate("sensitivity", detector.sensitivity);
-  figures.rate("specificity", detector.specificity);
 }
 
 }  // namespace
@@ -221,54 +224,28 @@ HumanAgreement human_agreement(const std::vector<EpisodeRow>& rows, const std::v
                                const IntervalOptions& options) {
   require(!raters.empty(), "agreement: expected a rater, found none");
   const RatedEpisodes rated = rated_episodes(rows, raters);
+  HumanAgreement agreement{.analysis = {.name = "human_agreement", .title = "People and detectors"},
+                           .episodes = static_cast<long>(rated.rows.size()),
+                           .yes = std::ranges::count(rated.majority, kYesCategory),
+                           .no = std::ranges::count(rated.majority, kNoCategory),
+                           .disputes = nlohmann::json::array()};
+  Analysis& analysis = agreement.analysis;
+  analysis.level = options.level;
+  for (const Rater& rater : raters)
+    if (static_cast<long>(rater.answers.size()) < agreement.episodes)
+      analysis.notes.push_back(
+          fmt::format("Rater {} answered {} of {} episodes.", rater.name, rater.answers.size(), agreement.episodes));
   KappaMaker kappas(rated.clips, options);
-  HumanAgreement agreement;
-  agreement.level = options.level;
-  agreement.episodes = static_cast<long>(rated.rows.size());
-  agreement.yes = std::ranges::count(rated.majority, kYesCategory);
-  agreement.no = std::ranges::count(rated.majority, kNoCategory);
-  for (const Rater& rater : raters) {
-    agreement.raters.push_back(rater.name);
-    agreement.answered.push_back(static_cast<long>(rater.answers.size()));
-  }
-  for (std::size_t b = 1; b < raters.size(); ++b)
-    for (std::size_t a = 0; a < b; ++a)
-      agreement.pairs.push_back({raters[a].name, raters[b].name, kappas.of({rated.answers[a], rated.answers[b]})});
-  agreement.all.agreed = agreement.all.value = std::numeric_limits<double>::quiet_NaN();
-  if (raters.size() > 2) agreement.all = kappas.of(rated.answers);
-  for (const std::string& detector : detectors_in(rated.rows))
-    agreement.detectors.push_back(agreement_of(detector, rated, options.level, kappas));
-  agreement.disputes = disputes_of(rated);
+  add_raters(rated, raters, kappas, analysis.estimates);
+  const std::vector<std::string> detectors = detectors_in(rated.rows);
+  Estimates of_detectors;
+  for (const std::string& detector : detectors)
+    add_detector(detector, rated, raters, options.level, kappas, of_detectors);
+  analysis.tables = {raters_table(analysis.estimates, raters, options.level),
+                     detectors_table(of_detectors, detectors, raters, agreement),
+                     disputes_table(rated, raters, agreement.disputes)};
+  std::ranges::move(of_detectors, std::back_inserter(analysis.estimates));
   return agreement;
-}
-
-Analysis human_agreement_analysis(const HumanAgreement& agreement) {
-  Analysis analysis{.name = "human_agreement", .title = "People and detectors", .level = agreement.level};
-  for (std::size_t i = 0; i < agreement.raters.size(); ++i)
-    if (agreement.answered[i] < agreement.episodes)
-      analysis.notes.push_back(fmt::format("Rater {} answered {} of {} episodes.", agreement.raters[i],
-                                           agreement.answered[i], agreement.episodes));
-  analysis.tables = {raters_table(agreement), detectors_table(agreement), disputes_table(agreement)};
-  for (const RaterPair& pair : agreement.pairs)
-    add_kappa(fmt::format("{} vs {}", pair.a, pair.b), pair.kappa, analysis.figures);
-  if (agreement.raters.size() > 2) add_kappa("all raters", agreement.all, analysis.figures);
-  for (const DetectorAgreement& detector : agreement.detectors)
-    add_detector_figures(detector, agreement.raters, analysis.figures);
-  return analysis;
-}
-
-nlohmann::json disputes_json(const HumanAgreement& agreement) {
-  nlohmann::json list = nlohmann::json::array();
-  for (const DisputedEpisode& episode : agreement.disputes) {
-    nlohmann::json answers = nlohmann::json::object();
-    for (std::size_t i = 0; i < agreement.raters.size(); ++i)
-      if (!episode.answers[i].empty()) answers[agreement.raters[i]] = episode.answers[i];
-    list.push_back({{"episode", episode.row->key},
-                    {"task", episode.row->task},
-                    {"clip", episode.row->clip},
-                    {"answers", std::move(answers)}});
-  }
-  return list;
 }
 
 }  // namespace duet

@@ -1,16 +1,34 @@
-#include "duet/report/studies/level_table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "duet/core/episode_tags.h"
 #include "duet/core/require.h"
+#include "duet/report/ranking/policy_groups.h"
+#include "duet/report/studies/studies.h"
 
 namespace duet {
 namespace {
+
+// A ladder and the success that counts as having passed a level of it.
+struct Ladder {
+  std::string_view word, title;
+  double pass;
+};
+constexpr std::array<Ladder, 2> kLadders = {{
+    {"level", "Levels", 0.5},   // of suites for policies
+    {"stage", "Stages", 0.95},  // of suites for controllers, as suites/wbc_gates.yaml asks of pushes
+}};
+
+struct LevelName {
+  int level = 0;
+  std::string name;  // "walks_up"
+  auto operator<=>(const LevelName&) const = default;
+};
 
 using CountsByLevel = std::map<int, SuccessByClip>;
 
@@ -47,106 +65,89 @@ void add_level_name(const Ladder& ladder, const LevelName& found, std::map<int, 
         fmt::format("two names of {} {}: '{}' and '{}'", ladder.word, found.level, known->second, found.name));
 }
 
-LevelEntry level_entry(const PolicyKey& key, const CountsByLevel& counts, const LevelTable& table) {
-  LevelEntry entry{.key = key, .levels = {}, .reached = {}};
-  bool passed = true;
-  int run = 0;
-  for (const LevelName& name : table.levels) {
-    const auto found = counts.find(name.level);
-    const Rate rate = found == counts.end() ? Rate{} : make_rate(found->second, table.level);
-    entry.levels.push_back(rate);
-    passed = passed && rate.n > 0 && rate.rate >= table.ladder.pass;
-    if (passed) entry.reached = name.level;
-    if (rate.n == 0) continue;
-    entry.mean += rate.rate;
-    ++run;
-  }
-  entry.mean /= run;
-  return entry;
-}
-
-LevelTable ladder_table(const Ladder& ladder, const std::map<PolicyKey, PerturbedRows>& policies, double level) {
-  LevelTable table{.ladder = ladder, .level = level, .levels = {}, .entries = {}};
+struct LadderCounts {
   std::map<int, std::string> names;
-  std::map<PolicyKey, CountsByLevel> counts;
+  std::map<PolicyKey, CountsByLevel> policies;
+};
+
+LadderCounts counts_of(const Ladder& ladder, const std::map<PolicyKey, PerturbedRows>& policies) {
+  LadderCounts counts;
   for (const auto& [key, perturbed] : policies) {
     for (const auto& [perturbation, episodes] : perturbed) {
       for (const auto& [id, row] : episodes) {
         const std::optional<LevelName> found = level_of_row(ladder.word, *row);
         if (!found) continue;
-        add_level_name(ladder, *found, names);
-        counts[key][found->level].add(id, passes(*row) ? 1.0 : 0.0);
+        add_level_name(ladder, *found, counts.names);
+        counts.policies[key][found->level].add(id, passes(*row) ? 1.0 : 0.0);
       }
     }
   }
-  for (const auto& [number, name] : names) table.levels.push_back({number, name});
-  for (const auto& [key, by_level] : counts) table.entries.push_back(level_entry(key, by_level, table));
-  return table;
-}
-
-std::string level_title(const LevelName& level) {
-  std::string words = level.name;
-  std::ranges::replace(words, '_', ' ');
-  return words.empty() ? fmt::format("{}", level.level) : fmt::format("{} {}", level.level, words);
-}
-
-TitledTable titled_ladder(const LevelTable& table) {
-  TitledTable titled = labelled_table(std::string(table.ladder.title), labels_of(table.entries));
-  for (const LevelName& level : table.levels) titled.table.header.push_back(level_title(level));
-  titled.table.header.insert(titled.table.header.end(), {"Mean [%]", "Reached"});
-  for (std::size_t i = 0; i < table.entries.size(); ++i) {
-    const LevelEntry& entry = table.entries[i];
-    std::vector<std::string>& cells = titled.table.rows[i];
-    for (const Rate& rate : entry.levels) cells.push_back(rate_cell(rate));
-    cells.push_back(percent(entry.mean));
-    cells.push_back(entry.reached ? count_cell(*entry.reached) : "none");
-  }
-  titled.notes = {
-      fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals, by clip where a clip has "
-                  "several draws. Mean: over the {0}s, each counting the same. Reached: the last {0} up to which "
-                  "success is {2:g} % or more at each.",
-                  table.ladder.word, 100.0 * table.level, 100.0 * table.ladder.pass)};
-  return titled;
+  return counts;
 }
 
 // "level_3_walks_up".
-std::string level_key(const Ladder& ladder, const LevelName& level) {
-  return fmt::format("{}_{}{}{}", ladder.word, level.level, level.name.empty() ? "" : "_", level.name);
+std::string level_key(const Ladder& ladder, int level, const std::string& name) {
+  return fmt::format("{}_{}{}{}", ladder.word, level, name.empty() ? "" : "_", name);
 }
 
-void add_level_figures(const LevelTable& table, std::vector<Figure>& into) {
-  FiguresOf{{.of = std::string(table.ladder.word)}, into}.add("pass", {}, table.ladder.pass);
-  for (const LevelEntry& entry : table.entries) {
-    FiguresOf figures = figures_of(entry.key, into);
-    for (std::size_t i = 0; i < entry.levels.size(); ++i) {
-      figures.keys.of = level_key(table.ladder, table.levels[i]);
-      figures.rate("success", entry.levels[i]);
-    }
-    figures.keys.of = table.ladder.word;
-    const auto levels = static_cast<long>(entry.levels.size());
-    figures.add("mean", levels, entry.mean);
-    if (entry.reached) figures.count("reached", levels, *entry.reached);
+// Success at each level, 0 episodes where it was not run; its mean over those that were; the last one up to which each
+// was passed, absent where not even the first was.
+void add_levels(const Ladder& ladder, const std::map<int, std::string>& names, const CountsByLevel& counts,
+                double level, EstimatesOf of) {
+  std::optional<int> reached;
+  bool passed = true;
+  std::vector<double> rates;
+  for (const auto& [number, name] : names) {
+    const auto found = counts.find(number);
+    const Rate rate = found == counts.end() ? Rate{} : make_rate(found->second, level);
+    of.keys.of = level_key(ladder, number, name);
+    of.rate("success", rate);
+    passed = passed && rate.n > 0 && rate.rate >= ladder.pass;
+    if (passed) reached = number;
+    if (rate.n > 0) rates.push_back(rate.rate);
   }
+  of.keys.of = ladder.word;
+  const auto levels = static_cast<long>(names.size());
+  of.add("mean", levels, mean_of(rates));
+  if (reached) of.count("reached", levels, *reached);
+}
+
+std::string level_title(int level, const std::string& name) {
+  std::string words = name;
+  std::ranges::replace(words, '_', ' ');
+  return words.empty() ? fmt::format("{}", level) : fmt::format("{} {}", level, words);
+}
+
+Pivot ladder_pivot(const Ladder& ladder, const std::map<int, std::string>& names, double level) {
+  Pivot pivot{.title = std::string(ladder.title), .rows = policy_rows(), .columns = {}};
+  for (const auto& [number, name] : names)
+    pivot.columns.push_back(
+        column(level_title(number, name), {.of = level_key(ladder, number, name), .name = "success"}, as_percent));
+  const std::string word(ladder.word);
+  pivot.columns.push_back(column("Mean [%]", {.of = word, .name = "mean"}, as_share));
+  pivot.columns.push_back(column("Reached", {.of = word, .name = "reached"}, as_count, "none"));
+  pivot.notes = {
+      fmt::format("Success [%] at each {0}, from easy to hard, with {1:g} % Wilson intervals, by clip where a clip has "
+                  "several draws. Mean: over the {0}s, each counting the same. Reached: the last {0} up to which "
+                  "success is {2:g} % or more at each.",
+                  word, 100.0 * level, 100.0 * ladder.pass)};
+  return pivot;
 }
 
 }  // namespace
 
-std::vector<LevelTable> level_tables(const std::vector<EpisodeRow>& rows, double level) {
+Analysis level_analysis(const std::vector<EpisodeRow>& rows, double level) {
+  Analysis analysis{.name = "levels", .title = "Levels", .level = level};
   const std::map<PolicyKey, PerturbedRows> policies = rows_of_policies(rows);
-  std::vector<LevelTable> tables;
   for (const Ladder& ladder : kLadders) {
-    LevelTable table = ladder_table(ladder, policies, level);
-    if (table.levels.size() > 1) tables.push_back(std::move(table));
-  }
-  return tables;
-}
-
-Analysis level_analysis(const std::vector<LevelTable>& tables) {
-  Analysis analysis{.name = "levels", .title = "Levels"};
-  for (const LevelTable& table : tables) {
-    analysis.level = table.level;
-    analysis.tables.push_back(titled_ladder(table));
-    add_level_figures(table, analysis.figures);
+    const LadderCounts counts = counts_of(ladder, policies);
+    if (counts.names.size() < 2) continue;
+    Estimates estimates;
+    EstimatesOf{{.of = std::string(ladder.word)}, estimates}.add("pass", {}, ladder.pass);
+    for (const auto& [key, by_level] : counts.policies)
+      add_levels(ladder, counts.names, by_level, level, estimates_of(key, estimates));
+    analysis.tables.push_back(table_of(estimates, ladder_pivot(ladder, counts.names, level)));
+    std::ranges::move(estimates, std::back_inserter(analysis.estimates));
   }
   return analysis;
 }

@@ -1,15 +1,17 @@
-#include "duet/report/studies/people_table.h"
-
 #include <fmt/format.h>
 
+#include <array>
 #include <map>
-#include <tuple>
 
 #include "duet/core/episode_tags.h"
+#include "duet/report/ranking/policy_groups.h"
+#include "duet/report/studies/studies.h"
 #include "duet/rows/groups/distinct_episodes.h"
 
 namespace duet {
 namespace {
+
+constexpr std::array<std::string_view, 2> kPeople = {kRecordedPeople, kSyntheticPeople};
 
 struct PeopleCounts {
   long n = 0, successes = 0, falls = 0;
@@ -20,104 +22,65 @@ struct PeopleCounts {
     falls += other.falls;
   }
 };
-
-struct BothPeople {
-  PeopleCounts recorded, synthetic;
-};
-
+using BothPeople = std::array<PeopleCounts, kPeople.size()>;
 using PeopleByTask = std::map<std::pair<int, std::string>, BothPeople>;  // by rank and name
 
-PeopleRates people_rates(const PeopleCounts& counts, double level) {
-  return {make_rate(counts.successes, counts.n, level), make_rate(counts.falls, counts.n, level)};
-}
-
-PeopleEntry people_entry(const PolicyKey& key, const std::string& task, const BothPeople& counts, double level) {
-  PeopleEntry entry{.key = key,
-                    .task = task,
-                    .recorded = people_rates(counts.recorded, level),
-                    .synthetic = people_rates(counts.synthetic, level),
-                    .interval = {}};
-  entry.difference = entry.recorded.success.rate - entry.synthetic.success.rate;
-  entry.interval = newcombe_independent(counts.recorded.successes, counts.recorded.n, counts.synthetic.successes,
-                                        counts.synthetic.n, level);
-  return entry;
-}
-
-void add_people(const PolicyKey& key, const PeopleByTask& tasks, PeopleTable& table) {
-  BothPeople all;
-  for (const auto& [task, counts] : tasks) {
-    if (counts.recorded.n == 0 || counts.synthetic.n == 0) continue;
-    table.entries.push_back(people_entry(key, task.second, counts, table.level));
-    all.recorded.add(counts.recorded);
-    all.synthetic.add(counts.synthetic);
+void add_people(const PolicyKey& key, const std::string& task, const BothPeople& counts, double level,
+                Estimates& into) {
+  const auto& [recorded, synthetic] = counts;
+  EstimatesOf of = estimates_of(key, into);
+  of.keys.task = task;
+  of.add(
+      "recorded_minus_synthetic", recorded.n + synthetic.n,
+      make_rate(recorded.successes, recorded.n, level).rate - make_rate(synthetic.successes, synthetic.n, level).rate,
+      newcombe_independent(recorded.successes, recorded.n, synthetic.successes, synthetic.n, level));
+  for (std::size_t i = 0; i < kPeople.size(); ++i) {
+    of.keys.of = kPeople[i];
+    of.rate("success", make_rate(counts[i].successes, counts[i].n, level));
+    of.rate("falls", make_rate(counts[i].falls, counts[i].n, level));
   }
-  if (all.recorded.n > 0) table.entries.push_back(people_entry(key, "all", all, table.level));
 }
 
-std::vector<std::string> people_cells(const PeopleRates& rates) {
-  return {count_cell(rates.success.n), rate_cell(rates.success), percent(rates.falls.rate)};
-}
-
-TitledTable people_rows(const PeopleTable& table) {
-  TitledTable titled = labelled_table("Recorded and synthetic people", labels_of(table.entries));
-  titled.table.header.insert(titled.table.header.end(), {"Task", "n", "Recorded [%]", "Fell [%]", "n", "Synthetic [%]",
-                                                         "Fell [%]", "Recorded - synthetic [points]"});
-  ++titled.table.label_columns;
-  for (std::size_t i = 0; i < table.entries.size(); ++i) {
-    const PeopleEntry& entry = table.entries[i];
-    std::vector<std::string>& cells = titled.table.rows[i];
-    cells.push_back(task_title(entry.task));
-    for (const PeopleRates* rates : {&entry.recorded, &entry.synthetic})
-      for (std::string& cell : people_cells(*rates)) cells.push_back(std::move(cell));
-    cells.push_back(points(entry.difference, entry.interval));
+Pivot people_pivot(double level) {
+  Pivot pivot{.title = "Recorded and synthetic people", .rows = policy_rows({kTaskLabel}), .columns = {}};
+  for (const auto& [people, title] : {std::pair("recorded", "Recorded [%]"), std::pair("synthetic", "Synthetic [%]")}) {
+    const Estimate success{.of = people, .name = "success"};
+    pivot.columns.insert(pivot.columns.end(), {column("n", success, as_n), column(title, success, as_percent),
+                                               column("Fell [%]", {.of = people, .name = "falls"}, as_share)});
   }
-  titled.notes = {
+  pivot.columns.push_back(column("Recorded - synthetic [points]", {.name = "recorded_minus_synthetic"}, as_points));
+  pivot.notes = {
       fmt::format("Success under the headline detector with {0:g} % Wilson intervals; the difference with Newcombe's "
                   "{0:g} % interval for independent shares. Where both roles of a clip are run, its two episodes "
                   "resemble each other and the intervals are too narrow. The leaderboard counts both kinds together.",
-                  100.0 * table.level)};
-  return titled;
-}
-
-void add_people_figures(const PeopleEntry& entry, std::vector<Figure>& into) {
-  FiguresOf figures = figures_of(entry.key, into);
-  figures.keys.task = entry.task;
-  figures.add("recorded_minus_synthetic", entry.recorded.success.n + entry.synthetic.success.n, entry.difference,
-              entry.interval);
-  for (const auto& [people, rates] :
-       {std::pair("recorded", &entry.recorded), std::pair("synthetic", &entry.synthetic)}) {
-    figures.keys.of = people;
-    figures.rate("success", rates->success);
-    figures.rate("falls", rates->falls);
-  }
+                  100.0 * level)};
+  return pivot;
 }
 
 }  // namespace
 
-PeopleTable people_table(const std::vector<EpisodeRow>& rows, double level) {
+Analysis people_analysis(const std::vector<EpisodeRow>& rows, double level) {
   std::map<PolicyKey, PeopleByTask> policies;
   for (const EpisodeRow* row : distinct_episodes(rows)) {
-    if (row->perturbation != kClean || row->outcome == Outcome::kUnsupported) continue;
-    const std::string& people = row->tags.text(kPeopleTag);
-    if (people != kSyntheticPeople && people != kRecordedPeople) continue;
-    BothPeople& both =
-        policies[{row->engine, row->controller, row->arm, row->policy}][{task_rank(row->task), row->task}];
-    (people == kSyntheticPeople ? both.synthetic : both.recorded)
+    const auto people = std::ranges::find(kPeople, row->tags.text(kPeopleTag));
+    if (row->perturbation != kClean || row->outcome == Outcome::kUnsupported || people == kPeople.end()) continue;
+    policies[policy_key(*row)][{task_rank(row->task), row->task}][static_cast<std::size_t>(people - kPeople.begin())]
         .add({1, headline_success(*row) ? 1L : 0L, row->fell ? 1L : 0L});
   }
-  PeopleTable table{.level = level, .entries = {}};
-  for (const auto& [key, tasks] : policies) add_people(key, tasks, table);
-  return table;
-}
-
-Analysis people_analysis(const PeopleTable& table) {
-  Analysis analysis{.name = "people", .title = "Recorded and synthetic people", .level = table.level};
-  if (table.entries.empty()) {
-    analysis.notes = {"No run with recorded and synthetic people."};
-    return analysis;
+  Analysis analysis{.name = "people", .title = "Recorded and synthetic people", .level = level};
+  for (const auto& [key, tasks] : policies) {
+    BothPeople all;
+    for (const auto& [task, counts] : tasks) {
+      if (counts[0].n == 0 || counts[1].n == 0) continue;
+      add_people(key, task.second, counts, level, analysis.estimates);
+      for (std::size_t i = 0; i < all.size(); ++i) all[i].add(counts[i]);
+    }
+    if (all[0].n > 0) add_people(key, "all", all, level, analysis.estimates);
   }
-  analysis.tables = {people_rows(table)};
-  for (const PeopleEntry& entry : table.entries) add_people_figures(entry, analysis.figures);
+  if (analysis.empty())
+    analysis.notes = {"No run with recorded and synthetic people."};
+  else
+    analysis.tables = {table_of(analysis.estimates, people_pivot(level))};
   return analysis;
 }
 

@@ -1,21 +1,22 @@
-#include "duet/report/studies/reactivity.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <set>
 
 #include "duet/core/episode_tags.h"
 #include "duet/core/order_statistics.h"
-#include "duet/report/studies/interaction_table.h"
-#include "duet/rows/groups/row_groups.h"
+#include "duet/report/ranking/policy_groups.h"
+#include "duet/report/studies/studies.h"
 
 namespace duet {
 namespace {
 
 constexpr const char* kAllTasks = "all";
+constexpr double kPartnerShift = 0.1;  // from here on the partner's onset counts as moved [s]
 constexpr double kNoReaction = std::numeric_limits<double>::quiet_NaN();
 
 struct Onsets {
@@ -32,6 +33,13 @@ Onsets onsets_of(const EpisodeRow& row) {
   };
   return {.robot = metric("onset_s"), .partner = metric("partner_onset_s")};
 }
+
+// Means over the episodes of one perturbation in which the partner's onset moved.
+struct OnsetShift {
+  std::string perturbation;
+  long n = 0;
+  double partner = 0.0, robot = 0.0;  // [s], later is positive
+};
 
 // The shifts of one policy, gathered before its figures are computed.
 struct GatheredShifts {
@@ -91,43 +99,59 @@ std::vector<double> delays_of(const EpisodeRows& rows) {
   return delays;
 }
 
-void count_false_starts(const PerturbedRows& rows, Reactivity& of) {
+// By the partner's shift.
+std::vector<OnsetShift> gather_all(const PerturbedRows& rows, GatheredShifts& gathered) {
+  std::vector<OnsetShift> shifts;
+  for (const auto& [perturbation, episodes] : rows) {
+    if (perturbation == kClean) continue;
+    OnsetShift shift = gather(perturbation, episodes, rows.find(kClean)->second, gathered);
+    if (shift.n > 0) shifts.push_back(std::move(shift));
+  }
+  std::ranges::stable_sort(shifts, {}, &OnsetShift::partner);
+  return shifts;
+}
+
+void add_false_starts(const PerturbedRows& rows, const EstimatesOf& of) {
+  long led = 0, false_starts = 0;
   for (const auto& [perturbation, episodes] : rows)
     for (const auto& [id, row] : episodes)
       if (const std::optional<double> lead = lead_of(*row)) {
-        ++of.led;
-        of.false_starts += *lead > kFalseStart ? 1 : 0;
+        ++led;
+        false_starts += *lead > kFalseStart ? 1 : 0;
       }
+  of.count("false_starts", led, false_starts);
 }
 
-Reactivity timing_of(const PolicyKey& key, const std::string& task, const PerturbedRows& rows,
-                     ClusterBootstrap& bootstrap, double level) {
-  const EpisodeRows& clean = rows.find(kClean)->second;
-  Reactivity of;
-  of.key = key;
-  of.task = task;
-  GatheredShifts gathered;
-  for (const auto& [perturbation, episodes] : rows) {
-    if (perturbation == kClean) continue;
-    OnsetShift shift = gather(perturbation, episodes, clean, gathered);
-    if (shift.n > 0) of.shifts.push_back(std::move(shift));
-  }
-  std::stable_sort(of.shifts.begin(), of.shifts.end(),
-                   [](const OnsetShift& a, const OnsetShift& b) { return a.partner < b.partner; });
-  of.n = static_cast<long>(gathered.products.size());
-  of.without = gathered.without;
-  of.slope = of.n > 0 ? sum(gathered.products) / sum(gathered.squares) : kNoReaction;
-  of.median_slope = weighted_median(gathered.ratios, gathered.sizes);
+// Slopes of the robot's over the partner's shift, through the origin: 1 follows, 0 plays its clip. One by least
+// squares, one by the least absolute deviations: what most episodes do. An arm that swings with the steps can pass for
+// an onset, in a few episodes, and pulls the squares. Intervals are bootstraps over clips, of two or more.
+void add_slopes(GatheredShifts& gathered, double level, ClusterBootstrap& bootstrap, const EstimatesOf& of) {
+  const auto n = static_cast<long>(gathered.products.size());
   const bool several = gathered.numbers.size() > 1;
-  of.interval = several ? bootstrap.ratio(gathered.products, gathered.squares, gathered.clips, level) : kNoInterval;
-  of.median_interval =
-      several ? bootstrap.weighted_median(gathered.ratios, gathered.sizes, gathered.clips, level) : kNoInterval;
-  std::vector<double> delays = delays_of(clean);
-  of.n_clean = static_cast<long>(delays.size());
-  of.delay_clean = quantile(std::move(delays), 0.5);
-  of.delay_moved = quantile(std::move(gathered.delays), 0.5);
-  count_false_starts(rows, of);
-  return of;
+  of.add("slope", n, n > 0 ? sum(gathered.products) / sum(gathered.squares) : kNoReaction,
+         several ? bootstrap.ratio(gathered.products, gathered.squares, gathered.clips, level) : kNoInterval);
+  of.add("median_slope", n, weighted_median(gathered.ratios, gathered.sizes),
+         several ? bootstrap.weighted_median(gathered.ratios, gathered.sizes, gathered.clips, level) : kNoInterval);
+}
+
+// Adds nothing where no partner moved. Delays are medians of the robot's minus its partner's onset.
+void add_timing(const PerturbedRows& rows, double level, ClusterBootstrap& bootstrap, EstimatesOf of) {
+  GatheredShifts gathered;
+  const std::vector<OnsetShift> shifts = gather_all(rows, gathered);
+  const auto n = static_cast<long>(gathered.products.size());
+  if (n + gathered.without == 0) return;
+  add_slopes(gathered, level, bootstrap, of);
+  of.count("did_not_act", n + gathered.without, gathered.without);
+  std::vector<double> delays = delays_of(rows.find(kClean)->second);
+  const auto n_clean = static_cast<long>(delays.size());
+  of.add("delay_clean", n_clean, quantile(std::move(delays), 0.5), kNoInterval, "s");
+  of.add("delay_moved", n, quantile(std::move(gathered.delays), 0.5), kNoInterval, "s");
+  add_false_starts(rows, of);
+  for (const OnsetShift& shift : shifts) {
+    of.keys.perturbation = shift.perturbation;
+    of.add("partner_shift", shift.n, shift.partner, kNoInterval, "s");
+    of.add("robot_shift", shift.n, shift.robot, kNoInterval, "s");
+  }
 }
 
 // All rows and, where there are several tasks, each task's in its order.
@@ -142,6 +166,11 @@ std::vector<std::pair<std::string, PerturbedRows>> with_tasks(const PerturbedRow
   return parts;
 }
 
+// The two heights at which clips offer hands. [m]
+struct OfferedHeights {
+  double low = 0.0, high = 0.0;
+};
+
 // None unless the variants of clips have two heights.
 std::optional<OfferedHeights> offered_heights(const std::vector<EpisodeRow>& rows) {
   std::set<double> heights;
@@ -151,6 +180,16 @@ std::optional<OfferedHeights> offered_heights(const std::vector<EpisodeRow>& row
   return OfferedHeights{.low = *heights.begin(), .high = *heights.rbegin()};
 }
 
+struct SpatialCell {
+  const char *variant, *title;
+  double paper;  // Table S10, handshake
+};
+// In the order (high, low) by (left, right).
+constexpr std::array<SpatialCell, 4> kSpatialCells = {{{"left_high", "Left, high", 0.8},
+                                                       {"right_high", "Right, high", 1.0},
+                                                       {"left_low", "Left, low", 0.4},
+                                                       {"right_low", "Right, low", 0.6}}};
+
 // Place in kSpatialCells; -1 for none.
 int spatial_cell(const EpisodeRow& row, const OfferedHeights& heights) {
   const std::string& side = row.tags.text(kSideTag);
@@ -159,87 +198,84 @@ int spatial_cell(const EpisodeRow& row, const OfferedHeights& heights) {
   return (height == heights.high ? 0 : 2) + (side == "left" ? 0 : 1);
 }
 
-std::vector<SpatialCells> spatial_of(const PolicyKey& key, const EpisodeRows& rows, const OfferedHeights& heights,
-                                     double level) {
-  std::map<std::pair<int, std::string>, std::array<EpisodeRows, 4>> tasks;
+// Success by the clip's variant, clean.
+void add_spatial(const EpisodeRows& rows, const OfferedHeights& heights, double level, EstimatesOf of) {
+  std::map<std::pair<int, std::string>, std::array<EpisodeRows, kSpatialCells.size()>> tasks;
   for (const auto& [id, row] : rows) {
     const int cell = spatial_cell(*row, heights);
     if (cell >= 0) tasks[{task_rank(id.task), id.task}][static_cast<std::size_t>(cell)].emplace(id, row);
   }
-  std::vector<SpatialCells> spatial;
   for (const auto& [task, cells] : tasks) {
-    SpatialCells of{.key = key, .task = task.second, .cells = {}};
-    for (std::size_t i = 0; i < cells.size(); ++i) of.cells[i] = headline_rate(cells[i], level);
-    spatial.push_back(std::move(of));
+    of.keys.task = task.second;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      of.keys.of = kSpatialCells[i].variant;
+      of.rate("success", headline_rate(cells[i], level));
+    }
   }
-  return spatial;
 }
 
-std::string seconds(double value) { return std::isfinite(value) ? fmt::format("{:+.2f}", value + 0.0) : "-"; }
-
-TitledTable timing_table(const ReactivityTable& table) {
-  TitledTable titled = labelled_table("Reactivity: when the robot acts", labels_of(table.timing));
-  titled.table.header.insert(titled.table.header.end(),
-                             {"Task", "n", "Did not act", "Slope", "Median slope", "Delay, clean [s]",
-                              "Delay, partner moved [s]", "False starts"});
-  ++titled.table.label_columns;
-  for (std::size_t i = 0; i < table.timing.size(); ++i) {
-    const Reactivity& of = table.timing[i];
-    titled.table.rows[i].insert(
-        titled.table.rows[i].end(),
-        {task_title(of.task), count_cell(of.n), count_cell(of.without), decimals(of.slope, of.interval, 2),
-         decimals(of.median_slope, of.median_interval, 2), seconds(of.delay_clean), seconds(of.delay_moved),
-         of.led > 0 ? fmt::format("{}/{}", of.false_starts, of.led) : "-"});
-  }
-  titled.notes = {fmt::format(
-      "n: perturbed episodes whose partner's onset is {:g} s or more from that of the same episode clean. Slope: of "
-      "the robot's onset shift over the partner's, least squares through the origin, with a {:g} % interval, clips "
-      "drawn again; 1 follows its partner, 0 plays its clip. Median slope: the least absolute deviations, what most "
-      "episodes do: an arm that swings with the steps can pass for an onset. Delay: median of the robot's onset minus "
-      "its partner's; replay's is that of the demonstrations. Did not act: of such episodes, those without an onset of "
-      "the robot, here or clean; they are in no slope. False starts: the robot begins more than {:g} s before its "
-      "partner, of the episodes, clean too, in which both begin; by the rule interaction, which counts withdrawn "
-      "beginnings, where it judged the run.",
-      kPartnerShift, 100.0 * table.level, kFalseStart)};
-  return titled;
+std::string seconds(const Estimate& of) {
+  return std::isfinite(of.value) ? fmt::format("{:+.2f}", of.value + 0.0) : "-";
 }
 
-TitledTable spatial_table(const ReactivityTable& table) {
-  TitledTable titled = labelled_table("Reactivity: where the partner's hand is (Table S10)", labels_of(table.spatial));
-  titled.table.header.emplace_back("Task");
-  ++titled.table.label_columns;
-  for (const SpatialCell& cell : kSpatialCells) titled.table.header.push_back(fmt::format("{} [%]", cell.title));
-  for (std::size_t i = 0; i < table.spatial.size(); ++i) {
-    std::vector<std::string>& cells = titled.table.rows[i];
-    cells.push_back(task_title(table.spatial[i].task));
-    for (const Rate& rate : table.spatial[i].cells) cells.push_back(rate_cell(rate));
-  }
-  --titled.table.label_columns;
-  std::vector<std::string>& paper = add_paper_row("D-STAR", titled);
-  ++titled.table.label_columns;
-  paper.push_back(task_title("handshake"));
-  for (const SpatialCell& cell : kSpatialCells) paper.push_back(percent(cell.paper));
-  titled.notes = {fmt::format(
+TitledTable timing_table(const Estimates& timing, double level) {
+  return table_of(
+      timing,
+      {.title = "Reactivity: when the robot acts",
+       .rows = policy_rows({kTaskLabel}),
+       .columns = {column("n", {.name = "slope"}, as_n), column("Did not act", {.name = "did_not_act"}, as_count),
+                   column("Slope", {.name = "slope"}, as_decimals(2)),
+                   column("Median slope", {.name = "median_slope"}, as_decimals(2)),
+                   column("Delay, clean [s]", {.name = "delay_clean"}, seconds),
+                   column("Delay, partner moved [s]", {.name = "delay_moved"}, seconds),
+                   column("False starts", {.name = "false_starts"}, as_count_of_n)},
+       .notes = {fmt::format(
+           "n: perturbed episodes whose partner's onset is {:g} s or more from that of the same episode clean. Slope: "
+           "of the robot's onset shift over the partner's, least squares through the origin, with a {:g} % interval, "
+           "clips drawn again; 1 follows its partner, 0 plays its clip. Median slope: the least absolute deviations, "
+           "what most episodes do: an arm that swings with the steps can pass for an onset. Delay: median of the "
+           "robot's onset minus its partner's; replay's is that of the demonstrations. Did not act: of such episodes, "
+           "those without an onset of the robot, here or clean; they are in no slope. False starts: the robot begins "
+           "more than {:g} s before its partner, of the episodes, clean too, in which both begin; by the rule "
+           "interaction, which counts withdrawn beginnings, where it judged the run.",
+           kPartnerShift, 100.0 * level, kFalseStart)}});
+}
+
+TitledTable spatial_table(const Estimates& spatial, const OfferedHeights& heights, double level) {
+  Pivot pivot{
+      .title = "Reactivity: where the partner's hand is (Table S10)", .rows = policy_rows({kTaskLabel}), .columns = {}};
+  for (const SpatialCell& cell : kSpatialCells)
+    pivot.columns.push_back(
+        column(fmt::format("{} [%]", cell.title), {.of = cell.variant, .name = "success"}, as_percent));
+  pivot.notes = {fmt::format(
       "Success in % of clean episodes under the headline detector with {:g} % Wilson intervals, by the hand "
       "and height that the partner offers: {:g} m is low, {:g} m high. The paper's row is Table S10 as printed: "
       "handshakes with a real robot, its number of trials not stated.",
-      100.0 * table.level, table.heights.low, table.heights.high)};
-  return titled;
+      100.0 * level, heights.low, heights.high)};
+  return table_of(spatial, pivot);
 }
 
-std::vector<LinePlot> reactivity_plots(const ReactivityTable& table) {
+void add_papers_spatial(Estimates& into) {
+  for (const SpatialCell& cell : kSpatialCells)
+    EstimatesOf{{.source = "paper", .policy = "D-STAR", .task = "handshake", .of = cell.variant}, into}.add(
+        "success", {}, cell.paper);
+}
+
+// Per engine and controller, as Figure S4.
+std::vector<LinePlot> reactivity_plots(const Estimates& timing) {
   std::map<std::pair<std::string, std::string>, LinePlot> plots;
-  for (const Reactivity& of : table.timing) {
-    if (of.shifts.empty() || of.task != kAllTasks) continue;
-    LinePlot& plot = plots[{of.key.engine, of.key.controller}];
-    plot.title = fmt::format("Onset shifts: {} in {}", of.key.controller, of.key.engine);
+  for (const PivotRow& row : rows_of(timing, policy_rows({kTaskLabel}))) {
+    const Estimate& keys = row.keys();
+    if (keys.task != kAllTasks || row.find({.name = "partner_shift"}) == nullptr) continue;
+    LinePlot& plot = plots[{keys.engine, keys.controller}];
+    plot.title = fmt::format("Onset shifts: {} in {}", keys.controller, keys.engine);
     plot.x_label = "shift of the partner's onset [s]";
     plot.y_label = "of the robot's [s]";
     LineSeries& series = plot.series.emplace_back();
-    series.name = policy_name(of.key);
-    for (const OnsetShift& shift : of.shifts) {
-      series.x.push_back(shift.partner);
-      series.y.push_back(shift.robot);
+    series.name = policy_title(keys);
+    for (const Estimate* estimate : row.estimates) {
+      if (estimate->name == "partner_shift") series.x.push_back(estimate->value);
+      if (estimate->name == "robot_shift") series.y.push_back(estimate->value);
     }
   }
   std::vector<LinePlot> list;
@@ -248,70 +284,31 @@ std::vector<LinePlot> reactivity_plots(const ReactivityTable& table) {
   return list;
 }
 
-void add_timing_figures(const Reactivity& of, std::vector<Figure>& into) {
-  FiguresOf figures = figures_of(of.key, into);
-  figures.keys.task = of.task;
-  figures.add("slope", of.n, of.slope, of.interval);
-  figures.add("median_slope", of.n, of.median_slope, of.median_interval);
-  figures.count("did_not_act", of.n + of.without, of.without);
-  figures.add("delay_clean", of.n_clean, of.delay_clean, kNoInterval, "s");
-  figures.add("delay_moved", of.n, of.delay_moved, kNoInterval, "s");
-  figures.count("false_starts", of.led, of.false_starts);
-  for (const OnsetShift& shift : of.shifts) {
-    figures.keys.perturbation = shift.perturbation;
-    figures.add("partner_shift", shift.n, shift.partner, kNoInterval, "s");
-    figures.add("robot_shift", shift.n, shift.robot, kNoInterval, "s");
-  }
-}
-
-void add_spatial_figures(const std::vector<SpatialCells>& spatial, std::vector<Figure>& into) {
-  for (const SpatialCells& of : spatial) {
-    FiguresOf figures = figures_of(of.key, into);
-    figures.keys.task = of.task;
-    for (std::size_t i = 0; i < kSpatialCells.size(); ++i) {
-      figures.keys.of = kSpatialCells[i].variant;
-      figures.rate("success", of.cells[i]);
-    }
-  }
-  if (spatial.empty()) return;
-  FiguresOf figures = paper_figures_of("D-STAR", into);
-  figures.keys.task = "handshake";
-  for (const SpatialCell& cell : kSpatialCells) {
-    figures.keys.of = cell.variant;
-    figures.add("success", {}, cell.paper);
-  }
-}
-
 }  // namespace
 
-ReactivityTable reactivity_table(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
-  ReactivityTable table{.level = options.level, .timing = {}, .spatial = {}};
+Analysis reactivity_analysis(const std::vector<EpisodeRow>& rows, const IntervalOptions& options) {
+  Estimates timing, spatial;
   ClusterBootstrap bootstrap(options.resamples, options.seed);
   const std::optional<OfferedHeights> heights = offered_heights(rows);
-  table.heights = heights.value_or(OfferedHeights());
   for (const auto& [key, perturbed] : rows_of_policies(rows)) {
     const auto clean = perturbed.find(kClean);
     if (clean == perturbed.end()) continue;
     for (const auto& [task, of] : with_tasks(perturbed)) {
-      Reactivity timing = timing_of(key, task, of, bootstrap, options.level);
-      if (timing.n + timing.without > 0) table.timing.push_back(std::move(timing));
+      EstimatesOf of_task = estimates_of(key, timing);
+      of_task.keys.task = task;
+      add_timing(of, options.level, bootstrap, of_task);
     }
-    if (!heights) continue;
-    for (SpatialCells& cells : spatial_of(key, clean->second, *heights, options.level))
-      table.spatial.push_back(std::move(cells));
+    if (heights) add_spatial(clean->second, *heights, options.level, estimates_of(key, spatial));
   }
-  return table;
-}
-
-Analysis reactivity_analysis(const ReactivityTable& table) {
-  Analysis analysis{.name = "reactivity", .title = "Reactivity", .level = table.level};
-  if (table.empty())
+  if (!spatial.empty()) add_papers_spatial(spatial);
+  Analysis analysis{.name = "reactivity", .title = "Reactivity", .level = options.level};
+  if (!timing.empty()) analysis.tables.push_back(timing_table(timing, options.level));
+  if (!spatial.empty()) analysis.tables.push_back(spatial_table(spatial, *heights, options.level));
+  if (analysis.tables.empty())
     analysis.notes = {"No perturbation moved a partner's onset, and no variants of clips offer hands at two heights."};
-  if (!table.timing.empty()) analysis.tables.push_back(timing_table(table));
-  if (!table.spatial.empty()) analysis.tables.push_back(spatial_table(table));
-  analysis.plots = {{.plots = reactivity_plots(table)}};
-  for (const Reactivity& of : table.timing) add_timing_figures(of, analysis.figures);
-  add_spatial_figures(table.spatial, analysis.figures);
+  analysis.plots = {{.plots = reactivity_plots(timing)}};
+  analysis.estimates = std::move(timing);
+  std::ranges::move(spatial, std::back_inserter(analysis.estimates));
   return analysis;
 }
 

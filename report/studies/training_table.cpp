@@ -1,5 +1,3 @@
-#include "duet/report/studies/training_table.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -8,12 +6,13 @@
 #include <functional>
 #include <map>
 #include <set>
-#include <tuple>
 
 #include "duet/core/episode_tags.h"
 #include "duet/core/require.h"
-#include "duet/report/ranking/resolution.h"
-#include "duet/report/tables/cells.h"
+#include "duet/report/ranking/comparison.h"
+#include "duet/report/ranking/policy_groups.h"
+#include "duet/report/studies/studies.h"
+#include "duet/statistics/crossed_effects.h"
 
 namespace duet {
 namespace {
@@ -62,26 +61,28 @@ std::vector<EpisodeKey> in_all(const std::vector<const Trainings*>& methods) {
   return keys;
 }
 
-MethodTrainings method_of(const PolicyKey& key, const Trainings& trainings, double level) {
-  MethodTrainings method{.key = key};
+// Success and falls of each training over the episodes that all of them have, and the mean and spread of their success.
+void add_method(const Trainings& trainings, double level, EstimatesOf of) {
   const std::vector<EpisodeKey> common = in_all({&trainings});
+  const auto n = static_cast<long>(common.size());
+  Estimates each;
   std::vector<double> rates;
   for (const auto& [seed, episodes] : trainings) {
     long successes = 0, falls = 0;
-    for (const EpisodeKey& each : common) {
-      const EpisodeRow& row = *episodes.at(each);
-      successes += headline_success(row) ? 1 : 0;
-      falls += row.fell ? 1 : 0;
+    for (const EpisodeKey& key : common) {
+      successes += headline_success(*episodes.at(key)) ? 1 : 0;
+      falls += episodes.at(key)->fell ? 1 : 0;
     }
-    const auto n = static_cast<long>(common.size());
-    method.seeds.push_back(seed.second);
-    method.success.push_back(make_rate(successes, n, level));
-    method.falls.push_back(make_rate(falls, n, level));
-    rates.push_back(method.success.back().rate);
+    of.keys.of = fmt::format("seed{}", seed.second);
+    const EstimatesOf training{of.keys, each};
+    training.rate("success", make_rate(successes, n, level));
+    rates.push_back(each.back().value);
+    training.rate("falls", make_rate(falls, n, level));
   }
-  method.mean = mean_of(rates);
-  method.deviation = sample_deviation(rates);
-  return method;
+  of.keys.of = "";
+  of.add("mean_success", n, mean_of(rates));
+  of.add("success_sd", static_cast<long>(rates.size()), sample_deviation(rates));
+  of.into.insert(of.into.end(), each.begin(), each.end());
 }
 
 TrainingOutcomes outcomes_of(const Trainings& trainings, const std::vector<EpisodeKey>& keys) {
@@ -101,196 +102,163 @@ double mean_success(const TrainingOutcomes& outcomes) {
   return sum / static_cast<double>(outcomes.size() * outcomes.front().size());
 }
 
-struct Pair {
-  PolicyKey key;
+struct MethodPair {
+  PolicyKey key;  // its policy is "dstar vs dp"
   const Trainings& a;
   const Trainings& b;
   double level;
 };
+constexpr const char* kEpisodes = "all";
 
-MethodDifference difference_of(const Pair& pair, const std::string& of, const std::vector<EpisodeKey>& keys) {
-  MethodDifference result{.key = pair.key, .of = of, .episodes = static_cast<long>(keys.size())};
+// A minus B over these episodes. The difference alone where a method has one training or all episodes are of one clip.
+void add_difference(const MethodPair& pair, const std::string& name, const std::vector<EpisodeKey>& keys,
+                    Estimates& into) {
   ClipNumbers clips;
   std::vector<int> clip;
   clip.reserve(keys.size());
   for (const auto& [perturbation, id] : keys) clip.push_back(clips.of(id));
   const TrainingOutcomes a = outcomes_of(pair.a, keys), b = outcomes_of(pair.b, keys);
-  result.clips = static_cast<long>(clips.size());
-  result.success_a = mean_success(a);
-  result.success_b = mean_success(b);
-  result.crossed.difference = result.success_a - result.success_b;
-  if (a.size() >= 2 && b.size() >= 2 && clips.size() >= 2) result.crossed = crossed_difference(a, b, clip, pair.level);
-  return result;
+  const double success_a = mean_success(a), success_b = mean_success(b);
+  CrossedDifference crossed{.difference = success_a - success_b};
+  if (a.size() >= 2 && b.size() >= 2 && clips.size() >= 2) crossed = crossed_difference(a, b, clip, pair.level);
+  const auto n = static_cast<long>(keys.size());
+  EstimatesOf of = estimates_of(pair.key, into);
+  of.keys.of = name;
+  of.add("success_a", n, success_a);
+  of.add("success_b", n, success_b);
+  of.add("difference", n, crossed.difference, crossed.interval);
+  of.add("of_trainings", n, crossed.of_trainings);
+  of.add("degrees_of_freedom", n, crossed.degrees);
+  of.add("p", n, crossed.p);
+  of.add("p_holm", n, CrossedDifference::kUnknown);
+  of.count("clips", n, static_cast<long>(clips.size()));
+  of.word("verdict", "");
 }
 
 using Belongs = std::function<bool(const EpisodeKey&)>;
 
-std::vector<EpisodeKey> chosen(const std::vector<EpisodeKey>& keys, const Belongs& belongs) {
+// A part that is empty or the whole is none.
+void add_part(const MethodPair& pair, const std::string& name, const std::vector<EpisodeKey>& keys,
+              const Belongs& belongs, Estimates& into) {
   std::vector<EpisodeKey> those;
   std::ranges::copy_if(keys, std::back_inserter(those), belongs);
-  return those;
+  if (!those.empty() && those.size() < keys.size()) add_difference(pair, name, those, into);
 }
 
-// A part that is empty or the whole is none.
-void add_part(const Pair& pair, const std::string& of, const std::vector<EpisodeKey>& keys, const Belongs& belongs,
-              std::vector<MethodDifference>& into) {
-  const std::vector<EpisodeKey> those = chosen(keys, belongs);
-  if (those.empty() || those.size() == keys.size()) return;
-  into.push_back(difference_of(pair, of, those));
-}
-
-void add_differences(const Pair& pair, TrainingTable& table) {
+// All episodes, recorded and synthetic people; `parts`: tasks and perturbations.
+void add_differences(const MethodPair& pair, Estimates& differences, Estimates& parts) {
   const std::vector<EpisodeKey> keys = in_all({&pair.a, &pair.b});
   if (keys.empty()) return;
-  table.differences.push_back(difference_of(pair, std::string(kEpisodes), keys));
+  add_difference(pair, kEpisodes, keys, differences);
   const Episodes& episodes = pair.a.begin()->second;
   for (const std::string_view people : {kRecordedPeople, kSyntheticPeople})
     add_part(
         pair, std::string(people), keys,
-        [&](const EpisodeKey& key) { return episodes.at(key)->tags.text(kPeopleTag) == people; }, table.differences);
+        [&](const EpisodeKey& key) { return episodes.at(key)->tags.text(kPeopleTag) == people; }, differences);
   std::set<std::pair<int, std::string>> tasks;
   std::set<std::string> perturbations;
   for (const auto& [perturbation, id] : keys) {
     tasks.insert({task_rank(id.task), id.task});
     perturbations.insert(perturbation);
   }
-  for (const auto& ranked : tasks)
+  for (const auto& [rank, task] : tasks)
     add_part(
-        pair, ranked.second, keys, [&](const EpisodeKey& key) { return key.second.task == ranked.second; },
-        table.parts);
+        pair, task, keys, [&task = task](const EpisodeKey& key) { return key.second.task == task; }, parts);
   for (const std::string& perturbation : perturbations)
     add_part(
-        pair, perturbation, keys, [&](const EpisodeKey& key) { return key.first == perturbation; }, table.parts);
+        pair, perturbation, keys, [&](const EpisodeKey& key) { return key.first == perturbation; }, parts);
 }
 
-// Holm over those that have a p.
-void judge(std::vector<MethodDifference>& differences, double level, double margin) {
-  std::vector<double> p_values;
-  for (const MethodDifference& each : differences)
-    if (!std::isnan(each.crossed.p)) p_values.push_back(each.crossed.p);
-  const std::vector<double> adjusted = holm(p_values);
-  std::size_t next = 0;
-  for (MethodDifference& each : differences) {
-    if (std::isnan(each.crossed.p)) continue;
-    each.p_holm = adjusted[next++];
-    each.verdict = verdict_of(each.crossed.difference, each.crossed.interval, each.p_holm, level, margin);
-  }
+std::vector<const Estimate*> of_each_seed(const PivotRow& row, std::string_view name) {
+  std::vector<const Estimate*> found;
+  for (const Estimate* estimate : row.estimates)
+    if (estimate->name == name && !estimate->of.empty()) found.push_back(estimate);
+  return found;
 }
 
-TitledTable method_rows(const TrainingTable& table) {
-  TitledTable titled = labelled_table("Trainings", labels_of(table.methods));
-  titled.table.header.insert(titled.table.header.end(),
-                             {"Seeds", "n of each", "Success of each [%]", "Mean [%]", "SD [points]", "Fell [%]"});
-  for (std::size_t i = 0; i < table.methods.size(); ++i) {
-    const MethodTrainings& method = table.methods[i];
-    std::vector<std::string> each;
-    double falls = 0.0;
-    for (std::size_t k = 0; k < method.seeds.size(); ++k) {
-      each.push_back(percent(method.success[k].rate));
-      falls += method.falls[k].rate / static_cast<double>(method.seeds.size());
-    }
-    std::vector<std::string>& cells = titled.table.rows[i];
-    for (std::string cell :
-         {fmt::format("{}", fmt::join(method.seeds, ", ")), count_cell(method.success.front().n),
-          fmt::format("{}", fmt::join(each, ", ")), percent(method.mean), percent(method.deviation), percent(falls)})
-      cells.push_back(std::move(cell));
-  }
-  titled.notes = {
-      "Policies to which the suite gives one tag `method` are its trainings. n: the episodes that all of them have. "
-      "SD: between trainings."};
+std::string seeds_cell(const PivotRow& row) {
+  std::vector<std::string> seeds;
+  for (const Estimate* success : of_each_seed(row, "success")) seeds.push_back(success->of.substr(4));
+  return fmt::format("{}", fmt::join(seeds, ", "));
+}
+
+std::string each_cell(const PivotRow& row) {
+  std::vector<std::string> each;
+  for (const Estimate* success : of_each_seed(row, "success")) each.push_back(as_share(*success));
+  return fmt::format("{}", fmt::join(each, ", "));
+}
+
+std::string falls_cell(const PivotRow& row) {
+  const std::vector<const Estimate*> falls = of_each_seed(row, "falls");
+  double mean = 0.0;
+  for (const Estimate* of : falls) mean += of->value / static_cast<double>(falls.size());
+  return percent(mean);
+}
+
+Pivot method_pivot() {
+  return {.title = "Trainings",
+          .rows = policy_rows(),
+          .columns = {{"Seeds", seeds_cell},
+                      column("n of each", {.name = "mean_success"}, as_n),
+                      {"Success of each [%]", each_cell},
+                      column("Mean [%]", {.name = "mean_success"}, as_share),
+                      column("SD [points]", {.name = "success_sd"}, as_share),
+                      {"Fell [%]", falls_cell}},
+          .notes = {"Policies to which the suite gives one tag `method` are its trainings. n: the episodes that all of "
+                    "them have. SD: between trainings."}};
+}
+
+std::string of_title(const Estimate& keys) { return keys.of == kEpisodes ? "all episodes" : keys.of; }
+
+TitledTable difference_table(const std::string& title, const Estimates& differences, double level, double margin) {
+  TitledTable titled = table_of(
+      differences,
+      {.title = title,
+       .rows = policy_rows({{"Of", &Estimate::of, true, of_title}}),
+       .columns = {column("n", {.name = "difference"}, as_n), column("Clips", {.name = "clips"}, as_count),
+                   column("A [%]", {.name = "success_a"}, as_share), column("B [%]", {.name = "success_b"}, as_share),
+                   column("A - B [points]", {.name = "difference"}, as_points), column("p", {.name = "p"}, as_p),
+                   column("p (Holm)", {.name = "p_holm"}, as_p), column("Verdict", {.name = "verdict"}, as_word)}});
+  titled.notes = {fmt::format(
+      "A, B: mean success of the trainings of the first and of the second method over n episodes that all "
+      "of them have. Trainings and clips are random effects: intervals of {0:g} % and p from Student's "
+      "distribution with Satterthwaite's degrees of freedom; a clip in both roles is one clip. p (Holm): "
+      "corrected for the {1} lines here. Verdict: of A; the same where the interval lies within {2:g} "
+      "points, else better or worse where p (Holm) is at most {3:.2g}. Without two trainings of each method "
+      "nothing is said.",
+      100.0 * level, titled.table.rows.size(), 100.0 * margin, 1.0 - level)};
   return titled;
-}
-
-std::string of_cell(const std::string& of) { return of == kEpisodes ? "all episodes" : of; }
-
-TitledTable difference_rows(const std::string& title, const std::vector<MethodDifference>& differences,
-                            const TrainingTable& table) {
-  TitledTable titled = labelled_table(title, labels_of(differences));
-  titled.table.header.insert(titled.table.header.end(),
-                             {"Of", "n", "Clips", "A [%]", "B [%]", "A - B [points]", "p", "p (Holm)", "Verdict"});
-  ++titled.table.label_columns;
-  for (std::size_t i = 0; i < differences.size(); ++i) {
-    const MethodDifference& each = differences[i];
-    std::vector<std::string>& cells = titled.table.rows[i];
-    for (std::string cell :
-         {of_cell(each.of), count_cell(each.episodes), count_cell(each.clips), percent(each.success_a),
-          percent(each.success_b), points(each.crossed.difference, each.crossed.interval), p_cell(each.crossed.p),
-          p_cell(each.p_holm), std::string(to_string(each.verdict))})
-      cells.push_back(std::move(cell));
-  }
-  titled.notes = {
-      fmt::format("A, B: mean success of the trainings of the first and of the second method over n episodes that all "
-                  "of them have. "
-                  "Trainings and clips are random effects: intervals of {0:g} % and p from Student's distribution with "
-                  "Satterthwaite's degrees of freedom; a clip in both roles is one clip. p (Holm): corrected for the "
-                  "{1} lines here. Verdict: of A; the "
-                  "same where the "
-                  "interval lies within {2:g} points, else better or worse where p (Holm) is at most {3:.2g}. Without "
-                  "two trainings "
-                  "of each method nothing is said.",
-                  100.0 * table.level, differences.size(), 100.0 * table.margin, 1.0 - table.level)};
-  return titled;
-}
-
-void add_method_figures(const MethodTrainings& method, std::vector<Figure>& into) {
-  FiguresOf figures = figures_of(method.key, into);
-  figures.add("mean_success", method.success.front().n, method.mean);
-  figures.add("success_sd", static_cast<long>(method.seeds.size()), method.deviation);
-  for (std::size_t i = 0; i < method.seeds.size(); ++i) {
-    figures.keys.of = fmt::format("seed{}", method.seeds[i]);
-    figures.rate("success", method.success[i]);
-    figures.rate("falls", method.falls[i]);
-  }
-}
-
-void add_difference_figures(const MethodDifference& each, std::vector<Figure>& into) {
-  FiguresOf figures = figures_of(each.key, into);
-  figures.keys.of = each.of;
-  figures.add("success_a", each.episodes, each.success_a);
-  figures.add("success_b", each.episodes, each.success_b);
-  figures.add("difference", each.episodes, each.crossed.difference, each.crossed.interval);
-  figures.add("of_trainings", each.episodes, each.crossed.of_trainings);
-  figures.add("degrees_of_freedom", each.episodes, each.crossed.degrees);
-  figures.add("p", each.episodes, each.crossed.p);
-  figures.add("p_holm", each.episodes, each.p_holm);
-  figures.count("clips", each.episodes, each.clips);
-  figures.word("verdict", std::string(to_string(each.verdict)));
 }
 
 }  // namespace
 
-TrainingTable training_table(const std::vector<EpisodeRow>& rows, double level, double margin) {
-  TrainingTable table{.level = level, .margin = margin, .methods = {}, .differences = {}, .parts = {}};
+Analysis training_analysis(const std::vector<EpisodeRow>& rows, double level, double margin) {
+  Analysis analysis{.name = "trainings", .title = "Several trainings of one policy", .level = level};
   const std::map<PolicyKey, Trainings> methods = trainings_of(rows);
+  Estimates differences, parts;
   for (auto a = methods.begin(); a != methods.end(); ++a) {
-    table.methods.push_back(method_of(a->first, a->second, level));
+    add_method(a->second, level, estimates_of(a->first, analysis.estimates));
     for (auto b = methods.begin(); b != methods.end(); ++b) {
       const bool in_turn = b->first.policy < a->first.policy;  // "dstar vs dp": the later name is A
       if (!in_turn || b->first.engine != a->first.engine || b->first.controller != a->first.controller) continue;
       PolicyKey key = a->first;
       key.policy = fmt::format("{} vs {}", a->first.policy, b->first.policy);
-      add_differences({key, a->second, b->second, level}, table);
+      add_differences({key, a->second, b->second, level}, differences, parts);
     }
   }
-  judge(table.differences, level, margin);
-  judge(table.parts, level, margin);
-  return table;
-}
-
-Analysis training_analysis(const TrainingTable& table) {
-  Analysis analysis{.name = "trainings", .title = "Several trainings of one policy", .level = table.level};
-  if (table.methods.empty()) {
+  if (analysis.empty()) {
     analysis.notes = {
         "The suite gives no policy the tags `method` and `seed`, which say that it is a training of several."};
     return analysis;
   }
-  analysis.tables = {method_rows(table)};
-  if (!table.differences.empty())
-    analysis.tables.push_back(difference_rows("Methods over their trainings", table.differences, table));
-  if (!table.parts.empty()) analysis.tables.push_back(difference_rows("Where each wins", table.parts, table));
-  for (const MethodTrainings& method : table.methods) add_method_figures(method, analysis.figures);
-  for (const std::vector<MethodDifference>* list : {&table.differences, &table.parts})
-    for (const MethodDifference& each : *list) add_difference_figures(each, analysis.figures);
+  analysis.tables = {table_of(analysis.estimates, method_pivot())};
+  for (const auto& [title, family] :
+       {std::pair("Methods over their trainings", &differences), std::pair("Where each wins", &parts)}) {
+    if (family->empty()) continue;
+    judge_family("difference", level, margin, *family);
+    analysis.tables.push_back(difference_table(title, *family, level, margin));
+    analysis.estimates.insert(analysis.estimates.end(), family->begin(), family->end());
+  }
   return analysis;
 }
 

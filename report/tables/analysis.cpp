@@ -51,7 +51,7 @@ std::string analysis_latex(const Analysis& analysis) {
 }
 
 std::string analysis_csv(const Analysis& analysis) {
-  return figures_csv(analysis.name, analysis.level, analysis.figures);
+  return estimates_csv(analysis.name, analysis.level, analysis.estimates);
 }
 
 nlohmann::json analysis_json(const Analysis& analysis) {
@@ -60,7 +60,7 @@ nlohmann::json analysis_json(const Analysis& analysis) {
     for (const std::string& note : titled.notes)
       if (std::ranges::find(notes, note) == notes.end()) notes.push_back(note);
   return {{"schema", "duet.analysis/1"}, {"analysis", analysis.name}, {"title", analysis.title},
-          {"level", analysis.level},     {"notes", std::move(notes)}, {"figures", figures_json(analysis.figures)}};
+          {"level", analysis.level},     {"notes", std::move(notes)}, {"figures", estimates_json(analysis.estimates)}};
 }
 
 std::vector<std::pair<std::string, std::string>> analysis_files(const std::vector<Analysis>& analyses,

@@ -1,5 +1,5 @@
-// The findings of one analysis of a run: figures, and tables of them for people. It is written here in every form
-// that a report has (Markdown for files and terminals, LaTeX, CSV, JSON; HTML in report/page/analysis_html.h), so
+// The findings of one analysis of a run: estimates, and tables that are pivots of them. It is written here in every
+// form that a report has (Markdown for files and terminals, LaTeX, CSV, JSON; HTML in report/page/analysis_html.h), so
 // that a new one is a function that returns an Analysis and an entry in a list (report/page/run_analyses.cpp).
 #pragma once
 
@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "duet/report/tables/figure.h"
+#include "duet/report/tables/estimate.h"
 #include "duet/report/tables/line_plot.h"
-#include "duet/report/tables/text_table.h"
+#include "duet/report/tables/pivot.h"
 
 namespace duet {
 
@@ -30,11 +30,11 @@ struct Analysis {
   std::vector<TitledTable> tables = {};
   std::vector<PlotGroup> plots = {};
   std::string drawing = {};  // HTML in front of the tables
-  std::vector<Figure> figures = {};
+  Estimates estimates = {};
   bool opens = false;       // its section in HTML is among the first, and unfolded
   bool in_terminal = true;  // false: left to the files
 
-  [[nodiscard]] bool empty() const { return figures.empty(); }
+  [[nodiscard]] bool empty() const { return estimates.empty(); }
 };
 
 std::string analysis_markdown(const Analysis& analysis);

@@ -14,9 +14,9 @@
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/work/progress.h"
 #include "duet/motion/interaction_clip.h"
-#include "duet/report/studies/degradation.h"
+#include "duet/report/studies/studies.h"
 #include "tests/experiment/fixtures.h"
-#include "tests/report/figures.h"
+#include "tests/report/estimates.h"
 #include "tests/support.h"
 
 namespace duet {
@@ -68,12 +68,9 @@ TEST(EpisodeTags, ANameThatLiesIsTabledByItsValue) {
   std::vector<EpisodeRow> rows = rows_of(suite);
   ASSERT_EQ(rows.size(), 3U);
   for (EpisodeRow& row : rows) row.success = row.perturbation == "clean";
-  const Degradation table = degradation(rows);
-  ASSERT_EQ(table.curves.size(), 1U);
-  EXPECT_EQ(table.curves[0].family, "push");
-  EXPECT_EQ(table.curves[0].largest, 20.0);
-  const Figure size =
-      test::figure(degradation_analysis(table), {.perturbation = "push_60n", .of = "push", .name = "size"});
+  const Analysis analysis = degradation_analysis(rows);
+  EXPECT_EQ(test::estimate(analysis, {.of = "push", .name = "largest"}).value, 20.0);
+  const Estimate size = test::estimate(analysis, {.perturbation = "push_60n", .of = "push", .name = "size"});
   EXPECT_EQ(size.value, 5.0);
   EXPECT_EQ(size.unit, "N");
 }

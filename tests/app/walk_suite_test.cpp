@@ -6,8 +6,8 @@
 
 #include "duet/execution/runner.h"
 #include "duet/experiment/suite/suite_reference.h"
-#include "duet/report/studies/walk_table.h"
 #include "duet/rows/folder/run_directory.h"
+#include "duet/rows/groups/row_groups.h"
 #include "tests/app/program.h"
 #include "tests/backends/engine_names.h"
 #include "tests/experiment/fixtures.h"

@@ -26,7 +26,7 @@ TitledTable table(const std::string& title, const std::string& group = "") {
 
 Analysis example() {
   Analysis analysis{.name = "two", .title = "Two tables", .tables = {table("First"), table("Second")}};
-  FiguresOf figures{{.engine = "mujoco", .policy = "say \"hi\", d_star"}, analysis.figures};
+  EstimatesOf figures{{.engine = "mujoco", .policy = "say \"hi\", d_star"}, analysis.estimates};
   figures.rate("success", {.n = 3, .k = 1, .rate = 1.0 / 3.0, .interval = {.low = 0.1, .high = 0.75}});
   figures.add("dof_jerk", {}, std::nan(""), kNoInterval, "rad/s^3");
   figures.word("verdict", "better");

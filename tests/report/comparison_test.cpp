@@ -1,11 +1,12 @@
+#include "duet/report/ranking/comparison.h"
+
 #include <gmock/gmock.h>
 
 #include <algorithm>
 
 #include "duet/core/require.h"
-#include "duet/report/ranking/resolution.h"
 #include "duet/statistics/by_clip.h"
-#include "tests/report/figures.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 
@@ -13,9 +14,10 @@ namespace duet {
 namespace {
 
 using test::episode;
-using test::figure;
+using test::estimate;
 using test::thrown_message;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -26,28 +28,38 @@ std::vector<EpisodeRow> hugs(const std::string& policy, int n, int from, int to)
   return rows;
 }
 
+// A name for each line of the table.
+std::vector<std::string> groups(const Analysis& analysis) {
+  std::vector<std::string> names;
+  for (const std::vector<std::string>& cells : analysis.tables.at(0).table.rows) names.push_back(cells.front());
+  return names;
+}
+
+Estimate of_hugs(const Analysis& analysis, const char* name, const char* perturbation = "clean") {
+  return estimate(analysis, {.perturbation = perturbation, .task = "hug", .name = name});
+}
+
 TEST(CompareRuns, BuildsThePairedTableOfTwoPolicies) {
-  const std::vector<Comparison> comparisons = compare_runs(hugs("dstar", 40, 0, 30), hugs("replay", 40, 25, 38));
-  ASSERT_EQ(comparisons.size(), 2U);
-  const Comparison& hug = comparisons[0];
-  EXPECT_EQ(hug.group, "mujoco/vmc/dstar vs replay hug");
-  EXPECT_EQ(comparisons[1].group, "mujoco/vmc/dstar vs replay all");
-  EXPECT_EQ(hug.pairs, 40);
-  EXPECT_EQ(hug.both, 5);
-  EXPECT_EQ(hug.only_a, 25);
-  EXPECT_EQ(hug.only_b, 8);
-  EXPECT_EQ(hug.neither, 2);
-  EXPECT_DOUBLE_EQ(hug.difference, 17.0 / 40.0);
-  EXPECT_EQ(hug.interval.low, newcombe_paired(5, 25, 8, 2).low);
-  EXPECT_EQ(hug.clips, 14);  // three draws of each
-  EXPECT_EQ(hug.p_episodes, mcnemar_exact(25, 8));
+  const Analysis analysis = comparison_analysis(hugs("dstar", 40, 0, 30), hugs("replay", 40, 25, 38));
+  EXPECT_THAT(groups(analysis), ElementsAre("mujoco/vmc/dstar vs replay hug", "mujoco/vmc/dstar vs replay all"));
+  const auto value = [&](const char* name) { return of_hugs(analysis, name).value; };
+  EXPECT_EQ(of_hugs(analysis, "difference").n, 40);
+  EXPECT_EQ(value("both"), 5.0);
+  EXPECT_EQ(value("only_a"), 25.0);
+  EXPECT_EQ(value("only_b"), 8.0);
+  EXPECT_EQ(value("neither"), 2.0);
+  EXPECT_DOUBLE_EQ(value("difference"), 17.0 / 40.0);
+  EXPECT_EQ(of_hugs(analysis, "difference").interval.low, newcombe_paired(5, 25, 8, 2).low);
+  EXPECT_EQ(value("clips"), 14.0);  // three draws of each
+  EXPECT_EQ(value("p_episodes"), mcnemar_exact(25, 8));
   // Sums of successes of A less those of B: clips 0 to 7 go A's way whole, in the ninth one draw, then B's.
-  EXPECT_EQ(hug.p, sign_flip_exact(std::vector<long>{3, 3, 3, 3, 3, 3, 3, 3, 1, 0, -3, -3, -2, 0}));
-  EXPECT_GT(hug.p, hug.p_episodes);
-  EXPECT_EQ(hug.p_holm, std::min(1.0, 2.0 * hug.p));
-  EXPECT_EQ(hug.minimum_detectable, minimum_detectable_difference_paired(33.0 / 40.0, 40));
-  EXPECT_LT(hug.cluster_interval.low, hug.difference);
-  EXPECT_GT(hug.cluster_interval.high, hug.difference);
+  EXPECT_EQ(value("p"), sign_flip_exact(std::vector<long>{3, 3, 3, 3, 3, 3, 3, 3, 1, 0, -3, -3, -2, 0}));
+  EXPECT_GT(value("p"), value("p_episodes"));
+  EXPECT_EQ(value("p_holm"), std::min(1.0, 2.0 * value("p")));
+  EXPECT_EQ(value("minimum_detectable"), minimum_detectable_difference_paired(33.0 / 40.0, 40));
+  const Estimate by_clip = of_hugs(analysis, "difference_by_clip");
+  EXPECT_LT(by_clip.interval.low, by_clip.value);
+  EXPECT_GT(by_clip.interval.high, by_clip.value);
 }
 
 // Where the two roles of a clip go the same way, twice as many episodes say no more than one role of each.
@@ -61,12 +73,12 @@ TEST(CompareRuns, ClustersTheTwoRolesOfAClipTogether) {
         rows->push_back(row);
       }
     }
-    return compare_runs(a, b)[0];
+    return of_hugs(comparison_analysis(a, b), "difference_by_clip");
   };
-  const auto width = [](const Comparison& of) { return of.cluster_interval.high - of.cluster_interval.low; };
-  const Comparison roles = compared(true), takes = compared(false);
-  EXPECT_EQ(roles.pairs, 40);
-  EXPECT_EQ(roles.difference, takes.difference);
+  const auto width = [](const Estimate& of) { return of.interval.high - of.interval.low; };
+  const Estimate roles = compared(true), takes = compared(false);
+  EXPECT_EQ(roles.n, 40);
+  EXPECT_EQ(roles.value, takes.value);
   EXPECT_GT(width(roles), 1.25 * width(takes));  // the square root of two, but for chance
 }
 
@@ -74,24 +86,23 @@ TEST(CompareRuns, PairsByEpisodeAndNotByOrder) {
   std::vector<EpisodeRow> a = hugs("replay", 12, 0, 6);
   std::vector<EpisodeRow> b = hugs("replay", 12, 0, 6);
   std::reverse(b.begin(), b.end());
-  const Comparison same = compare_runs(a, b)[0];
-  EXPECT_EQ(same.group, "mujoco/vmc/replay hug");
-  EXPECT_EQ(same.only_a + same.only_b, 0);
-  EXPECT_EQ(same.p, 1.0);
-  EXPECT_GT(same.minimum_detectable, 0.3);
+  const Analysis same = comparison_analysis(a, b);
+  EXPECT_EQ(groups(same).front(), "mujoco/vmc/replay hug");
+  EXPECT_EQ(of_hugs(same, "only_a").value + of_hugs(same, "only_b").value, 0.0);
+  EXPECT_EQ(of_hugs(same, "p").value, 1.0);
+  EXPECT_GT(of_hugs(same, "minimum_detectable").value, 0.3);
 }
 
 TEST(CompareRuns, SharedFieldsMustAgreeAndTheRestIsLeftOut) {
   std::vector<EpisodeRow> a = hugs("replay", 10, 0, 5);
   for (const EpisodeRow& row : hugs("dstar", 10, 0, 5)) a.push_back(row);
   std::vector<EpisodeRow> b = hugs("replay", 8, 0, 8);
-  const std::vector<Comparison> comparisons = compare_runs(a, b);
-  ASSERT_EQ(comparisons.size(), 2U);
-  EXPECT_EQ(comparisons[0].group, "mujoco/vmc/replay hug");
-  EXPECT_EQ(comparisons[0].pairs, 8);
-  EXPECT_EQ(comparisons[0].unpaired_a, 2);
-  EXPECT_EQ(comparisons[0].unpaired_b, 0);
-  EXPECT_THAT(analysis_markdown(comparison_analysis(comparisons)), HasSubstr("up to 2 of A and 0 of B"));
+  const Analysis analysis = comparison_analysis(a, b);
+  EXPECT_THAT(groups(analysis), ElementsAre("mujoco/vmc/replay hug", "mujoco/vmc/replay all"));
+  EXPECT_EQ(of_hugs(analysis, "difference").n, 8);
+  EXPECT_EQ(of_hugs(analysis, "unpaired_a").value, 2.0);
+  EXPECT_EQ(of_hugs(analysis, "unpaired_b").value, 0.0);
+  EXPECT_THAT(analysis_markdown(analysis), HasSubstr("up to 2 of A and 0 of B"));
 }
 
 TEST(CompareRuns, PerturbationsAreNamedAndKeptApart) {
@@ -102,11 +113,11 @@ TEST(CompareRuns, PerturbationsAreNamedAndKeptApart) {
     a.push_back(row);
     b.push_back(row);
   }
-  const std::vector<Comparison> comparisons = compare_runs(a, b);
-  ASSERT_EQ(comparisons.size(), 4U);
-  EXPECT_EQ(comparisons[2].group, "mujoco/vmc/replay jitter_0.05 hug");
-  EXPECT_EQ(comparisons[2].only_a, 0);
-  EXPECT_EQ(comparisons[0].only_a, 3);
+  const Analysis analysis = comparison_analysis(a, b);
+  EXPECT_THAT(groups(analysis), ElementsAre("mujoco/vmc/replay hug", "mujoco/vmc/replay all",
+                                            "mujoco/vmc/replay jitter_0.05 hug", "mujoco/vmc/replay jitter_0.05 all"));
+  EXPECT_EQ(of_hugs(analysis, "only_a", "jitter_0.05").value, 0.0);
+  EXPECT_EQ(of_hugs(analysis, "only_a").value, 3.0);
 }
 
 TEST(CompareRuns, OnlyTheMainArmIsCompared) {
@@ -116,22 +127,22 @@ TEST(CompareRuns, OnlyTheMainArmIsCompared) {
     a.push_back(episode("null", "hug", i, true, "null"));
     b.push_back(episode("null", "hug", i, false, "null"));
   }
-  EXPECT_EQ(compare_runs(a, b).size(), 2U);
+  EXPECT_EQ(groups(comparison_analysis(a, b)).size(), 2U);
 }
 
 TEST(CompareRuns, IsReproducible) {
-  const auto compared = [] { return comparison_analysis(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15))); };
+  const auto compared = [] { return comparison_analysis(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15)); };
   EXPECT_EQ(analysis_json(compared()), analysis_json(compared()));
 }
 
 TEST(CompareRuns, FiguresSayWhatIsComparedWithWhat) {
-  const Analysis analysis = comparison_analysis(compare_runs(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15)), 0.1);
-  const Figure of_all{
+  const Analysis analysis = comparison_analysis(hugs("a", 30, 0, 20), hugs("b", 30, 5, 15), {}, 0.1);
+  const Estimate of_all{
       .engine = "mujoco", .controller = "vmc", .policy = "a vs b", .perturbation = "clean", .task = "all"};
   const auto named = [&](const char* name) {
-    Figure like = of_all;
+    Estimate like = of_all;
     like.name = name;
-    return figure(analysis, like);
+    return estimate(analysis, like);
   };
   EXPECT_EQ(named("success_a").k, 20);
   EXPECT_EQ(named("success_b").k, 10);
@@ -140,13 +151,13 @@ TEST(CompareRuns, FiguresSayWhatIsComparedWithWhat) {
   EXPECT_EQ(named("only_b").value, 0.0);
   EXPECT_LE(named("p_holm").value, 1.0);
   EXPECT_EQ(named("verdict").text, "undecided");  // ten episodes, but of four clips
-  EXPECT_EQ(figure(analysis, {.name = "margin"}).value, 0.1);
+  EXPECT_EQ(estimate(analysis, {.name = "margin"}).value, 0.1);
 }
 
 TEST(CompareRuns, SaysWhatDiffersWhereNothingPairs) {
   const std::vector<EpisodeRow> a = hugs("replay", 4, 0, 2);
   const auto refusal = [&](const std::vector<EpisodeRow>& b) {
-    return thrown_message<InputError>([&] { compare_runs(a, b); });
+    return thrown_message<InputError>([&] { comparison_analysis(a, b); });
   };
   EXPECT_THAT(refusal({}), HasSubstr("run B has no episodes"));
   EXPECT_THAT(refusal({episode("replay", "wave", 0, true)}), HasSubstr("the tasks of A are hug, those of B wave"));
@@ -175,20 +186,90 @@ TEST(CompareRuns, SaysWhatDiffersWhereNothingPairs) {
 TEST(CompareRuns, RefusesAnEpisodeThatIsThereTwice) {
   std::vector<EpisodeRow> a = hugs("replay", 4, 0, 2);
   a.push_back(a.front());
-  EXPECT_THAT(thrown_message<InputError>([&] { compare_runs(a, hugs("replay", 4, 0, 2)); }),
+  EXPECT_THAT(thrown_message<InputError>([&] { comparison_analysis(a, hugs("replay", 4, 0, 2)); }),
               HasSubstr("is there twice"));
 }
 
 TEST(ComparisonMarkdown, WarnsOfSmallSamples) {
-  const std::string small =
-      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 10, 0, 9), hugs("b", 10, 0, 3))));
+  const std::string small = analysis_markdown(comparison_analysis(hugs("a", 10, 0, 9), hugs("b", 10, 0, 3)));
   EXPECT_THAT(small, HasSubstr("Warning: fewer than 30 clips in mujoco/vmc/a vs b hug"));
   EXPECT_THAT(small, HasSubstr("+60.0 ["));
-  const std::string large =
-      analysis_markdown(comparison_analysis(compare_runs(hugs("a", 120, 0, 100), hugs("b", 120, 0, 40))));
+  const std::string large = analysis_markdown(comparison_analysis(hugs("a", 120, 0, 100), hugs("b", 120, 0, 40)));
   EXPECT_THAT(large,
               AllOf(Not(HasSubstr("Warning")), HasSubstr("<0.001"), HasSubstr("corrected for the 2 comparisons")));
-  EXPECT_EQ(analysis_markdown(comparison_analysis({})), "Nothing to compare.\n");
+}
+
+TEST(Resolution, VerdictOfAFixedNumberOfPairs) {
+  const auto verdict = [](long both, long only_a, long only_b, double p_holm, double margin) {
+    const auto pairs = static_cast<double>(both + only_a + only_b);
+    return verdict_of(static_cast<double>(only_a - only_b) / pairs, newcombe_paired(both, only_a, only_b, 0), p_holm,
+                      0.95, margin);
+  };
+  EXPECT_EQ(verdict(80, 20, 0, 0.05, 0.05), PairVerdict::kBetter);
+  EXPECT_EQ(verdict(80, 0, 20, 0.01, 0.05), PairVerdict::kWorse);
+  EXPECT_EQ(verdict(80, 20, 0, 0.06, 0.05), PairVerdict::kUndecided);
+  EXPECT_EQ(verdict(2000, 5, 4, 1.0, 0.05), PairVerdict::kSame);
+  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.05), PairVerdict::kSame);  // not zero, and too small to matter
+  EXPECT_EQ(verdict(2000, 30, 0, 0.001, 0.01), PairVerdict::kBetter);
+}
+
+TEST(Resolution, NeededNumbersAreTheSmallestThatShowTheDifference) {
+  for (const double discordance : {0.02, 0.1, 0.3}) {
+    const long n = needed_pairs(discordance, 0.05);
+    EXPECT_LE(minimum_detectable_difference_paired(discordance, n), 0.05);
+    EXPECT_GT(minimum_detectable_difference_paired(discordance, n - 1), 0.05);
+  }
+  const long n = needed_episodes(0.85, 0.05);
+  EXPECT_EQ(n, 801);  // "about 800" in docs/reading-the-leaderboard.md
+  EXPECT_LE(minimum_detectable_difference(0.85, n), 0.05);
+  EXPECT_GT(minimum_detectable_difference(0.85, n - 1), 0.05);
+  EXPECT_THAT(thrown_message<std::invalid_argument>([] { needed_pairs(0.1, 0.0); }),
+              HasSubstr("difference: expected a number in (0, 1), found 0"));
+}
+
+// `both` clips that A and B pass, then those that A alone and B alone does, one episode each.
+Analysis compared(int both, int only_a, int only_b, double margin = kFivePoints) {
+  std::vector<EpisodeRow> a = hugs("a", both + only_a + only_b, 0, both + only_a);
+  std::vector<EpisodeRow> b = hugs("b", both + only_a + only_b, 0, both);
+  for (int i = both + only_a; i < both + only_a + only_b; ++i) b[static_cast<std::size_t>(i)].success = true;
+  for (std::vector<EpisodeRow>* rows : {&a, &b})
+    for (EpisodeRow& row : *rows) row.clip = "hug-" + std::to_string(row.episode);
+  return comparison_analysis(a, b, {.resamples = 200}, margin);
+}
+
+TEST(Resolution, ACautionNamesThePairsThatAreNeeded) {
+  const Analysis small = compared(100, 12, 14);
+  const std::vector<std::string> cautions = resolution_notes(small.estimates, small.level, 0.05);
+  ASSERT_EQ(cautions.size(), 2U);  // hugs and all
+  EXPECT_THAT(cautions[0], AllOf(HasSubstr("126 pairs cannot resolve 5 points"),
+                                 HasSubstr(std::to_string(needed_pairs(26.0 / 126.0, 0.05)))));
+  EXPECT_TRUE(resolution_notes(small.estimates, small.level, 0.5).empty());
+  const Analysis decided = compared(80, 20, 0);
+  EXPECT_TRUE(resolution_notes(decided.estimates, decided.level, 0.05).empty());
+  EXPECT_THAT(analysis_markdown(small), AllOf(HasSubstr("Caution: "), HasSubstr("| undecided")));
+  const Analysis wide = compared(100, 12, 14, 0.5);
+  EXPECT_THAT(analysis_markdown(wide), AllOf(Not(HasSubstr("Caution: ")), HasSubstr("| same within the margin")));
+  EXPECT_EQ(of_hugs(small, "verdict").text, "undecided");
+  EXPECT_EQ(estimate(wide, {.name = "margin"}).value, 0.5);
+}
+
+TEST(Resolution, AnArmThatIsTooSmallSaysSo) {
+  LeaderboardEntry arm;
+  arm.engine = "mujoco";
+  arm.controller = "vmc";
+  arm.policy = "dp";
+  arm.perturbation = "clean";
+  arm.task = "all";
+  arm.n = 800;
+  arm.success = 0.85;
+  EXPECT_THAT(resolution_notes(std::vector<LeaderboardEntry>{arm}, 0.05).at(0),
+              HasSubstr("mujoco/vmc/dp clean: 800 distinct episodes cannot resolve 5 points to another arm; unpaired "
+                        "about 801 would"));
+  arm.n = 801;
+  EXPECT_TRUE(resolution_notes(std::vector<LeaderboardEntry>{arm}, 0.05).empty());
+  arm.n = 10;
+  arm.task = "hug";
+  EXPECT_TRUE(resolution_notes(std::vector<LeaderboardEntry>{arm}, 0.05).empty());
 }
 
 }  // namespace

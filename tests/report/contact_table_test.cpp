@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "tests/report/figures.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 
@@ -14,7 +14,7 @@ namespace duet {
 namespace {
 
 using test::engine_episode;
-using test::figure;
+using test::estimate;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -56,73 +56,62 @@ std::vector<EpisodeRow> benchmark() {
           touched("ode", "replay", 3, {})};
 }
 
-const RegionContacts& region(const EngineContacts& engine, const std::string& name) {
-  const auto found = std::find_if(engine.regions.begin(), engine.regions.end(),
-                                  [&](const RegionContacts& contacts) { return contacts.region == name; });
-  EXPECT_NE(found, engine.regions.end()) << name;
-  return *found;
+Estimate of_region(const Analysis& analysis, const char* engine, const char* region, const char* name) {
+  return estimate(analysis, {.engine = engine, .of = region, .name = name});
 }
 
 TEST(ContactTable, IsOfTheLargestOfEachEngineAndRegion) {
-  const ContactTable table = contact_table(benchmark());
-  ASSERT_EQ(table.groups.size(), 1U);
-  const ContactGroup& group = table.groups[0];
-  ASSERT_EQ(group.engines.size(), 2U);
-  EXPECT_EQ(group.engines[0].engine, "mujoco");
-  EXPECT_EQ(group.engines[0].episodes, 4);
-  const RegionContacts& hand = region(group.engines[0], "hand");
-  EXPECT_EQ(hand.touched, 3);
-  EXPECT_EQ(hand.over, 0);
-  EXPECT_EQ(hand.peak, 60.0);
-  EXPECT_EQ(hand.median_peak, 30.0);
-  EXPECT_EQ(hand.quasi_static, 40.0);
-  EXPECT_EQ(hand.transient, 60.0);
-  EXPECT_EQ(hand.impulse, 8.0);
-  EXPECT_EQ(hand.pressure_n_cm2, 30.0);
-  EXPECT_EQ(hand.ratio, 0.5);
-  EXPECT_EQ(region(group.engines[0], "chest").over, 1);
-  EXPECT_EQ(region(group.engines[1], "chest").touched, 0);
-  EXPECT_TRUE(std::isnan(region(group.engines[1], "chest").peak));
-  EXPECT_TRUE(std::isnan(region(group.engines[1], "shoulder").ratio));
+  const Analysis analysis = contact_analysis(benchmark());
+  const auto hand = [&](const char* name) { return of_region(analysis, "mujoco", "hand", name).value; };
+  EXPECT_EQ(of_region(analysis, "mujoco", "hand", "touched").n, 4);
+  EXPECT_EQ(hand("touched"), 3.0);
+  EXPECT_EQ(hand("over"), 0.0);
+  EXPECT_EQ(hand("peak"), 60.0);
+  EXPECT_EQ(hand("median_peak"), 30.0);
+  EXPECT_EQ(hand("quasi_static"), 40.0);
+  EXPECT_EQ(hand("transient"), 60.0);
+  EXPECT_EQ(hand("impulse"), 8.0);
+  EXPECT_EQ(hand("pressure"), 30.0);
+  EXPECT_EQ(hand("ratio"), 0.5);
+  EXPECT_EQ(of_region(analysis, "mujoco", "chest", "over").value, 1.0);
+  EXPECT_EQ(of_region(analysis, "ode", "chest", "touched").value, 0.0);
+  EXPECT_TRUE(std::isnan(of_region(analysis, "ode", "chest", "peak").value));
+  EXPECT_TRUE(std::isnan(of_region(analysis, "ode", "shoulder", "ratio").value));
 }
 
 TEST(ContactTable, PoolsEnginesAndRegions) {
-  const ContactGroup group = contact_table(benchmark()).groups.at(0);
-  EXPECT_EQ(group.all.engine, "all");
-  EXPECT_EQ(group.all.episodes, 8);
-  const RegionContacts& hand = region(group.all, "hand");
-  EXPECT_EQ(hand.touched, 4);
-  EXPECT_EQ(hand.median_peak, 27.5);  // of 20, 25, 30, 60
-  EXPECT_EQ(hand.ratio, 0.75);
-  const RegionContacts& any = region(group.all, "any");
-  EXPECT_EQ(any.touched, 5);
-  EXPECT_EQ(any.over, 1);
-  EXPECT_EQ(any.peak, 150.0);
-  EXPECT_EQ(any.median_peak, 25.0);  // of 8, 20, 25, 30, 150
-  EXPECT_EQ(any.impulse, 38.0);      // of hand and chest in one episode
-  EXPECT_EQ(any.ratio, 1.25);
+  const Analysis analysis = contact_analysis(benchmark());
+  const auto all = [&](const char* region, const char* name) { return of_region(analysis, "all", region, name).value; };
+  EXPECT_EQ(of_region(analysis, "all", "hand", "touched").n, 8);
+  EXPECT_EQ(all("hand", "touched"), 4.0);
+  EXPECT_EQ(all("hand", "median_peak"), 27.5);  // of 20, 25, 30, 60
+  EXPECT_EQ(all("hand", "ratio"), 0.75);
+  EXPECT_EQ(all("any", "touched"), 5.0);
+  EXPECT_EQ(all("any", "over"), 1.0);
+  EXPECT_EQ(all("any", "peak"), 150.0);
+  EXPECT_EQ(all("any", "median_peak"), 25.0);  // of 8, 20, 25, 30, 150
+  EXPECT_EQ(all("any", "impulse"), 38.0);      // of hand and chest in one episode
+  EXPECT_EQ(all("any", "ratio"), 1.25);
 }
 
-std::string text_of(const ContactTable& table) { return analysis_markdown(contact_analysis(table)); }
+std::string text_of(const std::vector<EpisodeRow>& rows) { return analysis_markdown(contact_analysis(rows)); }
 
-nlohmann::json figures_of(const ContactTable& table) { return analysis_json(contact_analysis(table)); }
+nlohmann::json json_of(const std::vector<EpisodeRow>& rows) { return analysis_json(contact_analysis(rows)); }
 
 TEST(ContactTable, ListsRegionsFromTheHeadDown) {
-  const std::vector<EpisodeRow> rows = {touched("ode", "replay", 0,
-                                                {{"foot", 1, 0, 1, 1, 1, 0.1},
-                                                 {"aura", 1, 0, 1, 1, 1, 0.1},
-                                                 {"chest", 1, 0, 1, 1, 1, 0.1},
-                                                 {"head", 1, 0, 1, 1, 1, 0.1}})};
-  const ContactTable table = contact_table(rows);
-  std::vector<std::string> names;
-  for (const RegionContacts& contacts : table.groups.at(0).all.regions) names.push_back(contacts.region);
-  EXPECT_THAT(names, testing::ElementsAre("head", "chest", "foot", "aura", "any"));
+  const Analysis analysis = contact_analysis({touched("ode", "replay", 0,
+                                                      {{"foot", 1, 0, 1, 1, 1, 0.1},
+                                                       {"aura", 1, 0, 1, 1, 1, 0.1},
+                                                       {"chest", 1, 0, 1, 1, 1, 0.1},
+                                                       {"head", 1, 0, 1, 1, 1, 0.1}})});
+  EXPECT_THAT(values_of(analysis.estimates, &Estimate::of),
+              testing::ElementsAre("head", "chest", "foot", "aura", "any"));
 }
 
 TEST(ContactTable, DoesNotDependOnTheOrderOfRows) {
   std::vector<EpisodeRow> rows = benchmark();
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(figures_of(contact_table(rows)), figures_of(contact_table(benchmark())));
+  EXPECT_EQ(json_of(rows), json_of(benchmark()));
 }
 
 TEST(ContactTable, LeavesOutPlaybackOtherArmsAndGhosts) {
@@ -131,10 +120,8 @@ TEST(ContactTable, LeavesOutPlaybackOtherArmsAndGhosts) {
   rows.push_back(touched("mujoco", "null", 0, {{"head", 500, 0, 500, 9, 9, 9}}));
   rows.back().arm = "null";
   rows.push_back(engine_episode("bullet", "replay", 0, true));  // ghost
-  EXPECT_EQ(figures_of(contact_table(rows)), figures_of(contact_table(benchmark())));
-  const ContactTable null_arm = contact_table(rows, "null");
-  ASSERT_EQ(null_arm.groups.size(), 1U);
-  EXPECT_EQ(null_arm.groups[0].policy, "null");
+  EXPECT_EQ(json_of(rows), json_of(benchmark()));
+  EXPECT_THAT(values_of(contact_analysis(rows, "null").estimates, &Estimate::policy), testing::ElementsAre("null"));
 }
 
 TEST(ContactTable, HasAGroupPerControllerAndPolicy) {
@@ -143,47 +130,44 @@ TEST(ContactTable, HasAGroupPerControllerAndPolicy) {
   rows.push_back(touched("ode", "replay", 0, {{"hand", 5, 0, 5, 1, 1, 0.1}}));
   rows.back().controller = "twist";
   rows.back().outcome = Outcome::kDiverged;
-  const ContactTable table = contact_table(rows);
-  ASSERT_EQ(table.groups.size(), 3U);
-  EXPECT_EQ(table.groups[0].controller, "twist");
-  EXPECT_EQ(table.groups[0].diverged, 1);
-  EXPECT_EQ(table.groups[1].policy, "diffuse");
-  EXPECT_EQ(table.groups[2].policy, "replay");
-  EXPECT_EQ(table.groups[2].diverged, 0);
-  EXPECT_THAT(text_of(table),
+  std::vector<std::string> groups;
+  for (const Estimate& diverged : test::estimates_like(contact_analysis(rows), {.name = "diverged"}))
+    groups.push_back(fmt::format("{} {} {}", diverged.controller, diverged.policy, diverged.value));
+  EXPECT_THAT(groups, testing::ElementsAre("twist replay 1", "vmc diffuse 0", "vmc replay 0"));
+  EXPECT_THAT(text_of(rows),
               AllOf(HasSubstr("Controller vmc, policy diffuse"), HasSubstr("Of all episodes 1 diverged")));
 }
 
 TEST(ContactTable, ALimitOfExactlyOneIsWithin) {
   const std::vector<EpisodeRow> rows = {touched("ode", "replay", 0, {{"hand", 140, 0, 140, 1, 1, 1.0}})};
-  EXPECT_EQ(region(contact_table(rows).groups.at(0).all, "hand").over, 0);
-  EXPECT_THAT(text_of(contact_table(rows)), HasSubstr("140 (1.00)"));
+  EXPECT_EQ(of_region(contact_analysis(rows), "all", "hand", "over").value, 0.0);
+  EXPECT_THAT(text_of(rows), HasSubstr("140 (1.00)"));
 }
 
 TEST(ContactTable, LimitsAreVerifiedOnlyWhereEveryEpisodeSaysSo) {
   std::vector<EpisodeRow> rows = benchmark();
   const char* unverified = "Limits: unverified (nobody has yet checked the table against ISO/TS 15066)";
   for (EpisodeRow& row : rows) row.forces["human.limits_verified"] = 1.0;
-  const Analysis verified = contact_analysis(contact_table(rows));
+  const Analysis verified = contact_analysis(rows);
   EXPECT_EQ(verified.warning, "");
   EXPECT_EQ(verified.notes.at(0), "Limits: verified");
-  EXPECT_EQ(figure(verified, {.name = "limits_verified"}).value, 1.0);
+  EXPECT_EQ(estimate(verified, {.name = "limits_verified"}).value, 1.0);
   rows[5].forces["human.limits_verified"] = 0.0;
-  EXPECT_EQ(contact_analysis(contact_table(rows)).warning, unverified);
+  EXPECT_EQ(contact_analysis(rows).warning, unverified);
   rows[5].forces.erase("human.limits_verified");
-  EXPECT_EQ(contact_analysis(contact_table(rows)).warning, unverified);
+  EXPECT_EQ(contact_analysis(rows).warning, unverified);
 }
 
 TEST(ContactTable, RefusesTwoSuitesAndAnEpisodeTwice) {
   std::vector<EpisodeRow> rows = benchmark();
   rows.push_back(rows.front());
-  EXPECT_THAT(thrown_message<InputError>([&] { contact_table(rows); }), HasSubstr("is there twice"));
+  EXPECT_THAT(thrown_message<InputError>([&] { contact_analysis(rows); }), HasSubstr("is there twice"));
   rows.back().suite_version = "2.0.0";
-  EXPECT_THAT(thrown_message<InputError>([&] { contact_table(rows); }), HasSubstr("tiny@2.0.0"));
+  EXPECT_THAT(thrown_message<InputError>([&] { contact_analysis(rows); }), HasSubstr("tiny@2.0.0"));
 }
 
 TEST(ContactTableMarkdown, IsAsBlessed) {
-  EXPECT_EQ(text_of(contact_table(benchmark())), R"md(### Contact with people
+  EXPECT_EQ(text_of(benchmark()), R"md(### Contact with people
 
 Limits: unverified (nobody has yet checked the table against ISO/TS 15066)
 
@@ -221,7 +205,7 @@ TEST(ContactTableMarkdown, IsOneSentenceWithoutAnyContactForces) {
 }
 
 TEST(ContactTableMarkdown, EpisodesThatTouchNobodyCount) {
-  EXPECT_THAT(text_of(contact_table({touched("ode", "replay", 0, {})})),
+  EXPECT_THAT(text_of({touched("ode", "replay", 0, {})}),
               AllOf(HasSubstr("Controller vmc, policy replay; 1 episode."), HasSubstr("| any    |   - |"),
                     HasSubstr("|  0 of 1 |"), Not(HasSubstr("nan"))));
 }
@@ -229,13 +213,13 @@ TEST(ContactTableMarkdown, EpisodesThatTouchNobodyCount) {
 TEST(ContactTableMarkdown, UnequalEpisodesAreCountedPerEngine) {
   std::vector<EpisodeRow> rows = benchmark();
   rows.pop_back();
-  EXPECT_THAT(text_of(contact_table(rows)), HasSubstr("replay; episodes: mujoco 4, ode 3."));
+  EXPECT_THAT(text_of(rows), HasSubstr("replay; episodes: mujoco 4, ode 3."));
 }
 
 TEST(ContactTableFigures, AreThereForEveryEngineAndForAllOfThem) {
-  const Analysis analysis = contact_analysis(contact_table(benchmark()));
+  const Analysis analysis = contact_analysis(benchmark());
   const auto value = [&](const char* engine, const char* region, const char* name) {
-    return figure(analysis, {.engine = engine, .controller = "vmc", .policy = "replay", .of = region, .name = name});
+    return estimate(analysis, {.engine = engine, .controller = "vmc", .policy = "replay", .of = region, .name = name});
   };
   EXPECT_EQ(value("mujoco", "hand", "touched").value, 3.0);
   EXPECT_EQ(value("mujoco", "hand", "touched").n, 4);
@@ -247,8 +231,8 @@ TEST(ContactTableFigures, AreThereForEveryEngineAndForAllOfThem) {
   EXPECT_EQ(value("all", "any", "impulse").value, 38.0);
   EXPECT_EQ(value("all", "any", "impulse").unit, "N s");
   EXPECT_EQ(value("all", "any", "touched").n, 8);
-  EXPECT_EQ(figure(analysis, {.name = "diverged"}).value, 0.0);
-  EXPECT_EQ(figure(analysis, {.name = "limits_verified"}).value, 0.0);
+  EXPECT_EQ(estimate(analysis, {.name = "diverged"}).value, 0.0);
+  EXPECT_EQ(estimate(analysis, {.name = "limits_verified"}).value, 0.0);
 }
 
 }  // namespace

@@ -1,11 +1,10 @@
-#include "duet/report/studies/controller_table.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 
@@ -13,7 +12,7 @@ namespace duet {
 namespace {
 
 using test::engine_episode;
-using test::figure;
+using test::estimate;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -37,31 +36,30 @@ std::vector<EpisodeRow> two_controllers() {
   return rows;
 }
 
-std::string text_of(const ControllerTable& table) { return analysis_markdown(controller_analysis(table)); }
+std::string text_of(const std::vector<EpisodeRow>& rows) { return analysis_markdown(controller_analysis(rows)); }
+
+Estimate of_controller(const std::vector<EpisodeRow>& rows, const char* controller, const char* name) {
+  return estimate(controller_analysis(rows), {.controller = controller, .name = name});
+}
 
 TEST(ControllerTable, MeansAreOverEpisodesWithTheirInterval) {
-  const ControllerTable table = controller_table(two_controllers());
-  ASSERT_EQ(table.entries.size(), 2U);
-  const ControllerEntry& vmc = table.entries[0];
-  EXPECT_EQ(vmc.controller, "vmc");
-  EXPECT_EQ(vmc.engine, "mujoco");
-  EXPECT_EQ(vmc.n, 6);
-  const Estimate& after = vmc.figures.at("hf_ratio");
+  const std::vector<EpisodeRow> rows = two_controllers();
+  const Estimate after = of_controller(rows, "vmc", "hf_ratio");
+  EXPECT_EQ(after.engine, "mujoco");
   EXPECT_EQ(after.n, 6);
-  EXPECT_DOUBLE_EQ(after.mean, 0.28125);
-  EXPECT_LE(after.interval.low, after.mean);
-  EXPECT_GE(after.interval.high, after.mean);
+  EXPECT_DOUBLE_EQ(after.value, 0.28125);
+  EXPECT_LE(after.interval.low, after.value);
+  EXPECT_GE(after.interval.high, after.value);
   EXPECT_LT(after.interval.low, after.interval.high);
-  EXPECT_DOUBLE_EQ(vmc.figures.at("hf_ratio_reference").mean, 0.125);
-  EXPECT_DOUBLE_EQ(table.entries[1].figures.at("hf_ratio").interval.high, 0.5);  // all the same: no width
+  EXPECT_DOUBLE_EQ(of_controller(rows, "vmc", "hf_ratio_reference").value, 0.125);
+  EXPECT_DOUBLE_EQ(of_controller(rows, "wbc_sim", "hf_ratio").interval.high, 0.5);  // all the same: no width
 }
 
 TEST(ControllerTable, OneClipHasNoInterval) {
-  const ControllerTable table =
-      controller_table({controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)});
-  EXPECT_DOUBLE_EQ(table.entries[0].figures.at("hf_ratio").mean, 0.375);
-  EXPECT_TRUE(std::isnan(table.entries[0].figures.at("hf_ratio").interval.low));
-  EXPECT_THAT(text_of(table), HasSubstr("    0.375 |"));
+  const std::vector<EpisodeRow> rows = {controlled("mujoco", "vmc", 0, 0.25), controlled("mujoco", "vmc", 1, 0.5)};
+  EXPECT_DOUBLE_EQ(of_controller(rows, "vmc", "hf_ratio").value, 0.375);
+  EXPECT_TRUE(std::isnan(of_controller(rows, "vmc", "hf_ratio").interval.low));
+  EXPECT_THAT(text_of(rows), HasSubstr("    0.375 |"));
 }
 
 TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
@@ -70,21 +68,20 @@ TEST(ControllerTable, SurvivalCountsEveryOtherEndAsNone) {
   rows[2].outcome = Outcome::kDiverged;
   rows[4].outcome = Outcome::kError;
   rows[6].fell = true;  // ended well but on the ground
-  const ControllerEntry entry = controller_table(rows).entries[0];
-  EXPECT_EQ(entry.n, 6);
-  EXPECT_EQ(entry.survived, 2);
-  EXPECT_DOUBLE_EQ(entry.survival.low, wilson(2, 6).low);
+  const Estimate survival = of_controller(rows, "vmc", "survival");
+  EXPECT_EQ(survival.n, 6);
+  EXPECT_EQ(survival.k, 2);
+  EXPECT_DOUBLE_EQ(survival.interval.low, wilson(2, 6).low);
 }
 
 TEST(ControllerTable, FaultsAndSafeStopsAreCounted) {
   std::vector<EpisodeRow> rows = two_controllers();
   rows[0].faults.actions = 3;
   rows[2].faults = {.observations = 40, .actions = 0, .stopped = true};
-  const ControllerTable table = controller_table(rows);
-  EXPECT_EQ(table.entries[0].faulty, 2);
-  EXPECT_EQ(table.entries[0].stopped, 1);
-  EXPECT_EQ(table.entries[1].faulty, 0);
-  EXPECT_THAT(text_of(table), HasSubstr("2 (1 stopped)"));
+  EXPECT_EQ(of_controller(rows, "vmc", "faulty").value, 2.0);
+  EXPECT_EQ(of_controller(rows, "vmc", "stopped").value, 1.0);
+  EXPECT_EQ(of_controller(rows, "wbc_sim", "faulty").value, 0.0);
+  EXPECT_THAT(text_of(rows), HasSubstr("2 (1 stopped)"));
 }
 
 TEST(ControllerTable, EpisodesThatCouldNotRunAreInNoFigure) {
@@ -93,44 +90,38 @@ TEST(ControllerTable, EpisodesThatCouldNotRunAreInNoFigure) {
     rows.push_back(engine_episode("mujoco", "replay", i, false, "homie"));
     rows.back().outcome = Outcome::kUnsupported;
   }
-  const ControllerTable table = controller_table(rows);
-  const ControllerEntry& homie = table.entries[0];
-  EXPECT_EQ(homie.controller, "homie");
-  EXPECT_EQ(homie.n, 0);
-  EXPECT_EQ(homie.unsupported, 3);
-  EXPECT_TRUE(std::isnan(homie.figures.at("hf_ratio").mean));
-  EXPECT_THAT(text_of(table), HasSubstr("3 episodes could not run on this machine"));
+  EXPECT_EQ(of_controller(rows, "homie", "survival").n, 0);
+  EXPECT_EQ(of_controller(rows, "homie", "unsupported").value, 3.0);
+  EXPECT_TRUE(std::isnan(of_controller(rows, "homie", "hf_ratio").value));
+  EXPECT_THAT(text_of(rows), HasSubstr("3 episodes could not run on this machine"));
 }
 
 TEST(ControllerTable, PlaybackAndOtherArmsAreLeftOut) {
   std::vector<EpisodeRow> rows = {controlled("playback", "vmc", 0, 0.1), controlled("mujoco", "vmc", 0, 0.1)};
   rows.back().arm = "null";
-  EXPECT_TRUE(controller_table(rows).entries.empty());
-  EXPECT_EQ(text_of(controller_table(rows)), "No episode ran under a controller in a physics engine.\n");
-  EXPECT_EQ(controller_analysis({}).figures.size(), 0U);
+  EXPECT_TRUE(controller_analysis(rows).empty());
+  EXPECT_EQ(text_of(rows), "No episode ran under a controller in a physics engine.\n");
+  EXPECT_TRUE(controller_analysis({}).empty());
 }
 
 TEST(ControllerTable, CleanComesBeforePerturbationsAndTheyAreNamed) {
   std::vector<EpisodeRow> rows = two_controllers();
-  EXPECT_THAT(text_of(controller_table(rows)),
-              AllOf(HasSubstr("Perturbation clean."), Not(HasSubstr("| Perturbation |"))));
+  EXPECT_THAT(text_of(rows), AllOf(HasSubstr("Perturbation clean."), Not(HasSubstr("| Perturbation |"))));
   EpisodeRow pushed = controlled("bullet", "wbc_sim", 0, 0.75);
   pushed.perturbation = "a_push";
   rows.insert(rows.begin(), pushed);
-  const ControllerTable table = controller_table(rows);
-  ASSERT_EQ(table.entries.size(), 3U);
-  EXPECT_EQ(table.entries[2].perturbation, "a_push");
-  EXPECT_THAT(text_of(table), HasSubstr("| Perturbation "));
+  EXPECT_THAT(values_of(controller_analysis(rows).estimates, &Estimate::perturbation),
+              testing::ElementsAre("clean", "a_push"));
+  EXPECT_THAT(text_of(rows), HasSubstr("| Perturbation "));
 }
 
 TEST(ControllerTable, ThePapersRowsStandBesideOursAndSaySo) {
-  const ControllerTable table = controller_table(two_controllers());
-  const std::string text = text_of(table);
+  const Analysis analysis = controller_analysis(two_controllers());
+  const std::string text = analysis_markdown(analysis);
   EXPECT_THAT(text, AllOf(HasSubstr("the paper's"), HasSubstr("D-STAR"), HasSubstr("another experiment")));
   EXPECT_THAT(text, AllOf(HasSubstr("0.614"), HasSubstr("52.6"), HasSubstr("0.446")));
-  const Analysis analysis = controller_analysis(table);
   const auto printed = [&](const char* policy, const char* controller, const char* name) {
-    return figure(analysis, {.source = "paper", .controller = controller, .policy = policy, .name = name});
+    return estimate(analysis, {.source = "paper", .controller = controller, .policy = policy, .name = name});
   };
   EXPECT_EQ(printed("D-STAR", "WBC-Sim", "hf_ratio").value, 0.614);
   EXPECT_EQ(printed("DP", "WBC-Sim", "dof_jerk_reference").value, 180.0);
@@ -138,28 +129,28 @@ TEST(ControllerTable, ThePapersRowsStandBesideOursAndSaySo) {
 }
 
 TEST(ControllerTable, FiguresAreOfEachControllerAndEngine) {
-  const Analysis analysis = controller_analysis(controller_table(two_controllers()));
-  const Figure ratio =
-      figure(analysis, {.engine = "mujoco", .controller = "vmc", .perturbation = "clean", .name = "hf_ratio"});
+  const Analysis analysis = controller_analysis(two_controllers());
+  const Estimate ratio =
+      estimate(analysis, {.engine = "mujoco", .controller = "vmc", .perturbation = "clean", .name = "hf_ratio"});
   EXPECT_EQ(ratio.n, 6);
   EXPECT_DOUBLE_EQ(ratio.value, 0.28125);
   EXPECT_LT(ratio.interval.low, ratio.interval.high);
-  const Figure survival = figure(analysis, {.engine = "bullet", .controller = "wbc_sim", .name = "survival"});
+  const Estimate survival = estimate(analysis, {.engine = "bullet", .controller = "wbc_sim", .name = "survival"});
   EXPECT_EQ(survival.k, 6);
   EXPECT_DOUBLE_EQ(survival.value, 1.0);
 }
 
 TEST(ControllerTable, OrderOfRowsDoesNotMatter) {
   std::vector<EpisodeRow> rows = two_controllers();
-  const std::string before = analysis_csv(controller_analysis(controller_table(rows)));
+  const std::string before = analysis_csv(controller_analysis(rows));
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(analysis_csv(controller_analysis(controller_table(rows))), before);
+  EXPECT_EQ(analysis_csv(controller_analysis(rows)), before);
 }
 
 TEST(ControllerTable, TheSameEpisodeTwiceIsRefused) {
   std::vector<EpisodeRow> rows = two_controllers();
   rows.push_back(rows.front());
-  EXPECT_THAT(thrown_message<InputError>([&] { controller_table(rows); }), HasSubstr("is there twice"));
+  EXPECT_THAT(thrown_message<InputError>([&] { controller_analysis(rows); }), HasSubstr("is there twice"));
 }
 
 }  // namespace

@@ -5,14 +5,14 @@
 
 #include "duet/report/engines/cross_engine.h"
 #include "duet/report/page/interval_plot.h"
-#include "tests/report/figures.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 
 namespace duet {
 namespace {
 
 using test::engine_episode;
-using test::figure;
+using test::estimate;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
@@ -168,29 +168,29 @@ TEST(CrossEngineMarkdown, SeveralControllersHaveColumnsAndDriftsOfTheirOwn) {
 
 TEST(CrossEngineFigures, AreOfEnginesPairsOfEnginesAndAllOfThem) {
   const Analysis analysis = engine_analysis(compared(benchmark()));
-  const Figure rate =
-      figure(analysis, {.engine = "mujoco", .policy = "diffuse", .perturbation = "clean", .name = "success"});
+  const Estimate rate =
+      estimate(analysis, {.engine = "mujoco", .policy = "diffuse", .perturbation = "clean", .name = "success"});
   EXPECT_EQ(rate.n, 6);
   EXPECT_EQ(rate.k, 3);
   EXPECT_EQ(rate.value, 0.5);
-  EXPECT_EQ(figure(analysis, {.engine = "playback", .policy = "replay", .name = "success"}).value, 1.0);
-  EXPECT_EQ(figure(analysis, {.engine = "all", .policy = "replay", .name = "mean_success"}).n, 6);
-  const Figure tau = figure(analysis, {.engine = "bullet vs mujoco", .of = "combinations", .name = "tau_b"});
+  EXPECT_EQ(estimate(analysis, {.engine = "playback", .policy = "replay", .name = "success"}).value, 1.0);
+  EXPECT_EQ(estimate(analysis, {.engine = "all", .policy = "replay", .name = "mean_success"}).n, 6);
+  const Estimate tau = estimate(analysis, {.engine = "bullet vs mujoco", .of = "combinations", .name = "tau_b"});
   EXPECT_EQ(tau.n, 2);
   EXPECT_EQ(tau.value, 1.0);
-  EXPECT_EQ(figure(analysis, {.engine = "all", .of = "combinations", .name = "swapped"}).value, 1.0);
-  EXPECT_EQ(figure(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).unit, "m");
-  EXPECT_NEAR(figure(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).value, 0.05, 1e-12);
-  EXPECT_EQ(figure(analysis, {.engine = "bullet vs ode", .name = "parting_median"}).value, 0.2);
-  EXPECT_EQ(figure(analysis, {.engine = "ode", .of = "human.peak_n", .name = "force_ratio"}).value, 0.8);
-  EXPECT_EQ(figure(analysis, {.engine = "all", .of = "human.peak_n", .name = "typical_force"}).unit, "N");
+  EXPECT_EQ(estimate(analysis, {.engine = "all", .of = "combinations", .name = "swapped"}).value, 1.0);
+  EXPECT_EQ(estimate(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).unit, "m");
+  EXPECT_NEAR(estimate(analysis, {.engine = "ode", .of = "jpe", .name = "drift"}).value, 0.05, 1e-12);
+  EXPECT_EQ(estimate(analysis, {.engine = "bullet vs ode", .name = "parting_median"}).value, 0.2);
+  EXPECT_EQ(estimate(analysis, {.engine = "ode", .of = "human.peak_n", .name = "force_ratio"}).value, 0.8);
+  EXPECT_EQ(estimate(analysis, {.engine = "all", .of = "human.peak_n", .name = "typical_force"}).unit, "N");
 }
 
 TEST(CrossEngineFigures, WhatIsNotDefinedIsNoNumber) {
   std::vector<EpisodeRow> rows = benchmark();
   for (EpisodeRow& row : rows) row.success = true;
   EXPECT_TRUE(std::isnan(
-      figure(engine_analysis(compared(rows)), {.engine = "all", .of = "combinations", .name = "mean_tau_b"}).value));
+      estimate(engine_analysis(compared(rows)), {.engine = "all", .of = "combinations", .name = "mean_tau_b"}).value));
 }
 
 TEST(CrossEngineFigures, ACertificateIsShownOfOneEngineToo) {

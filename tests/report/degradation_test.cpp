@@ -1,11 +1,10 @@
-#include "duet/report/studies/degradation.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 #include "tests/support.h"
 
@@ -13,7 +12,7 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
-using test::figure;
+using test::estimate;
 using test::size_tags;
 using test::thrown_message;
 using testing::AllOf;
@@ -30,18 +29,25 @@ std::vector<EpisodeRow> jittered() {
   return rows;
 }
 
-std::string text_of(const Degradation& result) { return analysis_markdown(degradation_analysis(result)); }
+std::string text_of(const Analysis& analysis) { return analysis_markdown(analysis); }
+
+// Families that have a curve, ours.
+std::vector<std::string> families(const Analysis& analysis) {
+  std::vector<std::string> found;
+  for (const Estimate& estimate : analysis.estimates)
+    if (estimate.name == "normalised_area" && estimate.source == "duet") found.push_back(estimate.of);
+  return found;
+}
 
 TEST(Degradation, ANameThatSaysAnotherSizeIsNotBelieved) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "1111"}, rows);
   add_episodes({.perturbation = "push_60n", .successes = "0111", .tags = size_tags("push", 5.0, "N")}, rows);
   add_episodes({.perturbation = "jitter_1cm", .successes = "0111"}, rows);  // its suite says no size
-  const Degradation result = degradation(rows);
-  ASSERT_EQ(result.curves.size(), 1U);
-  EXPECT_EQ(result.curves[0].family, "push");
-  EXPECT_EQ(result.curves[0].largest, 5.0);
-  const Figure size = figure(degradation_analysis(result), {.perturbation = "push_60n", .of = "push", .name = "size"});
+  const Analysis analysis = degradation_analysis(rows);
+  EXPECT_THAT(families(analysis), testing::ElementsAre("push"));
+  EXPECT_EQ(estimate(analysis, {.of = "push", .name = "largest"}).value, 5.0);
+  const Estimate size = estimate(analysis, {.perturbation = "push_60n", .of = "push", .name = "size"});
   EXPECT_EQ(size.value, 5.0);
   EXPECT_EQ(size.unit, "N");
 }
@@ -52,52 +58,47 @@ TEST(Degradation, SizesOfOneKindThatDifferInMoreAreTwoCurves) {
   add_episodes({.perturbation = "a", .successes = "0111", .tags = size_tags("push", 20.0, "N", "duration: 1")}, rows);
   add_episodes({.perturbation = "b", .successes = "0011", .tags = size_tags("push", 40.0, "N", "duration: 1")}, rows);
   add_episodes({.perturbation = "c", .successes = "0001", .tags = size_tags("push", 30.0, "N", "duration: 9")}, rows);
-  const Degradation result = degradation(rows);
-  ASSERT_EQ(result.curves.size(), 2U);
-  EXPECT_EQ(result.curves[0].family, "push (duration: 1)");
-  EXPECT_EQ(result.curves[0].points.size(), 3U);
-  EXPECT_EQ(result.curves[1].family, "push (duration: 9)");
-  EXPECT_EQ(result.curves[1].largest, 30.0);
+  const Analysis analysis = degradation_analysis(rows);
+  EXPECT_THAT(families(analysis), testing::ElementsAre("push (duration: 1)", "push (duration: 9)"));
+  EXPECT_EQ(estimate(analysis, {.of = "push (duration: 1)", .name = "normalised_area"}).n, 3);  // points
+  EXPECT_EQ(estimate(analysis, {.of = "push (duration: 9)", .name = "largest"}).value, 30.0);
 }
 
 TEST(Degradation, LossIsPairedWithTheCleanEpisodes) {
-  const Degradation result = degradation(jittered());
-  ASSERT_EQ(result.success.size(), 5U);
-  EXPECT_EQ(result.success[0].perturbation, "clean");
-  EXPECT_EQ(result.success[0].difference.pairs, 0);
-  EXPECT_EQ(result.success[1].perturbation, "jitter_1cm");
-  EXPECT_EQ(result.success[3].perturbation, "jitter_5cm");
-  EXPECT_EQ(result.success[4].perturbation, "vanish");
-  const PerturbedSuccess& two = result.success[2];
-  EXPECT_EQ(two.success.k, 2);
-  EXPECT_EQ(two.paper.k, 2);
-  EXPECT_EQ(two.difference.pairs, 4);
-  EXPECT_DOUBLE_EQ(two.difference.difference, -0.5);
-  EXPECT_LT(two.difference.interval.low, newcombe_paired(2, 0, 2, 0).low);  // four draws of two clips
+  const Analysis analysis = degradation_analysis(jittered());
+  EXPECT_THAT(values_of(analysis.estimates, &Estimate::perturbation),
+              testing::ElementsAre("clean", "jitter_1cm", "jitter_2cm", "jitter_5cm", "vanish", "jitter_0.01m",
+                                   "jitter_0.02m", "jitter_0.05m"));
+  EXPECT_TRUE(test::estimates_like(analysis, {.perturbation = "clean", .name = "against_clean"}).empty());
+  EXPECT_EQ(estimate(analysis, {.perturbation = "jitter_2cm", .name = "success"}).k, 2);
+  EXPECT_EQ(estimate(analysis, {.perturbation = "jitter_2cm", .name = "paper_success"}).k, 2);
+  const Estimate loss = estimate(analysis, {.perturbation = "jitter_2cm", .name = "against_clean"});
+  EXPECT_EQ(loss.n, 4);
+  EXPECT_DOUBLE_EQ(loss.value, -0.5);
+  EXPECT_LT(loss.interval.low, newcombe_paired(2, 0, 2, 0).low);  // four draws of two clips
 }
 
 TEST(Degradation, OnlyEpisodesOfBothPair) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "11"}, rows);
   add_episodes({.perturbation = "vanish", .successes = "01", .first = 1}, rows);
-  const Degradation result = degradation(rows);
-  EXPECT_EQ(result.success[1].difference.pairs, 1);
-  EXPECT_DOUBLE_EQ(result.success[1].difference.difference, -1.0);
+  const Estimate loss = estimate(degradation_analysis(rows), {.perturbation = "vanish", .name = "against_clean"});
+  EXPECT_EQ(loss.n, 1);
+  EXPECT_DOUBLE_EQ(loss.value, -1.0);
 }
 
 TEST(Degradation, AreaOfACurveIsByTrapezia) {
-  const Degradation result = degradation(jittered());
-  ASSERT_EQ(result.curves.size(), 1U);
-  const DegradationCurve& curve = result.curves[0];
-  EXPECT_EQ(curve.family, "jitter");
-  EXPECT_EQ(curve.unit, "m");
-  ASSERT_EQ(curve.points.size(), 4U);
-  EXPECT_EQ(curve.points[0].x, 0.0);
-  EXPECT_EQ(curve.points[0].success, 1.0);
+  const Analysis analysis = degradation_analysis(jittered());
+  const Estimate area = estimate(analysis, {.of = "jitter", .name = "normalised_area"});
+  EXPECT_EQ(area.n, 4);  // points
   // (0.875 * 1 + 0.625 * 1 + 0.5 * 3) / 5
-  EXPECT_NEAR(curve.normalised_area, 0.6, 1e-12);
-  EXPECT_DOUBLE_EQ(curve.largest, 0.05);
-  EXPECT_DOUBLE_EQ(curve.difference.difference, -0.5);
+  EXPECT_NEAR(area.value, 0.6, 1e-12);
+  EXPECT_DOUBLE_EQ(estimate(analysis, {.of = "jitter", .name = "largest"}).value, 0.05);
+  EXPECT_EQ(estimate(analysis, {.of = "jitter", .name = "largest"}).unit, "m");
+  EXPECT_DOUBLE_EQ(estimate(analysis, {.of = "jitter", .name = "loss_at_largest"}).value, -0.5);
+  const LineSeries& series = analysis.plots.at(0).plots.at(0).series.at(0);
+  EXPECT_EQ(series.x.front(), 0.0);
+  EXPECT_EQ(series.y.front(), 100.0);
 }
 
 TEST(Degradation, SizesOnBothSidesOfZeroAreOneCurve) {
@@ -105,72 +106,74 @@ TEST(Degradation, SizesOnBothSidesOfZeroAreOneCurve) {
   add_episodes({.successes = "1100"}, rows);
   add_episodes({.perturbation = "early", .successes = "0000", .tags = size_tags("partner.shift_s", -1.0, "s")}, rows);
   add_episodes({.perturbation = "late", .successes = "1100", .tags = size_tags("partner.shift_s", 0.5, "s")}, rows);
-  const Degradation result = degradation(rows);
-  ASSERT_EQ(result.curves.size(), 1U);
-  EXPECT_DOUBLE_EQ(result.curves[0].points[0].x, -1.0);
-  EXPECT_DOUBLE_EQ(result.curves[0].largest, -1.0);
-  EXPECT_NEAR(result.curves[0].normalised_area, (0.25 + 0.25) / (1.5 * 0.5), 1e-12);
+  const Analysis analysis = degradation_analysis(rows);
+  EXPECT_THAT(families(analysis), testing::ElementsAre("partner.shift_s"));
+  EXPECT_EQ(analysis.plots.at(0).plots.at(0).series.at(0).x.front(), -1.0);
+  EXPECT_DOUBLE_EQ(estimate(analysis, {.of = "partner.shift_s", .name = "largest"}).value, -1.0);
+  EXPECT_NEAR(estimate(analysis, {.of = "partner.shift_s", .name = "normalised_area"}).value,
+              (0.25 + 0.25) / (1.5 * 0.5), 1e-12);
 }
 
 TEST(Degradation, ACurveThatNeverSucceedsHasNoArea) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "00"}, rows);
   add_episodes({.perturbation = "jitter_1cm", .successes = "00", .tags = size_tags("jitter", 0.01, "m")}, rows);
-  EXPECT_TRUE(std::isnan(degradation(rows).curves.at(0).normalised_area));
+  EXPECT_TRUE(std::isnan(estimate(degradation_analysis(rows), {.of = "jitter", .name = "normalised_area"}).value));
 }
 
 TEST(Degradation, ThePapersCurveStandsBesideOurs) {
-  const Degradation result = degradation(jittered());
-  ASSERT_EQ(result.paper.size(), 1U);
-  EXPECT_NEAR(result.paper[0].difference.difference, -0.071, 1e-12);
+  const Analysis analysis = degradation_analysis(jittered());
+  const auto of_paper = [&](const char* name) {
+    return estimate(analysis, {.source = "paper", .of = "jitter", .name = name}).value;
+  };
+  EXPECT_NEAR(of_paper("loss_at_largest"), -0.071, 1e-12);
   // (82.55 * 1 + 79.8 * 1 + 78.6 * 3) / 5 / 84.9
-  EXPECT_NEAR(result.paper[0].normalised_area, 398.15 / 5.0 / 84.9, 1e-12);
-  const std::vector<LinePlot> plots = degradation_analysis(result).plots.at(0).plots;
+  EXPECT_NEAR(of_paper("normalised_area"), 398.15 / 5.0 / 84.9, 1e-12);
+  const std::vector<LinePlot> plots = analysis.plots.at(0).plots;
   ASSERT_EQ(plots.size(), 1U);
   EXPECT_EQ(plots[0].x_label, "jitter [m]");
   ASSERT_EQ(plots[0].series.size(), 2U);
   EXPECT_EQ(plots[0].series[1].y.back(), 77.8);
-  EXPECT_THAT(text_of(result), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
+  EXPECT_THAT(text_of(analysis), AllOf(HasSubstr("D-STAR (the paper's)"), HasSubstr("-7.1")));
 }
 
 TEST(Degradation, TheTableSaysItsLevel) {
   IntervalOptions options;
-  EXPECT_THAT(text_of(degradation(jittered(), options)), HasSubstr("with 95 % Wilson intervals"));
+  EXPECT_THAT(text_of(degradation_analysis(jittered(), options)), HasSubstr("with 95 % Wilson intervals"));
   options.level = 0.9;
-  EXPECT_THAT(text_of(degradation(jittered(), options)), HasSubstr("with 90 % Wilson intervals"));
+  EXPECT_THAT(text_of(degradation_analysis(jittered(), options)), HasSubstr("with 90 % Wilson intervals"));
 }
 
 TEST(Degradation, CleanAloneSaysSo) {
   std::vector<EpisodeRow> rows;
   add_episodes({}, rows);
   add_episodes({.policy = "dp", .perturbation = "vanish"}, rows);  // never clean
-  const Degradation result = degradation(rows);
-  EXPECT_TRUE(result.success.empty());
-  EXPECT_EQ(text_of(result), "No policy ran both clean and perturbed.\n");
-  EXPECT_TRUE(degradation_analysis(result).empty());
+  const Analysis analysis = degradation_analysis(rows);
+  EXPECT_EQ(text_of(analysis), "No policy ran both clean and perturbed.\n");
+  EXPECT_TRUE(analysis.empty());
 }
 
 TEST(Degradation, FiguresAreOfPerturbationsAndOfFamilies) {
-  const Analysis analysis = degradation_analysis(degradation(jittered()));
-  const Figure loss = figure(analysis, {.policy = "dstar", .perturbation = "jitter_2cm", .name = "against_clean"});
+  const Analysis analysis = degradation_analysis(jittered());
+  const Estimate loss = estimate(analysis, {.policy = "dstar", .perturbation = "jitter_2cm", .name = "against_clean"});
   EXPECT_EQ(loss.n, 4);
   EXPECT_EQ(loss.value, -0.5);
-  EXPECT_EQ(figure(analysis, {.policy = "dstar", .perturbation = "clean", .name = "paper_success"}).value, 0.0);
-  const Figure size = figure(analysis, {.perturbation = "jitter_2cm", .of = "jitter", .name = "size"});
+  EXPECT_EQ(estimate(analysis, {.policy = "dstar", .perturbation = "clean", .name = "paper_success"}).value, 0.0);
+  const Estimate size = estimate(analysis, {.perturbation = "jitter_2cm", .of = "jitter", .name = "size"});
   EXPECT_EQ(size.value, 0.02);
   EXPECT_EQ(size.unit, "m");
-  EXPECT_NEAR(figure(analysis, {.of = "jitter", .name = "normalised_area"}).value, 0.6, 1e-12);
-  EXPECT_EQ(figure(analysis, {.of = "jitter", .name = "largest"}).value, 0.05);
-  EXPECT_NEAR(figure(analysis, {.source = "paper", .of = "jitter", .name = "loss_at_largest"}).value, -0.071, 1e-12);
+  EXPECT_NEAR(estimate(analysis, {.of = "jitter", .name = "normalised_area"}).value, 0.6, 1e-12);
+  EXPECT_EQ(estimate(analysis, {.of = "jitter", .name = "largest"}).value, 0.05);
+  EXPECT_NEAR(estimate(analysis, {.source = "paper", .of = "jitter", .name = "loss_at_largest"}).value, -0.071, 1e-12);
   EXPECT_EQ(
-      figure(analysis, {.source = "paper", .perturbation = "jitter_0.05m", .of = "jitter", .name = "success"}).value,
+      estimate(analysis, {.source = "paper", .perturbation = "jitter_0.05m", .of = "jitter", .name = "success"}).value,
       0.778);
 }
 
 TEST(Degradation, TheSameEpisodeTwiceIsRefused) {
   std::vector<EpisodeRow> rows = jittered();
   rows.push_back(rows.front());
-  EXPECT_THAT(thrown_message<InputError>([&] { degradation(rows); }), HasSubstr("is there twice"));
+  EXPECT_THAT(thrown_message<InputError>([&] { degradation_analysis(rows); }), HasSubstr("is there twice"));
 }
 
 }  // namespace

@@ -169,7 +169,7 @@ TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
   ReportContent solid = content();
   EXPECT_THAT(html_report(solid), Not(HasSubstr("Contact with people")));
   std::vector<EpisodeRow> rows = two_engines();
-  solid.analyses = {contact_analysis(contact_table(rows))};
+  solid.analyses = {contact_analysis(rows)};
   EXPECT_THAT(html_report(solid), Not(HasSubstr("<details open>")));
   const std::string evil = "\"><script>x</script>&'";
   for (EpisodeRow& row : rows) {
@@ -177,7 +177,7 @@ TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
     row.forces["human." + evil + ".worst_ratio"] = 1.5;
     if (row.engine == "ode") row.engine = row.policy = evil;
   }
-  solid.analyses = {contact_analysis(contact_table(rows))};
+  solid.analyses = {contact_analysis(rows)};
   const std::string html = html_report(solid);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"contacts\""), HasSubstr("class=\"warning\">Limits: unverified"),

@@ -1,11 +1,10 @@
-#include "duet/report/studies/human_agreement.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/file.h"
-#include "duet/report/tables/analysis.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 
@@ -42,8 +41,8 @@ Rater rater(const std::string& name, const std::string& letters, const std::vect
   return made;
 }
 
-const DetectorAgreement& detector(const HumanAgreement& agreement, const std::string& name) {
-  return *std::ranges::find(agreement.detectors, name, &DetectorAgreement::detector);
+Estimate found_of(const HumanAgreement& agreement, const std::string& of, const char* name) {
+  return test::estimate(agreement.analysis, {.of = of, .name = name});
 }
 
 TEST(HumanAgreement, OfRatersWhoAgreeWithTheHeadlineIsWhole) {
@@ -51,18 +50,16 @@ TEST(HumanAgreement, OfRatersWhoAgreeWithTheHeadlineIsWhole) {
   const std::string seen = "yyyynnnn";
   const HumanAgreement found =
       human_agreement(rows, {rater("anna", seen, rows), rater("ben", seen, rows), rater("carla", seen, rows)});
-  EXPECT_EQ(found.pairs.size(), 3U);
-  for (const RaterPair& pair : found.pairs) EXPECT_DOUBLE_EQ(pair.kappa.value, 1.0);
-  EXPECT_DOUBLE_EQ(found.all.value, 1.0);
+  for (const char* of : {"anna vs ben", "anna vs carla", "ben vs carla", "all raters", "headline vs majority"})
+    EXPECT_DOUBLE_EQ(found_of(found, of, "kappa").value, 1.0) << of;
   EXPECT_TRUE(found.disputes.empty());
-  EXPECT_DOUBLE_EQ(detector(found, "headline").majority.value, 1.0);
   // Two of the four that people see: 6 of 8 agreed, half by chance.
-  const DetectorAgreement& strict = detector(found, "robot/strict");
-  EXPECT_DOUBLE_EQ(strict.majority.value, 0.5);
-  EXPECT_EQ(strict.sensitivity.k, 2);
-  EXPECT_EQ(strict.sensitivity.n, 4);
-  EXPECT_DOUBLE_EQ(strict.specificity.rate, 1.0);
-  EXPECT_LT(strict.specificity.interval.low, 0.6);  // of four clips
+  const std::string strict = "robot/strict vs majority";
+  EXPECT_DOUBLE_EQ(found_of(found, strict, "kappa").value, 0.5);
+  EXPECT_EQ(found_of(found, strict, "sensitivity").k, 2);
+  EXPECT_EQ(found_of(found, strict, "sensitivity").n, 4);
+  EXPECT_DOUBLE_EQ(found_of(found, strict, "specificity").value, 1.0);
+  EXPECT_LT(found_of(found, strict, "specificity").interval.low, 0.6);  // of four clips
 }
 
 TEST(HumanAgreement, DisputesAndMajorities) {
@@ -73,13 +70,12 @@ TEST(HumanAgreement, DisputesAndMajorities) {
   EXPECT_EQ(found.yes, 3);  // the third has one of each
   EXPECT_EQ(found.no, 3);
   ASSERT_EQ(found.disputes.size(), 3U);
-  EXPECT_EQ(found.disputes[1].row->key, rows[2].key);
-  EXPECT_THAT(found.disputes[1].answers, ElementsAre("yes", "unsure", "no"));
-  EXPECT_EQ(detector(found, "headline").majority.n, 6);
-  EXPECT_EQ(detector(found, "headline").raters[1].n, 6);  // ben's unsure is left out
-  const nlohmann::json disputes = disputes_json(found);
-  EXPECT_EQ(disputes.at(1).at("episode"), rows[2].key);
-  EXPECT_EQ(disputes.at(1).at("answers").at("ben"), "unsure");
+  EXPECT_EQ(found.disputes.at(1).at("episode"), rows[2].key);
+  EXPECT_EQ(found.disputes.at(1).at("answers"), (nlohmann::json{{"anna", "yes"}, {"ben", "unsure"}, {"carla", "no"}}));
+  const TextTable& disputes = found.analysis.tables.at(2).table;
+  EXPECT_THAT(disputes.rows.at(1), ElementsAre(rows[2].key.substr(0, 16), "hug", rows[2].clip, "yes", "unsure", "no"));
+  EXPECT_EQ(found_of(found, "headline vs majority", "kappa").n, 6);
+  EXPECT_EQ(found_of(found, "headline vs ben", "kappa").n, 6);  // ben's unsure is left out
 }
 
 TEST(HumanAgreement, AnEpisodeThatFellIsNoSuccessOfAnyDetector) {
@@ -87,20 +83,20 @@ TEST(HumanAgreement, AnEpisodeThatFellIsNoSuccessOfAnyDetector) {
   rows[0].outcome = Outcome::kFell;
   rows[0].success = false;
   const HumanAgreement found = human_agreement(rows, {rater("anna", "yyyynnnn", rows)});
-  EXPECT_EQ(detector(found, "robot/paper").sensitivity.k, 3);
+  EXPECT_EQ(found_of(found, "robot/paper vs majority", "sensitivity").k, 3);
 }
 
 TEST(HumanAgreement, WhatIsNotAnsweredCountsForNobody) {
   const std::vector<EpisodeRow> rows = eight_rows();
   const HumanAgreement found = human_agreement(rows, {rater("anna", "yyyy----", rows), rater("ben", "--yynnnn", rows)});
-  EXPECT_EQ(found.pairs.at(0).kappa.n, 2);
-  EXPECT_TRUE(std::isnan(found.pairs[0].kappa.value));  // both say yes to both
-  EXPECT_EQ(found.all.n, 0);
-  const std::string text = terminal_text(human_agreement_analysis(found));
+  EXPECT_EQ(found_of(found, "anna vs ben", "kappa").n, 2);
+  EXPECT_TRUE(std::isnan(found_of(found, "anna vs ben", "kappa").value));  // both say yes to both
+  EXPECT_TRUE(test::estimates_like(found.analysis, {.of = "all raters", .name = "kappa"}).empty());
+  const std::string text = terminal_text(found.analysis);
   EXPECT_THAT(text, AllOf(HasSubstr("Rater anna answered 4 of 8 episodes."), HasSubstr("anna, ben")));
   const HumanAgreement apart = human_agreement(rows, {rater("anna", "yy------", rows), rater("ben", "--nn----", rows)});
-  EXPECT_EQ(apart.pairs.at(0).kappa.n, 0);
-  EXPECT_TRUE(std::isnan(apart.pairs[0].kappa.value));
+  EXPECT_EQ(found_of(apart, "anna vs ben", "kappa").n, 0);
+  EXPECT_TRUE(std::isnan(found_of(apart, "anna vs ben", "kappa").value));
   EXPECT_THROW(human_agreement(rows, {}), std::invalid_argument);
 }
 

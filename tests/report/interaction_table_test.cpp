@@ -1,16 +1,15 @@
 // The table of the rule interaction: who succeeds beside the detectors of before, and what failed episodes lack.
-#include "duet/report/studies/interaction_table.h"
-
 #include <gmock/gmock.h>
 
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 
 namespace duet {
 namespace {
 
 using test::add_episodes;
-using test::figure;
+using test::estimate;
 using testing::HasSubstr;
 
 Verdict ruled(bool success, const NamedFlags& parts, const NamedNumbers& values = {}) {
@@ -53,41 +52,42 @@ std::vector<EpisodeRow> judged_rows() {
 }
 
 TEST(InteractionTable, SaysWhichConditionFailedEpisodesLack) {
-  const InteractionTable table = interaction_table(judged_rows());
-  ASSERT_EQ(table.entries.size(), 7U);  // three arms, of each all tasks and every one
-  const InteractionEntry& dstar = table.entries[0];
-  EXPECT_EQ(dstar.key.policy, "dstar") << "the best arm first";
-  EXPECT_EQ(dstar.task, "all");
-  EXPECT_EQ(dstar.success.k, 3);
-  EXPECT_EQ(dstar.success.n, 6);
-  EXPECT_EQ(dstar.before.k, 6);
-  EXPECT_EQ(dstar.failed, (std::map<std::string, long>{{"act", 2}, {"touch", 3}, {"reply", 1}}));
-  EXPECT_EQ(dstar.led, 4);
-  EXPECT_EQ(dstar.false_starts, 1);
-  EXPECT_EQ(table.entries[1].task, "hug");
-  EXPECT_EQ(table.entries[1].success.k, 1);
-  const auto omni = std::ranges::find(table.entries, "omni", [](const InteractionEntry& e) { return e.key.policy; });
-  ASSERT_NE(omni, table.entries.end());
-  EXPECT_EQ(omni->unjudged, 1);
-  EXPECT_EQ(omni->failed.at("touch"), 3);
+  const Analysis analysis = interaction_analysis(judged_rows());
+  EXPECT_EQ(analysis.estimates.front().policy, "dstar") << "the best arm first";
+  EXPECT_EQ(analysis.estimates.front().task, "all");
+  EXPECT_EQ(analysis.tables.at(0).table.rows.size(), 3U);
+  EXPECT_EQ(analysis.tables.at(1).table.rows.size(), 7U);  // three arms, of each all tasks and every one
+  const auto of = [&](const char* policy, const char* part, const char* name) {
+    return estimate(analysis, {.policy = policy, .task = "all", .of = part, .name = name});
+  };
+  EXPECT_EQ(of("dstar", "", "success").k, 3);
+  EXPECT_EQ(of("dstar", "", "success").n, 6);
+  EXPECT_EQ(of("dstar", "robot/paper", "success").k, 6);
+  for (const auto& [part, failed] : {std::pair("act", 2.0), {"touch", 3.0}, {"reply", 1.0}})
+    EXPECT_EQ(of("dstar", part, "failed").value, failed) << part;
+  EXPECT_EQ(of("dstar", "", "false_starts").n, 4);
+  EXPECT_EQ(of("dstar", "", "false_starts").value, 1.0);
+  EXPECT_EQ(estimate(analysis, {.policy = "dstar", .task = "hug", .name = "success"}).k, 1);
+  EXPECT_EQ(of("omni", "", "not_judged").value, 1.0);
+  EXPECT_EQ(of("omni", "touch", "failed").value, 3.0);
 }
 
 TEST(InteractionTable, PrintsAndListsThem) {
-  const Analysis analysis = interaction_analysis(interaction_table(judged_rows()));
+  const Analysis analysis = interaction_analysis(judged_rows());
   const std::string text = analysis_markdown(analysis);
   EXPECT_THAT(text, HasSubstr("What failed episodes lack"));
   EXPECT_THAT(text, HasSubstr("omni (control arm)"));
   EXPECT_THAT(text, HasSubstr("Not judged"));
-  EXPECT_EQ(figure(analysis, {.policy = "omni", .task = "wave", .of = "reply", .name = "failed"}).value, 2.0);
-  EXPECT_EQ(figure(analysis, {.policy = "omni", .task = "wave", .name = "not_judged"}).value, 1.0);
-  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "all", .name = "success"}).k, 3);
-  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "all", .of = "robot/paper", .name = "success"}).k, 6);
+  EXPECT_EQ(estimate(analysis, {.policy = "omni", .task = "wave", .of = "reply", .name = "failed"}).value, 2.0);
+  EXPECT_EQ(estimate(analysis, {.policy = "omni", .task = "wave", .name = "not_judged"}).value, 1.0);
+  EXPECT_EQ(estimate(analysis, {.policy = "dstar", .task = "all", .name = "success"}).k, 3);
+  EXPECT_EQ(estimate(analysis, {.policy = "dstar", .task = "all", .of = "robot/paper", .name = "success"}).k, 6);
 }
 
 TEST(InteractionTable, IsOfRunsThatTheRuleJudged) {
   std::vector<EpisodeRow> rows;
   add_episodes({}, rows);
-  EXPECT_TRUE(interaction_analysis(interaction_table(rows)).empty());
+  EXPECT_TRUE(interaction_analysis(rows).empty());
 }
 
 }  // namespace

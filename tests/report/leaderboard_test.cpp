@@ -8,7 +8,7 @@
 #include "duet/core/require.h"
 #include "duet/report/page/interval_plot.h"
 #include "duet/report/ranking/leaderboard_rows.h"
-#include "tests/report/figures.h"
+#include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 
@@ -16,8 +16,8 @@ namespace duet {
 namespace {
 
 using test::episode;
-using test::figure;
-using test::figures_like;
+using test::estimate;
+using test::estimates_like;
 using test::thrown_message;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -253,7 +253,9 @@ TEST(Leaderboard, PlansThatWereLostStandInEveryTable) {
   EXPECT_THAT(text, HasSubstr("The first fault: no plan for tick 0\\x1b[31m\n"));
   EXPECT_THAT(latex_of(entries), AllOf(HasSubstr("Plans lost"), HasSubstr("{\\footnotesize Policy 'late' lost plans")));
   const Analysis analysis = leaderboard_analysis(entries);
-  const auto evil = [&](const char* name) { return figure(analysis, {.policy = "evil", .task = "all", .name = name}); };
+  const auto evil = [&](const char* name) {
+    return estimate(analysis, {.policy = "evil", .task = "all", .name = name});
+  };
   EXPECT_EQ(evil("policy_dead").value, 2.0);
   EXPECT_EQ(evil("plans_invalid").value, 3.0);
   EXPECT_EQ(evil("policy_fault").text, "policy 'evil': it ended");
@@ -296,20 +298,20 @@ TEST(LeaderboardFigures, AreOfEachTaskAndOfAll) {
   std::vector<EpisodeRow> rows = small_benchmark();
   rows[0].metrics = {{"jpe", 0.1}};
   const Analysis analysis = leaderboard_analysis(leaderboard(rows), {{"jpe", "Joint position error", "m", "lower"}});
-  const Figure success = figure(analysis, {.engine = "mujoco",
-                                           .controller = "vmc",
-                                           .policy = "replay",
-                                           .arm = "main",
-                                           .perturbation = "clean",
-                                           .task = "all",
-                                           .name = "success"});
+  const Estimate success = estimate(analysis, {.engine = "mujoco",
+                                               .controller = "vmc",
+                                               .policy = "replay",
+                                               .arm = "main",
+                                               .perturbation = "clean",
+                                               .task = "all",
+                                               .name = "success"});
   EXPECT_EQ(success.n, 30);
   EXPECT_EQ(success.k, 25);
   EXPECT_DOUBLE_EQ(success.value, 25.0 / 30.0);
   EXPECT_LT(success.interval.low, wilson(25, 30).low);  // by clip
-  EXPECT_EQ(figure(analysis, {.policy = "replay", .task = "all", .name = "lift"}).n, 30);
-  EXPECT_EQ(figure(analysis, {.policy = "replay", .task = "all", .name = "jpe"}).unit, "m");
-  EXPECT_TRUE(figures_like(leaderboard_analysis(leaderboard(rows), {}, false), {.name = "jpe"}).empty());
+  EXPECT_EQ(estimate(analysis, {.policy = "replay", .task = "all", .name = "lift"}).n, 30);
+  EXPECT_EQ(estimate(analysis, {.policy = "replay", .task = "all", .name = "jpe"}).unit, "m");
+  EXPECT_TRUE(estimates_like(leaderboard_analysis(leaderboard(rows), {}, false), {.name = "jpe"}).empty());
 }
 
 TEST(LeaderboardFigures, EveryDetectorHasItsSuccess) {
@@ -318,7 +320,7 @@ TEST(LeaderboardFigures, EveryDetectorHasItsSuccess) {
   strict.version = "paper";
   strict.thresholds = "strict";
   const Analysis analysis = leaderboard_analysis(leaderboard(rows));
-  EXPECT_EQ(figure(analysis, {.task = "all", .of = "paper/strict", .name = "success"}).value, 0.0);
+  EXPECT_EQ(estimate(analysis, {.task = "all", .of = "paper/strict", .name = "success"}).value, 0.0);
 }
 
 TEST(LeaderboardLatex, IsABooktabsTabularWithEscapedNames) {
@@ -330,7 +332,7 @@ TEST(LeaderboardLatex, IsABooktabsTabularWithEscapedNames) {
 TEST(LeaderboardFigures, ThereIsNoLiftWithoutANullArm) {
   const Analysis analysis = leaderboard_analysis(leaderboard({episode("replay", "hug", 0, true)}));
   for (const char* name : {"null_success", "lift"}) {
-    const Figure found = figure(analysis, {.task = "all", .name = name});
+    const Estimate found = estimate(analysis, {.task = "all", .name = name});
     EXPECT_TRUE(std::isnan(found.value));
     EXPECT_TRUE(std::isnan(found.interval.low));
   }

@@ -1,9 +1,8 @@
-#include "duet/report/studies/level_table.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 #include "tests/support.h"
 
@@ -11,8 +10,8 @@ namespace duet {
 namespace {
 
 using test::add_episodes;
-using test::figure;
-using test::figures_like;
+using test::estimate;
+using test::estimates_like;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -38,20 +37,22 @@ std::vector<EpisodeRow> ladder() {
 }
 
 TEST(LevelTable, AScoreSaysWhereItEnds) {
-  const std::vector<LevelTable> tables = level_tables(ladder());
-  ASSERT_EQ(tables.size(), 1U);
-  const LevelTable& table = tables[0];
-  EXPECT_EQ(table.levels, (std::vector<LevelName>{{0, "clean"}, {1, "waits"}, {2, "moves"}, {3, "pushed"}}));
-  ASSERT_EQ(table.entries.size(), 2U);  // the null arm has none
-  const LevelEntry& dstar = table.entries[0];
-  EXPECT_EQ(dstar.key.policy, "dstar");
-  EXPECT_EQ(dstar.levels[1].k, 2);
-  EXPECT_EQ(dstar.reached, 1);  // a half is enough; what comes after a level that was failed does not count
-  EXPECT_DOUBLE_EQ(dstar.mean, (1.0 + 0.5 + 0.25 + 0.75) / 4.0);
-  const LevelEntry& replay = table.entries[1];
-  EXPECT_FALSE(replay.reached.has_value());
-  EXPECT_EQ(replay.levels[2].n, 0);
-  EXPECT_DOUBLE_EQ(replay.mean, 0.625);  // of the levels that were run
+  const Analysis analysis = level_analysis(ladder());
+  ASSERT_EQ(analysis.tables.size(), 1U);
+  const TextTable& table = analysis.tables[0].table;
+  EXPECT_THAT(table.header,
+              testing::ElementsAre("Policy", "0 clean", "1 waits", "2 moves", "3 pushed", "Mean [%]", "Reached"));
+  ASSERT_EQ(table.rows.size(), 2U);  // the null arm has none
+  const auto of = [&](const char* policy, const char* level, const char* name) {
+    return estimate(analysis, {.policy = policy, .of = level, .name = name});
+  };
+  EXPECT_EQ(of("dstar", "level_1_waits", "success").k, 2);
+  EXPECT_EQ(of("dstar", "level", "reached").value,
+            1.0);  // a half is enough; what follows a failed level does not count
+  EXPECT_DOUBLE_EQ(of("dstar", "level", "mean").value, (1.0 + 0.5 + 0.25 + 0.75) / 4.0);
+  EXPECT_TRUE(estimates_like(analysis, {.policy = "replay", .of = "level", .name = "reached"}).empty());
+  EXPECT_EQ(of("replay", "level_2_moves", "success").n, 0);
+  EXPECT_DOUBLE_EQ(of("replay", "level", "mean").value, 0.625);  // of the levels that were run
 }
 
 // A push while the arms move is of the push's stage, whatever the arms do.
@@ -74,17 +75,16 @@ TEST(LevelTable, ARowIsOfTheHigherOfItsPerturbationAndItsClip) {
   add("own-stand", 1, "pushed", 3, "01");
   add("moving-stand", 2, "pushed", 3, "00");
   add("moving-stand", 2, "kick", 0, "11");  // on no stage
-  const std::vector<LevelTable> tables = level_tables(rows);
-  ASSERT_EQ(tables.size(), 1U);
-  EXPECT_EQ(tables[0].ladder.word, "stage");
-  const std::vector<Rate>& rates = tables[0].entries.at(0).levels;
-  ASSERT_EQ(rates.size(), 3U);
-  EXPECT_EQ(rates[0].n, 4);
-  EXPECT_EQ(rates[0].k, 3);
-  EXPECT_EQ(rates[1].n, 2);
-  EXPECT_EQ(rates[2].n, 4);
-  EXPECT_EQ(rates[2].k, 1);
-  EXPECT_FALSE(tables[0].entries[0].reached.has_value());  // 75 % of the first stage is not 95 %
+  const Analysis analysis = level_analysis(rows);
+  EXPECT_THAT(values_of(analysis.estimates, &Estimate::of),
+              testing::ElementsAre("stage", "stage_1_own", "stage_2_moving", "stage_3_pushed"));
+  const auto rate = [&](const char* stage) { return estimate(analysis, {.of = stage, .name = "success"}); };
+  EXPECT_EQ(rate("stage_1_own").n, 4);
+  EXPECT_EQ(rate("stage_1_own").k, 3);
+  EXPECT_EQ(rate("stage_2_moving").n, 2);
+  EXPECT_EQ(rate("stage_3_pushed").n, 4);
+  EXPECT_EQ(rate("stage_3_pushed").k, 1);
+  EXPECT_TRUE(estimates_like(analysis, {.of = "stage", .name = "reached"}).empty());  // 75 % of the first is not 95 %
 }
 
 TEST(LevelTable, WhoStandsWhereItShouldWalkDoesNotPass) {
@@ -104,37 +104,38 @@ TEST(LevelTable, WhoStandsWhereItShouldWalkDoesNotPass) {
     rows[row].metrics["command_forward"] = 0.3;
     rows[row].metrics["speed_forward"] = speed;
   }
-  const LevelEntry entry = level_tables(rows).at(0).entries.at(0);
-  EXPECT_EQ(entry.levels.at(0).k, 2);
-  EXPECT_EQ(entry.levels.at(1).k, 1);
+  const Analysis analysis = level_analysis(rows);
+  EXPECT_EQ(estimate(analysis, {.of = "stage_1_own", .name = "success"}).k, 2);
+  EXPECT_EQ(estimate(analysis, {.of = "stage_2_held", .name = "success"}).k, 1);
 }
 
 TEST(LevelTable, RowsWithoutLevelsAreNoTable) {
   std::vector<EpisodeRow> rows;
   add_episodes({.successes = "11"}, rows);
   add_episodes({.perturbation = "push", .successes = "01"}, rows);
-  EXPECT_TRUE(level_tables(rows).empty());
+  EXPECT_TRUE(level_analysis(rows).empty());
+  EXPECT_TRUE(level_analysis(rows).tables.empty());
   EXPECT_TRUE(level_analysis({}).empty());
 }
 
 TEST(LevelTable, TwoNamesOfOneLevelAreRefused) {
   std::vector<EpisodeRow> rows = ladder();
   add_episodes({.perturbation = "hurries", .successes = "1", .tags = level(1, "hurries")}, rows);
-  EXPECT_THAT(test::thrown_message<InputError>([&] { level_tables(rows); }),
+  EXPECT_THAT(test::thrown_message<InputError>([&] { level_analysis(rows); }),
               AllOf(HasSubstr("two names of level 1"), HasSubstr("hurries"), HasSubstr("waits")));
 }
 
 TEST(LevelTable, SaysWhatWasReached) {
-  const Analysis analysis = level_analysis(level_tables(ladder()));
+  const Analysis analysis = level_analysis(ladder());
   EXPECT_THAT(analysis_markdown(analysis),
               AllOf(HasSubstr("### Levels"), HasSubstr(" 1 waits |"), HasSubstr("25.0 [2.7, 80.2]"),
                     HasSubstr("up to which success is 50 % or more"), HasSubstr("|    none |")));
-  const auto reached = figures_like(analysis, {.of = "level", .name = "reached"});
+  const auto reached = estimates_like(analysis, {.of = "level", .name = "reached"});
   ASSERT_EQ(reached.size(), 1U);  // the other policy reaches none
   EXPECT_EQ(reached[0].policy, "dstar");
   EXPECT_EQ(reached[0].value, 1.0);
-  EXPECT_EQ(figure(analysis, {.of = "level", .name = "pass"}).value, 0.5);
-  const Figure waits = figure(analysis, {.policy = "dstar", .of = "level_1_waits", .name = "success"});
+  EXPECT_EQ(estimate(analysis, {.of = "level", .name = "pass"}).value, 0.5);
+  const Estimate waits = estimate(analysis, {.policy = "dstar", .of = "level_1_waits", .name = "success"});
   EXPECT_EQ(waits.n, 4);
 }
 

@@ -2,11 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "duet/report/ranking/leaderboard.h"
+#include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/policy_table.h"
-#include "duet/report/ranking/resolution.h"
-#include "duet/report/studies/controller_table.h"
-#include "duet/report/studies/degradation.h"
+#include "duet/report/studies/studies.h"
 #include "tests/report/policy_rows.h"
 
 namespace duet {
@@ -46,8 +44,8 @@ std::vector<EpisodeRow> rows() {
 
 TEST(Notes, EveryTableNamesTheLevelOfItsIntervals) {
   const std::vector<EpisodeRow> all = rows();
-  for (const Analysis& analysis : {leaderboard_analysis(leaderboard(all)), controller_analysis(controller_table(all)),
-                                   policy_analysis(policy_table(all)), degradation_analysis(degradation(all))}) {
+  for (const Analysis& analysis : {leaderboard_analysis(leaderboard(all)), controller_analysis(all),
+                                   policy_analysis(all, leaderboard(all)), degradation_analysis(all)}) {
     const std::string text = analysis_markdown(analysis);
     EXPECT_THAT(text, HasSubstr("95 %"));
     EXPECT_THAT(text, ::testing::Not(HasSubstr("195 %"))) << text;
@@ -58,7 +56,7 @@ TEST(Notes, AComparisonNamesTheLevelOfItsIntervals) {
   std::vector<EpisodeRow> a, b;
   add_episodes({.policy = "dstar", .successes = "110111011101"}, a);
   add_episodes({.policy = "replay", .successes = "100110001101"}, b);
-  const std::string text = analysis_markdown(comparison_analysis(compare_runs(a, b)));
+  const std::string text = analysis_markdown(comparison_analysis(a, b));
   EXPECT_THAT(text, HasSubstr("95 %"));
   EXPECT_THAT(text, ::testing::Not(HasSubstr("195 %")));
 }

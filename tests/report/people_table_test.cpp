@@ -1,17 +1,16 @@
-#include "duet/report/studies/people_table.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
-using test::figure;
+using test::estimate;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -41,25 +40,25 @@ std::vector<EpisodeRow> both_kinds() {
 }
 
 TEST(PeopleTable, RecordedStandBesideSynthetic) {
-  const PeopleTable table = people_table(both_kinds());
-  ASSERT_EQ(table.entries.size(), 3U);
-  const PeopleEntry& hug = table.entries[0];
-  EXPECT_EQ(hug.task, "hug");
-  EXPECT_EQ(hug.recorded.success.k, 1);
-  EXPECT_EQ(hug.recorded.falls.k, 3);
-  EXPECT_EQ(hug.synthetic.success.k, 3);
-  EXPECT_EQ(hug.synthetic.falls.k, 0);
-  EXPECT_DOUBLE_EQ(hug.difference, -0.5);
-  EXPECT_EQ(table.entries[1].task, "handshake");
+  const Analysis analysis = people_analysis(both_kinds());
+  const auto of_hugs = [&](const char* people, const char* name) {
+    return estimate(analysis, {.task = "hug", .of = people, .name = name});
+  };
+  EXPECT_EQ(of_hugs("recorded", "success").k, 1);
+  EXPECT_EQ(of_hugs("recorded", "falls").k, 3);
+  EXPECT_EQ(of_hugs("synthetic", "success").k, 3);
+  EXPECT_EQ(of_hugs("synthetic", "falls").k, 0);
+  EXPECT_DOUBLE_EQ(of_hugs("", "recorded_minus_synthetic").value, -0.5);
+  EXPECT_EQ(of_hugs("", "recorded_minus_synthetic").n, 8);
+  EXPECT_THAT(values_of(analysis.estimates, &Estimate::task), testing::ElementsAre("hug", "handshake", "all"));
 }
 
 TEST(PeopleTable, OverallIsOfTheTasksThatBothKindsHave) {
-  const PeopleTable table = people_table(both_kinds());
-  const PeopleEntry& all = table.entries.back();
-  EXPECT_EQ(all.task, "all");
-  EXPECT_EQ(all.recorded.success.n, 6);
-  EXPECT_EQ(all.synthetic.success.n, 6);  // without the waves
-  EXPECT_EQ(all.synthetic.success.k, 5);
+  const Analysis analysis = people_analysis(both_kinds());
+  EXPECT_EQ(estimate(analysis, {.task = "all", .of = "recorded", .name = "success"}).n, 6);
+  const Estimate synthetic = estimate(analysis, {.task = "all", .of = "synthetic", .name = "success"});
+  EXPECT_EQ(synthetic.n, 6);  // without the waves
+  EXPECT_EQ(synthetic.k, 5);
 }
 
 // Newcombe (1998), method 10: 56 of 70 against 48 of 80 is .2 [.0524, .3339].
@@ -67,37 +66,32 @@ TEST(PeopleTable, TheIntervalIsNewcombes) {
   std::vector<EpisodeRow> rows;
   add_people("recorded", "hug", std::string(56, '1') + std::string(14, '0'), rows);
   add_people("synthetic", "hug", std::string(48, '1') + std::string(32, '0'), rows);
-  const PeopleEntry entry = people_table(rows).entries.at(0);
+  const Estimate difference = estimate(people_analysis(rows), {.task = "hug", .name = "recorded_minus_synthetic"});
   constexpr double kPrinted = 5e-5;
-  EXPECT_NEAR(entry.difference, 0.2, 1e-12);
-  EXPECT_NEAR(entry.interval.low, 0.0524, kPrinted);
-  EXPECT_NEAR(entry.interval.high, 0.3339, kPrinted);
+  EXPECT_NEAR(difference.value, 0.2, 1e-12);
+  EXPECT_NEAR(difference.interval.low, 0.0524, kPrinted);
+  EXPECT_NEAR(difference.interval.high, 0.3339, kPrinted);
 }
 
 TEST(PeopleTable, PerturbedAndUnsupportedEpisodesAreLeftOut) {
   std::vector<EpisodeRow> rows = both_kinds();
   rows[0].perturbation = "push";
   rows[1].outcome = Outcome::kUnsupported;
-  EXPECT_EQ(people_table(rows).entries.at(0).recorded.success.n, 2);
+  EXPECT_EQ(estimate(people_analysis(rows), {.task = "hug", .of = "recorded", .name = "success"}).n, 2);
 }
 
 TEST(PeopleTable, OneKindAloneIsNoTable) {
   std::vector<EpisodeRow> rows;
   add_people("recorded", "hug", "1000", rows);
-  EXPECT_TRUE(people_table(rows).entries.empty());
-  EXPECT_EQ(analysis_markdown(people_analysis(people_table(rows))), "No run with recorded and synthetic people.\n");
+  EXPECT_EQ(analysis_markdown(people_analysis(rows)), "No run with recorded and synthetic people.\n");
+  EXPECT_TRUE(people_analysis(rows).empty());
   EXPECT_TRUE(people_analysis({}).empty());
 }
 
-TEST(PeopleTable, FiguresAreOfBothKindsAndOfTheirDifference) {
-  const Analysis analysis = people_analysis(people_table(both_kinds()));
-  EXPECT_THAT(analysis_markdown(analysis),
+TEST(PeopleTable, ShowsBothKindsAndTheirDifference) {
+  EXPECT_THAT(analysis_markdown(people_analysis(both_kinds())),
               AllOf(HasSubstr("### Recorded and synthetic people"), HasSubstr("| dstar  | Hug "),
                     HasSubstr("25.0 [4.6, 69.9]"), HasSubstr("The leaderboard counts both kinds together")));
-  const Figure difference = figure(analysis, {.policy = "dstar", .task = "hug", .name = "recorded_minus_synthetic"});
-  EXPECT_EQ(difference.n, 8);
-  EXPECT_EQ(difference.value, -0.5);
-  EXPECT_EQ(figure(analysis, {.policy = "dstar", .task = "hug", .of = "recorded", .name = "success"}).k, 1);
 }
 
 }  // namespace

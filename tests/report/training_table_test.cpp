@@ -1,19 +1,20 @@
-#include "duet/report/studies/training_table.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "tests/report/figures.h"
+#include "duet/report/studies/studies.h"
+#include "duet/statistics/crossed_effects.h"
+#include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 #include "tests/support.h"
 
 namespace duet {
 namespace {
 
-using test::figure;
+using test::estimate;
+using test::estimates_like;
 using testing::HasSubstr;
 
 // Each episode is of a clip of its own.
@@ -46,11 +47,11 @@ TEST(TrainingTable, NamesMakeNoTraining) {
   std::vector<EpisodeRow> rows;
   add_training("dp-seed2", "10000000", rows);
   for (EpisodeRow& row : rows) row.tags = {};
-  EXPECT_TRUE(training_table(rows).methods.empty());
+  EXPECT_TRUE(training_analysis(rows).empty());
   for (const char* seed : {"", "x", "-1", "1234567890123456789"}) {
     for (EpisodeRow& row : rows)
       row.tags = RowTags(Tags{{std::string(kMethodTag), "dp"}, {std::string(kTrainingSeedTag), seed}});
-    EXPECT_TRUE(training_table(rows).methods.empty()) << seed;
+    EXPECT_TRUE(training_analysis(rows).empty()) << seed;
   }
 }
 
@@ -59,45 +60,46 @@ TEST(TrainingTable, TwoPoliciesOfOneTrainingAreRefused) {
   for (EpisodeRow& row : rows)
     if (row.policy == "dp-seed10")
       row.tags = RowTags(Tags{{std::string(kMethodTag), "dp"}, {std::string(kTrainingSeedTag), "2"}});
-  EXPECT_THAT(test::thrown_message<InputError>([&] { training_table(rows); }),
+  EXPECT_THAT(test::thrown_message<InputError>([&] { training_analysis(rows); }),
               testing::AllOf(HasSubstr("'dp' with seed 2"), HasSubstr("'dp-seed10'"), HasSubstr("'dp-seed2'")));
 }
 
+constexpr const char* kAgainst = "dstar vs dp";
+
+Estimate of_difference(const Analysis& analysis, const char* of, const char* name) {
+  return estimate(analysis, {.policy = kAgainst, .of = of, .name = name});
+}
+
 TEST(TrainingTable, ATrainingIsOneOfItsMethod) {
-  const TrainingTable table = training_table(two_methods());
-  ASSERT_EQ(table.methods.size(), 2U);
-  const MethodTrainings& dp = table.methods[0];
-  EXPECT_EQ(dp.key.policy, "dp");
-  EXPECT_EQ(dp.seeds, (std::vector<std::string>{"2", "10"}));  // as numbers
-  EXPECT_EQ(dp.success[1].k, 2);
-  EXPECT_DOUBLE_EQ(dp.mean, 0.1875);
-  EXPECT_NEAR(dp.deviation, 0.125 / std::sqrt(2.0), 1e-12);
+  const Analysis analysis = training_analysis(two_methods());
+  EXPECT_THAT(analysis.tables.at(0).table.rows.at(0).at(1), "2, 10");  // seeds of dp as numbers
+  EXPECT_EQ(estimate(analysis, {.policy = "dp", .of = "seed10", .name = "success"}).k, 2);
+  EXPECT_DOUBLE_EQ(estimate(analysis, {.policy = "dp", .name = "mean_success"}).value, 0.1875);
+  EXPECT_NEAR(estimate(analysis, {.policy = "dp", .name = "success_sd"}).value, 0.125 / std::sqrt(2.0), 1e-12);
 }
 
 TEST(TrainingTable, MethodsAreComparedWithTrainingsAndClipsAsRandomEffects) {
-  const TrainingTable table = training_table(two_methods());
-  ASSERT_EQ(table.differences.size(), 1U);
-  const MethodDifference& found = table.differences.front();
-  EXPECT_EQ(found.key.policy, "dstar vs dp");
-  EXPECT_EQ(found.clips, 8);
+  const Analysis analysis = training_analysis(two_methods());
+  ASSERT_EQ(analysis.tables.size(), 2U);  // one task, clean: no part of it
+  const auto found = [&](const char* name) { return of_difference(analysis, "all", name); };
+  EXPECT_EQ(found("clips").value, 8.0);
   const std::vector<int> clip = {0, 1, 2, 3, 4, 5, 6, 7};
   const CrossedDifference expected = crossed_difference({{1, 1, 1, 1, 1, 1, 0, 0}, {1, 1, 1, 1, 1, 1, 1, 0}},
                                                         {{1, 0, 0, 0, 0, 0, 0, 0}, {1, 1, 0, 0, 0, 0, 0, 0}}, clip);
-  EXPECT_DOUBLE_EQ(found.crossed.p, expected.p);
-  EXPECT_DOUBLE_EQ(found.crossed.interval.low, expected.interval.low);
-  EXPECT_DOUBLE_EQ(found.success_a - found.success_b, expected.difference);
-  EXPECT_DOUBLE_EQ(found.p_holm, found.crossed.p);  // one line
-  EXPECT_EQ(found.verdict, PairVerdict::kBetter);
-  EXPECT_TRUE(table.parts.empty());  // one task, clean: no part of it
+  EXPECT_DOUBLE_EQ(found("p").value, expected.p);
+  EXPECT_DOUBLE_EQ(found("difference").interval.low, expected.interval.low);
+  EXPECT_DOUBLE_EQ(found("success_a").value - found("success_b").value, expected.difference);
+  EXPECT_DOUBLE_EQ(found("p_holm").value, expected.p);  // one line
+  EXPECT_EQ(found("verdict").text, "better");
 }
 
 TEST(TrainingTable, OnlyEpisodesThatAllHaveCount) {
   std::vector<EpisodeRow> rows = two_methods();
   std::erase_if(rows, [](const EpisodeRow& row) { return row.policy == "dp-seed2" && row.episode == 0; });
-  const TrainingTable table = training_table(rows);
-  EXPECT_EQ(table.differences.front().episodes, 7);
-  EXPECT_EQ(table.methods[0].success[1].n, 7);  // of dp; the trainings of dstar have eight
-  EXPECT_EQ(table.methods[1].success[1].n, 8);
+  const Analysis analysis = training_analysis(rows);
+  EXPECT_EQ(of_difference(analysis, "all", "difference").n, 7);
+  EXPECT_EQ(estimate(analysis, {.policy = "dp", .of = "seed10", .name = "success"}).n, 7);
+  EXPECT_EQ(estimate(analysis, {.policy = "dstar", .of = "seed2", .name = "success"}).n, 8);
 }
 
 TEST(TrainingTable, PartsAreTasksAndPerturbations) {
@@ -106,17 +108,19 @@ TEST(TrainingTable, PartsAreTasksAndPerturbations) {
     add_training(policy, "1010", rows, "wave");
     add_training(policy, "0101", rows, "wave", "level_1_hesitates");
   }
-  const TrainingTable table = training_table(rows);
+  const Analysis analysis = training_analysis(rows);
   std::vector<std::string> parts;
-  for (const MethodDifference& part : table.parts) parts.push_back(part.of);
-  EXPECT_EQ(parts, (std::vector<std::string>{"hug", "wave", "clean", "level_1_hesitates"}));
-  EXPECT_EQ(table.parts[0].episodes, 8);
-  EXPECT_EQ(table.parts[1].episodes, 8);
-  EXPECT_EQ(table.parts[1].clips, 4);  // one clip clean and perturbed is one clip
-  EXPECT_EQ(table.parts[3].episodes, 4);
+  for (const Estimate& difference : analysis.estimates)
+    if (difference.name == "difference") parts.push_back(difference.of);
+  EXPECT_EQ(parts, (std::vector<std::string>{"all", "hug", "wave", "clean", "level_1_hesitates"}));
+  EXPECT_EQ(of_difference(analysis, "hug", "difference").n, 8);
+  EXPECT_EQ(of_difference(analysis, "wave", "difference").n, 8);
+  EXPECT_EQ(of_difference(analysis, "wave", "clips").value, 4.0);  // one clip clean and perturbed is one clip
+  EXPECT_EQ(of_difference(analysis, "level_1_hesitates", "difference").n, 4);
   // Holm over the parts alone: the smallest p of four.
-  EXPECT_DOUBLE_EQ(table.parts[0].p_holm, std::min(1.0, 4 * table.parts[0].crossed.p));
-  EXPECT_DOUBLE_EQ(table.differences.front().p_holm, table.differences.front().crossed.p);
+  EXPECT_DOUBLE_EQ(of_difference(analysis, "hug", "p_holm").value,
+                   std::min(1.0, 4 * of_difference(analysis, "hug", "p").value));
+  EXPECT_DOUBLE_EQ(of_difference(analysis, "all", "p_holm").value, of_difference(analysis, "all", "p").value);
 }
 
 TEST(TrainingTable, RecordedPeopleAreApartFromSyntheticOnes) {
@@ -125,12 +129,10 @@ TEST(TrainingTable, RecordedPeopleAreApartFromSyntheticOnes) {
     if (row.episode >= 4) test::set_tag(row, kPeopleTag, std::string(kSyntheticPeople));
     row.key = episode_key(row);
   }
-  const TrainingTable table = training_table(rows);
-  ASSERT_EQ(table.differences.size(), 3U);
-  EXPECT_EQ(table.differences[1].of, "recorded");
-  EXPECT_EQ(table.differences[2].of, "synthetic");
-  EXPECT_DOUBLE_EQ(table.differences[1].success_a, 1.0);
-  EXPECT_DOUBLE_EQ(table.differences[2].success_a, 5.0 / 8.0);
+  const Analysis analysis = training_analysis(rows);
+  EXPECT_EQ(analysis.tables.at(1).table.rows.size(), 3U);
+  EXPECT_DOUBLE_EQ(of_difference(analysis, "recorded", "success_a").value, 1.0);
+  EXPECT_DOUBLE_EQ(of_difference(analysis, "synthetic", "success_a").value, 5.0 / 8.0);
 }
 
 TEST(TrainingTable, AClipInBothRolesIsOneClip) {
@@ -141,31 +143,30 @@ TEST(TrainingTable, AClipInBothRolesIsOneClip) {
     if (row.clip != recording) test::set_tag(row, kRecordingTag, recording);
     row.key = episode_key(row);
   }
-  const MethodDifference found = training_table(rows).differences.front();
-  EXPECT_EQ(found.episodes, 8);
-  EXPECT_EQ(found.clips, 4);
+  const Estimate clips = of_difference(training_analysis(rows), "all", "clips");
+  EXPECT_EQ(clips.n, 8);
+  EXPECT_EQ(clips.value, 4.0);
 }
 
 TEST(TrainingTable, OneTrainingSaysNothingOfAMethod) {
   std::vector<EpisodeRow> rows = two_methods();
   std::erase_if(rows, [](const EpisodeRow& row) { return row.policy == "dp-seed2"; });
-  const MethodDifference found = training_table(rows).differences.front();
-  EXPECT_TRUE(std::isnan(found.crossed.p));
-  EXPECT_EQ(found.verdict, PairVerdict::kUndecided);
-  EXPECT_DOUBLE_EQ(found.crossed.difference, found.success_a - found.success_b);
-  const Analysis analysis = training_analysis(training_table(rows));
+  const Analysis analysis = training_analysis(rows);
+  const auto found = [&](const char* name) { return of_difference(analysis, "all", name); };
+  EXPECT_TRUE(std::isnan(found("p").value));
+  EXPECT_TRUE(std::isnan(found("p_holm").value));
+  EXPECT_EQ(found("verdict").text, "undecided");
+  EXPECT_DOUBLE_EQ(found("difference").value, found("success_a").value - found("success_b").value);
   EXPECT_THAT(analysis_markdown(analysis), HasSubstr("Without two trainings of each method nothing is said"));
 }
 
 TEST(TrainingTable, OtherArmsAndOtherPoliciesAreLeftOut) {
   std::vector<EpisodeRow> rows = two_methods();
-  const TrainingTable before = training_table(rows);
+  const std::string before = analysis_csv(training_analysis(rows));
   add_training("dstar", "00000000", rows);
   test::add_episodes({.policy = "dstar-seed3", .arm = "shuffled", .successes = "0000"}, rows);
   std::reverse(rows.begin(), rows.end());
-  const TrainingTable after = training_table(rows);
-  ASSERT_EQ(after.methods.size(), 2U);
-  EXPECT_EQ(after.differences.front().crossed.p, before.differences.front().crossed.p);
+  EXPECT_EQ(analysis_csv(training_analysis(rows)), before);
 }
 
 TEST(TrainingTable, ControllersAreApart) {
@@ -174,18 +175,7 @@ TEST(TrainingTable, ControllersAreApart) {
     if (row.policy.starts_with("dp")) row.controller = "pd";
     row.key = episode_key(row);
   }
-  EXPECT_TRUE(training_table(rows).differences.empty());
-}
-
-TEST(TrainingAnalysis, FiguresAreThoseOfTheTable) {
-  const TrainingTable table = training_table(two_methods());
-  const Analysis analysis = training_analysis(table);
-  EXPECT_DOUBLE_EQ(figure(analysis, {.policy = "dp", .name = "mean_success"}).value, 0.1875);
-  EXPECT_EQ(figure(analysis, {.policy = "dp", .of = "seed10", .name = "success"}).k, 2);
-  EXPECT_DOUBLE_EQ(figure(analysis, {.policy = "dstar vs dp", .of = "all", .name = "p"}).value,
-                   table.differences.front().crossed.p);
-  EXPECT_EQ(figure(analysis, {.policy = "dstar vs dp", .of = "all", .name = "verdict"}).text, "better");
-  EXPECT_TRUE(training_analysis(training_table({})).empty());
+  EXPECT_TRUE(estimates_like(training_analysis(rows), {.of = "all", .name = "difference"}).empty());
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/report/ranking/leaderboard.h"
+#include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/policy_groups.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
@@ -58,9 +58,9 @@ TEST(DistinctEpisodes, PairedTestsCountThemOnceToo) {
     a.back().success = true;
     b.push_back(repeat(i, "b", "bad"));
   }
-  const std::vector<Comparison> comparisons = compare_runs(a, b);
-  EXPECT_EQ(comparisons.front().pairs, 1);
-  EXPECT_EQ(comparisons.front().p, 1.0);  // McNemar of one pair, not of six (0.03)
+  const Estimate p = *find_estimate(comparison_analysis(a, b).estimates, {.task = "all", .name = "p"});
+  EXPECT_EQ(p.n, 1);
+  EXPECT_EQ(p.value, 1.0);  // McNemar of one pair, not of six (0.03)
 }
 
 TEST(DistinctEpisodes, TheSameNumberTwiceIsStillRefused) {

@@ -5,8 +5,7 @@
 #include "duet/app/command.h"
 #include "duet/core/naming_file.h"
 #include "duet/execution/story.h"
-#include "duet/report/ranking/leaderboard.h"
-#include "duet/report/ranking/resolution.h"
+#include "duet/report/ranking/comparison.h"
 #include "duet/rows/folder/name_digests.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/groups/distinct_episodes.h"
@@ -50,10 +49,9 @@ void run_compare(const Session& session, const CompareArguments& arguments) {
   const Run a = open_run(arguments.a);
   const Run b = open_run(arguments.b);
   const std::vector<std::string> notes = comparison_notes(arguments, a, b);
-  const std::vector<Comparison> comparisons = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
-    return compare_runs(a.rows, b.rows, arguments.options);
+  const Analysis analysis = naming_file(fmt::format("A = {}, B = {}", arguments.a, arguments.b), [&] {
+    return comparison_analysis(a.rows, b.rows, arguments.options, arguments.min_effect / 100.0);
   });
-  const Analysis analysis = comparison_analysis(comparisons, arguments.min_effect / 100.0);
   const std::string text = fmt::format("A = {}\nB = {}\n\n{}", arguments.a, arguments.b, terminal_text(analysis));
   print(session, with_notes("md", text, notes),
         {{"a", arguments.a}, {"b", arguments.b}, {"comparison", analysis_json(analysis)}, {"notes", notes}});

@@ -5,7 +5,7 @@
 #include "duet/app/command.h"
 #include "duet/core/file.h"
 #include "duet/replay/rating_page.h"
-#include "duet/report/studies/human_agreement.h"
+#include "duet/report/studies/studies.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet::cli {
@@ -47,14 +47,15 @@ void run_agree(Session& session, const AgreeArguments& arguments) {
   const Run run = open_run(arguments.run);
   const std::vector<Rater> raters = read_ratings(arguments.ratings, run.rows, arguments.run);
   const HumanAgreement agreement = human_agreement(run.rows, raters, arguments.options);
-  const Analysis analysis = human_agreement_analysis(agreement);
-  print(session, terminal_text(analysis),
+  std::vector<std::string> names;
+  for (const Rater& rater : raters) names.push_back(rater.name);
+  print(session, terminal_text(agreement.analysis),
         {{"run", arguments.run},
-         {"raters", agreement.raters},
+         {"raters", names},
          {"episodes", agreement.episodes},
          {"majority", {{"yes", agreement.yes}, {"no", agreement.no}}},
-         {"agreement", analysis_json(analysis)},
-         {"disputes", disputes_json(agreement)}});
+         {"agreement", analysis_json(agreement.analysis)},
+         {"disputes", agreement.disputes}});
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #include "duet/report/page/html_report.h"
 #include "duet/report/page/interval_plot.h"
 #include "duet/report/page/run_analyses.h"
-#include "duet/report/ranking/resolution.h"
+#include "duet/report/ranking/comparison.h"
 #include "duet/rows/groups/database.h"
 #include "duet/rows/merge/run_union.h"
 

@@ -1,6 +1,6 @@
-// A figure of an analysis in the long form that CSV and JSON have: what it is of, what it is called, its value, what it
-// is over and its interval. The columns are the same for every analysis, so that their files may be joined. Nothing is
-// rounded.
+// An estimate in the long form (tidy data) that CSV and JSON have: what it is of, what it is called, its value, what it
+// is over and its interval. An analysis is a list of them; its tables are pivots of that list (pivot.h). The columns
+// are the same for every analysis, so that their files may be joined. Nothing is rounded.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -21,8 +21,8 @@ struct Rate {
 };
 Rate make_rate(long k, long n, double level);
 
-struct Figure {
-  // The figure's keys; "" where one does not apply. A figure of two names both: "bullet vs mujoco". "all": of all
+struct Estimate {
+  // The keys; "" where one does not apply. An estimate of two names both: "bullet vs mujoco". "all": of all
   // tasks, or of all physics engines, together.
   std::string source = "duet";  // or "paper": as the supplement prints it
   std::string engine = {}, controller = {}, policy = {}, arm = {}, perturbation = {}, task = {};
@@ -34,10 +34,12 @@ struct Figure {
   std::string text = {};  // in the place of a value where it is a word
 };
 
-// Figures with the same keys, one after another.
-struct FiguresOf {
-  Figure keys;
-  std::vector<Figure>& into;
+using Estimates = std::vector<Estimate>;
+
+// Estimates with the same keys, one after another.
+struct EstimatesOf {
+  Estimate keys;
+  Estimates& into;
 
   void add(std::string_view name, std::optional<long> n, double value, const Interval& interval = kNoInterval,
            std::string_view unit = "1") const;
@@ -46,11 +48,12 @@ struct FiguresOf {
   void word(std::string_view name, const std::string& text) const;
 };
 
-// A line per figure; `analysis` and the level of intervals are columns, too. Empty where a figure has no such value.
-std::string figures_csv(std::string_view analysis, double level, const std::vector<Figure>& figures);
+// A line per estimate; `analysis` and the level of intervals are columns, too. Empty where an estimate has no such
+// value.
+std::string estimates_csv(std::string_view analysis, double level, const Estimates& estimates);
 
 // A list of objects with the names of those columns, but `analysis` and `level`; what is empty is left out, a value
 // that is not defined is null.
-nlohmann::json figures_json(const std::vector<Figure>& figures);
+nlohmann::json estimates_json(const Estimates& estimates);
 
 }  // namespace duet
