@@ -1,4 +1,4 @@
-// D-STAR in double precision as docs/file-formats.md words it, without a thought for speed.
+// D-STAR's arithmetic in double precision, without a thought for speed (docs/file-formats.md, "Arithmetic").
 #include <fmt/format.h>
 
 #include <algorithm>
