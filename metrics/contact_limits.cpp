@@ -9,19 +9,12 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 namespace {
 
 constexpr const char* kSchema = "duet.contact_limits/1";
-
-std::optional<double> optional_positive(const YamlSection& section, const char* key) {
-  const std::optional<double> value = section.optional_number(key);
-  if (value && *value <= 0.0)
-    section.fail(section.line(key), fmt::format("'{}': expected a number > 0, found {}", key, *value));
-  return value;
-}
 
 void read_transient(const YamlSection& section, RegionLimits& limits) {
   constexpr const char* kKey = "transient_n";
@@ -43,17 +36,15 @@ void read_transient(const YamlSection& section, RegionLimits& limits) {
   limits.transient_n = value;
 }
 
-RegionLimits read_region(const std::string& file, const YAML::Node& node) {
-  const YamlSection section(file, node, "contact limits of a region",
-                            {"region", "quasi_static_n", "transient_n", "pressure_n_cm2", "stiffness_n_mm", "mass_kg"});
-  RegionLimits limits{.region = section.text("region"),
-                      .quasi_static_n = optional_positive(section, "quasi_static_n"),
-                      .transient_n = std::nullopt,
-                      .pressure_n_cm2 = optional_positive(section, "pressure_n_cm2"),
-                      .stiffness_n_mm = optional_positive(section, "stiffness_n_mm"),
-                      .mass_kg = optional_positive(section, "mass_kg")};
-  read_transient(section, limits);
-  return limits;
+const Schema<RegionLimits>& region_schema() {
+  using L = RegionLimits;
+  static const Schema<L> schema = {required_key({"region"}, &L::region),
+                                   optional_key({.name = "quasi_static_n", .range = kPositive}, &L::quasi_static_n),
+                                   {"transient_n", read_transient},
+                                   optional_key({.name = "pressure_n_cm2", .range = kPositive}, &L::pressure_n_cm2),
+                                   optional_key({.name = "stiffness_n_mm", .range = kPositive}, &L::stiffness_n_mm),
+                                   optional_key({.name = "mass_kg", .range = kPositive}, &L::mass_kg)};
+  return schema;
 }
 
 // The key must be there; nothing or blanks behind it mean that nobody has checked the table.
@@ -95,7 +86,8 @@ ContactLimits parse_contact_limits(const std::string& text, const std::string& f
       .name = top.text("name"), .source = top.text("source"), .verified_by = read_verified_by(top), .regions = {}};
   (void)top.node("regions");
   for (const YAML::Node& node : top.items("regions")) {
-    RegionLimits entry = read_region(file, node);
+    RegionLimits entry;
+    read_mapping(file, node, "contact limits of a region", region_schema(), entry);
     for (const RegionLimits& earlier : limits.regions)
       if (earlier.region == entry.region)
         top.fail(node.Mark().line + 1, fmt::format("expected each region once, found '{}' again", entry.region));

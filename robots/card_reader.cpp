@@ -13,7 +13,7 @@
 #include "duet/core/skeleton.h"
 #include "duet/robots/card_digest.h"
 #include "duet/robots/card_roles.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 namespace {
@@ -27,41 +27,33 @@ std::string name_of(const YAML::Node& node) {
   return node.IsMap() && node["name"] && node["name"].IsScalar() ? node["name"].Scalar() : "";
 }
 
-void refuse_negative(const YamlSection& section, const char* key, std::optional<double> value) {
-  if (value && *value < 0.0)
-    section.fail(section.line(key), fmt::format("'{}': expected a number >= 0, found {}", key, *value));
-}
-
-double positive(const YamlSection& section, const char* key) {
-  const double value = section.number(key);
-  if (value <= 0.0) section.fail(section.line(key), fmt::format("'{}': expected a number > 0, found {}", key, value));
-  return value;
+// An entry of one of the card's lists, with its place.
+template <typename Entry>
+Entry read_entry(const std::string& file, const YAML::Node& node, const std::string& where,
+                 const Schema<Entry>& schema) {
+  Entry entry;
+  entry.place = {file, read_mapping(file, node, where, schema, entry).line()};
+  return entry;
 }
 
 CardJoint read_joint(const std::string& file, const YAML::Node& node) {
-  const YamlSection section(file, node, fmt::format("joint '{}'", name_of(node)),
-                            {"name", "armature", "kp", "kd", "neutral", "lower", "upper", "effort", "velocity"});
-  CardJoint joint{.name = section.text("name"),
-                  .place = {file, section.line()},
-                  .armature = section.number("armature"),
-                  .kp = section.number("kp"),
-                  .kd = section.number("kd"),
-                  .neutral = section.optional_number("neutral").value_or(0.0),
-                  .lower = section.optional_number("lower"),
-                  .upper = section.optional_number("upper"),
-                  .effort = section.optional_number("effort"),
-                  .velocity = section.optional_number("velocity")};
-  refuse_negative(section, "armature", joint.armature);
-  refuse_negative(section, "kp", joint.kp);
-  refuse_negative(section, "kd", joint.kd);
-  if (joint.effort) joint.effort = positive(section, "effort");
-  if (joint.velocity) joint.velocity = positive(section, "velocity");
-  return joint;
+  using J = CardJoint;
+  static const Schema<J> schema = {required_key({"name"}, &J::name),
+                                   required_key({.name = "armature", .range = kNotNegative}, &J::armature),
+                                   required_key({.name = "kp", .range = kNotNegative}, &J::kp),
+                                   required_key({.name = "kd", .range = kNotNegative}, &J::kd),
+                                   optional_key({"neutral"}, &J::neutral),
+                                   optional_key({"lower"}, &J::lower),
+                                   optional_key({"upper"}, &J::upper),
+                                   optional_key({.name = "effort", .range = kPositive}, &J::effort),
+                                   optional_key({.name = "velocity", .range = kPositive}, &J::velocity)};
+  return read_entry(file, node, fmt::format("joint '{}'", name_of(node)), schema);
 }
 
 CardLock read_lock(const std::string& file, const YAML::Node& node) {
-  const YamlSection section(file, node, fmt::format("locked joint '{}'", name_of(node)), {"name", "position"});
-  return {.joint = section.text("name"), .place = {file, section.line()}, .position = section.number("position")};
+  using L = CardLock;
+  static const Schema<L> schema = {required_key({"name"}, &L::joint), required_key({"position"}, &L::position)};
+  return read_entry(file, node, fmt::format("locked joint '{}'", name_of(node)), schema);
 }
 
 // URDF's fixed-axis roll, pitch, yaw.
@@ -71,16 +63,17 @@ Eigen::Quaterniond from_rpy(const Eigen::Vector3d& rpy) {
 }
 
 CardFrame read_frame(const std::string& file, const YAML::Node& node) {
-  const YamlSection section(file, node, fmt::format("frame '{}'", name_of(node)),
-                            {"name", "link", "xyz", "rpy", "replaces_urdf_link"});
-  CardFrame frame{.name = section.text("name"),
-                  .place = {file, section.line()},
-                  .link = section.text("link"),
-                  .X_LF = {},
-                  .replaces_urdf_link = section.flag_or("replaces_urdf_link", false)};
-  frame.X_LF.p = section.vector3("xyz");
-  if (section.has("rpy")) frame.X_LF.R = from_rpy(section.vector3("rpy"));
-  return frame;
+  using F = CardFrame;
+  static const Schema<F> schema = {
+      required_key({"name"}, &F::name),
+      required_key({"link"}, &F::link),
+      {"xyz", [](const YamlSection& section, F& frame) { frame.X_LF.p = section.vector3("xyz"); }},
+      {"rpy",
+       [](const YamlSection& section, F& frame) {
+         if (section.has("rpy")) frame.X_LF.R = from_rpy(section.vector3("rpy"));
+       }},
+      optional_key({"replaces_urdf_link"}, &F::replaces_urdf_link)};
+  return read_entry(file, node, fmt::format("frame '{}'", name_of(node)), schema);
 }
 
 CardShape read_shape(const std::string& file, const YAML::Node& node) {
@@ -102,7 +95,7 @@ CardShape read_shape(const std::string& file, const YAML::Node& node) {
   shape.to = section.vector3(sphere ? "center" : "to");
   if (!sphere && (shape.to - shape.from).norm() < 1e-6)
     section.fail(shape.place.line, "expected two different ends of the capsule, found the same point");
-  shape.radius = positive(section, "radius");
+  read_value(section, {.name = "radius", .range = kPositive}, shape.radius);
   shape.region = section.text("region");
   shape.sole = section.flag_or("sole", false);
   return shape;

@@ -12,6 +12,7 @@
 #include "duet/core/require.h"
 #include "duet/robots/origin.h"
 #include "duet/robots/roles.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 namespace {
@@ -63,12 +64,6 @@ void read_name(const YamlSection& card, const std::string& file, const char* key
   if (card.has(key)) name = CardName{card.text(key), {file, card.line(key)}};
 }
 
-double above_zero(const YamlSection& section, const char* key) {
-  const double value = section.number(key);
-  if (value <= 0.0) section.fail(section.line(key), fmt::format("'{}': expected a number > 0, found {}", key, value));
-  return value;
-}
-
 std::pair<double, double> range(const YamlSection& section, const std::string& key, const YAML::Node& node) {
   const auto number = [&](std::size_t i) {
     double value = 0.0;
@@ -89,12 +84,15 @@ std::pair<double, double> range(const YamlSection& section, const std::string& k
 void read_sizes(const YamlSection& card, const std::string& file, CardRoles& roles) {
   if (card.has("fall")) {
     const YamlSection section(file, card.node("fall"), "fall", {"height", "cos_tilt"});
-    roles.fall = FallRule{above_zero(section, "height"), section.number("cos_tilt")};
+    FallRule& fall = roles.fall.emplace();
+    read_value(section, {.name = "height", .range = kPositive}, fall.height);
+    fall.cos_tilt = section.number("cos_tilt");
   }
   if (card.has("stance")) {
     const YamlSection section(file, card.node("stance"), "stance", {"half_width", "shift"});
     const auto shift = range(section, "shift", section.node("shift"));
-    roles.stance = StanceSize{above_zero(section, "half_width"), {shift.first, shift.second}};
+    StanceSize& stance = roles.stance.emplace(StanceSize{0.0, {shift.first, shift.second}});
+    read_value(section, {.name = "half_width", .range = kPositive}, stance.half_width);
   }
   if (card.has("root_bounds")) {
     const YamlSection section(file, card.node("root_bounds"), "root_bounds", {"height", "crouch", "roll", "pitch"});

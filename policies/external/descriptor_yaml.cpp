@@ -8,7 +8,7 @@
 #include "duet/core/names.h"
 #include "duet/policies/external/descriptor.h"
 #include "duet/policies/policy.h"
-#include "duet/robots/yaml_section.h"
+#include "duet/robots/yaml_schema.h"
 
 namespace duet {
 namespace {
@@ -17,73 +17,100 @@ constexpr const char* kSchema = "duet.policy/1";
 constexpr int kMostAnchors = 1000, kMostTicks = 500;
 constexpr int kMostNoise = 1000000;
 
-std::string text_or(const YamlSection& section, const char* key, const std::string& fallback) {
-  return section.has(key) ? section.text(key) : fallback;
+void read_schema(const YamlSection& root, PolicyDescriptor&) {
+  if (const std::string schema = root.text("schema"); schema != kSchema)
+    root.fail(root.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kSchema, schema));
 }
 
-// The place of the key's word in `known`; of `fallback` where the key is absent.
-int choice(const YamlSection& section, const char* key, const std::string& fallback,
-           const std::vector<std::string>& known) {
-  const std::string word = text_or(section, key, fallback);
-  const auto it = std::ranges::find(known, word);
-  if (it == known.end()) section.fail(section.line(key), unknown_name_message(key, word, known));
-  return static_cast<int>(it - known.begin());
+void read_joints(const YamlSection& root, PolicyDescriptor& out) {
+  read_optional(root, {"joints"}, out.joints);
+  out.joints_line = root.line("joints");
+  for (auto it = out.joints.begin(); it != out.joints.end(); ++it)
+    if (std::find(out.joints.begin(), it, *it) != it)
+      root.fail(out.joints_line, fmt::format("'joints': expected each joint once, found '{}' again", *it));
 }
 
-int whole_or(const YamlSection& section, const char* key, int fallback, int least, int most) {
-  const double value = section.optional_number(key).value_or(fallback);
-  if (value != std::floor(value) || value < least || value > most)
-    section.fail(section.line(key),
-                 fmt::format("'{}': expected a whole number in [{}, {}], found {}", key, least, most, value));
-  return static_cast<int>(value);
-}
-
-std::vector<std::string> texts(const YamlSection& section, const char* key) {
-  std::vector<std::string> values;
-  for (const YAML::Node& item : section.items(key)) {
-    if (!item.IsScalar() || item.Scalar().empty())
-      section.fail(section.line(key), fmt::format("'{}': expected texts, found {}", key, describe(item)));
-    values.push_back(item.Scalar());
+void read_tasks(const YamlSection& root, PolicyDescriptor& out) {
+  if (!root.has("tasks")) return;
+  out.tasks.clear();
+  const auto fail = [&](const std::string& message) { root.fail(root.line("tasks"), "'tasks': " + message); };
+  std::vector<std::string> names;
+  read_value(root, {"tasks"}, names);
+  for (const std::string& name : names) {
+    try {
+      out.tasks.push_back(parse_task(name));
+    } catch (const std::invalid_argument& error) {
+      fail(error.what());
+    }
+    if (std::find(out.tasks.begin(), out.tasks.end() - 1, out.tasks.back()) != out.tasks.end() - 1)
+      fail(fmt::format("expected each task once, found '{}' again", name));
   }
-  return values;
+  if (out.tasks.empty()) fail("expected at least one task, found none");
 }
 
-// A number or a list of them, without a NaN.
-std::vector<double> numbers_or(const YamlSection& section, const char* key, double fallback) {
-  if (!section.has(key)) return {fallback};
-  if (section.node(key).IsScalar()) return {section.number(key)};
-  std::vector<double> values;
-  for (const YAML::Node& item : section.items(key)) {
-    double value = 0.0;
-    if (!item.IsScalar() || !YAML::convert<double>::decode(item, value) || !std::isfinite(value))
-      section.fail(section.line(key), fmt::format("'{}': expected finite numbers, found {}", key, describe(item)));
-    values.push_back(value);
-  }
-  if (values.empty()) section.fail(section.line(key), fmt::format("'{}': expected numbers, found none", key));
-  return values;
+void read_spacing(const YamlSection& s, PlanFormat& output) {
+  const double spacing = s.optional_number("spacing").value_or(kAnchorSpacing);
+  const double ticks = std::round(spacing / kTick);
+  if (std::abs(ticks * kTick - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
+    s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}", kTick, kTick,
+                                          kMostTicks * kTick, spacing));
+  output.ticks_per_anchor = static_cast<int>(ticks);
+}
+
+// A number or a list of them.
+void read_numbers(const YamlSection& s, const char* key, std::vector<double>& values) {
+  if (!s.has(key)) return;
+  if (s.node(key).IsScalar())
+    values = {s.number(key)};
+  else
+    read_value(s, {key}, values);
+}
+
+const Schema<PlanFormat>& output_schema() {
+  using F = PlanFormat;
+  static const Schema<F> schema = {
+      optional_key({"name"}, &F::name),
+      optional_key({.name = "anchors", .range = {1.0, kMostAnchors}}, &F::anchors),
+      {"spacing", read_spacing},
+      optional_key({.name = "frame", .choices = {"world", "ego", "displacement"}}, &F::frame),
+      optional_key({.name = "joints_from", .choices = {"zero", "neutral"}}, &F::joints_from_neutral),
+      {"scale", [](const YamlSection& s, F& output) { read_numbers(s, "scale", output.scale); }},
+      {"offset", [](const YamlSection& s, F& output) { read_numbers(s, "offset", output.offset); }}};
+  return schema;
+}
+
+// The keys of every descriptor; those of one kind alone are required or refused once the kind is known.
+const Schema<PolicyDescriptor>& descriptor_schema() {
+  using D = PolicyDescriptor;
+  const FieldRange wait = {1.0, kMostMilliseconds};
+  static const Schema<D> schema = {{"schema", read_schema},
+                                   required_key({"name"}, &D::name),
+                                   required_key({"about"}, &D::about),
+                                   required_key({.name = "kind", .choices = {"onnx", "process"}}, &D::kind),
+                                   {"joints", read_joints},
+                                   {"tasks", read_tasks},
+                                   optional_key({.name = "frame_of_reference", .choices = {"world", "ego"}}, &D::frame),
+                                   mapping_key("output", &D::output, output_schema()),
+                                   {"network"},
+                                   {"inputs"},
+                                   optional_key({"command"}, &D::command),
+                                   optional_key({"socket"}, &D::socket),
+                                   optional_key({.name = "deadline_ms", .range = wait}, &D::deadline_ms),
+                                   optional_key({.name = "hang_ms", .range = wait}, &D::hang_ms),
+                                   optional_key({.name = "start_ms", .range = wait}, &D::start_ms)};
+  return schema;
 }
 
 // Reads one descriptor; its members are the state that the steps share.
 class DescriptorReader {
  public:
   DescriptorReader(const std::string& text, const std::string& file)
-      : root_(file, parse_yaml(text, file), "policy descriptor",
-              {"schema", "name", "about", "kind", "joints", "tasks", "frame_of_reference", "output", "network",
-               "inputs", "command", "socket", "deadline_ms", "hang_ms", "start_ms"}) {
+      : root_(read_mapping(file, parse_yaml(text, file), "policy descriptor", descriptor_schema(), out_)) {
     out_.file = file;
+    out_.output.line = root_.line("output");
   }
 
   PolicyDescriptor read() {
-    if (root_.text("schema") != kSchema)
-      root_.fail(root_.line("schema"),
-                 fmt::format("'schema': expected '{}', found '{}'", kSchema, root_.text("schema")));
-    out_.name = root_.text("name");
-    out_.about = root_.text("about");
-    out_.kind = static_cast<PolicyKind>(choice(root_, "kind", root_.text("kind"), {"onnx", "process"}));
-    out_.frame = static_cast<PolicyFrame>(choice(root_, "frame_of_reference", "world", {"world", "ego"}));
-    read_joints();
-    read_tasks();
-    read_output();
     if (out_.kind == PolicyKind::kOnnx)
       read_network();
     else
@@ -92,54 +119,6 @@ class DescriptorReader {
   }
 
  private:
-  void read_joints() {
-    out_.joints = texts(root_, "joints");
-    out_.joints_line = root_.line("joints");
-    for (auto it = out_.joints.begin(); it != out_.joints.end(); ++it)
-      if (std::find(out_.joints.begin(), it, *it) != it)
-        root_.fail(out_.joints_line, fmt::format("'joints': expected each joint once, found '{}' again", *it));
-  }
-
-  void read_tasks() {
-    if (!root_.has("tasks")) return;
-    out_.tasks.clear();
-    const auto fail = [&](const std::string& message) { root_.fail(root_.line("tasks"), "'tasks': " + message); };
-    for (const std::string& name : texts(root_, "tasks")) {
-      try {
-        out_.tasks.push_back(parse_task(name));
-      } catch (const std::invalid_argument& error) {
-        fail(error.what());
-      }
-      if (std::find(out_.tasks.begin(), out_.tasks.end() - 1, out_.tasks.back()) != out_.tasks.end() - 1)
-        fail(fmt::format("expected each task once, found '{}' again", name));
-    }
-    if (out_.tasks.empty()) fail("expected at least one task, found none");
-  }
-
-  void read_output() {
-    PlanFormat& output = out_.output;
-    output.line = root_.line("output");
-    if (!root_.has("output")) return;
-    const YamlSection s(out_.file, root_.node("output"), "output",
-                        {"name", "anchors", "spacing", "frame", "joints_from", "scale", "offset"});
-    output.name = text_or(s, "name", "");
-    output.anchors = whole_or(s, "anchors", output.anchors, 1, kMostAnchors);
-    output.ticks_per_anchor = read_spacing(s);
-    output.frame = static_cast<PlanFrame>(choice(s, "frame", "world", {"world", "ego", "displacement"}));
-    output.joints_from_neutral = choice(s, "joints_from", "zero", {"zero", "neutral"}) == 1;
-    output.scale = numbers_or(s, "scale", 1.0);
-    output.offset = numbers_or(s, "offset", 0.0);
-  }
-
-  static int read_spacing(const YamlSection& s) {
-    const double spacing = s.optional_number("spacing").value_or(kAnchorSpacing);
-    const double ticks = std::round(spacing / kTick);
-    if (std::abs(ticks * kTick - spacing) > 1e-9 || ticks < 1 || ticks > kMostTicks)
-      s.fail(s.line("spacing"), fmt::format("'spacing': expected a multiple of {} s in [{}, {}], found {}", kTick,
-                                            kTick, kMostTicks * kTick, spacing));
-    return static_cast<int>(ticks);
-  }
-
   void refuse_keys(std::initializer_list<const char*> keys, const char* kind) const {
     for (const char* key : keys)
       if (root_.has(key))
@@ -156,11 +135,16 @@ class DescriptorReader {
   }
 
   [[nodiscard]] PolicyInput read_input(const YAML::Node& node) const {
-    const YamlSection s(out_.file, node, "input", {"name", "frames", "order", "channels"});
-    PolicyInput input{.name = text_or(s, "name", ""), .line = s.line(), .channels = {}};
-    input.frames = whole_or(s, "frames", 1, 1, kHistoryFrames);
-    input.newest_first = choice(s, "order", "oldest_first", {"oldest_first", "newest_first"}) == 1;
-    for (const YAML::Node& channel : s.items("channels")) input.channels.push_back(read_channel(s, channel));
+    using I = PolicyInput;
+    const Schema<I> schema = {
+        optional_key({"name"}, &I::name),
+        optional_key({.name = "frames", .range = {1.0, kHistoryFrames}}, &I::frames),
+        optional_key({.name = "order", .choices = {"oldest_first", "newest_first"}}, &I::newest_first),
+        {"channels", [this](const YamlSection& s, I& input) {
+           for (const YAML::Node& channel : s.items("channels")) input.channels.push_back(read_channel(s, channel));
+         }}};
+    PolicyInput input;
+    const YamlSection s = read_mapping(out_.file, node, "input", schema, input);
     if (input.channels.empty()) s.fail(s.line("channels"), "'channels': expected at least one, found none");
     for (const Channel& channel : input.channels)
       if (input.frames > 1 && !is_of_a_frame(channel.kind))
@@ -173,31 +157,36 @@ class DescriptorReader {
   [[nodiscard]] Channel read_channel(const YamlSection& input, const YAML::Node& node) const {
     Channel channel{.line = std::max(node.Mark().line, 0) + 1};
     if (node.IsScalar()) {
-      channel.kind = kind_of(input, channel.line, node.Scalar());
-      if (channel.kind == ChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
+      read_kind(input, channel.line, node.Scalar(), channel);
       refuse_noise_without_size(input, channel);
       return channel;
     }
-    const YamlSection s(out_.file, node, "channel", {"channel", "size", "offset", "scale"});
-    channel.kind = kind_of(s, s.line("channel"), s.text("channel"));
-    if (s.has("size") && channel.kind != ChannelKind::kNoise)
-      s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", name_of(channel)));
-    if (channel.kind == ChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
-    if (s.has("size")) channel.size = whole_or(s, "size", 0, 1, kMostNoise);
-    refuse_noise_without_size(s, channel);
-    channel.shift = numbers_for(s, "offset", 0.0, channel);
-    channel.scale = numbers_for(s, "scale", 1.0, channel);
+    using C = Channel;
+    const Schema<C> schema = {
+        {"channel", [this](const YamlSection& s, C& c) { read_kind(s, s.line("channel"), s.text("channel"), c); }},
+        {"size", read_size},
+        {"offset", [this](const YamlSection& s, C& c) { read_each(s, "offset", c, c.shift); }},
+        {"scale", [this](const YamlSection& s, C& c) { read_each(s, "scale", c, c.scale); }}};
+    read_mapping(out_.file, node, "channel", schema, channel);
     return channel;
   }
 
   static std::string name_of(const Channel& channel) { return channel_name(channel.kind, ChannelFormat::kPolicy); }
 
-  static ChannelKind kind_of(const YamlSection& s, int line, const std::string& name) {
+  void read_kind(const YamlSection& s, int line, const std::string& name, Channel& channel) const {
     try {
-      return channel_kind(name, ChannelFormat::kPolicy);
+      channel.kind = channel_kind(name, ChannelFormat::kPolicy);
     } catch (const std::invalid_argument& error) {
       s.fail(line, error.what());
     }
+    if (channel.kind == ChannelKind::kTask) channel.size = static_cast<int>(out_.tasks.size());
+  }
+
+  static void read_size(const YamlSection& s, Channel& channel) {
+    if (s.has("size") && channel.kind != ChannelKind::kNoise)
+      s.fail(s.line("size"), fmt::format("expected no key 'size' in a {}, found one", name_of(channel)));
+    read_optional(s, {.name = "size", .range = {1.0, kMostNoise}}, channel.size);
+    refuse_noise_without_size(s, channel);
   }
 
   static void refuse_noise_without_size(const YamlSection& s, const Channel& channel) {
@@ -205,31 +194,25 @@ class DescriptorReader {
       s.fail(channel.line, "channel 'noise': expected {channel: noise, size: NUMBER}, found no size");
   }
 
-  [[nodiscard]] std::vector<double> numbers_for(const YamlSection& s, const char* key, double fallback,
-                                                const Channel& channel) const {
-    std::vector<double> values = numbers_or(s, key, fallback);
+  // One number for all of the channel's, or one each.
+  void read_each(const YamlSection& s, const char* key, const Channel& channel, std::vector<double>& values) const {
+    read_numbers(s, key, values);
     const int size = channel_size(channel, {.joints = static_cast<int>(out_.joints.size()), .actions = 0});
     if (values.size() != 1 && static_cast<int>(values.size()) != size)
       s.fail(s.line(key), fmt::format("'{}': expected 1 or {} numbers, found {}", key, size, values.size()));
-    return values;
   }
 
   void read_process() {
     refuse_keys({"network", "inputs"}, "process");
     if (!out_.output.name.empty())
       root_.fail(out_.output.line, "output: expected no key 'name' where 'kind' is 'process', found one");
-    out_.command = texts(root_, "command");
-    out_.socket = text_or(root_, "socket", "");
     if (out_.command.empty() == out_.socket.empty())
       root_.fail(root_.line("command"), fmt::format("expected one of 'command' and 'socket', found {}",
                                                     out_.socket.empty() ? "none" : "both"));
-    if (root_.has("deadline_ms")) out_.deadline_ms = whole_or(root_, "deadline_ms", 1, 1, kMostMilliseconds);
-    out_.hang_ms = whole_or(root_, "hang_ms", out_.hang_ms, 1, kMostMilliseconds);
-    out_.start_ms = whole_or(root_, "start_ms", out_.start_ms, 1, kMostMilliseconds);
   }
 
-  YamlSection root_;
   PolicyDescriptor out_;
+  YamlSection root_;
 };
 
 }  // namespace
