@@ -76,12 +76,11 @@ std::vector<SuiteReference> read_references(const YamlSection& suite, const std:
 }
 
 std::string references_yaml(const std::vector<SuiteReference>& references) {
-  if (references.empty()) return "";
-  std::string text = "reference:\n";
+  std::string text;
   for (const SuiteReference& reference : references) {
     const Eigen::Vector3d& v = reference.velocity;
     text += fmt::format(
-        "  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}}}\n",
+        "\n  - {{name: {}, velocity: [{}, {}, {}], seconds: {}, begin: {}, end: {}, pause: {}, upper_body: {}{}}}",
         reference.name, v.x(), v.y(), v.z(), reference.seconds, reference.begin, reference.end, reference.pause,
         kUpperBodies.at(static_cast<std::size_t>(reference.upper_body)), tags_yaml(reference.tags));
   }

@@ -34,7 +34,7 @@ struct SuiteReference {
 
 // A mapping or a list of them. Throws InputError: file, line, expected, found.
 std::vector<SuiteReference> read_references(const YamlSection& suite, const std::string& file);
-std::string references_yaml(const std::vector<SuiteReference>& references);  // "" where there are none
+std::string references_yaml(const std::vector<SuiteReference>& references);  // a block; "" where there are none
 
 // The reference by its name; throws std::invalid_argument with those that are there.
 const SuiteReference& reference_of(const std::vector<SuiteReference>& references, const std::string& name);

@@ -155,11 +155,11 @@ std::string to_yaml(const SuitePolicy& policy) {
 }
 
 template <typename Item>
-std::string list_yaml(const char* key, const std::vector<Item>& items) {
+std::string list_yaml(const std::vector<Item>& items) {
   std::vector<std::string> texts;
   texts.reserve(items.size());
   for (const Item& item : items) texts.push_back(to_yaml(item));
-  return fmt::format("{}: [{}]\n", key, fmt::join(texts, ", "));
+  return fmt::format("[{}]", fmt::join(texts, ", "));
 }
 
 }  // namespace
@@ -205,8 +205,8 @@ std::string from_folder_of(const Suite& suite, const std::string& file) {
   return std::filesystem::absolute(here ? std::filesystem::path(file) : beside).lexically_normal().string();
 }
 
-std::string controllers_yaml(const Suite& suite) { return list_yaml("controllers", suite.controllers); }
-std::string policies_yaml(const Suite& suite) { return list_yaml("policies", suite.policies); }
+std::string controllers_yaml(const Suite& suite) { return list_yaml(suite.controllers); }
+std::string policies_yaml(const Suite& suite) { return list_yaml(suite.policies); }
 
 void read_controllers(const YamlSection& top, Suite& suite) {
   read_list(top, "controllers", "controller", [&](const YAML::Node& node) {

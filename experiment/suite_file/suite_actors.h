@@ -12,7 +12,7 @@ namespace duet {
 void read_controllers(const YamlSection& top, Suite& suite);
 void read_policies(const YamlSection& top, Suite& suite);
 
-// Their lines of the resolved form; a plain controller or policy is its name.
+// Their values in the resolved form; a plain controller or policy is its name.
 std::string controllers_yaml(const Suite& suite);
 std::string policies_yaml(const Suite& suite);
 

@@ -198,8 +198,8 @@ std::string clips_yaml(const SuiteClips& clips) {
   if (clips.synth_per_task > 0 || clips.synth_per_file > 0) parts.push_back("synth: " + synth_yaml(clips));
   if (clips.pad.any()) parts.push_back("pad: " + flow_mapping(padding_fields(), clips.pad));
   if (clips.roles != ClipRoles::kOwn) parts.push_back(fmt::format("roles: {}", name_of(role_names(), clips.roles)));
-  if (clips.files.empty()) return fmt::format("clips: {{{}}}\n", fmt::join(parts, ", "));
-  return fmt::format("clips:\n  {}\n", fmt::join(parts, "\n  "));
+  if (clips.files.empty()) return fmt::format("{{{}}}", fmt::join(parts, ", "));
+  return fmt::format("\n  {}", fmt::join(parts, "\n  "));
 }
 
 }  // namespace duet

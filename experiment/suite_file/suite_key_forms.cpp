@@ -3,60 +3,40 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
-#include <utility>
 
 #include "duet/experiment/suite_file/suite_section.h"
-#include "duet/robots/yaml_fields.h"
 
 namespace duet {
 namespace {
 
-using With = SuiteKey::With;
-
-std::string written(const Field<Suite>& value, KeyForm form, const Suite& suite) {
-  const std::string text = value.text(suite);
-  if (form == KeyForm::kUnlessDefault && text == value.text(Suite())) return "";
+std::string in_form(const std::string& text, KeyForm form, const std::string& fallback) {
+  if (form == KeyForm::kUnlessDefault && text == fallback) return "";
   if (form == KeyForm::kQuotedUnlessEmpty && text.empty()) return "";
-  const bool quoted = form == KeyForm::kQuoted || form == KeyForm::kQuotedUnlessEmpty;
-  return fmt::format("{}: {}\n", value.name, quoted ? yaml_quoted(text) : text);
+  return form == KeyForm::kQuoted || form == KeyForm::kQuotedUnlessEmpty ? yaml_quoted(text) : text;
 }
 
 }  // namespace
 
-// A key whose value is one field of the suite.
-SuiteKey plain_key(Field<Suite> value, With with, KeyForm form) {
-  SuiteKey key{value.name, field_rows(FieldTable<Suite>{value}, Suite()), with};
-  key.read = [value](const YamlSection& top, Suite& suite) { read_field(top, value, suite); };
-  key.write = [value = std::move(value), form](const Suite& suite) { return written(value, form, suite); };
+SuiteKey plain_key(const Field<Suite>& value, SuiteKey::With with, KeyForm form) {
+  SuiteKey key(field_key(value), with);
+  key.write = [value, form](const Suite& suite) { return in_form(value.text(suite), form, value.text(Suite())); };
   return key;
 }
 
-SuiteKey required_key(Field<Suite> value, KeyForm form) {
-  SuiteKey key = plain_key(value, With::kBoth, form);
+SuiteKey required_key(const Field<Suite>& value, KeyForm form) {
+  SuiteKey key = plain_key(value, SuiteKey::With::kBoth, form);
   key.rows.front().fallback = "required";
-  key.read = [value = std::move(value)](const YamlSection& top, Suite& suite) {
+  key.read = [value](const YamlSection& top, Suite& suite) {
     static_cast<void>(top.text(value.name.c_str()));  // it has to be there
     read_field(top, value, suite);
   };
   return key;
 }
 
-// A key whose value is a mapping of fields of the suite.
-SuiteKey group_key(const std::string& name, const FieldTable<Suite>& table, With with) {
-  SuiteKey key{name, field_rows(table, Suite()), with};
-  for (FieldRow& row : key.rows) row.name = name + '.' + row.name;
-  key.read = [name, table](const YamlSection& top, Suite& suite) {
-    read_fields(section_below(top, suite.file, name, field_keys(table)), table, suite);
-  };
-  key.write = [name, table](const Suite& suite) { return name + ": " + flow_mapping(table, suite) + '\n'; };
-  return key;
-}
-
 // A map whose keys and values another room checks, each by itself and then all together.
 SuiteKey choices_key(const std::string& name, const FieldRow& row, SuiteChoices Suite::*member,
                      const std::function<void(const SuiteChoices&)>& check) {
-  SuiteKey key{name, {row}, With::kClips};
-  key.read = [name, member, check](const YamlSection& top, Suite& suite) {
+  const auto read = [name, member, check](const YamlSection& top, Suite& suite) {
     if (!top.has(name.c_str())) return;
     const YAML::Node node = top.node(name.c_str());
     if (!node.IsMap())
@@ -79,12 +59,12 @@ SuiteKey choices_key(const std::string& name, const FieldRow& row, SuiteChoices 
     }
     checked(top, name.c_str(), [&] { check(found); });
   };
-  key.write = [name, member](const Suite& suite) {
-    std::string text = (suite.*member).empty() ? "" : name + ":\n";
-    for (const auto& [option, value] : suite.*member) text += fmt::format("  {}: {}\n", option, value);
+  const auto write = [member](const Suite& suite) {
+    std::string text;
+    for (const auto& [option, value] : suite.*member) text += fmt::format("\n  {}: {}", option, value);
     return text;
   };
-  return key;
+  return {{name, read, {row}, write}, SuiteKey::With::kClips};
 }
 
 }  // namespace duet

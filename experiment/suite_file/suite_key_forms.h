@@ -1,4 +1,4 @@
-// The forms that a suite's keys have: a field of the suite, a mapping of fields, a mapping that another room checks.
+// The forms that a suite's keys have: a field of the suite, a mapping that another room checks.
 #pragma once
 
 #include <functional>
@@ -12,12 +12,9 @@ namespace duet {
 enum class KeyForm { kAsIs, kQuoted, kUnlessDefault, kQuotedUnlessEmpty };  // of a value in the resolved form
 
 // The key that a field names.
-SuiteKey plain_key(Field<Suite> value, SuiteKey::With with = SuiteKey::With::kBoth, KeyForm form = KeyForm::kAsIs);
-SuiteKey required_key(Field<Suite> value, KeyForm form);
-
-// A key whose value is a mapping of fields.
-SuiteKey group_key(const std::string& name, const FieldTable<Suite>& table,
-                   SuiteKey::With with = SuiteKey::With::kBoth);
+SuiteKey plain_key(const Field<Suite>& value, SuiteKey::With with = SuiteKey::With::kBoth,
+                   KeyForm form = KeyForm::kAsIs);
+SuiteKey required_key(const Field<Suite>& value, KeyForm form);
 
 // A mapping from names to values: `check` throws std::invalid_argument for each of them alone, then for all together.
 using SuiteChoices = std::map<std::string, std::string>;

@@ -32,15 +32,16 @@ namespace {
 using Keys = std::vector<SuiteKey>;
 using With = SuiteKey::With;
 
+constexpr const char* kSuiteSchema = "duet.suite/1";
+
 SuiteKey schema_key() {
-  SuiteKey key{"schema", {{"schema", "duet.suite/1", "required", "of this file"}}};
-  key.read = [](const YamlSection& top, Suite&) {
+  const auto read = [](const YamlSection& top, Suite&) {
     const std::string schema = top.text("schema");
-    if (schema != "duet.suite/1")
-      top.fail(top.line("schema"), fmt::format("schema: expected 'duet.suite/1', found '{}'", schema));
+    if (schema != kSuiteSchema)
+      top.fail(top.line("schema"), fmt::format("schema: expected '{}', found '{}'", kSuiteSchema, schema));
   };
-  key.write = [](const Suite&) { return "schema: duet.suite/1\n"; };
-  return key;
+  return SchemaKey<Suite>("schema", read, {{"schema", kSuiteSchema, "required", "of this file"}},
+                          [](const Suite&) { return kSuiteSchema; });
 }
 
 // Fills in what a suite of references has in the place of policies, tasks and people.
@@ -52,20 +53,20 @@ void lead_by_velocity(Suite& suite) {
 }
 
 SuiteKey reference_key() {
-  SuiteKey key{"reference",
-               {{"reference", "a mapping, or a list of them", "",
-                 "a root that moves by command, in the place of clips, tasks and policies (file-formats.md)"}},
-               With::kReference};
-  key.read = [](const YamlSection& top, Suite& suite) {
+  const auto read = [](const YamlSection& top, Suite& suite) {
     suite.references = read_references(top, suite.file);
     if (!suite.references.empty()) lead_by_velocity(suite);
   };
-  key.write = [](const Suite& suite) { return references_yaml(suite.references); };
-  return key;
+  return {{"reference",
+           read,
+           {{"reference", "a mapping, or a list of them", "",
+             "a root that moves by command, in the place of clips, tasks and policies (file-formats.md)"}},
+           [](const Suite& suite) { return references_yaml(suite.references); }},
+          With::kReference};
 }
 
 SuiteKey clips_key() {
-  SuiteKey key{"clips", {}, With::kClips, read_clips, [](const Suite& suite) { return clips_yaml(suite.clips); }};
+  SuiteKey key({"clips", read_clips, {}, [](const Suite& suite) { return clips_yaml(suite.clips); }}, With::kClips);
   for (const FieldRow& row : field_rows(synth_fields(), SuiteClips()))
     key.rows.push_back(
         {"clips.synth." + row.name, row.values, row.name == "per_task" ? "" : row.fallback, row.meaning});
@@ -84,13 +85,11 @@ SuiteKey clips_key() {
   return key;
 }
 
+std::string list_yaml(const std::vector<std::string>& names) { return fmt::format("[{}]", fmt::join(names, ", ")); }
+
 // "all", "none" or a list of names.
 SuiteKey controls_key() {
-  SuiteKey key{"controls",
-               {{"controls", "a list of names, `all` or `none`", "none",
-                 "scripted policies that no score may reward, each an arm of its own (`duet list policies`)"}},
-               With::kClips};
-  key.read = [](const YamlSection& top, Suite& suite) {
+  const auto read = [](const YamlSection& top, Suite& suite) {
     if (!top.has("controls")) return;
     checked(top, "controls", [&] {
       if (top.node("controls").IsSequence())
@@ -104,15 +103,17 @@ SuiteKey controls_key() {
     });
   };
   // Left out where there are none, so that a suite from before there were any keeps its hash.
-  key.write = [](const Suite& suite) {
-    return suite.controls.empty() ? std::string() : fmt::format("controls: [{}]\n", fmt::join(suite.controls, ", "));
-  };
-  return key;
+  const auto write = [](const Suite& suite) { return suite.controls.empty() ? "" : list_yaml(suite.controls); };
+  return {{"controls",
+           read,
+           {{"controls", "a list of names, `all` or `none`", "none",
+             "scripted policies that no score may reward, each an arm of its own (`duet list policies`)"}},
+           write},
+          With::kClips};
 }
 
 SuiteKey tasks_key() {
-  SuiteKey key{"tasks", {{"tasks", "a list of names", "the first six", "names of `duet list tasks`"}}, With::kClips};
-  key.read = [](const YamlSection& top, Suite& suite) {
+  const auto read = [](const YamlSection& top, Suite& suite) {
     if (!top.has("tasks")) {
       suite.tasks.assign(kPaperTasks.begin(), kPaperTasks.end());
       return;
@@ -122,8 +123,11 @@ SuiteKey tasks_key() {
       require(!suite.tasks.empty(), "expected at least one task, found none");
     });
   };
-  key.write = [](const Suite& suite) { return fmt::format("tasks: [{}]\n", fmt::join(task_names(suite.tasks), ", ")); };
-  return key;
+  return {{"tasks",
+           read,
+           {{"tasks", "a list of names", "the first six", "names of `duet list tasks`"}},
+           [](const Suite& suite) { return list_yaml(task_names(suite.tasks)); }},
+          With::kClips};
 }
 
 // `all`: playback and every engine that this machine has.
@@ -147,39 +151,39 @@ void read_engines(const YamlSection& top, Suite& suite) {
 // A suite with nothing but the clean arm says nothing of perturbations.
 std::string perturbations_yaml(const Suite& suite) {
   if (suite.perturbations.size() == 1 && suite.perturbations.front().name == kCleanName) return "";
-  std::string text = "perturbations:\n";
-  for (const Perturbation& perturbation : suite.perturbations) text += fmt::format("  - {}\n", to_yaml(perturbation));
+  std::string text;
+  for (const Perturbation& perturbation : suite.perturbations) text += fmt::format("\n  - {}", to_yaml(perturbation));
   return text;
 }
 
 void add_lists(Keys& keys) {
-  keys.push_back({"engines",
-                  {{"engines", "a list of names, or all", "required",
-                    "names of `duet list engines`; `all` is playback and every engine that is there"}},
-                  With::kBoth,
-                  read_engines,
-                  [](const Suite& suite) { return fmt::format("engines: [{}]\n", fmt::join(suite.engines, ", ")); }});
-  keys.push_back({"controllers",
-                  {{"controllers", "a list", "required",
-                    "each a name (`duet list controllers`), the path of an IO descriptor, or `{name, use, options}`"}},
-                  With::kBoth,
-                  read_controllers,
-                  [](const Suite& suite) { return controllers_yaml(suite); }});
-  keys.push_back({"policies",
-                  {{"policies", "a list", "required",
-                    "each a name (`duet list policies`), the path of a policy descriptor, or `{name, use, options, "
-                    "prompt, partner, tags}`"}},
-                  With::kClips,
-                  read_policies,
-                  [](const Suite& suite) { return policies_yaml(suite); }});
-  keys.push_back(
-      {"perturbations",
-       {{"perturbations", "a list", "[clean]",
-         "every engine, controller and policy runs under each, and so does the null arm "
-         "([perturbations.md](perturbations.md)). Playback is clean"}},
-       With::kBoth,
-       [](const YamlSection& top, Suite& suite) { suite.perturbations = read_perturbations(top, suite.file); },
-       perturbations_yaml});
+  keys.emplace_back(
+      SchemaKey<Suite>{"engines",
+                       read_engines,
+                       {{"engines", "a list of names, or all", "required",
+                         "names of `duet list engines`; `all` is playback and every engine that is there"}},
+                       [](const Suite& suite) { return list_yaml(suite.engines); }});
+  keys.emplace_back(SchemaKey<Suite>{
+      "controllers",
+      read_controllers,
+      {{"controllers", "a list", "required",
+        "each a name (`duet list controllers`), the path of an IO descriptor, or `{name, use, options}`"}},
+      controllers_yaml});
+  keys.emplace_back(
+      SchemaKey<Suite>{"policies",
+                       read_policies,
+                       {{"policies", "a list", "required",
+                         "each a name (`duet list policies`), the path of a policy descriptor, or `{name, "
+                         "use, options, prompt, partner, tags}`"}},
+                       policies_yaml},
+      With::kClips);
+  keys.emplace_back(SchemaKey<Suite>{
+      "perturbations",
+      [](const SchemaSection& top, Suite& suite) { suite.perturbations = read_perturbations(top, suite.file); },
+      {{"perturbations", "a list", "[clean]",
+        "every engine, controller and policy runs under each, and so does the null arm "
+        "([perturbations.md](perturbations.md)). Playback is clean"}},
+      perturbations_yaml});
 }
 
 void add_start_and_partner(Keys& keys) {
@@ -234,10 +238,9 @@ void read_profile_key(const YamlSection& top, Suite& suite) {
 
 // Writes the profile as it is; what it leaves to an engine's defaults is left to them here too.
 std::string profile_yaml(const Profile& profile) {
-  std::string text =
-      fmt::format("profile:\n  name: {}\n  engines:{}\n", profile.name, profile.engines.empty() ? " {}" : "");
+  std::string text = fmt::format("\n  name: {}\n  engines:{}", profile.name, profile.engines.empty() ? " {}" : "");
   for (const auto& [engine, settings] : profile.engines)
-    text += fmt::format("    {}: {}\n", engine, settings_yaml(settings));
+    text += fmt::format("\n    {}: {}", engine, settings_yaml(settings));
   return text;
 }
 
@@ -252,18 +255,16 @@ void read_step(const YamlSection& top, Suite& suite) {
 }
 
 void add_profile(Keys& keys) {
-  keys.push_back({"profile",
-                  {{"profile", "a name, a path or a mapping", "parity",
-                    "engine profile: a name (`duet list profiles`), a file (from the suite's folder), or its mapping"}},
-                  With::kBoth,
-                  read_profile_key,
-                  [](const Suite& suite) { return profile_yaml(suite.profile); }});
-  keys.push_back(
-      {"dt",
-       {{"dt", "a number that divides 0.02 s, 1e-6 or more", "the profile's", "physics step of every engine"}},
-       With::kBoth,
-       read_step,
-       [](const Suite&) { return ""; }});
+  keys.emplace_back(SchemaKey<Suite>{
+      "profile",
+      read_profile_key,
+      {{"profile", "a name, a path or a mapping", "parity",
+        "engine profile: a name (`duet list profiles`), a file (from the suite's folder), or its mapping"}},
+      [](const Suite& suite) { return profile_yaml(suite.profile); }});
+  keys.emplace_back(SchemaKey<Suite>{
+      "dt",
+      read_step,
+      {{"dt", "a number that divides 0.02 s, 1e-6 or more", "the profile's", "physics step of every engine"}}});
 }
 
 void read_robot(const YamlSection& top, const Field<Suite>& robot, Suite& suite) {
@@ -295,30 +296,33 @@ void add_files(Keys& keys) {
 }
 
 void add_verdict_and_record(Keys& keys) {
-  keys.push_back(group_key(
-      "detector",
-      {field<Suite>({.name = "version",
-                     .meaning = "which verdict is the headline; the others are stored too",
-                     .choices = choices_of(version_names())},
-                    &Suite::detector),
-       field<Suite>({.name = "thresholds",
-                     .meaning = "`paper`: Table S11; `strict`: the stricter set; `act`: the rules that know the act",
-                     .choices = choices_of(threshold_names())},
-                    &Suite::thresholds)},
-      With::kClips));
+  keys.emplace_back(
+      group_key<Suite>(
+          "detector",
+          {field<Suite>({.name = "version",
+                         .meaning = "which verdict is the headline; the others are stored too",
+                         .choices = choices_of(version_names())},
+                        &Suite::detector),
+           field<Suite>(
+               {.name = "thresholds",
+                .meaning = "`paper`: Table S11; `strict`: the stricter set; `act`: the rules that know the act",
+                .choices = choices_of(threshold_names())},
+               &Suite::thresholds)}),
+      With::kClips);
+  keys.push_back(group_key<Suite>(
+      "limits", {field<Suite>({.name = "wall_s_per_episode",
+                               .meaning = "an episode that computes for longer is a time-out (a "
+                                          "failure, and run again by the same command); plans, and time in "
+                                          "which the process was stopped, are not counted",
+                               .unit = "s",
+                               .range = {0.0, 1.0e6, false}},
+                              &Suite::wall_limit)}));
   keys.push_back(
-      group_key("limits", {field<Suite>({.name = "wall_s_per_episode",
-                                         .meaning = "an episode that computes for longer is a time-out (a "
-                                                    "failure, and run again by the same command); plans, and time in "
-                                                    "which the process was stopped, are not counted",
-                                         .unit = "s",
-                                         .range = {0.0, 1.0e6, false}},
-                                        &Suite::wall_limit)}));
-  keys.push_back(group_key("record", {field<Suite>({.name = "trajectories",
-                                                    .meaning = "recordings under `trajectories/`, which `duet score` "
-                                                               "scores again",
-                                                    .choices = choices_of(record_names())},
-                                                   &Suite::record)}));
+      group_key<Suite>("record", {field<Suite>({.name = "trajectories",
+                                                .meaning = "recordings under `trajectories/`, which `duet score` "
+                                                           "scores again",
+                                                .choices = choices_of(record_names())},
+                                               &Suite::record)}));
   keys.push_back(
       plain_key(field<Suite>({.name = "null_arm", .meaning = "the control arm: the robot holds its neutral pose"},
                              &Suite::null_arm),

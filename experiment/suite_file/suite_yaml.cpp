@@ -51,9 +51,8 @@ void check_whole(const YamlSection& top, const Suite& suite) {
 
 Suite read_suite(const YAML::Node& document, const std::string& file) {
   std::vector<const char*> names;
-  names.reserve(suite_keys().size());
   for (const SuiteKey& key : suite_keys()) names.push_back(key.name.c_str());
-  const YamlSection top(file, document, "suite", names);
+  const SchemaSection top(file, document, "suite", names);
   Suite suite;
   suite.file = file;
   if (top.has("reference")) refuse_clips(top);
@@ -129,7 +128,7 @@ std::string resolved_yaml(const Suite& suite) {
   const SuiteKey::With other = suite.references.empty() ? SuiteKey::With::kReference : SuiteKey::With::kClips;
   std::string text;
   for (const SuiteKey& key : suite_keys())
-    if (key.with != other) text += key.write(suite);
+    if (key.with != other) text += written(key, suite);
   return text;
 }
 

@@ -8,8 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "duet/core/field.h"
-#include "duet/robots/yaml_fields.h"
+#include "duet/robots/yaml_schema.h"
 #include "duet/rollout/perturbations/perturbation.h"
 
 namespace duet {
@@ -30,12 +29,14 @@ FieldTexts field_texts(const FieldTable<Owner>& table, const Owner& owner) {
   return texts;
 }
 
-struct PerturbationKind {
-  std::string name, meaning;
-  std::vector<FieldRow> rows;  // of its mapping; of a kind that is one value, that value
-  // Reads the mapping of a perturbation, which has the key. Throws InputError: file, line, expected, found.
-  std::function<void(const YamlSection& item, const std::string& file, Perturbation& into)> read;
-  std::function<std::string(const Perturbation& of)> write;       // "" where there is none of it
+// A key of a perturbation's mapping. Its rows are of the mapping below it; of a kind that is one value, that value.
+struct PerturbationKind : SchemaKey<Perturbation> {
+  PerturbationKind(const std::string& kind, std::string about, Read reader, std::vector<FieldRow> described,
+                   Write writer)
+      : SchemaKey<Perturbation>(kind, std::move(reader), std::move(described), std::move(writer)),
+        meaning(std::move(about)) {}
+
+  std::string meaning;
   std::string fallback = "{}";                                    // what the name alone stands for
   std::function<FieldTexts(const Perturbation& of)> values = {};  // of its mapping, where there is some of it
   std::vector<PerturbationAxis> axes = {};                        // none: no value of it is a size
@@ -53,27 +54,34 @@ PerturbationKind plain_kind(const Field<Perturbation>& value, const std::string&
 // Reads a plan from its mapping: an empty one, the name alone, gives Plan(); values that another leaves out are
 // `named`'s.
 template <typename Plan>
-Plan read_plan(const YamlSection& item, const std::string& file, const std::string& name, const FieldTable<Plan>& table,
-               const Plan& named) {
-  const YamlSection mapping(file, item.node(name.c_str()), name, field_keys(table));
+Plan read_plan(const SchemaSection& item, const std::string& name, const FieldTable<Plan>& table, const Plan& named) {
+  const YamlSection mapping(item.file, item.node(name.c_str()), name, field_keys(table));
   Plan plan = mapping.keys().size() > 0 ? named : Plan();
   read_fields(mapping, table, plan);
   return plan;
 }
 
-// A kind whose values are a struct of its own: `slot` is the optional one of a perturbation.
-template <typename Plan, typename Slot>
-PerturbationKind planned_kind(std::string name, std::string meaning, FieldTable<Plan> table, Slot slot,
-                              Plan named = {}) {
-  PerturbationKind kind{name, std::move(meaning), field_rows(table, Plan()), {}, {}};
-  kind.read = [name, table, slot, named](const YamlSection& item, const std::string& file, Perturbation& into) {
-    slot(into) = read_plan(item, file, name, table, named);
+// A kind whose values are a struct of its own: `found` gives that of a perturbation, null where it has none, and `put`
+// gives it one.
+template <typename Plan, typename Found, typename Put>
+PerturbationKind plan_kind(const std::string& name, std::string meaning, const FieldTable<Plan>& table, Found found,
+                           Put put, const Plan& named) {
+  const auto read = [=](const SchemaSection& item, Perturbation& into) {
+    put(into, read_plan(item, name, table, named));
   };
-  kind.write = [table, slot](const Perturbation& of) { return slot(of) ? flow_mapping(table, *slot(of)) : ""; };
-  kind.values = [table, slot](const Perturbation& of) {
-    return slot(of) ? field_texts(table, *slot(of)) : FieldTexts();
-  };
+  const auto write = [=](const Perturbation& of) { return found(of) ? flow_mapping(table, *found(of)) : ""; };
+  PerturbationKind kind(name, std::move(meaning), read, field_rows(table, Plan()), write);
+  kind.values = [=](const Perturbation& of) { return found(of) ? field_texts(table, *found(of)) : FieldTexts(); };
   return kind;
+}
+
+// `slot` is the optional one of a perturbation.
+template <typename Plan, typename Slot>
+PerturbationKind planned_kind(const std::string& name, std::string meaning, const FieldTable<Plan>& table, Slot slot,
+                              const Plan& named = {}) {
+  return plan_kind(
+      name, std::move(meaning), table, [slot](const Perturbation& of) { return slot(of) ? &*slot(of) : nullptr; },
+      [slot](Perturbation& into, Plan plan) { slot(into) = std::move(plan); }, named);
 }
 
 // The values of a kind that acts on the robot; null where the perturbation has none of it.
@@ -86,20 +94,12 @@ const Plan* robot_plan(const Perturbation& of) {
 
 // A kind that acts on the robot: `Plan` is a RobotPerturbation.
 template <typename Plan>
-PerturbationKind robot_kind(std::string name, std::string meaning, FieldTable<Plan> table, Plan named = {}) {
-  PerturbationKind kind{name, std::move(meaning), field_rows(table, Plan()), {}, {}};
-  kind.read = [name, table, named](const YamlSection& item, const std::string& file, Perturbation& into) {
-    into.robot.push_back(std::make_shared<const Plan>(read_plan(item, file, name, table, named)));
-  };
-  kind.write = [table](const Perturbation& of) {
-    const Plan* plan = robot_plan<Plan>(of);
-    return plan ? flow_mapping(table, *plan) : "";
-  };
-  kind.values = [table](const Perturbation& of) {
-    const Plan* plan = robot_plan<Plan>(of);
-    return plan ? field_texts(table, *plan) : FieldTexts();
-  };
-  return kind;
+PerturbationKind robot_kind(const std::string& name, std::string meaning, const FieldTable<Plan>& table,
+                            const Plan& named = {}) {
+  return plan_kind(
+      name, std::move(meaning), table, robot_plan<Plan>,
+      [](Perturbation& into, Plan plan) { into.robot.push_back(std::make_shared<const Plan>(std::move(plan))); },
+      named);
 }
 
 }  // namespace duet

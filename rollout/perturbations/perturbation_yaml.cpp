@@ -21,10 +21,10 @@ std::vector<std::string> kinds_of(const YamlSection& item) {
   return names;
 }
 
-Perturbation read_kinds(const YamlSection& item, const std::string& file) {
+Perturbation read_kinds(const SchemaSection& item) {
   Perturbation perturbation;
   for (const PerturbationKind& known : perturbation_kind_table())
-    if (item.has(known.name.c_str())) known.read(item, file, perturbation);
+    if (item.has(known.name.c_str())) known.read(item, perturbation);
   return perturbation;
 }
 
@@ -43,11 +43,11 @@ Perturbation read_item(const YamlSection& suite, const YAML::Node& node, const s
       suite.fail(line, fmt::format("perturbations: {}", error.what()));
     }
   }
-  const YamlSection item(file, node, "perturbation", keys_of_item());
+  const SchemaSection item(file, node, "perturbation", keys_of_item());
   const std::vector<std::string> named = kinds_of(item);
   if (named.empty())
     item.fail(line, fmt::format("expected at least one of {}, found none", fmt::join(perturbation_kinds(), ", ")));
-  Perturbation perturbation = read_kinds(item, file);
+  Perturbation perturbation = read_kinds(item);
   perturbation.tags = read_tags(item, kOfPerturbation);
   perturbation.name = item.has("name") ? item.text("name") : fmt::format("{}", fmt::join(named, "+"));
   if (perturbation.name == kCleanName) item.fail(item.line("name"), "name: 'clean' is the arm without a perturbation");
@@ -72,7 +72,7 @@ Perturbation default_perturbation(const std::string& kind) {
   for (const PerturbationKind& known : perturbation_kind_table()) {
     if (known.name != kind) continue;
     const YAML::Node item = YAML::Load(fmt::format("{{{}: {}}}", kind, known.fallback));
-    Perturbation perturbation = read_kinds({kind, item, "perturbation", {known.name.c_str()}}, kind);
+    Perturbation perturbation = read_kinds({kind, item, "perturbation", {known.name.c_str()}});
     perturbation.name = kind;
     return perturbation;
   }
