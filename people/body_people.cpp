@@ -8,9 +8,9 @@
 
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/motion/bodies/body_kinematics.h"
-#include "duet/motion/bodies/body_model.h"
 #include "duet/people/alignment.h"
+#include "duet/people/bodies/body_kinematics.h"
+#include "duet/people/bodies/body_model.h"
 
 namespace duet {
 namespace {

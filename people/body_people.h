@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/motion/bodies/number_table.h"
+#include "duet/people/bodies/number_table.h"
 #include "duet/people/people_format.h"
 
 namespace duet {

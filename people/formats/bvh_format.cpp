@@ -1,5 +1,5 @@
 // Two people in BVH, a pair of files or one that holds both, through
-// motion/bvh/bvh.h.
+// people/bvh/bvh.h.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,11 +8,11 @@
 #include <memory>
 
 #include "duet/core/require.h"
-#include "duet/motion/bvh/bvh.h"
-#include "duet/motion/bvh/bvh_kinematics.h"
-#include "duet/motion/bvh/bvh_people.h"
-#include "duet/motion/bvh/bvh_skeleton.h"
 #include "duet/motion/people/people_files.h"
+#include "duet/people/bvh/bvh.h"
+#include "duet/people/bvh/bvh_kinematics.h"
+#include "duet/people/bvh/bvh_people.h"
+#include "duet/people/bvh/bvh_skeleton.h"
 #include "duet/people/people_readers.h"
 
 namespace duet {

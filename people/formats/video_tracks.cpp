@@ -13,7 +13,7 @@
 #include "duet/core/data_file.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/motion/bodies/body_kinematics.h"
+#include "duet/people/bodies/body_kinematics.h"
 #include "duet/people/body_people.h"
 #include "duet/people/clip_files.h"
 

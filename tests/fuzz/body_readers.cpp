@@ -1,13 +1,12 @@
 // Containers of other programs (joblib, torch.save, NumPy's objects), and two people as parameters of body models.
 #include <algorithm>
 
-#include "duet/archives/hdf5/hdf5.h"
 #include "duet/archives/pickle/joblib.h"
 #include "duet/archives/pickle/npy_objects.h"
 #include "duet/archives/pickle/pickle_machine.h"
-#include "duet/archives/pickle/torch_tensors.h"
 #include "duet/core/file.h"
-#include "duet/motion/bodies/body_model.h"
+#include "duet/people/bodies/body_model.h"
+#include "duet/people/bodies/torch_tensors.h"
 #include "duet/people/formats/amass.h"
 #include "duet/people/formats/gvhmr.h"
 #include "duet/people/formats/inter/inter_x.h"
@@ -15,10 +14,11 @@
 #include "duet/people/formats/inter/interhuman_raw.h"
 #include "duet/people/formats/motion_rows.h"
 #include "duet/people/formats/video_tracks.h"
+#include "duet/people/hdf5/hdf5.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
-#include "tests/motion/body_files.h"
-#include "tests/motion/body_model_files.h"
+#include "tests/people/body_files.h"
+#include "tests/people/body_model_files.h"
 
 namespace duet::fuzz {
 namespace {

@@ -3,17 +3,17 @@
 #include <fstream>
 
 #include "duet/archives/pickle/motion_pickle.h"
-#include "duet/motion/bvh/bvh.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/people/object_shape.h"
+#include "duet/people/bvh/bvh.h"
 #include "duet/people/formats/people_formats.h"
 #include "tests/archives/pickle_bytes.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
-#include "tests/motion/bvh_text.h"
 #include "tests/motion/people.h"
 #include "tests/motion/people_files.h"
+#include "tests/people/bvh_text.h"
 
 namespace duet::fuzz {
 namespace {

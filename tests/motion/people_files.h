@@ -11,8 +11,8 @@
 #include "duet/archives/npy/npz.h"
 #include "duet/archives/zip/zip.h"
 #include "tests/archives/pickle_bytes.h"
-#include "tests/motion/bvh_text.h"
 #include "tests/motion/people_standins.h"
+#include "tests/people/bvh_text.h"
 
 namespace duet::test {
 

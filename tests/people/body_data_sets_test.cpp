@@ -1,17 +1,17 @@
-// Peculiarities of each of the formats of body models (tests/motion/body_formats_test.cpp: what they share).
+// Peculiarities of each of the formats of body models (tests/people/body_formats_test.cpp: what they share).
 #include <gmock/gmock.h>
 
 #include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/bodies/body_model.h"
 #include "duet/motion/people/source_clip.h"
+#include "duet/people/bodies/body_model.h"
 #include "duet/people/formats/amass.h"
 #include "duet/people/formats/inter/inter_x.h"
 #include "duet/people/formats/inter/inter_x_h5.h"
 #include "duet/people/formats/inter/interhuman_raw.h"
 #include "duet/people/formats/video_tracks.h"
-#include "tests/motion/body_files.h"
+#include "tests/people/body_files.h"
 #include "tests/support.h"
 
 namespace duet {

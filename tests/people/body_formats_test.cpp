@@ -1,5 +1,5 @@
 // The formats that hold two people as parameters of body models: each stand-in is found, read, and refused where it is
-// damaged. The expected joints come from tests/motion/body_files.h, by another way.
+// damaged. The expected joints come from tests/people/body_files.h, by another way.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 #include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/motion/bodies/body_model.h"
 #include "duet/motion/people/source_clip.h"
+#include "duet/people/bodies/body_model.h"
 #include "duet/people/formats/amass.h"
 #include "duet/people/formats/gvhmr.h"
 #include "duet/people/formats/inter/inter_x.h"
@@ -19,8 +19,8 @@
 #include "duet/people/formats/motion_rows.h"
 #include "duet/people/formats/people_formats.h"
 #include "duet/people/formats/video_tracks.h"
-#include "tests/motion/body_files.h"
-#include "tests/motion/body_model_files.h"
+#include "tests/people/body_files.h"
+#include "tests/people/body_model_files.h"
 #include "tests/people/format_cases.h"
 #include "tests/support.h"
 

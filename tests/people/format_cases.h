@@ -17,8 +17,8 @@
 #include "duet/people/formats/motion_rows.h"
 #include "duet/people/formats/people_formats.h"
 #include "duet/people/formats/video_tracks.h"
-#include "tests/motion/body_files.h"
-#include "tests/motion/body_model_files.h"
+#include "tests/people/body_files.h"
+#include "tests/people/body_model_files.h"
 
 namespace duet::test {
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "duet/archives/hdf5/hdf5.h"
 #include "duet/archives/npy/npy_header.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
@@ -13,6 +12,7 @@
 #include "duet/people/body_people.h"
 #include "duet/people/clip_files.h"
 #include "duet/people/formats/inter/inter_x.h"
+#include "duet/people/hdf5/hdf5.h"
 
 namespace duet {
 namespace {
