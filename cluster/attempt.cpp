@@ -21,7 +21,7 @@
 #include "duet/core/number.h"
 #include "duet/core/require.h"
 #include "duet/core/text.h"
-#include "duet/execution/run_episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/rows/folder/environment.h"
 #include "duet/rows/json_fields.h"
 

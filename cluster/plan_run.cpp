@@ -14,7 +14,6 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/execution/runner.h"
-#include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/episode_costs.h"
 #include "duet/experiment/plan/prepared_clips.h"
 #include "duet/experiment/suite_file/suite_actors.h"
@@ -45,22 +44,14 @@ std::vector<PlannedClip> keep_clips(const std::vector<PairedMotion>& clips, cons
 // The state of planning a run.
 class Planner {
  public:
-  Planner(const Suite& suite, std::string directory, const Bodies& bodies, const RunIdentity& identity,
-          const RunPart& part)
-      : suite_(suite),
-        directory_(std::move(directory)),
-        bodies_(bodies),
-        identity_(identity),
-        episodes_(suite, bodies, part),
-        per_clip_(episodes_of_clip()) {}
-
-  [[nodiscard]] std::int64_t size() const { return episodes_.size(); }
+  Planner(const Experiment& experiment, std::string directory)
+      : experiment_(experiment), directory_(std::move(directory)), per_clip_(episodes_of_clip()) {}
 
   // Runs the first clip of each engine and controller that has no cost yet.
   void measure(std::map<std::string, double>& costs, const StopSign& stop, Progress& progress) {
     progress.start("measuring costs", static_cast<int>(uncosted(costs).size()), "engines and controllers");
     for (const std::int64_t begin : uncosted(costs)) {
-      costs[cost_name(episodes_.at(begin))] = std::max(kLeastCost, measured(begin, stop));
+      costs[cost_name(experiment_.at(begin))] = std::max(kLeastCost, measured(begin, stop));
       progress.advance();
     }
     progress.finish();
@@ -68,17 +59,15 @@ class Planner {
 
   [[nodiscard]] std::vector<PlanBlock> blocks(const std::map<std::string, double>& costs) const {
     std::vector<PlanBlock> blocks;
-    for (std::int64_t begin = 0; begin < episodes_.size(); begin += per_clip_) {
-      const EpisodeSpec spec = episodes_.at(begin);
-      const double cost = costs.at(cost_name(spec)) * motion_seconds(spec, suite_) * static_cast<double>(per_clip_);
+    for (std::int64_t begin = 0; begin < experiment_.size(); begin += per_clip_) {
+      const EpisodeSpec spec = experiment_.at(begin);
+      const double cost = costs.at(cost_name(spec)) * motion_seconds(spec) * static_cast<double>(per_clip_);
       blocks.push_back({spec.engine, begin, begin + per_clip_, cost});
     }
     return blocks;
   }
 
-  [[nodiscard]] std::string keys(const Shard& shard) const {
-    return keys_digest(episodes_, shard.begin, shard.end, suite_, identity_, bodies_);
-  }
+  [[nodiscard]] std::string keys(const Shard& shard) const { return keys_digest(experiment_, shard.begin, shard.end); }
 
   // The rows of measure() as attempts at the shards that they are of.
   void keep_pilots(const ShardPlan& plan) const {
@@ -97,8 +86,8 @@ class Planner {
   [[nodiscard]] std::size_t pilots() const { return pilots_.size(); }
   [[nodiscard]] std::set<std::string> cost_names() const {
     std::set<std::string> names;
-    for (std::int64_t begin = 0; begin < episodes_.size(); begin += per_clip_)
-      names.insert(cost_name(episodes_.at(begin)));
+    for (std::int64_t begin = 0; begin < experiment_.size(); begin += per_clip_)
+      names.insert(cost_name(experiment_.at(begin)));
     return names;
   }
 
@@ -106,19 +95,19 @@ class Planner {
   // As long as the clip stays the same.
   [[nodiscard]] std::int64_t episodes_of_clip() const {
     std::int64_t count = 1;
-    const EpisodeSpec first = episodes_.at(0);
+    const EpisodeSpec first = experiment_.at(0);
     const auto same = [&](const EpisodeSpec& spec) {
       return spec.clip == first.clip && cost_name(spec) == cost_name(first) && spec.perturbation == first.perturbation;
     };
-    while (count < episodes_.size() && same(episodes_.at(count))) ++count;
+    while (count < experiment_.size() && same(experiment_.at(count))) ++count;
     return count;
   }
 
   [[nodiscard]] std::vector<std::int64_t> uncosted(const std::map<std::string, double>& costs) const {
     std::set<std::string> names;
     std::vector<std::int64_t> places;
-    for (std::int64_t begin = 0; begin < episodes_.size(); begin += per_clip_) {
-      const std::string name = cost_name(episodes_.at(begin));
+    for (std::int64_t begin = 0; begin < experiment_.size(); begin += per_clip_) {
+      const std::string name = cost_name(experiment_.at(begin));
       if (!costs.contains(name) && names.insert(name).second) places.push_back(begin);
     }
     return places;
@@ -127,44 +116,42 @@ class Planner {
   // All policies on one clip, an episode each. [s of one core per s of motion]
   double measured(std::int64_t begin, const StopSign& stop) {
     double cost = 0.0, motion = 0.0;
-    const std::string trajectories =
-        suite_.record == RecordTrajectories::kNone ? "" : inside(directory_, "trajectories");
+    const bool records = experiment_.suite().record != RecordTrajectories::kNone;
+    const EpisodeOverrides overrides{.stop_asked = [&] { return stop.asked(); },
+                                     .trajectories = records ? inside(directory_, "trajectories") : ""};
     for (std::int64_t place = begin; place < begin + per_clip_; ++place) {
-      const EpisodeSpec spec = episodes_.at(place);
+      const EpisodeSpec spec = experiment_.at(place);
       if (spec.episode > 0) break;
       if (stop.asked()) throw Stopped();
       try {
-        const EpisodeRow row =
-            run_or_refuse(spec, suite_, identity_, bodies_, trajectories, [&] { return stop.asked(); });
+        const EpisodeRow row = experiment_.run(spec, overrides);
         cost += row.wall_s;
         pilots_.emplace_back(place, row);
       } catch (const EpisodeInterrupted&) {
         throw Stopped();
       }
-      motion += motion_seconds(spec, suite_);
+      motion += motion_seconds(spec);
     }
     return cost / motion;
   }
 
-  const Suite& suite_;
+  const Experiment& experiment_;
   std::string directory_;
-  const Bodies& bodies_;
-  const RunIdentity& identity_;
-  EpisodePlan episodes_;
   std::int64_t per_clip_;
   std::vector<std::pair<std::int64_t, EpisodeRow>> pilots_;
 };
 
-std::vector<std::string> lacks(const Suite& suite, const Bodies& bodies, const RunPart& part) {
+std::vector<std::string> lacks(const Experiment& experiment, const RunPart& part) {
   std::vector<std::string> warnings;
   const char* what = "; its episodes are rows with outcome `unsupported`";
-  for (const std::string& engine : suite.engines)
+  const std::vector<std::string>& engines = experiment.suite().engines;
+  for (const std::string& engine : engines)
     if (!can_run_in(engine) && chosen(part.engines, engine))
       warnings.push_back(fmt::format("engine '{}' is absent{}", engine, what));
-  for (const auto* absent : {&bodies.absent(), &bodies.absent_policies()})
+  for (const auto* absent : {&experiment.bodies().absent(), &experiment.bodies().absent_policies()})
     for (const auto& [name, reason] : *absent) warnings.push_back(reason + what);
-  if (std::ranges::none_of(suite.engines, can_run_in))
-    throw MissingError(fmt::format("none of the suite's engines is here: {}", fmt::join(suite.engines, ", ")));
+  if (std::ranges::none_of(engines, can_run_in))
+    throw MissingError(fmt::format("none of the suite's engines is here: {}", fmt::join(engines, ", ")));
   return warnings;
 }
 
@@ -175,33 +162,31 @@ void check_costs(const std::map<std::string, double>& costs, const std::set<std:
 
 }  // namespace
 
-PlanSummary plan_run(const Suite& suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
+PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
                      Progress& progress) {
-  require_clips(suite);
+  suite.require_clips();
   refuse_planned(directory);
   PlanSummary summary;
   check_filters(options.part, suite);
-  Bodies bodies(suite, left_out(options.part.controllers, controller_names_of(suite)),
-                left_out(options.part.policies, policy_names_of(suite)));
-  const RunIdentity identity = identity_of(suite, bodies.read());
-  summary.warnings = lacks(suite, bodies, options.part);
-  for (const std::string& note : bodies.notes()) progress.note(note);
-  const KeptSuite kept = kept_suite(suite, directory, identity.files);
-  RunDirectory run =
-      RunDirectory::open(directory, new_run_info(suite, kept, identity, options.argv, options.certificate));
+  ExperimentOptions planned = only(options.part, suite);
+  planned.part = options.part;
+  Experiment experiment(std::move(suite), std::move(planned));
+  const RunIdentity& identity = experiment.identity();
+  summary.warnings = lacks(experiment, options.part);
+  for (const std::string& note : experiment.bodies().notes()) progress.note(note);
+  const KeptSuite kept = kept_suite(experiment.suite(), directory, identity.files);
+  RunDirectory run = RunDirectory::open(directory, new_run_info(experiment, kept, options.argv, options.certificate));
   if (run.size() > 0)
     throw InputError(fmt::format("'{}' has {} rows of a `duet run`: plan in another folder", directory, run.size()));
   keep_inputs(kept, directory);
-  std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress,
-                                                  {.keep_in = directory, .stop = &stop, .files = &identity.files});
+  experiment.prepare(options.threads, progress, {.keep_in = directory, .stop = &stop});
   ShardPlan& plan = summary.plan;
-  if (suite.references.empty()) plan.clips = keep_clips(clips, directory);
-  bodies.take_clips(std::move(clips));
-  Planner planner(suite, directory, bodies, identity, options.part);
+  if (!experiment.suite().is_commanded()) plan.clips = keep_clips(experiment.bodies().clips(), directory);
+  Planner planner(experiment, directory);
   check_costs(options.costs, planner.cost_names());
-  plan.program = program_digests(suite.engines);
+  plan.program = program_digests(experiment.suite().engines);
   plan.suite_hash = identity.suite_hash;
-  plan.episodes = planner.size();
+  plan.episodes = experiment.size();
   plan.costs = options.costs;
   planner.measure(plan.costs, stop, progress);
   plan.shards = cut_shards(planner.blocks(plan.costs), options.shards);

@@ -34,7 +34,7 @@ struct PlanSummary {
 // is planned when plan.json is there; a command that was killed before may be given again. Throws as run_suite, Stopped
 // after the sign, and InputError for a folder that is planned already or has rows; std::invalid_argument for costs of
 // what the suite does not have.
-PlanSummary plan_run(const Suite& suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
+PlanSummary plan_run(Suite suite, const std::string& directory, const PlanOptions& options, const StopSign& stop,
                      Progress& progress);
 
 }  // namespace duet

@@ -6,9 +6,7 @@
 #include <vector>
 
 #include "duet/cluster/shard_plan.h"
-#include "duet/experiment/plan/bodies.h"
-#include "duet/experiment/plan/episode.h"
-#include "duet/experiment/plan/run_identity.h"
+#include "duet/execution/experiment.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet {
@@ -25,12 +23,7 @@ class PlannedRun {
   [[nodiscard]] const std::string& path() const { return head_.path; }
   [[nodiscard]] const RunInfo& info() const { return head_.info; }
   [[nodiscard]] const ShardPlan& plan() const { return plan_; }
-  [[nodiscard]] const Suite& suite() const { return suite_; }
-  [[nodiscard]] const RunIdentity& identity() const { return identity_; }
-  [[nodiscard]] const Bodies& bodies() const { return bodies_; }
-  [[nodiscard]] const EpisodePlan& episodes() const { return episodes_; }
-
-  [[nodiscard]] std::string key_at(std::int64_t place) const;
+  [[nodiscard]] const Experiment& experiment() const { return experiment_; }
 
   // Reads the clips of these places, and of no others. Throws InputError for one that is not what was planned with.
   void load_clips(std::int64_t begin, std::int64_t end);
@@ -38,14 +31,10 @@ class PlannedRun {
  private:
   Run head_;
   ShardPlan plan_;
-  Suite suite_;
-  Bodies bodies_;
-  RunIdentity identity_;
-  EpisodePlan episodes_;
+  Experiment experiment_;
 };
 
 // SHA-256 over the keys of these places in their order.
-std::string keys_digest(const EpisodePlan& episodes, std::int64_t begin, std::int64_t end, const Suite& suite,
-                        const RunIdentity& identity, const Bodies& bodies);
+std::string keys_digest(const Experiment& experiment, std::int64_t begin, std::int64_t end);
 
 }  // namespace duet

@@ -107,12 +107,11 @@ class ShardWorker {
         shard_(shard_of(run_.plan(), number)),
         options_(options),
         stop_(stop) {
-    if (keys_digest(run_.episodes(), shard_.begin, shard_.end, run_.suite(), run_.identity(), run_.bodies()) !=
-        shard_.keys)
+    if (keys_digest(run_.experiment(), shard_.begin, shard_.end) != shard_.keys)
       throw InputError(
           fmt::format("{}/plan.json: shard {}: the keys of its episodes are not those of the plan", path, number));
     history_ = history_of(run_, number, rows_);
-    if (run_.suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
+    if (run_.experiment().suite().record != RecordTrajectories::kNone) trajectories_ = inside(path, "trajectories");
   }
 
   WorkSummary work(Progress& progress) {
@@ -139,7 +138,7 @@ class ShardWorker {
     std::vector<std::int64_t> places;
     summary_.planned = shard_.episodes();
     for (std::int64_t place = shard_.begin; place < shard_.end; ++place) {
-      const std::string key = run_.key_at(place);
+      const std::string key = run_.experiment().row(place).key;
       if (is_there(key))
         ++summary_.already_there;
       else
@@ -177,32 +176,21 @@ class ShardWorker {
   }
 
   void take(std::int64_t place, AttemptWriter& attempt) {
-    const std::string key = run_.key_at(place);
+    const std::string key = run_.experiment().row(place).key;
     if (is_done_by_others(key)) return;
     const std::string poison = options_.retry_errors ? "" : poison_of(key, history_);
     if (!poison.empty()) {
-      record(poisoned_row(place, poison), attempt, true);
+      record(ended_row(run_.experiment().row(place), Outcome::kError, poison), attempt, true);
       return;
     }
     attempt.began(key);
     const CrashScope scope(key);
     try {
-      record(run_or_refuse(run_.episodes().at(place), run_.suite(), run_.identity(), run_.bodies(), trajectories_,
-                           [&] { return stop_.asked(); }),
+      record(run_.experiment().run(place, {.stop_asked = [&] { return stop_.asked(); }, .trajectories = trajectories_}),
              attempt, false);
     } catch (const EpisodeInterrupted&) {
       return;  // no row: it runs again
     }
-  }
-
-  [[nodiscard]] EpisodeRow poisoned_row(std::int64_t place, const std::string& why) const {
-    const EpisodeSpec spec = run_.episodes().at(place);
-    EpisodeRow row = row_for(spec, run_.suite(), run_.identity(), *run_.bodies().robot(spec.controller));
-    row.started_at = utc_now();
-    row.outcome = Outcome::kError;
-    row.message = why;
-    row.success = false;
-    return row;
   }
 
   void record(const EpisodeRow& row, AttemptWriter& attempt, bool poisoned) {

@@ -47,7 +47,7 @@ std::vector<EpisodeRow> rows_of_part(std::vector<EpisodeRow> rows, const RunPart
 }
 
 bool is_needed(const EpisodeSpec& spec, const Decision& so_far) {
-  return spec.arm == "null" || so_far.is_open(spec.policy);
+  return spec.arm == "null" || so_far.is_open(spec.policy->name);
 }
 
 std::string decided_run_text(const DecidedRun& run) {

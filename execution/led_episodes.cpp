@@ -10,21 +10,11 @@
 #include "duet/backends/factory.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/run_identity.h"
 #include "duet/experiment/work/run_work.h"
 #include "duet/policies/language.h"
-#include "duet/rollout/act_episode.h"
 
 namespace duet {
 namespace {
-
-EpisodeRow failed_row(const std::string& message) {
-  EpisodeRow row;
-  row.outcome = Outcome::kError;
-  row.message = message;
-  return row;
-}
 
 constexpr double kWhile = 1.0;  // [s] between two looks at whether the episode is over
 
@@ -45,15 +35,14 @@ std::string engine_of(const Suite& suite, const std::string& asked) {
 
 // The suite of one policy, the caller, in one engine under one controller.
 Suite narrowed(Suite suite, const LedPart& part) {
-  require_clips(suite);
+  suite.require_clips();
   if (!suite.references.empty())
     throw InputError(fmt::format("{}: expected a suite of clips, found one of walking commands", suite.file));
   suite.engines = {engine_of(suite, part.engine)};
-  suite.controllers = {controller_of(suite, one_of("controller", part.controller, controller_names_of(suite)))};
-  suite.perturbations = {
-      perturbation_of(suite, one_of("perturbation", part.perturbation, perturbation_names_of(suite)))};
+  suite.controllers = {suite.controller(one_of("controller", part.controller, suite.controller_names()))};
+  suite.perturbations = {suite.perturbation(one_of("perturbation", part.perturbation, suite.perturbation_names()))};
   if (!part.task.empty()) suite.tasks = {parse_task(part.task)};
-  suite.policies = {SuitePolicy{.name = kCaller, .use = kNullPolicy}};  // Bodies loads one; each episode has its own
+  suite.policies = {SuitePolicy{.name = kCaller, .use = kNullPolicy}};  // one is loaded; each episode has its own
   suite.null_arm = false;
   suite.record = RecordTrajectories::kNone;
   return suite;
@@ -61,29 +50,17 @@ Suite narrowed(Suite suite, const LedPart& part) {
 
 }  // namespace
 
-LedSuite::LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress)
-    : suite_(narrowed(std::move(suite), part)) {
-  if (suite_.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite_.engines.front()));
-  bodies_ = std::make_unique<Bodies>(suite_);
-  if (!bodies_->absent().empty()) throw MissingError(bodies_->absent().begin()->second);
-  identity_ = identity_of(suite_, bodies_->read());
-  identity_.policies[kCaller].clear();  // what the caller is nobody knows
-  bodies_->take_clips(prepare_clips(suite_, *bodies_->nominal(), threads, progress, {.files = &identity_.files}));
-  plan_ = std::make_unique<EpisodePlan>(suite_, *bodies_);
+std::shared_ptr<Experiment> led_experiment(Suite suite, const LedPart& part, int threads, Progress& progress) {
+  suite = narrowed(std::move(suite), part);
+  if (suite.engines.front() != kPlaybackEngine) static_cast<void>(engine_module(suite.engines.front()));
+  auto experiment = std::make_shared<Experiment>(std::move(suite), ExperimentOptions{.led = {kCaller}});
+  if (const auto& absent = experiment->bodies().absent(); !absent.empty()) throw MissingError(absent.begin()->second);
+  experiment->prepare(threads, progress);
+  return experiment;
 }
 
-const std::shared_ptr<const RobotModel>& LedSuite::robot() const {
-  return bodies_->robot(suite_.controllers.front().name);
-}
-
-EpisodeRow LedSuite::run(int episode, const EpisodeLead& lead) const {
-  return run_episode(plan_->at(episode), suite_, identity_, robot(), "", lead);
-}
-
-std::string LedSuite::prompt(int episode) const { return std::string(task_prompt(plan_->at(episode).clip->task)); }
-
-int LedSuite::questions(int episode) const {
-  const int ticks = episode_ticks(episode_setup(plan_->at(episode), suite_, *robot()));
+int questions_of(const Experiment& experiment, std::int64_t episode) {
+  const int ticks = episode_ticks(experiment.setup(experiment.at(episode)));
   return (ticks + kTicksPerPlan - 1) / kTicksPerPlan;
 }
 
@@ -107,23 +84,23 @@ void LedEpisode::require_same_process() const {
 
 void LedEpisode::start(int episode) {
   require_same_process();
-  require(episode >= 0 && episode < suite_->size(), "episode: expected a number from 0 to {}, found {}",
-          suite_->size() - 1, episode);
+  require(episode >= 0 && episode < experiment_->size(), "episode: expected a number from 0 to {}, found {}",
+          experiment_->size() - 1, episode);
   stop();
   stop_ = false;
   row_.reset();
   queue_ = PlanQueue::make({.name = kCaller, .patience = 0.0, .share = 1.0});
   partner_ = led_ == Led::kBoth ? std::make_shared<PointTracks>() : nullptr;
-  const EpisodeLead lead{
-      .policy = queue_->maker(suite_->robot()), .stop_asked = [this] { return stop_.load(); }, .partner = partner_};
-  thread_ = std::thread([this, episode, lead, queue = queue_] {
+  const EpisodeOverrides overrides{.policy = queue_->maker(experiment_->at(episode).body->robot),
+                                   .stop_asked = [this] { return stop_.load(); },
+                                   .partner = partner_};
+  thread_ = std::thread([this, episode, overrides, queue = queue_] {
     try {
-      row_ = suite_->run(episode, lead);
+      row_ = experiment_->run(episode, overrides);
     } catch (const EpisodeInterrupted&) {  // it leaves no row
-    } catch (const std::bad_alloc&) {
-      row_ = failed_row("there is not enough memory for the episode");
     } catch (const std::exception& error) {
-      row_ = failed_row(error.what());
+      const bool memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+      row_ = ended_row({}, Outcome::kError, memory ? "there is not enough memory for the episode" : error.what());
     }
     queue->close("the episode is over");
   });

@@ -13,9 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "duet/execution/run_episode.h"
-#include "duet/experiment/plan/bodies.h"
-#include "duet/experiment/plan/episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/experiment/work/progress.h"
 #include "duet/policies/plan_queue.h"
@@ -30,31 +28,13 @@ struct LedPart {
 // The name that the caller has among a suite's policies.
 inline constexpr const char* kCaller = "caller";
 
-// The suite that such episodes are drawn from: clips are prepared and networks loaded once. Immutable, thread-safe.
-class LedSuite {
- public:
-  // Throws std::invalid_argument for a name that the suite does not have, MissingError for an engine or a controller
-  // that this machine lacks, InputError (clips, cards, a suite of walking commands).
-  LedSuite(Suite suite, const LedPart& part, int threads, Progress& progress);
-  LedSuite(const LedSuite&) = delete;  // the plan points into it
-  LedSuite& operator=(const LedSuite&) = delete;
+// The experiment that such episodes are drawn from; its policy is the caller. Throws std::invalid_argument for a name
+// that the suite does not have, MissingError for an engine or a controller that this machine lacks, InputError (clips,
+// cards, a suite of walking commands).
+std::shared_ptr<Experiment> led_experiment(Suite suite, const LedPart& part, int threads, Progress& progress);
 
-  [[nodiscard]] int size() const { return static_cast<int>(plan_->size()); }
-  [[nodiscard]] EpisodeSpec at(int episode) const { return plan_->at(episode); }
-  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot() const;
-  // The language command of an episode.
-  [[nodiscard]] std::string prompt(int episode) const;
-  // How many questions an episode asks at most.
-  [[nodiscard]] int questions(int episode) const;
-  // As run_episode: an exception is a row, but StorageError and EpisodeInterrupted.
-  [[nodiscard]] EpisodeRow run(int episode, const EpisodeLead& lead) const;
-
- private:
-  Suite suite_;
-  RunIdentity identity_;
-  std::unique_ptr<Bodies> bodies_;     // that the plan refers to
-  std::unique_ptr<EpisodePlan> plan_;  // likewise the suite
-};
+// How many questions an episode asks at most.
+int questions_of(const Experiment& experiment, std::int64_t episode);
 
 // The bodies that are led: the robot alone, while the partner follows the clip, or both.
 enum class Led { kRobot, kBoth };
@@ -63,8 +43,8 @@ enum class Led { kRobot, kBoth };
 // every call throws std::runtime_error, and nothing is waited for.
 class LedEpisode {
  public:
-  explicit LedEpisode(std::shared_ptr<const LedSuite> suite, Led led = Led::kRobot)
-      : suite_(std::move(suite)), led_(led), process_(::getpid()) {}
+  explicit LedEpisode(std::shared_ptr<const Experiment> experiment, Led led = Led::kRobot)
+      : experiment_(std::move(experiment)), led_(led), process_(::getpid()) {}
   ~LedEpisode();
   LedEpisode(const LedEpisode&) = delete;
   LedEpisode& operator=(const LedEpisode&) = delete;
@@ -100,7 +80,7 @@ class LedEpisode {
  private:
   void require_same_process() const;
 
-  std::shared_ptr<const LedSuite> suite_;  // shared by the episodes of a batch
+  std::shared_ptr<const Experiment> experiment_;  // shared by the episodes of a batch
   Led led_;
   pid_t process_;
   std::shared_ptr<PointTracks> partner_;         // with the episode's thread, which waits while a question is open

@@ -114,7 +114,9 @@ bool add_missing_tags(const RunInfo& info, std::vector<EpisodeRow>& rows) {
       if (!lacks_tags(row)) continue;
       const auto [found, is_new] = known.try_emplace({row.perturbation, row.clip, row.policy});
       if (is_new) {
-        Tags tags = with_named_tags(tags_of(perturbation_of(suite, row.perturbation)), suite, row.clip, row.policy);
+        const SuiteReference* command = suite.is_commanded() ? &reference_of(suite.references, row.clip) : nullptr;
+        Tags tags = with_named_tags(tags_of(suite.perturbation(row.perturbation)),
+                                    command == nullptr ? suite.policy(row.policy) : SuitePolicy(), command);
         tags.merge(clips.of(row.clip));
         found->second = RowTags(std::move(tags));
       }

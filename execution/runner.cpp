@@ -36,8 +36,7 @@ void check_decision_of(const RunOptions& options, const Suite& suite) {
 }
 
 bool plays_back(const Suite& suite, const RunOptions& options) {
-  const std::string playback(kPlaybackEngine);
-  return std::ranges::find(suite.engines, playback) != suite.engines.end() && chosen(options.engines, playback);
+  return suite.runs_in(kPlaybackEngine) && chosen(options.engines, kPlaybackEngine);
 }
 
 // Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
@@ -45,8 +44,7 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
   std::map<std::string, std::string> absent;
   int present = plays_back(suite, options) ? 1 : 0;
   for (const EngineInfo& engine : engines()) {
-    if (std::find(suite.engines.begin(), suite.engines.end(), engine.name) == suite.engines.end()) continue;
-    if (!chosen(options.engines, engine.name)) continue;
+    if (!suite.runs_in(engine.name) || !chosen(options.engines, engine.name)) continue;
     if (engine.available)
       ++present;
     else
@@ -57,46 +55,22 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
 }
 
 // Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
-void check_actors(const Bodies& bodies, const Suite& suite, const RunOptions& options) {
-  const std::size_t policies =
-      suite.policies.size() - left_out(part_of(options).policies, policy_names_of(suite)).size();
-  if (!bodies.absent_policies().empty() && bodies.absent_policies().size() == policies)
-    throw MissingError(bodies.absent_policies().begin()->second);
-  const std::size_t wanted =
-      suite.controllers.size() - left_out(options.controllers, controller_names_of(suite)).size();
-  if (!bodies.absent().empty() && bodies.absent().size() == wanted && !plays_back(suite, options))
-    throw MissingError(bodies.absent().begin()->second);
+void check_actors(const Experiment& experiment, const RunOptions& options) {
+  const Suite& suite = experiment.suite();
+  const auto& absent = experiment.bodies().absent();
+  const auto& absent_policies = experiment.bodies().absent_policies();
+  const std::size_t policies = suite.policies.size() - left_out(part_of(options).policies, suite.policy_names()).size();
+  if (!absent_policies.empty() && absent_policies.size() == policies)
+    throw MissingError(absent_policies.begin()->second);
+  const std::size_t wanted = suite.controllers.size() - left_out(options.controllers, suite.controller_names()).size();
+  if (!absent.empty() && absent.size() == wanted && !plays_back(suite, options))
+    throw MissingError(absent.begin()->second);
 }
 
 std::string no_locks_warning(const std::string& folder, const std::string& reason) {
   return fmt::format("'{}' is on a file system without locks ({}): let no other run work in it at the same time",
                      folder, reason);
 }
-
-EpisodeRow unsupported_row(EpisodeRow row, const std::string& reason) {
-  row.started_at = utc_now();
-  row.robot_digest.clear();
-  row.outcome = Outcome::kUnsupported;
-  row.message = reason;
-  row.success = false;
-  return row;
-}
-
-}  // namespace
-
-EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
-                         const std::string& trajectory_folder, const std::function<bool()>& stop_asked) {
-  const std::shared_ptr<const RobotModel>& robot = bodies.robot(spec.controller);
-  const auto absent = bodies.absent().find(spec.controller);
-  if (absent != bodies.absent().end() && spec.engine != kPlaybackEngine)
-    return unsupported_row(row_for(spec, suite, identity, *robot), absent->second);
-  const PolicyOnBody& policy = bodies.policy(spec.controller, spec.policy);
-  if (!policy.refusal.empty()) return unsupported_row(row_for(spec, suite, identity, *robot), policy.refusal);
-  return run_episode(spec, suite, identity, robot, trajectory_folder,
-                     {.policy = policy.make, .stop_asked = stop_asked});
-}
-
-namespace {
 
 // The settings under profile_digest, for people. The suite says less; another machine's engines may add other defaults.
 std::string settings_here(const Suite& suite) {
@@ -109,8 +83,10 @@ std::string settings_here(const Suite& suite) {
 
 }  // namespace
 
-RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentity& identity,
-                     const std::vector<std::string>& argv, const nlohmann::json& certificate) {
+RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const std::vector<std::string>& argv,
+                     const nlohmann::json& certificate) {
+  const Suite& suite = experiment.suite();
+  const RunIdentity& identity = experiment.identity();
   return {.suite = suite.name,
           .suite_version = suite.version,
           .suite_hash = identity.suite_hash,
@@ -127,17 +103,16 @@ RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentit
 namespace {
 
 // Places in the plan of those that are asked for and not in the folder yet; counts those that are.
-std::vector<std::uint32_t> missing_episodes(const EpisodePlan& plan, const RunPart& part, const RunDirectory& run,
-                                            const std::function<std::string(const EpisodeSpec&)>& key_of,
+std::vector<std::uint32_t> missing_episodes(const Experiment& experiment, const RunPart& part, const RunDirectory& run,
                                             const StopSign& stop, RunSummary& summary) {
   std::vector<std::uint32_t> missing;
-  for (std::int64_t i = 0; i < plan.size(); ++i) {
+  for (std::int64_t i = 0; i < experiment.size(); ++i) {
     if (i % 256 == 0 && stop.asked()) throw Stopped();
-    const EpisodeSpec spec = plan.at(i);
+    const EpisodeSpec spec = experiment.at(i);
     if (!belongs(spec, spec.clip->task, part)) continue;
-    if (run.size() > 0 && run.has(key_of(spec))) {
+    if (run.size() > 0 && run.has(experiment.row(spec).key)) {
       ++summary.already_there;
-      ++summary.there_of[spec.policy];
+      ++summary.there_of[spec.policy->name];
     } else {
       missing.push_back(static_cast<std::uint32_t>(i));
     }
@@ -160,30 +135,24 @@ void ask_for(const Suite& suite, const std::vector<Task>& clips, const RunOption
   run.ask_for(part_of(options), count({RunPart()}), count);
 }
 
-// The actors and rules that the episodes of a plan need, and where their rows go.
+// Episodes that are run into a folder.
 struct Rollouts {
-  const Suite& suite;
-  const RunIdentity& identity;
-  const Bodies& bodies;
-  const EpisodePlan& plan;
+  const Experiment& experiment;
   const StopSign& stop;
   EpisodeCosts& costs;
   int threads = 1;
 
-  [[nodiscard]] std::string key_of(const EpisodeSpec& spec) const {
-    return row_for(spec, suite, identity, *bodies.robot(spec.controller)).key;
-  }
-
   // Those at these places of the plan.
   void run(const std::vector<std::uint32_t>& places, RunDirectory& folder, Progress& progress,
            RunSummary& summary) const {
-    const std::string trajectories =
-        suite.record == RecordTrajectories::kNone ? "" : inside(folder.path(), "trajectories");
+    const bool records = experiment.suite().record != RecordTrajectories::kNone;
+    const EpisodeOverrides overrides{.stop_asked = [&] { return stop.asked(); },
+                                     .trajectories = records ? inside(folder.path(), "trajectories") : ""};
     SharedWork work(folder, stop);
-    const auto key_at = [&](int i) { return key_of(plan.at(places[i])); };
+    const auto key_at = [&](int i) { return experiment.row(places[i]).key; };
     const auto run_at = [&](int i) {
-      const EpisodeSpec spec = plan.at(places[i]);
-      EpisodeRow row = run_or_refuse(spec, suite, identity, bodies, trajectories, [&] { return stop.asked(); });
+      const EpisodeSpec spec = experiment.at(places[i]);
+      EpisodeRow row = experiment.run(spec, overrides);
       costs.ended(spec, row.wall_s);
       progress.set_share(costs.share_done());
       return row;
@@ -202,13 +171,13 @@ void run_until_decided(const Rollouts& rollouts, const RunOptions& options, cons
                        Progress& progress, RunDirectory& run, RunSummary& summary) {
   const RunPart part = part_of(options);
   const DecisionSchedule schedule =
-      decision_schedule(rollouts.plan, part, rollouts.suite.seed, options.episodes_per_look);
+      decision_schedule(rollouts.experiment.plan(), part, rollouts.experiment.suite().seed, options.episodes_per_look);
   DecidedRun decided{.decision = decide({}, schedule.rounds, {}, options.decide), .planned = summary.planned};
   progress.start("rolling out until decided", static_cast<int>(missing.size()), "episodes at most");
   for (std::size_t look = 0; look < schedule.looks.size() && !decided.decision.is_decided(); ++look) {
     std::vector<std::uint32_t> places;
     for (const std::uint32_t place : schedule.episodes[look]) {
-      if (!is_needed(rollouts.plan.at(place), decided.decision)) continue;
+      if (!is_needed(rollouts.experiment.at(place), decided.decision)) continue;
       ++decided.used;
       if (std::ranges::binary_search(missing, place)) places.push_back(place);
     }
@@ -229,35 +198,29 @@ std::vector<std::uint32_t> pilots_first(const EpisodePlan& plan, const std::vect
   std::vector<std::uint32_t> first, rest;
   for (const std::uint32_t place : places) {
     const EpisodeSpec spec = plan.at(place);
-    const bool is_first = seen.insert(fmt::format("{}/{}/{}", cost_name(spec), spec.arm, spec.policy)).second;
+    const bool is_first = seen.insert(fmt::format("{}/{}/{}", cost_name(spec), spec.arm, spec.policy->name)).second;
     (is_first ? first : rest).push_back(place);
   }
   first.insert(first.end(), rest.begin(), rest.end());
   return first;
 }
 
-// Plans and runs what is missing.
-void run_missing(const Suite& suite, const RunIdentity& identity, const Bodies& bodies, const RunOptions& options,
-                 const StopSign& stop, Progress& progress, RunDirectory& run, RunSummary& summary) {
-  const EpisodePlan plan(suite, bodies);
-  EpisodeCosts costs(suite);
-  const Rollouts rollouts{suite, identity, bodies, plan, stop, costs, options.threads};
-  const auto key_of = [&](const EpisodeSpec& spec) { return rollouts.key_of(spec); };
-  const std::vector<std::uint32_t> missing = missing_episodes(plan, part_of(options), run, key_of, stop, summary);
-  for (const std::uint32_t place : missing) costs.expect(plan.at(place));
+// Runs what is missing.
+void run_missing(const Experiment& experiment, const RunOptions& options, const StopSign& stop, Progress& progress,
+                 RunDirectory& run, RunSummary& summary) {
+  EpisodeCosts costs;
+  const Rollouts rollouts{experiment, stop, costs, options.threads};
+  const std::vector<std::uint32_t> missing = missing_episodes(experiment, part_of(options), run, stop, summary);
+  for (const std::uint32_t place : missing) costs.expect(experiment.at(place));
   if (options.decide.asked()) {
     run_until_decided(rollouts, options, missing, progress, run, summary);
     return;
   }
   progress.start("rolling out", static_cast<int>(missing.size()), "episodes");
   progress.set_share(costs.share_done());
-  rollouts.run(pilots_first(plan, missing), run, progress, summary);
+  rollouts.run(pilots_first(experiment.plan(), missing), run, progress, summary);
   progress.finish();
 }
-
-}  // namespace
-
-namespace {
 
 // The suite hash says nothing of policies and engines; a folder is of those that its suite.yaml names.
 void require_names_of(const std::string& directory, const Suite& suite) {
@@ -273,7 +236,7 @@ void require_names_of(const std::string& directory, const Suite& suite) {
                         "joins two)",
                         directory, kind, fmt::join(known, ", "), name));
   };
-  require_all("policies", policy_names_of(there), policy_names_of(suite));
+  require_all("policies", there.policy_names(), suite.policy_names());
   require_all("engines", there.engines, suite.engines);
 }
 
@@ -299,22 +262,23 @@ void say_replaced(const std::string& directory, const Suite& suite, const std::v
 
 }  // namespace
 
-RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress) {
-  require_clips(suite);
-  check_filters(options, suite);
-  check_filters(part_of(options), suite);
-  check_decision_of(options, suite);
+RunSummary run_suite(Suite given, const std::string& directory, const RunOptions& options, Progress& progress) {
+  given.require_clips();
+  check_filters(options, given);
+  check_filters(part_of(options), given);
+  check_decision_of(options, given);
   RunSummary summary;
-  summary.absent_engines = absent_engines(suite, options);
-  Bodies bodies(suite, left_out(options.controllers, controller_names_of(suite)),
-                left_out(part_of(options).policies, policy_names_of(suite)), options.called);
-  const RunIdentity identity = identity_of(suite, bodies.read());
-  check_actors(bodies, suite, options);
-  for (const std::string& note : bodies.notes()) progress.note(note);
-  summary.absent_controllers = bodies.absent();
-  summary.absent_policies = bodies.absent_policies();
-  const KeptSuite kept = kept_suite(suite, directory, identity.files);
-  const RunInfo info = new_run_info(suite, kept, identity, options.argv, options.certificate);
+  summary.absent_engines = absent_engines(given, options);
+  ExperimentOptions loaded = only(part_of(options), given);
+  loaded.called = options.called;
+  Experiment experiment(std::move(given), std::move(loaded));
+  const Suite& suite = experiment.suite();
+  check_actors(experiment, options);
+  for (const std::string& note : experiment.bodies().notes()) progress.note(note);
+  summary.absent_controllers = experiment.bodies().absent();
+  summary.absent_policies = experiment.bodies().absent_policies();
+  const KeptSuite kept = kept_suite(suite, directory, experiment.identity().files);
+  const RunInfo info = new_run_info(experiment, kept, options.argv, options.certificate);
   require_names_of(directory, suite);
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
   say_replaced(directory, suite, options.replaced);
@@ -322,12 +286,10 @@ RunSummary run_suite(const Suite& suite, const std::string& directory, const Run
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
   const StopSign stop(options.time_limit, options.begin, options.stop_asked);
   try {
-    if (suite.clips.files.empty()) ask_for(suite, tasks_of_own_clips(suite), options, run, summary);
-    const PrepareOptions prepare{.keep_in = directory, .stop = &stop, .files = &identity.files};
-    std::vector<PairedMotion> clips = prepare_clips(suite, *bodies.nominal(), options.threads, progress, prepare);
-    if (!suite.clips.files.empty()) ask_for(suite, tasks_of(clips), options, run, summary);
-    bodies.take_clips(std::move(clips));
-    run_missing(suite, identity, bodies, options, stop, progress, run, summary);
+    if (suite.clips.files.empty()) ask_for(suite, suite.tasks_of_own_clips(), options, run, summary);
+    experiment.prepare(options.threads, progress, {.keep_in = directory, .stop = &stop});
+    if (!suite.clips.files.empty()) ask_for(suite, tasks_of(experiment.bodies().clips()), options, run, summary);
+    run_missing(experiment, options, stop, progress, run, summary);
   } catch (const Stopped&) {
     summary.end = stop.end();
     return summary;

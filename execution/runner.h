@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "duet/execution/decided_run.h"
-#include "duet/execution/run_episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/suite.h"
@@ -53,14 +53,10 @@ struct RunSummary {
 // Several processes may run one suite into one folder at once: each episode is run by one of them. Throws InputError
 // (suite, clips, run directory, a full disk; a decision for a suite of walking commands), MissingError (none of its
 // engines, of its policies or, but for playback, of its controllers is there), std::invalid_argument.
-RunSummary run_suite(const Suite& suite, const std::string& directory, const RunOptions& options, Progress& progress);
+RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions& options, Progress& progress);
 
 // The run.json of a new run, but for its plan.
-RunInfo new_run_info(const Suite& suite, const KeptSuite& kept, const RunIdentity& identity,
-                     const std::vector<std::string>& argv, const nlohmann::json& certificate);
-
-// run_episode with the actors of `bodies`; a row with `unsupported` where this machine lacks one of them.
-EpisodeRow run_or_refuse(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity, const Bodies& bodies,
-                         const std::string& trajectory_folder, const std::function<bool()>& stop_asked);
+RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const std::vector<std::string>& argv,
+                     const nlohmann::json& certificate);
 
 }  // namespace duet

@@ -195,7 +195,7 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
 
   const auto robot = load_shared_robot(suite.robot);
   const std::vector<PairedMotion> clips = prepare_clips(suite, *robot, threads, progress);
-  const Readings readings = readings_of(suite);
+  const Readings readings = suite.metric_readings();
   std::vector<ClipScore> scores(clips.size());
   content.stories.resize(std::min(clips.size(), kMostStories));
   if (clips.size() > kMostStories)

@@ -14,10 +14,6 @@
 #include "duet/core/text.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/execution/runner.h"
-#include "duet/experiment/plan/bodies.h"
-#include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/episode.h"
-#include "duet/experiment/suite/suite_names.h"
 #include "duet/metrics/detector.h"
 #include "duet/rows/folder/name_digests.h"
 #include "duet/rows/folder/published.h"
@@ -40,7 +36,7 @@ std::string text_of(const EpisodeRow& row) {
                      row.perturbation, row.arm);
 }
 
-// Names of the suite that no row has need not be on this machine.
+// Names of the suite that no row has.
 std::vector<std::string> without_rows(const Run& run, const std::vector<std::string>& names,
                                       std::string EpisodeRow::*field) {
   std::set<std::string> used;
@@ -65,20 +61,17 @@ void check_actors(const char* kind, const std::map<std::string, std::string>& cl
 
 class Verifier {
  public:
-  Verifier(const Verifier&) = delete;  // the plan points into the bodies
+  Verifier(const Verifier&) = delete;  // the plan points into the experiment
   Verifier& operator=(const Verifier&) = delete;
   Verifier(const Run& run, const VerifyOptions& options, Progress& progress)
-      : run_(run),
-        options_(options),
-        progress_(progress),
-        suite_(read_suite()),
-        bodies_(suite_, skipped_controllers_, skipped_policies_) {
+      : run_(run), options_(options), progress_(progress), loaded_(what_is_needed()), experiment_(suite(), loaded_) {
     check_identity();
-    bodies_.take_clips(
-        prepare_clips(suite_, *bodies_.nominal(), options_.threads, progress_, {.files = &identity_.files}));
-    plan_ = plan_episodes(suite_, bodies_);
-    for (std::size_t i = 0; i < plan_.size(); ++i) planned_.push_back(row_of(plan_[i]));
-    for (std::size_t i = 0; i < plan_.size(); ++i) place_[planned_[i].key] = i;
+    experiment_.prepare(options_.threads, progress_);
+    for (std::int64_t i = 0; i < experiment_.size(); ++i) {
+      plan_.push_back(experiment_.at(i));
+      planned_.push_back(experiment_.row(plan_.back()));
+      place_[planned_.back().key] = static_cast<std::size_t>(i);
+    }
   }
 
   Verification verify() {
@@ -90,14 +83,15 @@ class Verifier {
   }
 
   std::map<std::string, std::string> record(const std::vector<std::string>& keys, const std::string& folder) {
-    suite_.record = RecordTrajectories::kAll;  // only now: it is in the suite's hash
     std::vector<std::string> hashes(keys.size());
     progress_.start("running again", static_cast<int>(keys.size()), "episodes");
     parallel_for_each(static_cast<int>(keys.size()), options_.threads, [&](int i) {
       const auto place = place_.find(keys[i]);
       if (place == place_.end())
         throw InputError(fmt::format("'{}': episode {:.16} is no episode of its suite", run_.path, keys[i]));
-      hashes[i] = run_planned(plan_[place->second], folder).state_hash;
+      const EpisodeSpec& spec = plan_[place->second];
+      if (const std::string lack = lack_of(spec); !lack.empty()) throw MissingError(lack);
+      hashes[i] = experiment_.run(spec, {.trajectories = folder, .record_all = true}).state_hash;
       progress_.advance();
     });
     progress_.finish();
@@ -107,31 +101,31 @@ class Verifier {
   }
 
  private:
-  Suite read_suite() {
+  // Actors that no row has need not be on this machine.
+  [[nodiscard]] ExperimentOptions what_is_needed() const {
     const Suite named = parse_suite(run_.info.suite_yaml, run_.path + "/suite.yaml");
-    skipped_policies_ = without_rows(run_, policy_names_of(named), &EpisodeRow::policy);
-    skipped_controllers_ = without_rows(run_, controller_names_of(named), &EpisodeRow::controller);
-    Suite suite = suite_of_run(run_, {skipped_policies_, skipped_controllers_, options_.clips});
+    return {.skipped_controllers = without_rows(run_, named.controller_names(), &EpisodeRow::controller),
+            .skipped_policies = without_rows(run_, named.policy_names(), &EpisodeRow::policy)};
+  }
+
+  [[nodiscard]] Suite suite() const {
+    Suite suite = suite_of_run(run_, {loaded_.skipped_policies, loaded_.skipped_controllers, options_.clips});
     suite.allow_programs = options_.allow_programs;
     return suite;
   }
 
-  void check_identity() {
+  void check_identity() const {
     for (const EpisodeRow& row : run_.rows)
       if (row.detectors != kDetectorsVersion)
         throw InputError(fmt::format("'{}': its rows were judged by detectors {}, this program has {}", run_.path,
                                      row.detectors, kDetectorsVersion));
-    identity_ = identity_of(suite_, bodies_.read());
-    if (identity_.suite_hash != run_.info.suite_hash)
+    const RunIdentity& identity = experiment_.identity();
+    if (identity.suite_hash != run_.info.suite_hash)
       throw InputError(fmt::format(
           "'{}': suite.yaml, with its inputs and this program's robots and limits, has the hash {}, run.json says {}",
-          run_.path, short_digest(identity_.suite_hash), short_digest(run_.info.suite_hash)));
-    check_actors("policy", run_.info.policies, identity_.policies, skipped_policies_);
-    check_actors("controller", run_.info.controllers, identity_.controllers, skipped_controllers_);
-  }
-
-  [[nodiscard]] EpisodeRow row_of(const EpisodeSpec& spec) const {
-    return row_for(spec, suite_, identity_, *bodies_.robot(spec.controller));
+          run_.path, short_digest(identity.suite_hash), short_digest(run_.info.suite_hash)));
+    check_actors("policy", run_.info.policies, identity.policies, loaded_.skipped_policies);
+    check_actors("controller", run_.info.controllers, identity.controllers, loaded_.skipped_controllers);
   }
 
   // Checks what is known of an episode before it runs.
@@ -189,24 +183,19 @@ class Verifier {
     });
   }
 
-  // Why this machine cannot run the episode of a row; empty where it can.
-  [[nodiscard]] std::string lack_of(const EpisodeRow& row) const {
-    if (!can_run_in(row.engine)) return fmt::format("engine '{}' is not on this machine", row.engine);
-    if (const auto absent = bodies_.absent().find(row.controller);
-        absent != bodies_.absent().end() && row.engine != kPlaybackEngine)
-      return absent->second;
-    return bodies_.policy(row.controller, row.policy).refusal;
+  // Why this machine cannot run the episode; empty where it can.
+  [[nodiscard]] static std::string lack_of(const EpisodeSpec& spec) {
+    if (!can_run_in(spec.engine)) return fmt::format("engine '{}' is not on this machine", spec.engine);
+    return Experiment::lack_of(spec);
   }
+
+  [[nodiscard]] const EpisodeSpec& spec_of(const EpisodeRow& row) const { return plan_[place_.at(row.key)]; }
 
   // An episode that has nothing to say against its engine, controller and policy is set up here and stopped at once:
   // what refuses it there would refuse it here.
   [[nodiscard]] bool is_refused_here(const EpisodeRow& row) const {
-    const EpisodeSpec& spec = plan_[place_.at(row.key)];
     try {
-      return run_episode(
-                 spec, suite_, identity_, bodies_.robot(spec.controller), "",
-                 {.policy = bodies_.policy(spec.controller, spec.policy).make, .stop_asked = [] { return true; }})
-                 .outcome == Outcome::kUnsupported;
+      return experiment_.run(spec_of(row), {.stop_asked = [] { return true; }}).outcome == Outcome::kUnsupported;
     } catch (const EpisodeInterrupted&) {
       return false;
     }
@@ -216,7 +205,7 @@ class Verifier {
   void check_unsupported() {
     std::vector<const EpisodeRow*> marked;
     for (const EpisodeRow& row : run_.rows)
-      if (row.outcome == Outcome::kUnsupported && place_.contains(row.key) && lack_of(row).empty())
+      if (row.outcome == Outcome::kUnsupported && place_.contains(row.key) && lack_of(spec_of(row)).empty())
         marked.push_back(&row);
     std::vector<char> refused(marked.size());
     parallel_for_each(static_cast<int>(marked.size()), options_.threads,
@@ -241,7 +230,7 @@ class Verifier {
     std::vector<const EpisodeRow*> rows, time_outs;
     for (const EpisodeRow& row : run_.rows) {
       if (!place_.contains(row.key)) continue;
-      if (const std::string lack = lack_of(row); !lack.empty()) {
+      if (const std::string lack = lack_of(spec_of(row)); !lack.empty()) {
         ++result_.not_run[lack];
       } else if (row.outcome != Outcome::kUnsupported) {  // check_unsupported
         (row.outcome == Outcome::kTimedOut ? time_outs : rows).push_back(&row);
@@ -268,7 +257,7 @@ class Verifier {
   }
 
   [[nodiscard]] RepeatedEpisode repeated(const EpisodeRow& row, bool with_traces) const {
-    EpisodeRow now = run_planned(plan_[place_.at(row.key)], "");
+    EpisodeRow now = experiment_.run(spec_of(row));
     if (!with_traces) {
       now.trace = {};
       now.feet = {};
@@ -282,22 +271,11 @@ class Verifier {
     return repeat;
   }
 
-  [[nodiscard]] EpisodeRow run_planned(const EpisodeSpec& spec, const std::string& folder) const {
-    if (!can_run_in(spec.engine)) throw MissingError(fmt::format("engine '{}' is not on this machine", spec.engine));
-    if (const auto absent = bodies_.absent().find(spec.controller); absent != bodies_.absent().end())
-      throw MissingError(absent->second);
-    const PolicyOnBody& policy = bodies_.policy(spec.controller, spec.policy);
-    if (!policy.refusal.empty()) throw MissingError(policy.refusal);
-    return run_episode(spec, suite_, identity_, bodies_.robot(spec.controller), folder, {.policy = policy.make});
-  }
-
   const Run& run_;
   const VerifyOptions& options_;
   Progress& progress_;
-  std::vector<std::string> skipped_policies_, skipped_controllers_;
-  Suite suite_;
-  Bodies bodies_;
-  RunIdentity identity_;
+  ExperimentOptions loaded_;
+  Experiment experiment_;
   std::vector<EpisodeSpec> plan_;
   std::vector<EpisodeRow> planned_;                     // as known before they run
   std::unordered_map<std::string, std::size_t> place_;  // of a key in both

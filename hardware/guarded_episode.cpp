@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <new>
+#include <utility>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
@@ -11,7 +11,6 @@
 #include "duet/robots/robot_cards.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
-#include "duet/scoring/scoring.h"
 
 namespace duet {
 namespace {
@@ -32,32 +31,20 @@ GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robo
   return episode;
 }
 
-void fill_row(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const RobotModel& robot,
-              EpisodeRow& row) {
-  const PolicyFaults& faults = rollout.policy_faults;
-  row.policy_faults = {faults.late, faults.invalid, faults.dead, faults.message};
-  if (faults.dead) throw std::runtime_error(faults.message);
-  score_rollout(rollout, setup, suite, readings_of(suite), robot, row);
-}
-
-void run_in_world(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-                  const PolicyMaker& policy, GuardLink& link, const GuardedOptions& options, GuardedRun& run) {
-  RolloutSetup setup = episode_setup(spec, suite, *robot);
-  if (options.stop_asked) setup.stop_asked = options.stop_asked;
-  const PointTracks partner = episode_partner(setup).joints;
-  GuardedEpisode episode = guarded_episode(setup, *robot, options, partner);
+Rollout roll_out_guarded(const RolloutSetup& setup, const std::shared_ptr<const RobotModel>& robot, Policy& policy,
+                         GuardLink& link, const GuardedOptions& options, GuardedRun& run) {
+  GuardedEpisode episode = guarded_episode(setup, *robot, options, episode_partner(setup).joints);
   run.executed = executed_mask(*robot, episode.joints, true);
   GuardedWorld world(std::move(episode), robot, link);
-  const std::unique_ptr<Policy> leader = policy();
-  const Rollout rollout = roll_out(setup, world, *leader, options.engine);
-  run.interrupted = rollout.interrupted;
+  Rollout rollout = roll_out(setup, world, policy, options.engine);
+  run.interrupted = std::exchange(rollout.interrupted, false);
   run.clamps = world.clamps();
   run.held_ticks = world.held_ticks();
   run.guard_seconds = world.report().now - world.began_at();
   run.missed_reports = world.missed_reports();
   if (!options.recording.empty()) save_logged_run(rollout.recording, run.executed, options.recording);
-  fill_row(rollout, setup, suite, *robot, run.row);
   world.rest(kRest);
+  return rollout;
 }
 
 std::string share_text(long k, long n, const Interval& interval) {
@@ -67,32 +54,13 @@ std::string share_text(long k, long n, const Interval& interval) {
 
 }  // namespace
 
-GuardedRun run_guarded_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
-                               const std::shared_ptr<const RobotModel>& robot, const PolicyMaker& policy,
-                               GuardLink& link, const GuardedOptions& options) {
+GuardedRun run_guarded_episode(const Experiment& experiment, const EpisodeSpec& spec, GuardLink& link,
+                               const GuardedOptions& options) {
   GuardedRun run;
-  run.row = row_for(spec, suite, identity, *robot);
-  run.row.engine = options.engine;
-  run.row.engine_version = "1";
-  run.row.key = episode_key(run.row);
-  run.row.started_at = utc_now();
-  const double begin = monotonic_seconds();
-  try {
-    run_in_world(spec, suite, robot, policy, link, options, run);
-  } catch (const StorageError&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw;  // the machine's fault, not the policy's: no row says it
-  } catch (const MissingError& error) {
-    run.row.outcome = Outcome::kUnsupported;
-    run.row.message = error.what();
-    run.row.success = false;
-  } catch (const std::exception& error) {
-    run.row.outcome = Outcome::kError;
-    run.row.message = error.what();
-    run.row.success = false;
-  }
-  run.row.wall_s = monotonic_seconds() - begin;
+  const auto in_world = [&](const RolloutSetup& setup, Policy& policy) {
+    return roll_out_guarded(setup, spec.body->robot, policy, link, options, run);
+  };
+  run.row = experiment.run(spec, {.stop_asked = options.stop_asked, .engine = options.engine, .world = in_world});
   return run;
 }
 

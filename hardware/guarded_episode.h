@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/execution/run_episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/hardware/guarded_world.h"
 #include "duet/hardware/log_recording.h"
@@ -35,11 +35,10 @@ struct GuardedRun {
   bool interrupted = false;  // by stop_asked: the row is no result
 };
 
-// The setup's episode through `link`, scored as the suite scores. Whatever ends it is an outcome; a guard that does not
-// run is `error` with what it is at. Throws StorageError where the recording cannot be written.
-GuardedRun run_guarded_episode(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& identity,
-                               const std::shared_ptr<const RobotModel>& robot, const PolicyMaker& policy,
-                               GuardLink& link, const GuardedOptions& options);
+// The episode through `link`, scored as the suite scores. Whatever ends it is an outcome; a guard that does not run is
+// `error` with what it is at. Throws StorageError where the recording cannot be written.
+GuardedRun run_guarded_episode(const Experiment& experiment, const EpisodeSpec& spec, GuardLink& link,
+                               const GuardedOptions& options);
 
 // The same episodes in two worlds, one row each.
 struct PairedEpisodes {

@@ -13,6 +13,7 @@
 #include "duet/core/require.h"
 #include "duet/execution/led_episodes.h"
 #include "duet/experiment/plan/shipped_suites.h"
+#include "duet/policies/language.h"
 #include "duet/python/bindings.h"
 #include "duet/rows/episode_row.h"
 #include "duet/rows/json_fields.h"
@@ -26,13 +27,17 @@ struct Part {
   int first, size;
 };
 
+// The robot that is led: of the experiment's one controller.
+const RobotModel& robot_of(const Experiment& experiment) { return *experiment.at(0).body->robot; }
+
 class EpisodeBatch {
  public:
-  EpisodeBatch(std::shared_ptr<const LedSuite> suite, int n, Led led) : suite_(std::move(suite)), led_(led) {
+  EpisodeBatch(std::shared_ptr<const Experiment> experiment, int n, Led led)
+      : experiment_(std::move(experiment)), led_(led) {
     require(n >= 1 && n <= 4096, "n: expected 1 to 4096 episodes, found {}", n);
-    joints_ = suite_->robot()->dof();
+    joints_ = robot().dof();
     numbers_ = 91 + 2 * joints_;
-    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(suite_, led));
+    for (int i = 0; i < n; ++i) episodes_.push_back(std::make_unique<LedEpisode>(experiment_, led));
     frames_.resize(static_cast<std::size_t>(n) * kHistoryFrames * numbers_);
     root_.resize(static_cast<std::size_t>(n) * 7);
     hold_.resize(static_cast<std::size_t>(n) * kAnchors * width());
@@ -111,7 +116,7 @@ class EpisodeBatch {
     for (int row = 0; row < kAnchors; ++row) {
       double* out = &hold_[(static_cast<std::size_t>(place) * kAnchors + row) * width()];
       put(request->standing, out);
-      std::copy(suite_->robot()->neutral.data(), suite_->robot()->neutral.data() + joints_, out + 7);
+      std::copy(robot().neutral.data(), robot().neutral.data() + joints_, out + 7);
     }
     tick_[place] = request->tick;
     if (!leads_partner()) return;
@@ -123,7 +128,9 @@ class EpisodeBatch {
     for (const double value : {X.p.x(), X.p.y(), X.p.z(), X.R.w(), X.R.x(), X.R.y(), X.R.z()}) *out++ = value;
   }
 
-  std::shared_ptr<const LedSuite> suite_;
+  [[nodiscard]] const RobotModel& robot() const { return robot_of(*experiment_); }
+
+  std::shared_ptr<const Experiment> experiment_;
   Led led_;
   std::vector<std::unique_ptr<LedEpisode>> episodes_;
   int joints_ = 0;
@@ -197,30 +204,33 @@ void step_batch(EpisodeBatch& batch, const Numbers& plans, const std::optional<N
   batch.step(data, rows, ahead);
 }
 
-std::shared_ptr<LedSuite> led_suite(const std::string& suite, const Overrides& overrides, const LedPart& part,
-                                    int threads) {
+std::shared_ptr<Experiment> led_suite(const std::string& suite, const Overrides& overrides, const LedPart& part,
+                                      int threads) {
   Progress quiet(Progress::Style::kQuiet);
-  return std::make_shared<LedSuite>(load_suite(suite_file(suite), overrides), part, threads, quiet);
+  return led_experiment(load_suite(suite_file(suite), overrides), part, threads, quiet);
 }
 
-std::tuple<std::string, std::string, std::string> about_episode(const LedSuite& suite, int episode) {
-  require(episode >= 0 && episode < suite.size(), "episode: expected a number below {}, found {}", suite.size(),
-          episode);
-  const PairedMotion& clip = *suite.at(episode).clip;
-  return {clip.clip_id, std::string(to_string(clip.task)), suite.prompt(episode)};
+std::tuple<std::string, std::string, std::string> about_episode(const Experiment& experiment, int episode) {
+  require(episode >= 0 && episode < experiment.size(), "episode: expected a number below {}, found {}",
+          experiment.size(), episode);
+  const PairedMotion& clip = *experiment.at(episode).clip;
+  return {clip.clip_id, std::string(to_string(clip.task)), std::string(task_prompt(clip.task))};
 }
 
-int most_steps(const LedSuite& suite) {
+int most_steps(const Experiment& experiment) {
   int most = 0;
-  for (int episode = 0; episode < suite.size(); ++episode) most = std::max(most, suite.questions(episode));
+  for (std::int64_t episode = 0; episode < experiment.size(); ++episode)
+    most = std::max(most, questions_of(experiment, episode));
   return most;
 }
+
+std::vector<double> list_of(const Eigen::VectorXd& values) { return {values.begin(), values.end()}; }
 
 }  // namespace
 
 void add_environment(py::module_& module) {
   const auto released = py::call_guard<py::gil_scoped_release>();
-  py::class_<LedSuite, std::shared_ptr<LedSuite>>(module, "LedSuite", "What episodes are drawn from.")
+  py::class_<Experiment, std::shared_ptr<Experiment>>(module, "LedSuite", "What episodes are drawn from.")
       .def(py::init([](const std::string& suite, const Overrides& overrides, const std::string& engine,
                        const std::string& controller, const std::string& task, const std::string& perturbation,
                        int threads) {
@@ -228,21 +238,14 @@ void add_environment(py::module_& module) {
            }),
            py::arg("suite"), py::arg("overrides"), py::arg("engine"), py::arg("controller"), py::arg("task"),
            py::arg("perturbation"), py::arg("threads"), released)
-      .def("__len__", &LedSuite::size)
+      .def("__len__", &Experiment::size)
       .def("about", &about_episode, py::arg("episode"), "Its clip, task and prompt.")
       .def_property_readonly("most_steps", &most_steps, "That an episode of it has; looks at each.")
-      .def_property_readonly("joints", [](const LedSuite& suite) { return suite.robot()->joint_names(); })
-      .def_property_readonly("lower",
-                             [](const LedSuite& suite) {
-                               const Eigen::VectorXd lower = suite.robot()->lower();
-                               return std::vector<double>(lower.begin(), lower.end());
-                             })
-      .def_property_readonly("upper", [](const LedSuite& suite) {
-        const Eigen::VectorXd upper = suite.robot()->upper();
-        return std::vector<double>(upper.begin(), upper.end());
-      });
+      .def_property_readonly("joints", [](const Experiment& suite) { return robot_of(suite).joint_names(); })
+      .def_property_readonly("lower", [](const Experiment& suite) { return list_of(robot_of(suite).lower()); })
+      .def_property_readonly("upper", [](const Experiment& suite) { return list_of(robot_of(suite).upper()); });
   py::class_<EpisodeBatch>(module, "EpisodeBatch", "Episodes that are led in step.")
-      .def(py::init([](const std::shared_ptr<LedSuite>& suite, int n, bool leads_partner) {
+      .def(py::init([](const std::shared_ptr<Experiment>& suite, int n, bool leads_partner) {
              return std::make_unique<EpisodeBatch>(suite, n, leads_partner ? Led::kBoth : Led::kRobot);
            }),
            py::arg("suite"), py::arg("n"), py::arg("leads_partner") = false)

@@ -61,7 +61,7 @@ void require_same_function(const SuitePolicy& policy, const std::string& directo
 void add_policies(const std::vector<AskedPolicy>& asked, const std::string& directory, bool replace, Suite& suite,
                   RunOptions& options) {
   for (const AskedPolicy& policy : asked) {
-    const std::vector<std::string> known = policy_names_of(suite);
+    const std::vector<std::string> known = suite.policy_names();
     const bool there = std::ranges::find(known, policy.name) != known.end() || policy.name == kNullPolicy;
     if (!there || !policy.options.empty()) {
       require(!there, "policy '{}' is the suite's own: expected another name for the function", policy.name);
@@ -91,7 +91,7 @@ Suite suite_of(const SuiteQuestion& asked) {
   Suite suite = load_suite(suite_file(asked.suite), asked.overrides);
   suite.allow_programs = asked.allow_programs;
   use_clips(asked.clips, suite);
-  require_clips(suite);
+  suite.require_clips();
   return suite;
 }
 
@@ -111,7 +111,8 @@ class Evaluation {
   Evaluation(Suite suite, std::string output, RunOptions options, bool quiet)
       : options_(std::move(options)), progress_(quiet ? Progress::Style::kQuiet : Progress::Style::kAuto) {
     options_.stop_asked = [this] { return stop_.load(); };
-    thread_ = std::thread([this, suite = std::move(suite), output = std::move(output)] { run(suite, output); });
+    thread_ = std::thread(
+        [this, suite = std::move(suite), output = std::move(output)]() mutable { run(std::move(suite), output); });
   }
   ~Evaluation() {
     const py::gil_scoped_release released;  // a policy that is under way needs it to end
@@ -135,9 +136,9 @@ class Evaluation {
   }
 
  private:
-  void run(const Suite& suite, const std::string& output) {
+  void run(Suite suite, const std::string& output) {
     try {
-      summary_ = run_suite(suite, output, options_, progress_);
+      summary_ = run_suite(std::move(suite), output, options_, progress_);
     } catch (...) {
       error_ = std::current_exception();
     }

@@ -183,12 +183,6 @@ void add_finite(const std::map<std::string, double>& values, NamedNumbers& out) 
   out = all;
 }
 
-Readings readings_of(const Suite& suite) {
-  Readings readings;
-  for (const auto& [option, value] : suite.readings) set_reading(readings, option, value);
-  return readings;
-}
-
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set) {
   Verdict verdict;
   verdict.version = to_string(version);
@@ -288,7 +282,7 @@ void score_recording(const Recording& recording, const ActSource& source, const 
     add_finite(retargeting_metrics(executed, robot, rules.readings.metrics), row.metrics);
 }
 
-void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
+void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const ScoringRules& rules,
                    const RobotModel& robot, EpisodeRow& row) {
   row.late_plans = rollout.late_plans;
   row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
@@ -296,7 +290,6 @@ void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suit
   row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
   set_measured(rollout, row);
   add_contacts(rollout, *setup.clip, robot, row);
-  const ScoringRules rules{suite.detector, suite.thresholds, readings, setup.foot_trace};
   score_recording(rollout.recording, act_source(rollout.recording, setup), rules, robot, row);
 }
 

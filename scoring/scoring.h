@@ -32,7 +32,7 @@ void score_recording(const Recording& recording, const ActSource& source, const 
                      const RobotModel& robot, EpisodeRow& row);
 
 // The same of a rollout, and what was measured while it ran: contacts, forces, faults, times of plans, state hash.
-void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const Suite& suite, const Readings& readings,
+void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const ScoringRules& rules,
                    const RobotModel& robot, EpisodeRow& row);
 
 // Scores an episode that a commanded velocity led: success where the robot was upright to the end, how it walked, and
@@ -56,8 +56,6 @@ PairedMotion executed_act(const Recording& recording, const ActSource& source, c
 std::string state_hash(const Recording& recording);
 
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set);
-
-Readings readings_of(const Suite& suite);
 
 // Frames that figures of a motion need: third differences at both ends.
 inline constexpr int kShortestScored = 8;

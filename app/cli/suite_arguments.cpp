@@ -16,8 +16,8 @@ namespace {
 
 // Sets the network of a controller or a policy; a name that is neither is refused with both.
 void set_network(Suite& suite, const std::string& actor, const std::string& path) {
-  const std::vector<std::string> policies = policy_names_of(suite);
-  std::vector<std::string> known = controller_names_of(suite);
+  const std::vector<std::string> policies = suite.policy_names();
+  std::vector<std::string> known = suite.controller_names();
   if (std::find(known.begin(), known.end(), actor) != known.end()) {
     set_controller_option(suite, actor, "network", path);
   } else if (std::find(policies.begin(), policies.end(), actor) != policies.end()) {
@@ -47,7 +47,7 @@ Suite suite_of(const SuiteArguments& arguments) {
   Suite suite = load_suite(suite_file(arguments.suite), overrides);
   suite.allow_programs = arguments.allow_programs;
   use_clips(arguments.clips, suite);
-  require_clips(suite);
+  suite.require_clips();
   for (const std::string& text : arguments.networks) {
     const auto [actor, path] = split_assignment(text);
     set_network(suite, actor, std::filesystem::absolute(path).lexically_normal().string());

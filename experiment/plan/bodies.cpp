@@ -40,8 +40,8 @@ void require_joints_of(const RobotModel& nominal, const RobotModel& robot, const
                   controller, robot.name, nominal.name, robot.name));
 }
 
-bool is_simulated(const Suite& suite) {
-  return std::ranges::any_of(suite.engines, [](const std::string& engine) { return engine != kPlaybackEngine; });
+bool is_played_back(const std::vector<std::string>& engines) {
+  return std::ranges::all_of(engines, [](const std::string& engine) { return engine == kPlaybackEngine; });
 }
 
 // Requires what every episode of the suite needs of the robot's card: now, not after the physics of the first one.
@@ -55,7 +55,7 @@ void require_parts_of(const Suite& suite, const RobotModel& robot, const std::st
         lacks.push_back(fmt::format("keypoints: {}", hand));
     if (robot.pairs.empty()) lacks.emplace_back("pairs");
   }
-  if (robot.feet.empty() && is_simulated(suite)) lacks.emplace_back("shapes with sole: true");
+  if (robot.feet.empty() && !is_played_back(suite.engines)) lacks.emplace_back("shapes with sole: true");
   if (lacks.empty()) return;
   throw InputError(fmt::format("{}: robot '{}': expected what suite '{}' needs of a robot, found no {}", card,
                                robot.name, suite.name, fmt::join(lacks, ", ")));
@@ -75,28 +75,21 @@ void require_same_facts(const SuiteController& controller) {
 
 }  // namespace
 
-std::string contact_limits_of(const Suite& suite) {
-  return suite.contact_limits.empty() ? default_contact_limits_path() : suite.contact_limits;
-}
-
-std::string card_of(const Suite& suite, const SuiteController& controller) {
-  if (!suite.robot.empty()) return suite.robot;
-  const std::string robot = about(controller).robot;
-  return robot.empty() ? default_card_path() : card_path(robot);
-}
-
 Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers,
                const std::vector<std::string>& skipped_policies, const std::map<std::string, PolicyLoader>& called) {
   require_allowed(programs_of(suite, skipped_policies), suite.allow_programs);
   const DigestReads reads(read_);
-  if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(contact_limits_of(suite));
-  add(suite.robot.empty() ? default_card_path() : suite.robot);
+  if (suite.partner == PartnerMode::kSolid) limits_ = load_contact_limits(suite.contact_limits_file());
+  add(suite.card());
   for (const SuiteController& controller : suite.controllers) {
+    ControllerOnBody& entry = controllers_[controller.name];
+    entry.robot = nominal();
     if (contains(skipped_controllers, controller.name)) continue;
     try {
       load_controller_of(suite, controller);
     } catch (const MissingError& error) {
-      absent_[controller.name] = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
+      entry.refusal = fmt::format("controller '{}' is absent: {}", controller.name, error.what());
+      absent_[controller.name] = entry.refusal;
     }
   }
   for (const SuitePolicy& policy : suite.policies) {
@@ -112,15 +105,15 @@ Bodies::Bodies(const Suite& suite, const std::vector<std::string>& skipped_contr
 // Made once to see whether it can be.
 void Bodies::load_controller_of(const Suite& suite, const SuiteController& controller) {
   require_same_facts(controller);
-  const std::size_t place = add(card_of(suite, controller));
-  const std::shared_ptr<const RobotModel>& robot = bodies_[place].robot;
-  if (suite.references.empty()) require_joints_of(*nominal(), *robot, controller.name);
-  require_parts_of(suite, *robot, card_of(suite, controller));
+  const std::size_t place = add(suite.card_of(controller));
+  const std::shared_ptr<const RobotModel> robot = bodies_[place].robot;
+  if (!suite.is_commanded()) require_joints_of(*nominal(), *robot, controller.name);
+  require_parts_of(suite, *robot, suite.card_of(controller));
   LoadedController loaded = load_controller(controller.use, robot, controller.options);
   static_cast<void>(loaded.make(controller.options));
   take_notes(loaded.notes);
   for (const Perturbation& perturbation : suite.perturbations) check_perturbation(perturbation, *robot);
-  controllers_[controller.name] = std::move(loaded);
+  controllers_[controller.name] = {robot, std::move(loaded)};
   place_[controller.name] = place;
 }
 
@@ -177,16 +170,13 @@ std::size_t Bodies::place(const std::string& controller) const {
   return found == place_.end() ? 0 : found->second;
 }
 
-const std::shared_ptr<const RobotModel>& Bodies::robot(const std::string& controller) const {
-  return bodies_[place(controller)].robot;
-}
-
 const std::vector<PairedMotion>& Bodies::clips(const std::string& controller) const {
   return bodies_[place(controller)].clips;
 }
 
-const PolicyOnBody& Bodies::policy(const std::string& controller, const std::string& policy) const {
-  return policies_.at({policy, place(controller)});
+const PolicyOnBody* Bodies::policy(const std::string& controller, const std::string& policy) const {
+  const auto found = policies_.find({policy, place(controller)});
+  return found == policies_.end() ? nullptr : &found->second;
 }
 
 }  // namespace duet

@@ -26,11 +26,12 @@ struct PolicyOnBody {
   std::string refusal;  // its files are not on this machine; empty where it can
 };
 
-// The table that contacts with a solid partner are held against.
-std::string contact_limits_of(const Suite& suite);
-
-// The card of the robot that one of the suite's controllers runs on. Throws MissingError where it is not there.
-std::string card_of(const Suite& suite, const SuiteController& controller);
+// A controller of a suite on the robot that it was made for.
+struct ControllerOnBody {
+  std::shared_ptr<const RobotModel> robot;  // the nominal one where the controller is absent or was skipped
+  LoadedController loaded = {};             // empty there
+  std::string refusal = {};                 // why this machine cannot run it; empty where it can
+};
 
 class Bodies {
  public:
@@ -42,14 +43,16 @@ class Bodies {
   explicit Bodies(const Suite& suite, const std::vector<std::string>& skipped_controllers = {},
                   const std::vector<std::string>& skipped_policies = {},
                   const std::map<std::string, PolicyLoader>& called = {});
+  Bodies(const Bodies&) = delete;  // the specs of a plan point into it
+  Bodies& operator=(const Bodies&) = delete;
 
   // Puts the clips, retargeted to nominal(), on every body. Once.
   void take_clips(std::vector<PairedMotion> clips);
 
   // That clips are retargeted to: the suite's robot, or the one that ships with duet.
   [[nodiscard]] const std::shared_ptr<const RobotModel>& nominal() const { return bodies_.front().robot; }
-  // The controller with what it has loaded. Throws std::out_of_range for one that is absent or was skipped.
-  [[nodiscard]] const LoadedController& controller(const std::string& name) const { return controllers_.at(name); }
+  // Throws std::out_of_range for a name that the suite does not have.
+  [[nodiscard]] const ControllerOnBody& controller(const std::string& name) const { return controllers_.at(name); }
   // None where no partner is solid.
   [[nodiscard]] const std::optional<ContactLimits>& limits() const { return limits_; }
   // Digests of the files that were loaded, of the bytes that are used.
@@ -57,14 +60,18 @@ class Bodies {
   // Sentences of what was loaded, each once: what of a URDF is not simulated, where two files of a controller disagree.
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
   // The robot of a controller of the suite; nominal() for one that is absent.
-  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot(const std::string& controller) const;
+  [[nodiscard]] const std::shared_ptr<const RobotModel>& robot(const std::string& name) const {
+    return controller(name).robot;
+  }
+  // The clips on nominal(), and on the robot of a controller.
+  [[nodiscard]] const std::vector<PairedMotion>& clips() const { return bodies_.front().clips; }
   [[nodiscard]] const std::vector<PairedMotion>& clips(const std::string& controller) const;
   // Controllers of the suite that cannot run here, with the reason.
   [[nodiscard]] const std::map<std::string, std::string>& absent() const { return absent_; }
   // Policies of the suite that cannot run here, with the reason.
   [[nodiscard]] const std::map<std::string, std::string>& absent_policies() const { return absent_policies_; }
-  // The policy on the body of a controller. Throws std::out_of_range for a policy that was skipped.
-  [[nodiscard]] const PolicyOnBody& policy(const std::string& controller, const std::string& policy) const;
+  // The policy on the body of a controller; null for one that was skipped.
+  [[nodiscard]] const PolicyOnBody* policy(const std::string& controller, const std::string& policy) const;
 
  private:
   struct Body {
@@ -82,7 +89,7 @@ class Bodies {
 
   std::vector<Body> bodies_;                  // the nominal first
   std::map<std::string, std::size_t> place_;  // of a controller's body
-  std::map<std::string, LoadedController> controllers_;
+  std::map<std::string, ControllerOnBody> controllers_;
   std::optional<ContactLimits> limits_;
   FileDigests read_;
   std::vector<std::string> notes_;

@@ -7,7 +7,6 @@
 
 #include "duet/core/random.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/episode_tags.h"
 #include "duet/experiment/suite/suite_names.h"
 #include "duet/robots/robot_cards.h"
 #include "duet/rows/groups/row_groups.h"
@@ -23,8 +22,8 @@ bool one_playback(const Suite& suite) {
     return made_for.empty() ? default_robot() : made_for;
   };
   const SuiteController& first = suite.controllers.front();
-  return std::all_of(suite.controllers.begin(), suite.controllers.end(), [&](const SuiteController& controller) {
-    return robot(controller) == robot(first) && start_mode(suite, controller) == start_mode(suite, first);
+  return std::ranges::all_of(suite.controllers, [&](const SuiteController& controller) {
+    return robot(controller) == robot(first) && suite.start_of(controller) == suite.start_of(first);
   });
 }
 
@@ -40,7 +39,7 @@ const PairedMotion& next_of_task(const std::vector<PairedMotion>& clips, const P
                   to_string(clip.task)));
 }
 
-// Engine, controller and perturbation of all episodes.
+// Engine, controller and perturbation of all episodes; playback has none.
 std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
   std::vector<EpisodeSpec> combinations;
   const bool once = one_playback(suite);
@@ -50,11 +49,11 @@ std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
       if (playback && once && controller.name != suite.controllers.front().name) continue;
       EpisodeSpec combination;
       combination.engine = engine;
-      combination.controller = controller.name;
+      combination.controller = &controller;
       if (playback) combinations.push_back(combination);
       if (playback) continue;
       for (const Perturbation& perturbation : suite.perturbations) {
-        combination.perturbation = perturbation.name;
+        combination.perturbation = &perturbation;
         combination.perturbation_tags = RowTags(tags_of(perturbation));
         combinations.push_back(combination);
       }
@@ -66,10 +65,9 @@ std::vector<EpisodeSpec> combinations_of(const Suite& suite) {
 std::vector<EpisodeArm> arms_of(const Suite& suite) {
   std::vector<EpisodeArm> arms;
   for (const SuitePolicy& policy : suite.policies)
-    if (policy.name != kNullPolicy)
-      arms.push_back({policy.name, policy.shuffled_partner ? "shuffled" : "main", policy.shuffled_partner});
-  for (const std::string& control : suite.controls) arms.push_back({control, "control"});
-  if (suite.null_arm) arms.push_back({kNullPolicy, "null"});
+    if (policy.name != kNullPolicy) arms.push_back({policy, policy.shuffled_partner ? "shuffled" : "main"});
+  for (const std::string& control : suite.controls) arms.push_back({SuitePolicy{control}, "control"});
+  if (suite.null_arm) arms.push_back({SuitePolicy{kNullPolicy}, "null"});
   return arms;
 }
 
@@ -81,38 +79,30 @@ bool chosen(const std::vector<std::string>& names, std::string_view name) {
 
 bool can_run_in(const std::string& engine) { return engine == kPlaybackEngine || is_available(engine); }
 
-StartMode start_mode(const Suite& suite, const SuiteController& controller) {
-  switch (suite.start) {
-    case SuiteStart::kClip:
-      return StartMode::kClip;
-    case SuiteStart::kApproach:
-      return StartMode::kApproach;
-    case SuiteStart::kAct:
-      return StartMode::kAct;
-    case SuiteStart::kSimToReal:
-      return StartMode::kSimToReal;
-    case SuiteStart::kAuto:
-      break;
-  }
-  return about(controller).walks ? StartMode::kApproach : StartMode::kAct;
-}
-
 EpisodePlan::EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part)
     : suite_(suite),
       bodies_(bodies),
       suite_id_(suite.name + "@" + suite.version),
       combinations_(combinations_of(suite)),
       arms_(arms_of(suite)) {
-  const std::vector<PairedMotion>& clips = bodies.clips(suite.controllers.front().name);
+  const std::vector<PairedMotion>& clips = bodies.clips();
   require_sane_size(suite, static_cast<std::int64_t>(clips.size()));
   for (const EpisodeArm& arm : arms_)
     for (const PairedMotion& clip : clips)
-      if (arm.shuffled) static_cast<void>(next_of_task(clips, clip, arm.policy));
+      if (arm.policy.shuffled_partner) static_cast<void>(next_of_task(clips, clip, arm.policy.name));
   std::erase_if(combinations_, [&](const EpisodeSpec& spec) {
-    return !chosen(part.engines, spec.engine) || !chosen(part.controllers, spec.controller) ||
-           (spec.engine != kPlaybackEngine && !chosen(part.perturbations, spec.perturbation));
+    return !chosen(part.engines, spec.engine) || !chosen(part.controllers, spec.controller->name) ||
+           (spec.engine != kPlaybackEngine && !chosen(part.perturbations, spec.perturbation->name));
   });
-  std::erase_if(arms_, [&](const EpisodeArm& arm) { return arm.name != "null" && !chosen(part.policies, arm.policy); });
+  std::erase_if(arms_,
+                [&](const EpisodeArm& arm) { return arm.name != "null" && !chosen(part.policies, arm.policy.name); });
+  for (EpisodeSpec& spec : combinations_) {
+    spec.body = &bodies.controller(spec.controller->name);
+    if (spec.engine == kPlaybackEngine)
+      spec.perturbation = &clean_;
+    else
+      spec.settings = &settings_.try_emplace(spec.engine, suite.profile.settings(spec.engine)).first->second;
+  }
   for (std::size_t i = 0; i < clips.size(); ++i)
     if (chosen(part.tasks, to_string(clips[i].task))) clips_.push_back(i);
   if (!part.is_whole() && size() == 0)
@@ -128,12 +118,13 @@ EpisodeSpec EpisodePlan::at(std::int64_t i) const {
   const std::int64_t per_clip = arms * suite_.episodes_per_clip;
   const EpisodeArm& arm = arms_[i % arms];
   EpisodeSpec spec = combinations_[i / (per_clip * count)];
-  spec.bodies = &bodies_;
-  const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller);
+  const std::vector<PairedMotion>& clips = bodies_.clips(spec.controller->name);
   spec.clip = &clips[clips_[i / per_clip % count]];
   spec.episode = static_cast<int>(i / arms % suite_.episodes_per_clip);
-  spec.seen = arm.shuffled ? &next_of_task(clips, *spec.clip, arm.policy) : nullptr;
-  spec.policy = arm.policy;
+  spec.policy = &arm.policy;
+  spec.leader = bodies_.policy(spec.controller->name, arm.policy.name);
+  spec.seen = arm.policy.shuffled_partner ? &next_of_task(clips, *spec.clip, arm.policy.name) : nullptr;
+  if (suite_.is_commanded()) spec.reference = &reference_of(suite_.references, spec.clip->clip_id);
   spec.arm = arm.name;
   spec.seed = seed(*spec.clip, spec.episode, "episode");
   spec.perturbation_seed = seed(*spec.clip, spec.episode, "perturbation");
@@ -142,13 +133,6 @@ EpisodeSpec EpisodePlan::at(std::int64_t i) const {
 
 std::uint64_t EpisodePlan::seed(const PairedMotion& clip, int episode, const char* stream) const {
   return suite_.seed + stream_key({suite_id_, to_string(clip.task), clip.clip_id, std::to_string(episode), stream});
-}
-
-std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies) {
-  const EpisodePlan plan(suite, bodies);
-  std::vector<EpisodeSpec> all;
-  for (std::int64_t i = 0; i < plan.size(); ++i) all.push_back(plan.at(i));
-  return all;
 }
 
 std::vector<std::string> left_out(const std::vector<std::string>& filter, const std::vector<std::string>& known) {
@@ -168,36 +152,29 @@ void check_filters(const RunPart& part, const Suite& suite) {
   std::vector<std::string> tasks;
   for (const Task task : suite.tasks) tasks.emplace_back(to_string(task));
   check(part.engines, suite.engines, "engine");
-  check(part.controllers, controller_names_of(suite), "controller");
-  std::vector<std::string> policies = policy_names_of(suite);
+  check(part.controllers, suite.controller_names(), "controller");
+  std::vector<std::string> policies = suite.policy_names();
   policies.insert(policies.end(), suite.controls.begin(), suite.controls.end());
   check(part.policies, policies, "policy");
   check(part.tasks, tasks, "task");
-  check(part.perturbations, perturbation_names_of(suite), "perturbation");
+  check(part.perturbations, suite.perturbation_names(), "perturbation");
 }
 
 bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part) {
-  return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller) &&
-         (spec.arm == "null" || chosen(part.policies, spec.policy)) && chosen(part.tasks, to_string(task)) &&
-         (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation));
-}
-
-std::vector<Task> tasks_of_own_clips(const Suite& suite) {
-  if (!suite.references.empty()) return std::vector<Task>(suite.references.size(), Task::kHug);
-  std::vector<Task> tasks;
-  const std::size_t per_task = suite.clips.synth_per_task * suite.clips.copies();
-  for (const Task task : suite.tasks) tasks.insert(tasks.end(), per_task, task);
-  return tasks;
+  return chosen(part.engines, spec.engine) && chosen(part.controllers, spec.controller->name) &&
+         (spec.arm == "null" || chosen(part.policies, spec.policy->name)) && chosen(part.tasks, to_string(task)) &&
+         (spec.engine == kPlaybackEngine || chosen(part.perturbations, spec.perturbation->name));
 }
 
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts) {
   std::int64_t total = 0;
+  const std::vector<EpisodeArm> arms = arms_of(suite);
   for (EpisodeSpec spec : combinations_of(suite)) {
-    for (const EpisodeArm& arm : arms_of(suite)) {
-      spec.policy = arm.policy;
+    for (const EpisodeArm& arm : arms) {
+      spec.policy = &arm.policy;
       spec.arm = arm.name;
-      total += std::count_if(clips.begin(), clips.end(), [&](Task task) {
-        return std::any_of(parts.begin(), parts.end(), [&](const RunPart& part) { return belongs(spec, task, part); });
+      total += std::ranges::count_if(clips, [&](Task task) {
+        return std::ranges::any_of(parts, [&](const RunPart& part) { return belongs(spec, task, part); });
       });
     }
   }
@@ -205,51 +182,12 @@ std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, 
 }
 
 void require_sane_size(const Suite& suite, std::int64_t clips) {
-  const std::size_t combinations = combinations_of(suite).size();
-  const double episodes = static_cast<double>(combinations) * static_cast<double>(arms_of(suite).size()) *
-                          static_cast<double>(clips) * suite.episodes_per_clip;
+  const double episodes = static_cast<double>(combinations_of(suite).size()) *
+                          static_cast<double>(arms_of(suite).size()) * static_cast<double>(clips) *
+                          suite.episodes_per_clip;
   if (episodes > static_cast<double>(kMostEpisodes))
     throw InputError(fmt::format("{}: expected at most {} episodes, found {:.0f} ({} clips, {} episodes per clip)",
                                  suite.file, kMostEpisodes, episodes, clips, suite.episodes_per_clip));
-}
-
-namespace {
-
-std::string digest_of(const std::map<std::string, std::string>& digests, const std::string& name) {
-  const auto found = digests.find(name);
-  return found == digests.end() ? "" : found->second;
-}
-
-}  // namespace
-
-EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& run, const RobotModel& robot) {
-  EpisodeRow row;
-  row.suite = suite.name;
-  row.suite_version = suite.version;
-  row.suite_hash = run.suite_hash;
-  row.task = suite.references.empty() ? std::string(to_string(spec.clip->task)) : std::string(kWalkRows);
-  row.clip = spec.clip->clip_id;
-  row.episode = spec.episode;
-  row.seed = spec.seed;
-  row.engine = spec.engine;
-  if (spec.engine != kPlaybackEngine) {
-    row.engine_profile = suite.profile.name;
-    row.profile_digest = settings_digest(spec.engine, suite.profile.settings(spec.engine));
-  }
-  row.controller = spec.controller;
-  row.controller_digest = digest_of(run.controllers, spec.controller);
-  row.policy = spec.policy;
-  row.policy_digest = digest_of(run.policies, spec.policy);
-  row.detectors = kDetectorsVersion;
-  row.perturbation = spec.perturbation;
-  row.arm = spec.arm;
-  row.robot_digest = robot.digest;
-  const bool known = spec.perturbation == kCleanName || !spec.perturbation_tags.empty();
-  row.tags =
-      RowTags(episode_tags(known ? spec.perturbation_tags.map() : tags_of(perturbation_of(suite, spec.perturbation)),
-                           suite, *spec.clip, spec.policy));
-  row.key = episode_key(row);
-  return row;
 }
 
 }  // namespace duet

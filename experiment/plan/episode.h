@@ -2,39 +2,42 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "duet/experiment/plan/bodies.h"
-#include "duet/experiment/plan/run_identity.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/policies/phase_adaptation.h"
 #include "duet/rows/episode_row.h"
 #include "duet/rows/folder/run_info.h"
 
 namespace duet {
 
+// What an episode is made of. It points at the suite's own parts and at what this machine has loaded of them, so that
+// nothing is looked up by name while it runs; Experiment (execution/experiment.h) owns both.
 struct EpisodeSpec {
   const PairedMotion* clip = nullptr;
-  std::string engine, controller, policy;
+  std::string engine;
+  const EngineSettings* settings = nullptr;  // of the engine; null: of playback
+  const SuiteController* controller = nullptr;
+  const SuitePolicy* policy = nullptr;
+  const Perturbation* perturbation = nullptr;
+  const SuiteReference* reference = nullptr;  // the commanded velocity that leads in the place of clip and policy
   // "control" and "null" (policy `null`) for control arms; "shuffled": the policy sees `seen`.
   std::string arm = "main";
   int episode = 0;
-  std::uint64_t seed = 0;  // of the episode, the same for every engine, controller and policy
-  std::string perturbation = kCleanName;
-  RowTags perturbation_tags = {};       // of a plan's episodes, which share them; none: looked up where a row is made
+  std::uint64_t seed = 0;               // of the episode, the same for every engine, controller and policy
   std::uint64_t perturbation_seed = 0;  // likewise
+  RowTags perturbation_tags = {};       // of a plan's episodes, which share them
   const PairedMotion* seen = nullptr;   // whose partner the policy sees in the place of this clip's; null: this one's
-  const Bodies* bodies = nullptr;       // with what was loaded for all episodes; null: this one loads it itself
+  const ControllerOnBody* body = nullptr;  // the controller with its robot
+  const PolicyOnBody* leader = nullptr;    // the policy on that robot; null for one that was skipped
 };
 
 // Whether this machine can run episodes in it: playback always.
 bool can_run_in(const std::string& engine);
-
-// Where episodes of one of the suite's controllers begin.
-StartMode start_mode(const Suite& suite, const SuiteController& controller);
 
 // More episodes than that are a mistake in a suite.
 inline constexpr std::int64_t kMostEpisodes = 10'000'000;
@@ -43,20 +46,21 @@ inline constexpr std::int64_t kMostEpisodes = 10'000'000;
 void require_sane_size(const Suite& suite, std::int64_t clips);
 
 struct EpisodeArm {
-  std::string policy, name;  // name: EpisodeSpec::arm
-  bool shuffled = false;
+  SuitePolicy policy;
+  std::string name;  // EpisodeSpec::arm
 };
 
 // Every episode of the suite, the null arm included, in a fixed order: the arms of one clip follow one another, so that
 // a part of the work has pairs. The null arm is run once per engine, controller and perturbation. Playback is always
 // clean and, as no controller acts in it, run under the first alone, or under each where they differ in robot or start.
 // A policy with a shuffled partner sees that of the next clip of its task, the last one that of the first. Each episode
-// is made when it is asked for. Suite and bodies must outlive it.
+// is made when it is asked for, and points into suite, bodies and plan, which must outlive it.
 class EpisodePlan {
  public:
   // `part`: those of it alone, in the same order. Throws InputError where a task with a shuffled partner has one clip
   // alone, for more than kMostEpisodes, and for a part without an episode.
   EpisodePlan(const Suite& suite, const Bodies& bodies, const RunPart& part = {});
+  EpisodePlan(Suite&&, const Bodies&, const RunPart& = {}) = delete;  // a suite that is gone by the next line
   EpisodePlan(const EpisodePlan&) = delete;
   EpisodePlan& operator=(const EpisodePlan&) = delete;
 
@@ -69,13 +73,12 @@ class EpisodePlan {
   const Suite& suite_;
   const Bodies& bodies_;
   std::string suite_id_;
-  std::vector<EpisodeSpec> combinations_;  // engine, controller and perturbation alone
+  Perturbation clean_;                              // of playback
+  std::map<std::string, EngineSettings> settings_;  // by engine
+  std::vector<EpisodeSpec> combinations_;           // engine, controller and perturbation alone
   std::vector<EpisodeArm> arms_;
   std::vector<std::size_t> clips_;  // that are in the part; the same on every body
 };
-
-// The whole plan at once.
-std::vector<EpisodeSpec> plan_episodes(const Suite& suite, const Bodies& bodies);
 
 // Whether the choice holds this name; none at all is a choice of every name.
 bool chosen(const std::vector<std::string>& names, std::string_view name);
@@ -90,13 +93,7 @@ void check_filters(const RunPart& part, const Suite& suite);
 // arm to every choice of policies.
 bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part);
 
-// Tasks of the clips that the suite makes itself, or of its commanded velocities, which have none: any stands for it.
-std::vector<Task> tasks_of_own_clips(const Suite& suite);
-
 // How many episodes of a suite, over clips of these tasks, belong to one of these parts.
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts);
-
-// A row with everything that is known before the episode runs, its key included.
-EpisodeRow row_for(const EpisodeSpec& spec, const Suite& suite, const RunIdentity& run, const RobotModel& robot);
 
 }  // namespace duet

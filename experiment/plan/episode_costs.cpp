@@ -7,20 +7,20 @@
 
 namespace duet {
 
-std::string cost_name(const EpisodeSpec& spec) { return fmt::format("{}/{}", spec.engine, spec.controller); }
+std::string cost_name(const EpisodeSpec& spec) { return fmt::format("{}/{}", spec.engine, spec.controller->name); }
 
-double motion_seconds(const EpisodeSpec& spec, const Suite& suite) {
-  if (!suite.references.empty()) return reference_of(suite.references, spec.clip->clip_id).seconds;
+double motion_seconds(const EpisodeSpec& spec) {
+  if (spec.reference != nullptr) return spec.reference->seconds;
   return static_cast<double>(spec.clip->robot.frames()) / spec.clip->robot.rate_hz;
 }
 
 void EpisodeCosts::expect(const EpisodeSpec& spec) {
   const std::lock_guard lock(mutex_);
-  work_[cost_name(spec)].left += motion_seconds(spec, suite_);
+  work_[cost_name(spec)].left += motion_seconds(spec);
 }
 
 void EpisodeCosts::ended(const EpisodeSpec& spec, double wall_s) {
-  const double motion = motion_seconds(spec, suite_);
+  const double motion = motion_seconds(spec);
   const std::lock_guard lock(mutex_);
   Work& work = work_[cost_name(spec)];
   work.left = std::max(work.left - motion, 0.0);

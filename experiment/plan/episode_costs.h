@@ -14,12 +14,10 @@ namespace duet {
 std::string cost_name(const EpisodeSpec& spec);
 
 // The length of the motion that an episode follows, its start included. [s]
-double motion_seconds(const EpisodeSpec& spec, const Suite& suite);
+double motion_seconds(const EpisodeSpec& spec);
 
 class EpisodeCosts {
  public:
-  explicit EpisodeCosts(const Suite& suite) : suite_(suite) {}
-
   // Said of each episode that is to run, before any has ended.
   void expect(const EpisodeSpec& spec);
   // Such an episode has ended, after so much time of one core [s].
@@ -33,7 +31,6 @@ class EpisodeCosts {
     double left = 0.0, done = 0.0;  // motion [s]
     double wall = 0.0;              // that `done` took [s]
   };
-  const Suite& suite_;
   mutable std::mutex mutex_;
   std::map<std::string, Work> work_;
 };

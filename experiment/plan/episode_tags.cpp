@@ -11,18 +11,18 @@ void add_tags(std::string_view of, const Tags& tags, Tags& into) {
 
 }  // namespace
 
-Tags with_named_tags(Tags of_perturbation, const Suite& suite, const std::string& clip, const std::string& policy) {
+Tags with_named_tags(Tags of_perturbation, const SuitePolicy& policy, const SuiteReference* command) {
   Tags tags = std::move(of_perturbation);
-  if (suite.references.empty())
-    add_tags(kOfPolicy, policy_of(suite, policy).tags, tags);
+  if (command == nullptr)
+    add_tags(kOfPolicy, policy.tags, tags);
   else
-    add_tags(kOfClip, reference_of(suite.references, clip).tags, tags);
+    add_tags(kOfClip, command->tags, tags);
   return tags;
 }
 
-Tags episode_tags(Tags of_perturbation, const Suite& suite, const PairedMotion& clip, const std::string& policy) {
-  Tags tags = with_named_tags(std::move(of_perturbation), suite, clip.clip_id, policy);
-  tags.insert(clip.tags.begin(), clip.tags.end());
+Tags episode_tags(const EpisodeSpec& spec) {
+  Tags tags = with_named_tags(spec.perturbation_tags.map(), *spec.policy, spec.reference);
+  tags.insert(spec.clip->tags.begin(), spec.clip->tags.end());
   return tags;
 }
 

@@ -47,7 +47,7 @@ std::string robots_text(const Suite& suite, const RobotModel& nominal) {
   std::string text = fmt::format("robot of clips: {}\n", nominal.digest);
   for (const SuiteController& controller : suite.controllers) {
     try {
-      text += fmt::format("robot of {}: {}\n", controller.name, digest(card_of(suite, controller)));
+      text += fmt::format("robot of {}: {}\n", controller.name, digest(suite.card_of(controller)));
     } catch (const MissingError&) {
       text += fmt::format("robot of {}: absent\n", controller.name);
     }
@@ -56,7 +56,7 @@ std::string robots_text(const Suite& suite, const RobotModel& nominal) {
 }
 
 std::string limits_digest(const Suite& suite, FileDigests& files) {
-  return suite.partner == PartnerMode::kSolid ? files.of(contact_limits_of(suite)) : "";
+  return suite.partner == PartnerMode::kSolid ? files.of(suite.contact_limits_file()) : "";
 }
 
 SuiteController without_places(SuiteController controller, FileDigests& files) {
@@ -70,12 +70,12 @@ std::string hash_of(const Suite& suite, FileDigests& files) {
   Suite said = suite;
   said.policies.clear();
   said.engines.clear();
-  clear_tags(said);
+  said.clear_tags();
   said.robot.clear();  // robots_text
   for (std::string& file : said.clips.files) file = files.of(file);
   said.contact_limits = limits_digest(suite, files);
   for (SuiteController& controller : said.controllers) controller = without_places(controller, files);
-  const RobotModel nominal = load_robot(suite.robot.empty() ? default_card_path() : suite.robot);
+  const RobotModel nominal = load_robot(suite.card());
   for (Perturbation& perturbation : said.perturbations) perturbation = with_links(perturbation, nominal);
   return sha256_hex(
       fmt::format("{}{}detectors: {}\n", resolved_yaml(said), robots_text(suite, nominal), kDetectorsVersion));

@@ -48,7 +48,7 @@ std::optional<Suite> suite_that_ships(const std::string& name) {
 std::map<std::string, std::string> hashed_keys(Suite suite) {
   suite.policies.clear();
   suite.engines.clear();
-  clear_tags(suite);
+  suite.clear_tags();
   std::map<std::string, std::string> keys;
   for (const auto& entry : parse_yaml(resolved_yaml(suite), "suite.yaml")) {
     const auto name = entry.first.as<std::string>();
@@ -92,7 +92,7 @@ ShippedSuite shipped_suite(const std::string& name) {
   const std::string file = path_of(name);
   const Suite suite = load_suite(file);
   return {name, fmt::format("{} {}", suite.name, suite.version), first_sentence(read_file(file)),
-          count_episodes(suite, tasks_of_own_clips(suite), {RunPart()}), suite.clips.given};
+          count_episodes(suite, suite.tasks_of_own_clips(), {RunPart()}), suite.clips.given};
 }
 
 std::string suite_file(const std::string& suite) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -17,6 +18,7 @@
 #include "duet/experiment/suite/suite_names.h"
 #include "duet/experiment/suite/suite_reference.h"
 #include "duet/metrics/detector.h"
+#include "duet/metrics/readings.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
@@ -110,6 +112,38 @@ struct Suite {
   std::vector<std::string> controls = {};  // scripted control arms (policies/controls/control_policy.h)
   bool allow_programs =
       false;  // the user's word, never a file's: policies may start programs (experiment/plan/trust.h)
+
+  // Whether commanded velocities lead its episodes, in the place of clips and policies.
+  [[nodiscard]] bool is_commanded() const { return !references.empty(); }
+  [[nodiscard]] bool runs_in(std::string_view engine) const;
+
+  // Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it
+  // is playback's.
+  [[nodiscard]] const SuiteController& controller(const std::string& name) const;
+  // The null arm's policy always is, too, and so are those of the control arms.
+  [[nodiscard]] SuitePolicy policy(const std::string& name) const;
+  [[nodiscard]] Perturbation perturbation(const std::string& name) const;
+  [[nodiscard]] std::vector<std::string> controller_names() const;
+  [[nodiscard]] std::vector<std::string> policy_names() const;
+  [[nodiscard]] std::vector<std::string> perturbation_names() const;
+
+  // The card of the robot that clips are retargeted to, and of the one that a controller runs on. Throw MissingError
+  // where it is not there.
+  [[nodiscard]] std::string card() const;
+  [[nodiscard]] std::string card_of(const SuiteController& controller) const;
+  // The table that contacts with a solid partner are held against.
+  [[nodiscard]] std::string contact_limits_file() const;
+  // Where episodes of one of its controllers begin.
+  [[nodiscard]] StartMode start_of(const SuiteController& controller) const;
+  // Throws std::invalid_argument for a reading that is unknown.
+  [[nodiscard]] Readings metric_readings() const;
+  // Tasks of the clips that the suite makes itself, or of its commanded velocities, which have none: any stands for it.
+  [[nodiscard]] std::vector<Task> tasks_of_own_clips() const;
+
+  // Takes the tags from all that has some; they are no part of what the suite runs.
+  void clear_tags();
+  // Throws InputError where the suite's clips are still to be given, saying how.
+  void require_clips() const;
 };
 
 using Overrides =
@@ -117,22 +151,6 @@ using Overrides =
 
 // The facts known of a controller: those that the suite was read with, or those known now.
 ControllerInfo about(const SuiteController& controller);
-
-// Throw std::invalid_argument for a name that is not in the suite, with those that are. The clean arm always is: it is
-// playback's.
-const SuiteController& controller_of(const Suite& suite, const std::string& name);
-// The null arm's policy always is, too.
-SuitePolicy policy_of(const Suite& suite, const std::string& name);
-Perturbation perturbation_of(const Suite& suite, const std::string& name);
-std::vector<std::string> controller_names_of(const Suite& suite);
-std::vector<std::string> policy_names_of(const Suite& suite);
-std::vector<std::string> perturbation_names_of(const Suite& suite);
-
-// Takes the tags from all that has some; they are no part of what the suite runs.
-void clear_tags(Suite& suite);
-
-// Throws InputError where the suite's clips are still to be given, saying how.
-void require_clips(const Suite& suite);
 
 // Throws InputError: file, line, key, expected, found.
 Suite load_suite(const std::string& path, const Overrides& overrides = {});

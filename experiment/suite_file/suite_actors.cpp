@@ -184,7 +184,7 @@ void check_options_of(const SuitePolicy& policy) {
 
 void set_controller_option(Suite& suite, const std::string& controller, const std::string& option,
                            const std::string& value) {
-  SuiteController asked = controller_of(suite, controller);
+  SuiteController asked = suite.controller(controller);
   asked.options = {{option, value}};
   check_options_of(asked);
   for (SuiteController& entry : suite.controllers)
@@ -192,7 +192,7 @@ void set_controller_option(Suite& suite, const std::string& controller, const st
 }
 
 void set_policy_option(Suite& suite, const std::string& policy, const std::string& option, const std::string& value) {
-  SuitePolicy asked = policy_of(suite, policy);
+  SuitePolicy asked = suite.policy(policy);
   asked.options = {{option, value}};
   check_options_of(asked);
   for (SuitePolicy& entry : suite.policies)

@@ -20,7 +20,7 @@
 #include "duet/core/require.h"
 #include "duet/core/scratch_folder.h"
 #include "duet/core/shell_word.h"
-#include "duet/execution/run_episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/parts/cluster/part.h"
 #include "duet/rows/json_fields.h"
 #include "duet/rows/merge/merge_files.h"

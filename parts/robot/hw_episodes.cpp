@@ -15,8 +15,6 @@
 #include "duet/core/scratch_folder.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/execution/runner.h"
-#include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/run_identity.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite_file/suite_actors.h"
 #include "duet/experiment/work/interrupt.h"
@@ -60,46 +58,39 @@ TwinOptions noisy_twin(double share, const std::string& engine, int mode_machine
   return twin;
 }
 
-const SuiteController& walker_of(const Suite& suite, const std::string& name) {
-  return name.empty() ? suite.controllers.front() : controller_of(suite, name);
-}
-
 // The state that all episodes of a command share.
 class TwinEpisodes {
  public:
-  TwinEpisodes(const TwinEpisodes&) = delete;  // it points into its own suite
+  TwinEpisodes(const TwinEpisodes&) = delete;  // it points into its own experiment
   TwinEpisodes& operator=(const TwinEpisodes&) = delete;
   TwinEpisodes(Session& session, const EpisodesArguments& arguments)
       : session_(session),
         arguments_(arguments),
         clock_(parse_clock(arguments.clock)),
         config_(read_robot_config(arguments.config)),
-        suite_(read_suite(arguments)),
-        bodies_(suite_),
-        walker_(walker_of(suite_, arguments.walker)) {
+        experiment_(read_suite(arguments)),
+        walker_(arguments.walker.empty() ? experiment_.suite().controllers.front()
+                                         : experiment_.suite().controller(arguments.walker)) {
     if (!config_.twin)
       throw InputError(fmt::format("{}: expected a twin's configuration (twin: true)", arguments.config));
     if (!config_.permission.allow_motion)
       throw InputError(fmt::format("{}: it does not allow motion: 'allow_motion' is not true", arguments.config));
-    if (const auto absent = bodies_.absent().find(walker_.name); absent != bodies_.absent().end())
-      throw MissingError(absent->second);
-    make_walker_ = Walker::load(walker_.use, walker_.options, bodies_.robot(walker_.name));
-    identity_ = identity_of(suite_, bodies_.read());
-    const KeptSuite kept = kept_suite(suite_, arguments.output, identity_.files);
-    const RunInfo info = new_run_info(suite_, kept, identity_, session.argv, {});
-    rows_.emplace(RunDirectory::open(arguments.output, info));
+    const ControllerOnBody& body = experiment_.bodies().controller(walker_.name);
+    if (!body.refusal.empty()) throw MissingError(body.refusal);
+    make_walker_ = Walker::load(walker_.use, walker_.options, body.robot);
+    const KeptSuite kept = kept_suite(experiment_.suite(), arguments.output, experiment_.identity().files);
+    rows_.emplace(RunDirectory::open(arguments.output, new_run_info(experiment_, kept, session.argv, {})));
     keep_inputs(kept, arguments.output);
   }
 
   void run() {
     say_first();
     Progress progress(session_.progress());
-    bodies_.take_clips(prepare_clips(suite_, *bodies_.nominal(), 1, progress, {.files = &identity_.files}));
-    const EpisodePlan plan(suite_, bodies_);
+    experiment_.prepare(1, progress);
     int done = 0;
-    for (std::int64_t i = 0; i < plan.size() && interrupt() == Interrupt::kNone; ++i) {
-      const EpisodeSpec spec = plan.at(i);
-      if (spec.engine != arguments_.engine || spec.controller != walker_.name || spec.perturbation != kCleanName)
+    for (std::int64_t i = 0; i < experiment_.size() && interrupt() == Interrupt::kNone; ++i) {
+      const EpisodeSpec spec = experiment_.at(i);
+      if (spec.engine != arguments_.engine || spec.controller != &walker_ || spec.perturbation->name != kCleanName)
         continue;
       if (arguments_.limit > 0 && done >= arguments_.limit) break;
       try {
@@ -120,13 +111,13 @@ class TwinEpisodes {
   }
 
   void say_first() const {
-    note(
-        session_,
-        fmt::format("rolls out each episode of {} {} twice under '{}': in {}, and over a twin with {} behind it ({}, "
-                    "domain {}), behind the guard of '{}' whose log goes to '{}'. The twin is armed by this program; a "
-                    "robot cannot be.",
-                    suite_.name, suite_.version, walker_.name, arguments_.engine, arguments_.engine, arguments_.clock,
-                    config_.permission.domain, arguments_.config, arguments_.output));
+    note(session_,
+         fmt::format(
+             "rolls out each episode of {} {} twice under '{}': in {}, and over a twin with {} behind it ({}, "
+             "domain {}), behind the guard of '{}' whose log goes to '{}'. The twin is armed by this program; a "
+             "robot cannot be.",
+             experiment_.suite().name, experiment_.suite().version, walker_.name, arguments_.engine, arguments_.engine,
+             arguments_.clock, config_.permission.domain, arguments_.config, arguments_.output));
   }
 
   [[nodiscard]] std::string path(int index, const char* ending) const {
@@ -149,7 +140,6 @@ class TwinEpisodes {
   }
 
   GuardedRun run_guarded(const EpisodeSpec& spec, int index) {
-    const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
     std::unique_ptr<Walker> walker = make_walker_();
     GuardedOptions options;
     options.config = config_;
@@ -160,16 +150,13 @@ class TwinEpisodes {
     std::filesystem::remove(path(index, ".mcap"));
     RunLog log(path(index, ".mcap"), setup());
     const std::unique_ptr<GuardLink> link = make_link(spec, std::move(walker), log);
-    GuardedRun run = run_guarded_episode(spec, suite_, identity_, robot,
-                                         bodies_.policy(spec.controller, spec.policy).make, *link, options);
+    GuardedRun run = run_guarded_episode(experiment_, spec, *link, options);
     dropped_ += log.dropped();
     return run;
   }
 
   void run_both(const EpisodeSpec& spec, int index) {
-    const std::shared_ptr<const RobotModel>& robot = bodies_.robot(spec.controller);
-    const EpisodeRow simulated =
-        run_episode(spec, suite_, identity_, robot, "", {.policy = bodies_.policy(spec.controller, spec.policy).make});
+    const EpisodeRow simulated = experiment_.run(spec);
     const GuardedRun guarded = run_guarded(spec, index);
     if (guarded.interrupted) throw EpisodeInterrupted();
     keep(simulated);
@@ -227,7 +214,7 @@ class TwinEpisodes {
       missed += run.missed_reports;
     }
     const std::string executed =
-        runs_.empty() ? "nothing" : executed_mask_text(runs_.front().executed, *bodies_.nominal());
+        runs_.empty() ? "nothing" : executed_mask_text(runs_.front().executed, *experiment_.bodies().nominal());
     const std::string text = fmt::format(
         "{}\n{}executed of the reference: {}\nclamps of the guard (its ticks): {}\n{:.1f} s of episodes in {:.1f} s of "
         "wall time with the wait for the guard ({}); held {} of the planner's ticks, {} reports missed, {} ticks left "
@@ -248,9 +235,7 @@ class TwinEpisodes {
   const EpisodesArguments& arguments_;
   TwinClock clock_;
   RobotConfig config_;
-  Suite suite_;
-  Bodies bodies_;
-  RunIdentity identity_;
+  Experiment experiment_;
   std::optional<RunDirectory> rows_;  // the output folder: a run that `duet report` reads
   const SuiteController& walker_;
   ScratchFolder scratch_;  // of the guard's socket
@@ -331,14 +316,11 @@ void add_clip_options(CLI::App& command, ClipEpisodeArguments& arguments) {
 void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, const std::string& socket) {
   if (arguments.config.empty()) throw InputError("--clip: expected the configuration too (--config), found none");
   const RobotConfig config = read_robot_config(arguments.config);
-  const Suite suite = suite_of_clip(arguments.clip, arguments.policy, arguments.start, "pd");
-  Bodies bodies(suite);
-  const RunIdentity identity = identity_of(suite, bodies.read());
+  Experiment experiment(suite_of_clip(arguments.clip, arguments.policy, arguments.start, "pd"));
   Progress progress(session.progress());
-  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, progress, {.files = &identity.files}));
-  const EpisodePlan plan(suite, bodies);
-  const EpisodeSpec spec = plan.at(0);
-  const RolloutSetup setup = episode_setup(spec, suite, *bodies.nominal());
+  experiment.prepare(1, progress);
+  const EpisodeSpec spec = experiment.at(0);
+  const RolloutSetup setup = experiment.setup(spec);
   note(session,
        fmt::format(
            "asks the guard at '{}' for {:.1f} s of '{}' ({}, policy '{}', start {}): the robot's arms follow the "
@@ -357,13 +339,12 @@ void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, c
   options.watch = [&](const GuardReport& report) {
     note(session, fmt::format("the guard: {} ({})", safety_state_name(report.state), stop_cause_name(report.cause)));
   };
-  const GuardedRun run = run_guarded_episode(spec, suite, identity, bodies.nominal(),
-                                             bodies.policy("pd", arguments.policy).make, link, options);
+  const GuardedRun run = run_guarded_episode(experiment, spec, link, options);
   print(session,
         fmt::format("{}{}; success: {}; {:.1f} s; held {} ticks, {} reports missed; executed: {}",
                     to_string(run.row.outcome), run.row.message.empty() ? "" : " (" + run.row.message + ")",
                     run.row.success.value_or(false) ? "yes" : "no", run.guard_seconds, run.held_ticks,
-                    run.missed_reports, executed_mask_text(run.executed, *bodies.nominal())),
+                    run.missed_reports, executed_mask_text(run.executed, *experiment.bodies().nominal())),
         to_json(run.row));
   if (run.row.outcome == Outcome::kError) session.exit_code = kExitErrors;
 }

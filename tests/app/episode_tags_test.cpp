@@ -37,10 +37,10 @@ Suite suite_of(const std::string& rest) {
 // Rows as they are before their episodes run.
 std::vector<EpisodeRow> rows_of(const Suite& suite) {
   Progress quiet(Progress::Style::kQuiet);
-  Bodies bodies(suite);
-  bodies.take_clips(prepare_clips(suite, *bodies.nominal(), 1, quiet));
+  Experiment experiment(suite);
+  experiment.prepare(1, quiet);
   std::vector<EpisodeRow> rows;
-  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) rows.push_back(row_for(spec, suite, {}, *test::g1()));
+  for (std::int64_t i = 0; i < experiment.size(); ++i) rows.push_back(experiment.row(i));
   return rows;
 }
 

@@ -16,6 +16,7 @@
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/prepared_clips.h"
 #include "tests/app/program.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -327,15 +328,15 @@ TEST_F(RunFolder, TheStopIsHeardWithinAControlPeriodOfManySteps) {
   suite.engines = {"mujoco"};
   suite.start = SuiteStart::kAct;
   suite.profile.engines["mujoco"].dt = 1e-6;
-  const auto robot = test::g1();
-  const PairedMotion clip = test::paired(Task::kWave, *robot);
-  const EpisodeSpec spec{&clip, "mujoco", "pd", "replay", "main", 0, 7};
+  const PairedMotion clip = test::paired(Task::kWave, *test::g1());
+  const auto experiment = test::experiment_of(suite, {clip});
   int looks = 0;
-  EXPECT_THROW(run_episode(spec, suite, {"hash"}, robot, "", {.stop_asked = [&] { return ++looks >= 2; }}),
+  EXPECT_THROW((void)experiment->run(test::first_of(*experiment, 7), {.stop_asked = [&] { return ++looks >= 2; }}),
                EpisodeInterrupted);
   EXPECT_EQ(looks, 3);  // twice within the first period, once after it
   suite.wall_limit = 0.001;
-  const EpisodeRow row = run_episode(spec, suite, {"hash"}, robot);
+  const auto hurried = test::experiment_of(suite, {clip});
+  const EpisodeRow row = hurried->run(test::first_of(*hurried, 7));
   EXPECT_EQ(row.outcome, Outcome::kTimedOut);
   EXPECT_LE(row.frames, 1);
 }
@@ -400,10 +401,17 @@ TEST(EpisodePlan, ArmsOfAClipFollowOneAnotherAndEachEpisodeIsMadeWhenItIsAskedFo
     EXPECT_EQ(plan.at(i).clip, &bodies.clips("pd")[i / 4]);
     EXPECT_EQ(plan.at(i).seed, plan.at(i / 2 * 2).seed);
   }
-  EXPECT_EQ(plan_episodes(suite, bodies).size(), 8U);
   suite.episodes_per_clip = 3000000;
   EXPECT_THAT(test::thrown_message<InputError>([&] { EpisodePlan(suite, bodies); }),
               HasSubstr("expected at most 10000000 episodes, found 12000000"));
+}
+
+// Its specs point into the experiment: it stays where it is.
+TEST(Experiment, AndItsPlanCannotBeMovedOrCopied) {
+  EXPECT_FALSE(std::is_move_constructible_v<Experiment> || std::is_move_assignable_v<Experiment>);
+  EXPECT_FALSE(std::is_move_constructible_v<Bodies> || std::is_move_assignable_v<Bodies>);
+  EXPECT_FALSE(std::is_move_constructible_v<EpisodePlan> || std::is_move_assignable_v<EpisodePlan>);
+  EXPECT_FALSE((std::is_constructible_v<EpisodePlan, Suite, const Bodies&>)) << "of a suite that is gone";
 }
 
 TEST(EpisodePlan, CountsWhatPartsHave) {

@@ -9,6 +9,7 @@
 #include "duet/policies/on_other_body.h"
 #include "duet/robots/joint_map.h"
 #include "duet/scoring/scoring.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -60,7 +61,7 @@ TEST(Bodies, APolicyThatTheCallerBringsIsMadeByItsNameAndNotByWhatItUses) {
     };
   };
   const Bodies bodies(suite, {}, {}, {{"a", loader("first")}, {"b", loader("second")}});
-  for (const char* name : {"b", "a", "null"}) static_cast<void>(bodies.policy("pd", name).make());
+  for (const char* name : {"b", "a", "null"}) static_cast<void>(bodies.policy("pd", name)->make());
   EXPECT_EQ(made, (std::vector<std::string>{"second", "first"}));
 }
 
@@ -138,13 +139,13 @@ TEST(Plan, PerturbationsAreAnAxisOfEnginesAndNotOfPlayback) {
   Suite suite = test::playback_suite();
   suite.engines = {"playback", "mujoco"};
   suite.perturbations = {Perturbation{}, default_perturbation("push"), default_perturbation("delay")};
-  Bodies bodies(suite);
-  bodies.take_clips({test::paired(Task::kWave, *bodies.nominal())});
+  const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
   std::map<std::string, int> count;
   std::set<std::string> keys;
-  for (const EpisodeSpec& spec : plan_episodes(suite, bodies)) {
-    ++count[spec.engine + " " + spec.perturbation + " " + spec.arm];
-    keys.insert(row_for(spec, suite, {"hash"}, *bodies.nominal()).key);
+  for (std::int64_t i = 0; i < experiment->size(); ++i) {
+    const EpisodeSpec spec = experiment->at(i);
+    ++count[spec.engine + " " + spec.perturbation->name + " " + spec.arm];
+    keys.insert(experiment->row(spec).key);
     EXPECT_NE(spec.seed, spec.perturbation_seed);
   }
   EXPECT_EQ(count, (std::map<std::string, int>{{"playback clean main", 1},

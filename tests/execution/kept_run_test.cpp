@@ -89,7 +89,7 @@ TEST_F(KeptRun, ADescriptorWithACardOfItsOwnStaysWhereItIs) {
   EXPECT_EQ(kept.suite.controllers[0].use, "../here/mine.yaml");
   EXPECT_EQ(kept.suite.controllers[1].use, "inputs/controllers/plain/plain.yaml");
   for (const RunInput& input : kept.inputs) EXPECT_FALSE(input.of == "controller mine" && input.kept) << input.role;
-  EXPECT_EQ(card_of(suite, suite.controllers[0]), scratch_ / "here/cards/g1.yaml");
+  EXPECT_EQ(suite.card_of(suite.controllers[0]), scratch_ / "here/cards/g1.yaml");
 }
 
 TEST_F(KeptRun, IsVerifiedElsewhereWithoutTheOriginals) {

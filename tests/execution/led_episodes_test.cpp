@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "duet/core/require.h"
-#include "duet/execution/run_episode.h"
 #include "duet/policies/catalogue/registry.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
@@ -17,9 +16,9 @@ namespace {
 using test::thrown_message;
 using ::testing::HasSubstr;
 
-std::shared_ptr<const LedSuite> led(const LedPart& part = {}) {
+std::shared_ptr<const Experiment> led(const LedPart& part = {}) {
   Progress quiet(Progress::Style::kQuiet);
-  return std::make_shared<const LedSuite>(test::playback_suite(), part, 1, quiet);
+  return led_experiment(test::playback_suite(), part, 1, quiet);
 }
 
 // The null arm's answer to a question.
@@ -34,18 +33,18 @@ std::vector<double> holding(const PlanRequest& request, const RobotModel& robot)
 }
 
 TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
-  const std::shared_ptr<const LedSuite> suite = led();
+  const std::shared_ptr<const Experiment> suite = led();
   ASSERT_EQ(suite->size(), 2);
   LedEpisode episode(suite);
   int questions = 0;
   for (auto request = episode.begin(1); request != nullptr; ++questions) {
     EXPECT_EQ(request->tick, questions * kTicksPerPlan);
-    request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+    request = episode.go_on(holding(*request, *suite->bodies().nominal()), kAnchors);
   }
   EXPECT_GT(questions, 5);
   EXPECT_TRUE(episode.is_over());
   ASSERT_TRUE(episode.row().has_value());
-  const EpisodeRow expected = suite->run(1, {.policy = policy_maker("null", suite->robot())});
+  const EpisodeRow expected = suite->run(1, {.policy = policy_maker("null", suite->bodies().nominal())});
   EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
   EXPECT_EQ(episode.row()->state_hash, expected.state_hash);
   EXPECT_EQ(episode.row()->key, expected.key);
@@ -53,10 +52,10 @@ TEST(LedEpisode, LeadsToTheRowOfTheSameEpisodeUnderAPolicy) {
 }
 
 TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
-  const std::shared_ptr<const LedSuite> suite = led();
+  const std::shared_ptr<const Experiment> suite = led();
   auto episode = std::make_unique<LedEpisode>(suite);
   const auto request = episode->begin(0);
-  const std::vector<double> plan = holding(*request, *suite->robot());
+  const std::vector<double> plan = holding(*request, *suite->bodies().nominal());
   const pid_t child = ::fork();
   if (child == 0) {
     ::alarm(60);
@@ -72,15 +71,14 @@ TEST(LedEpisode, AForkedChildThatGoesOnIsToldAndDoesNotWait) {
   EXPECT_NE(episode->go_on(plan, kAnchors), nullptr);
 }
 
-TEST(LedSuite, SaysHowManyQuestionsAnEpisodeAsksAtMost) {
-  const std::shared_ptr<const LedSuite> suite = led();
+TEST(LedExperiment, SaysHowManyQuestionsAnEpisodeAsksAtMost) {
+  const std::shared_ptr<const Experiment> suite = led();
   for (int number = 0; number < suite->size(); ++number) {
     LedEpisode episode(suite);
     int questions = 0;
     for (auto request = episode.begin(number); request != nullptr; ++questions)
-      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
-    EXPECT_EQ(questions, suite->questions(number));
-    EXPECT_FALSE(suite->prompt(number).empty());
+      request = episode.go_on(holding(*request, *suite->bodies().nominal()), kAnchors);
+    EXPECT_EQ(questions, questions_of(*suite, number));
   }
 }
 
@@ -90,7 +88,7 @@ Eigen::MatrixXd partner_in(const PlanRequest& request) {
 }
 
 TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
-  const std::shared_ptr<const LedSuite> suite = led();
+  const std::shared_ptr<const Experiment> suite = led();
   LedEpisode episode(suite, Led::kBoth);
   const auto first = episode.begin(0);
   ASSERT_NE(first, nullptr);
@@ -98,23 +96,24 @@ TEST(LedEpisode, APartnerWhoIsLedGoesWhereTheyAreLed) {
   ASSERT_EQ(ahead.frames(), kTicksPerPlan);
   for (int i = 0; i < kTicksPerPlan; ++i) ahead.frame(i).row(1).array() += 0.1 * (i + 1);
   episode.lead_partner(ahead);
-  const auto second = episode.go_on(holding(*first, *suite->robot()), kAnchors);
+  const auto second = episode.go_on(holding(*first, *suite->bodies().nominal()), kAnchors);
   ASSERT_NE(second, nullptr);
   EXPECT_EQ(partner_in(*second), ahead.frame(kTicksPerPlan - 1));
-  const auto third = episode.go_on(holding(*second, *suite->robot()), kAnchors);  // from here on as in the clip
+  const auto third =
+      episode.go_on(holding(*second, *suite->bodies().nominal()), kAnchors);  // from here on as in the clip
   ASSERT_NE(third, nullptr);
   EXPECT_LT((partner_in(*third) - partner_in(*first)).cwiseAbs().maxCoeff(), 0.5);
 }
 
 TEST(LedEpisode, APartnerWhoIsNotLedOtherwiseFollowsTheClip) {
-  const std::shared_ptr<const LedSuite> suite = led();
+  const std::shared_ptr<const Experiment> suite = led();
   std::vector<Eigen::MatrixXd> alone, both;
   for (auto* seen : {&alone, &both}) {
     LedEpisode episode(suite, seen == &both ? Led::kBoth : Led::kRobot);
     for (auto request = episode.begin(1); request != nullptr;) {
       seen->push_back(request->frames);
       if (seen == &both) episode.lead_partner(episode.partner_ahead());
-      request = episode.go_on(holding(*request, *suite->robot()), kAnchors);
+      request = episode.go_on(holding(*request, *suite->bodies().nominal()), kAnchors);
     }
     EXPECT_EQ(episode.row()->outcome, Outcome::kOk);
   }
@@ -139,11 +138,11 @@ TEST(LedEpisode, RefusesToLeadAPartnerWhereItCannot) {
 }
 
 TEST(LedEpisode, BeginsAnotherInTheMiddleOfOne) {
-  const std::shared_ptr<const LedSuite> suite = led();
+  const std::shared_ptr<const Experiment> suite = led();
   LedEpisode episode(suite);
   const auto first = episode.begin(0);
   ASSERT_NE(first, nullptr);
-  ASSERT_NE(episode.go_on(holding(*first, *suite->robot()), kAnchors), nullptr);
+  ASSERT_NE(episode.go_on(holding(*first, *suite->bodies().nominal()), kAnchors), nullptr);
   const auto again = episode.begin(0);
   ASSERT_NE(again, nullptr);
   EXPECT_EQ(again->tick, 0);
@@ -165,7 +164,7 @@ TEST(LedEpisode, RefusesWhatItCannotLead) {
               HasSubstr("policy 'caller': plan: expected (5, 36) or (100, 36) numbers, found 5 rows and 10 numbers"));
 }
 
-TEST(LedSuite, RefusesNamesThatTheSuiteDoesNotHave) {
+TEST(LedExperiment, RefusesNamesThatTheSuiteDoesNotHave) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.engine = "mujoco"}); }),
               HasSubstr("unknown engine 'mujoco'"));
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.controller = "vmc"}); }),
@@ -175,8 +174,8 @@ TEST(LedSuite, RefusesNamesThatTheSuiteDoesNotHave) {
   EXPECT_THAT(thrown_message<std::invalid_argument>([] { led({.task = "waltz"}); }), HasSubstr("'waltz'"));
 }
 
-TEST(LedSuite, ChoosesATask) {
-  const std::shared_ptr<const LedSuite> suite = led({.task = "handshake"});
+TEST(LedExperiment, ChoosesATask) {
+  const std::shared_ptr<const Experiment> suite = led({.task = "handshake"});
   ASSERT_EQ(suite->size(), 1);
   EXPECT_EQ(suite->at(0).clip->task, Task::kHandshake);
 }

@@ -13,6 +13,7 @@
 #include "duet/core/parallel.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -197,24 +198,21 @@ TEST(Runner, ATouchInPlaybackCannotBeJudgedByTheRuleInteraction) {
 }
 
 TEST(Runner, AnEpisodeThatThrowsBecomesAFailedRow) {
-  const auto robot = test::g1();
-  PairedMotion clip = test::paired(Task::kWave, *robot);
+  PairedMotion clip = test::paired(Task::kWave, *test::g1());
   clip.phases = {0, clip.frames() + 10};  // the adaptation refuses it
-  const EpisodeRow row =
-      run_episode({&clip, "playback", "pd", "replay", "main", 0, 1}, test::playback_suite(), {"hash"}, robot);
+  const EpisodeRow row = test::experiment_of(test::playback_suite(), {clip})->run(0);
   EXPECT_EQ(row.outcome, Outcome::kError);
   EXPECT_EQ(row.success, false);
   EXPECT_FALSE(row.message.empty());
 }
 
 TEST(Runner, ATaskThatThePolicyWasNotMadeForIsAnUnsupportedRow) {
-  const auto robot = test::g1();
-  PairedMotion clip = test::paired(Task::kWave, *robot);
+  PairedMotion clip = test::paired(Task::kWave, *test::g1());
   clip.task = all_tasks().back();
   ASSERT_GT(clip.task, Task::kFlyKiss) << "the list has a seventh task";
   Suite suite = test::playback_suite();
   suite.policies = {SuitePolicy{"dstar"}};
-  const EpisodeRow row = run_episode({&clip, "playback", "pd", "dstar", "main", 0, 1}, suite, {"hash"}, robot);
+  const EpisodeRow row = test::experiment_of(suite, {clip})->run(0);
   EXPECT_EQ(row.outcome, Outcome::kUnsupported);
   EXPECT_EQ(row.success, false);
   EXPECT_THAT(row.message, HasSubstr(fmt::format("was not made for the task '{}'", to_string(clip.task))));
@@ -239,11 +237,9 @@ TEST(Runner, MujocoEpisodesRepeatBitForBit) {
   suite.engines = {"mujoco"};
   suite.controllers = {SuiteController{"vmc"}};
   suite.start = SuiteStart::kAct;
-  const auto robot = test::g1();
-  const PairedMotion clip = test::paired(Task::kWave, *robot);
-  const EpisodeSpec spec{&clip, "mujoco", "vmc", "replay", "main", 0, 7};
-  const EpisodeRow first = run_episode(spec, suite, {"hash"}, robot);
-  const EpisodeRow second = run_episode(spec, suite, {"hash"}, robot);
+  const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
+  const EpisodeSpec spec = test::first_of(*experiment, 7);
+  const EpisodeRow first = experiment->run(spec), second = experiment->run(spec);
   EXPECT_EQ(first.outcome, Outcome::kOk) << first.message;
   EXPECT_EQ(first.state_hash, second.state_hash);
   EXPECT_EQ(first.metrics, second.metrics);
@@ -259,20 +255,19 @@ TEST(Runner, PerturbedEpisodesDifferFromCleanAndRepeat) {
   for (const char* kind : {"delay", "latency", "noise", "push", "friction", "mass"})  // of the body; replay is blind
     suite.perturbations.push_back(default_perturbation(kind));
   suite.perturbations[4] = test::perturbation("{push: {every: 1.5}}");  // within the clip
-  const auto robot = test::g1();
-  PairedMotion clip = test::paired(Task::kWave, *robot);
-  EpisodeSpec spec{&clip, "mujoco", "vmc", "replay", "main", 0, 7};
+  const auto experiment = test::experiment_of(suite, {test::paired(Task::kWave, *test::g1())});
+  EpisodeSpec spec = test::first_of(*experiment, 7);
   spec.perturbation_seed = 11;
   std::map<std::string, std::string> by_hash;
-  for (const Perturbation& perturbation : suite.perturbations) {
-    spec.perturbation = perturbation.name;
-    const EpisodeRow row = run_episode(spec, suite, {"hash"}, robot);
+  for (const Perturbation& perturbation : experiment->suite().perturbations) {
+    spec.perturbation = &perturbation;
+    const EpisodeRow row = experiment->run(spec);
     EXPECT_TRUE(row.outcome == Outcome::kOk || row.outcome == Outcome::kFell) << row.message;
     EXPECT_EQ(row.perturbation, perturbation.name);
     EXPECT_TRUE(by_hash.emplace(row.state_hash, perturbation.name).second)
         << perturbation.name << " changes nothing: as " << by_hash[row.state_hash];
     if (perturbation.name != "push") continue;
-    EXPECT_EQ(run_episode(spec, suite, {"hash"}, robot).state_hash, row.state_hash);
+    EXPECT_EQ(experiment->run(spec).state_hash, row.state_hash);
   }
 }
 

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "duet/core/require.h"
-#include "duet/execution/run_episode.h"
+#include "duet/execution/experiment.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/run_identity.h"
 #include "duet/experiment/work/progress.h"

@@ -16,6 +16,7 @@
 #include "duet/experiment/plan/trust.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -45,7 +46,7 @@ bool has_dstar() {
 
 TEST(SuitePolicies, ANameIsAPolicyWithoutOptions) {
   const Suite suite = with_policies("[replay, replay_dense]");
-  EXPECT_EQ(policy_names_of(suite), (std::vector<std::string>{"replay", "replay_dense"}));
+  EXPECT_EQ(suite.policy_names(), (std::vector<std::string>{"replay", "replay_dense"}));
   EXPECT_EQ(suite.policies[1].use, "replay_dense");
   EXPECT_FALSE(suite.policies[1].shuffled_partner);
   EXPECT_THAT(resolved_yaml(suite), HasSubstr("\npolicies: [replay, replay_dense]\n"));
@@ -211,10 +212,10 @@ TEST(SuitePolicies, APolicyWhoseNetworkIsNotHereIsAbsentAndOthersGoOn) {
 
 TEST(SuitePolicies, EveryBodyHasAMakerOfEveryPolicy) {
   const Bodies bodies(with_policies("[replay, {name: second, use: replay}]"), {}, {"replay"});
-  EXPECT_EQ(bodies.policy("pd", "second").make()->name(), "replay");
-  EXPECT_EQ(bodies.policy("pd", "null").make()->name(), "null");
-  EXPECT_NE(bodies.policy("pd", "second").make(), bodies.policy("pd", "second").make());
-  EXPECT_THROW(static_cast<void>(bodies.policy("pd", "replay")), std::out_of_range);
+  EXPECT_EQ(bodies.policy("pd", "second")->make()->name(), "replay");
+  EXPECT_EQ(bodies.policy("pd", "null")->make()->name(), "null");
+  EXPECT_NE(bodies.policy("pd", "second")->make(), bodies.policy("pd", "second")->make());
+  EXPECT_EQ(bodies.policy("pd", "replay"), nullptr);
 }
 
 // Remembers what it saw; a plan that may be left out.
@@ -238,13 +239,9 @@ class Watcher final : public Policy {
   Reference start_;
 };
 
-Rollout watch(const EpisodeSpec& spec, const Suite& suite, const std::shared_ptr<const RobotModel>& robot,
-              Policy& policy) {
-  return play_back(episode_setup(spec, suite, *robot), policy);
-}
-
 class ShuffledPartner : public ::testing::Test {
  protected:
+  // The first clip's episodes of `replay` and of `blind`, which sees the other clip's partner, are the first two.
   void take_clips(int count) {
     std::vector<PairedMotion> clips;
     for (int i = 0; i < count; ++i) {
@@ -252,44 +249,51 @@ class ShuffledPartner : public ::testing::Test {
       options.index = i;
       clips.push_back(retarget(synthesize(Task::kWave, options), *robot_));
     }
-    bodies_.take_clips(std::move(clips));
+    experiment_ = test::experiment_of(suite_, std::move(clips));
   }
+  [[nodiscard]] const std::vector<PairedMotion>& clips() const { return experiment_->bodies().clips("pd"); }
+  [[nodiscard]] EpisodeSpec spec(int place) const {
+    EpisodeSpec spec = experiment_->at(place);
+    spec.seed = 1;
+    return spec;
+  }
+  Rollout watch(const EpisodeSpec& spec, Policy& policy) const { return play_back(experiment_->setup(spec), policy); }
 
   Suite suite_ = with_policies("[replay, {name: blind, use: replay, partner: shuffled}]");
   std::shared_ptr<const RobotModel> robot_ = test::g1();
-  Bodies bodies_{suite_};
+  std::shared_ptr<const Experiment> experiment_;
 };
 
 TEST_F(ShuffledPartner, IsThatOfTheNextClipOfTheTask) {
   take_clips(2);
-  const std::vector<PairedMotion>& clips = bodies_.clips("pd");
   int shuffled = 0;
-  for (const EpisodeSpec& spec : plan_episodes(suite_, bodies_)) {
-    EXPECT_EQ(spec.arm, spec.policy == "blind" ? "shuffled" : spec.policy == "null" ? "null" : "main");
-    if (spec.policy != "blind") {
+  for (std::int64_t i = 0; i < experiment_->size(); ++i) {
+    const EpisodeSpec spec = experiment_->at(i);
+    const std::string& policy = spec.policy->name;
+    EXPECT_EQ(spec.arm, policy == "blind" ? "shuffled" : policy == "null" ? "null" : "main");
+    if (policy != "blind") {
       EXPECT_EQ(spec.seen, nullptr);
       continue;
     }
     ++shuffled;
-    EXPECT_EQ(spec.seen, spec.clip == &clips[0] ? &clips[1] : &clips[0]);
-    EXPECT_EQ(row_for(spec, suite_, {"hash"}, *robot_).arm, "shuffled");
+    EXPECT_EQ(spec.seen, spec.clip == &clips()[0] ? &clips()[1] : &clips()[0]);
+    EXPECT_EQ(experiment_->row(spec).arm, "shuffled");
   }
   EXPECT_EQ(shuffled, 2);
 }
 
 TEST_F(ShuffledPartner, IsRefusedWhereATaskHasOneClip) {
-  take_clips(1);
-  EXPECT_EQ(test::thrown_message<InputError>([&] { plan_episodes(suite_, bodies_); }),
+  EXPECT_EQ(test::thrown_message<InputError>([&] { take_clips(1); }),
             "policy 'blind' sees the partner of another clip: expected two clips of wave or more, found one");
 }
 
 TEST_F(ShuffledPartner, IsSeenByThePolicyAlone) {
   take_clips(2);
-  EpisodeSpec spec{&bodies_.clips("pd")[0], "playback", "pd", "blind", "shuffled", 0, 1};
+  EpisodeSpec blind = spec(1);
   Watcher own, other;
-  const Rollout plain = watch(spec, suite_, robot_, own);
-  spec.seen = &bodies_.clips("pd")[1];
-  const Rollout shuffled = watch(spec, suite_, robot_, other);
+  const Rollout shuffled = watch(blind, other);
+  blind.seen = nullptr;
+  const Rollout plain = watch(blind, own);
   EXPECT_EQ(plain.recording.partner, shuffled.recording.partner);
   EXPECT_EQ(plain.state_hash, shuffled.state_hash);
   ASSERT_EQ(own.seen.size(), other.seen.size());
@@ -299,15 +303,14 @@ TEST_F(ShuffledPartner, IsSeenByThePolicyAlone) {
 // The policy sees another clip's partner, relative to the robot, as it would in that clip's own episode.
 TEST_F(ShuffledPartner, StandsToTheRobotAsInItsOwnClip) {
   take_clips(2);
-  const std::vector<PairedMotion>& clips = bodies_.clips("pd");
-  const EpisodeSpec there{&clips[1], "playback", "pd", "replay", "main", 0, 1};
-  EpisodeSpec here{&clips[0], "playback", "pd", "blind", "shuffled", 0, 1};
-  here.seen = &clips[1];
-  const RolloutSetup original = episode_setup(there, suite_, *robot_), moved = episode_setup(here, suite_, *robot_);
+  const EpisodeSpec there = spec(3), here = spec(1);
+  ASSERT_EQ(there.clip, &clips()[1]);
+  ASSERT_EQ(here.seen, &clips()[1]);
+  const RolloutSetup original = experiment_->setup(there), moved = experiment_->setup(here);
   const Pose &from = original.reference.motion.root.front(), &to = moved.reference.motion.root.front();
   constexpr double kRounding = 1e-9;  // [m]
   for (const int joint : {static_cast<int>(kPelvis), static_cast<int>(kRightHand)}) {
-    const Eigen::Vector3d p_W = clips[1].partner.joints.at(original.reference.clip_frame, joint);
+    const Eigen::Vector3d p_W = clips()[1].partner.joints.at(original.reference.clip_frame, joint);
     const Eigen::Vector3d wanted = yaw_rotation(yaw_of(from.R)).conjugate() * (p_W - from.p);
     const Eigen::Vector3d found = yaw_rotation(yaw_of(to.R)).conjugate() * (moved.seen_partner.at(0, joint) - to.p);
     EXPECT_NEAR((wanted - found).head<2>().norm(), 0.0, kRounding);
@@ -317,12 +320,12 @@ TEST_F(ShuffledPartner, StandsToTheRobotAsInItsOwnClip) {
 
 TEST_F(ShuffledPartner, PromptIsTheTasksUnlessTheSuiteSaysAnother) {
   take_clips(2);
-  const EpisodeSpec spec{&bodies_.clips("pd")[0], "playback", "pd", "replay", "main", 0, 1};
   Watcher watcher;
-  watch(spec, suite_, robot_, watcher);
+  watch(spec(0), watcher);
   EXPECT_EQ(watcher.prompt, "wave to the person");
   suite_.policies[0].prompt = "hug them";
-  watch(spec, suite_, robot_, watcher);
+  take_clips(2);
+  watch(spec(0), watcher);
   EXPECT_EQ(watcher.prompt, "hug them");
 }
 

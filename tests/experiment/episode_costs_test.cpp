@@ -18,10 +18,14 @@ PairedMotion second_long() {
 
 TEST(EpisodeCosts, TheWorkLeftIsThatOfEachEngineAtItsOwnCost) {
   const PairedMotion clip = second_long();
-  const Suite suite;
-  const EpisodeSpec quick{.clip = &clip, .engine = "playback", .controller = "vmc", .policy = ""};
-  const EpisodeSpec slow{.clip = &clip, .engine = "mujoco", .controller = "vmc", .policy = ""};
-  EpisodeCosts costs(suite);
+  const SuiteController vmc{"vmc"};
+  EpisodeSpec quick, slow;
+  for (EpisodeSpec* spec : {&quick, &slow}) {
+    spec->clip = &clip;
+    spec->controller = &vmc;
+    spec->engine = spec == &quick ? "playback" : "mujoco";
+  }
+  EpisodeCosts costs;
   EXPECT_TRUE(std::isnan(costs.share_done()));
   for (int i = 0; i < 4; ++i) costs.expect(quick);
   for (int i = 0; i < 2; ++i) costs.expect(slow);
@@ -35,7 +39,11 @@ TEST(EpisodeCosts, TheWorkLeftIsThatOfEachEngineAtItsOwnCost) {
 }
 
 TEST(EpisodeCosts, AreToldApartByEngineAndController) {
-  EXPECT_EQ(cost_name({.engine = "ode", .controller = "pd", .policy = ""}), "ode/pd");
+  const SuiteController pd{"pd"};
+  EpisodeSpec spec;
+  spec.engine = "ode";
+  spec.controller = &pd;
+  EXPECT_EQ(cost_name(spec), "ode/pd");
 }
 
 }  // namespace

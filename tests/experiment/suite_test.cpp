@@ -142,8 +142,8 @@ TEST(Suite, ControllersHaveNamesOfTheirOwn) {
   EXPECT_EQ(suite.controllers[1].use, "pd");
   EXPECT_EQ(resolved_yaml(parse_suite(resolved_yaml(suite), "again.yaml")), resolved_yaml(suite));
   EXPECT_THAT(resolved_yaml(parse_suite(kMinimal, "s.yaml")), HasSubstr("controllers: [pd]\n"));
-  EXPECT_EQ(controller_of(suite, "plain").use, "pd");
-  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { controller_of(suite, "plian"); }),
+  EXPECT_EQ(suite.controller("plain").use, "pd");
+  EXPECT_THAT(test::thrown_message<std::invalid_argument>([&] { (void)suite.controller("plian"); }),
               HasSubstr("did you mean 'plain'"));
 }
 

@@ -68,7 +68,8 @@ void plan(const Suite& suite) {
   for (const SuitePolicy& policy : suite.policies) policies.push_back(policy.name);
   Bodies bodies(suite, controllers, policies);
   bodies.take_clips(clips_of(suite));
-  (void)plan_episodes(suite, bodies);
+  const EpisodePlan planned(suite, bodies);
+  for (std::int64_t i = 0; i < planned.size(); ++i) (void)planned.at(i);
 }
 
 void read_suite(std::string_view bytes) {

@@ -12,6 +12,7 @@
 #include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
 #include "duet/rollout/perturbations/perturbation.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -214,9 +215,8 @@ TEST(PartnerVariation, WhatIsNotAskedForIsNotWritten) {
 TEST(PartnerVariation, IsTheRealPartnerOfAnEpisode) {
   const auto robot = test::g1();
   const PairedMotion clip = test::paired(Task::kWave, *robot);
-  const EpisodeSpec spec{&clip, "playback", "pd", "replay", "main", 0, 1};
-  const Suite suite = test::playback_suite();
-  RolloutSetup setup = episode_setup(spec, suite, *robot);
+  const auto experiment = test::experiment_of(test::playback_suite(), {clip});
+  RolloutSetup setup = experiment->setup(test::first_of(*experiment));
   const auto roll = [&] {
     const auto policy = make_policy("replay", robot);
     return play_back(setup, *policy).recording;

@@ -10,6 +10,7 @@
 #include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
 #include "duet/scoring/scoring.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -19,8 +20,12 @@ namespace {
 struct Parts {
   std::shared_ptr<const RobotModel> robot = test::g1();
   PairedMotion clip = test::paired(Task::kWave, *robot);
-  Suite suite = test::playback_suite();
-  EpisodeSpec spec{&clip, "playback", "pd", "replay", "main", 0, 1};
+  std::shared_ptr<const Experiment> experiment;
+  EpisodeSpec spec;
+
+  explicit Parts(Suite suite = test::playback_suite())
+      : experiment(test::experiment_of(std::move(suite), {clip})), spec(test::first_of(*experiment)) {}
+  [[nodiscard]] RolloutSetup setup() const { return experiment->setup(spec); }
 };
 
 Rollout roll(const Parts& parts, const RolloutSetup& setup, const std::string& policy = "replay") {
@@ -30,7 +35,7 @@ Rollout roll(const Parts& parts, const RolloutSetup& setup, const std::string& p
 
 TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const RolloutSetup setup = parts.setup();
   const Rollout rollout = roll(parts, setup);
   ASSERT_EQ(rollout.recording.frames(), parts.clip.frames());
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
@@ -46,24 +51,26 @@ TEST(Rollout, PlaybackOfReplayFollowsTheRetargetedMotion) {
 }
 
 TEST(Rollout, ASuiteMayHandPlansOverAtOnce) {
-  Parts parts;
-  const Rollout slowly = roll(parts, episode_setup(parts.spec, parts.suite, *parts.robot));
-  parts.suite.fuse_ticks = 1;
-  const Rollout at_once = roll(parts, episode_setup(parts.spec, parts.suite, *parts.robot));
+  const Parts parts;
+  const Rollout slowly = roll(parts, parts.setup());
+  Suite suite = test::playback_suite();
+  suite.fuse_ticks = 1;
+  const Parts others(suite);
+  const Rollout at_once = roll(others, others.setup());
   const int wave = parts.clip.phases.act_begin + 4;  // within the fuse of a plan
   EXPECT_NE(slowly.recording.reference[wave].q, at_once.recording.reference[wave].q);
 }
 
 TEST(Rollout, SameEpisodeGivesTheSameHash) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const RolloutSetup setup = parts.setup();
   EXPECT_EQ(roll(parts, setup).state_hash, roll(parts, setup).state_hash);
   EXPECT_NE(roll(parts, setup).state_hash, roll(parts, setup, "null").state_hash);
 }
 
 TEST(Rollout, PartnerIsTheClipsOwnAtEveryTick) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const RolloutSetup setup = parts.setup();
   const Rollout rollout = roll(parts, setup);
   for (int t = 0; t < rollout.recording.frames(); t += 31)
     EXPECT_EQ(rollout.recording.partner.at(t, kHead), parts.clip.partner.joints.at(t, kHead)) << t;
@@ -80,7 +87,7 @@ TEST(Rollout, PartnerVelocityLeadsToTheNextFrame) {
 
 TEST(Rollout, WallLimitEndsAsTimedOut) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   setup.wall_limit = 1e-9;
   const Rollout rollout = roll(parts, setup);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kTimedOut);
@@ -97,7 +104,7 @@ EpisodeClock clock_of(double& wall, double& computed, double wall_step, double c
 
 TEST(Rollout, AnEpisodeWhoseProcessWasStoppedLosesNothing) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   const Rollout expected = roll(parts, setup);
   double wall = 0.0, computed = 0.0;
   setup.clock = clock_of(wall, computed, 9.0, 1e-6);  // stopped between any two looks for three times the limit
@@ -110,7 +117,7 @@ TEST(Rollout, AnEpisodeWhoseProcessWasStoppedLosesNothing) {
 
 TEST(Rollout, AnEpisodeThatComputesForLongOrWaitsForMuchLongerTimesOut) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   setup.wall_limit = 3.0;
   double wall = 0.0, computed = 0.0;
   setup.clock = clock_of(wall, computed, 1e-6, 0.5);
@@ -123,7 +130,7 @@ TEST(Rollout, AnEpisodeThatComputesForLongOrWaitsForMuchLongerTimesOut) {
 
 TEST(Rollout, StopRequestMarksTheEpisodeInterrupted) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   setup.stop_asked = [] { return true; };
   EXPECT_TRUE(roll(parts, setup).interrupted);
 }
@@ -146,11 +153,13 @@ class FaultyController final : public Controller {
 };
 
 TEST(Rollout, FaultsAndTheDelayedStateAreTheControllers) {
-  const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
-  setup.perturbation.delay_ticks = 2;
   if (!is_available("mujoco")) GTEST_SKIP() << "not run: mujoco absent";
-  const auto backend = make_backend("mujoco", episode_scene(parts.spec, parts.suite, parts.robot));
+  Suite suite = test::playback_suite();
+  suite.engines = {"mujoco"};
+  const Parts parts(suite);
+  RolloutSetup setup = parts.setup();
+  setup.perturbation.delay_ticks = 2;
+  const auto backend = make_backend("mujoco", parts.experiment->scene(parts.spec));
   FaultyController controller(*parts.robot);
   const auto policy = make_policy("replay", parts.robot);
   const Rollout rollout = roll_out(setup, *backend, controller, *policy);
@@ -182,7 +191,7 @@ class MissingPlan final : public Policy {
 
 TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const RolloutSetup setup = parts.setup();
   MissingPlan policy(make_policy("replay", parts.robot));
   const Rollout rollout = play_back(setup, policy);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kOk);
@@ -192,7 +201,7 @@ TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
   EXPECT_GE(rollout.plan_times.max, rollout.plan_times.p95);
   EXPECT_GE(rollout.plan_times.p95, rollout.plan_times.p50);
   EpisodeRow row;
-  score_rollout(rollout, setup, parts.suite, {}, *parts.robot, row);
+  score_rollout(rollout, setup, {}, *parts.robot, row);
   EXPECT_EQ(row.policy_faults.late, 1);
   EXPECT_EQ(row.policy_ms.max, rollout.plan_times.max);
 }
@@ -200,7 +209,7 @@ TEST(Rollout, APlanThatDoesNotComeIsLateAndAFaultOfThePolicy) {
 // Half of a plan's period late, each plan counts for the other half; what it was made of is not moved by it.
 TEST(Rollout, APlanArrivesItsSimulatedLatencyLater) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   const int ticks = roll(parts, setup).recording.frames();
   setup.perturbation = default_perturbation("plan_latency");
   ASSERT_EQ(setup.perturbation.plan_latency_ms, 100.0);
@@ -236,14 +245,14 @@ class DyingPolicy final : public Policy {
 
 TEST(Rollout, ADeadPolicyEndsTheEpisodeAsAnErrorNotAsAFailureToAct) {
   const Parts parts;
-  const RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  const RolloutSetup setup = parts.setup();
   DyingPolicy policy(make_policy("replay", parts.robot));
   const Rollout rollout = play_back(setup, policy);
   EXPECT_EQ(rollout.recording.outcome, Outcome::kError);
   EXPECT_EQ(rollout.recording.message, "its process ended");
   EXPECT_EQ(rollout.recording.frames(), kTicksPerPlan);
   const PolicyMaker maker = [&] { return std::make_unique<DyingPolicy>(make_policy("replay", parts.robot)); };
-  const EpisodeRow row = run_episode(parts.spec, parts.suite, {"hash"}, parts.robot, "", {.policy = maker});
+  const EpisodeRow row = parts.experiment->run(parts.spec, {.policy = maker});
   EXPECT_EQ(row.outcome, Outcome::kError);
   EXPECT_EQ(row.message, "its process ended");
   EXPECT_TRUE(row.policy_faults.dead);
@@ -269,7 +278,7 @@ class SlowPolicy final : public Policy {
 
 TEST(Rollout, WaitingForPlansIsNotHeldAgainstTheWallLimit) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   const Rollout expected = roll(parts, setup);
   setup.wall_limit = 2.0;  // playback takes some milliseconds
   SlowPolicy policy(make_policy("replay", parts.robot));
@@ -281,7 +290,7 @@ TEST(Rollout, WaitingForPlansIsNotHeldAgainstTheWallLimit) {
 // The onset of a wave is the hand's, in the act; the policy's view of the partner changes nothing that is recorded.
 TEST(Rollout, ADisturbedViewIsThePolicysAlone) {
   const Parts parts;
-  RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+  RolloutSetup setup = parts.setup();
   const Rollout clean = roll(parts, setup);
   setup.perturbation = default_perturbation("jitter");
   setup.perturbation.perception.vanish = 1.0;
@@ -296,7 +305,7 @@ TEST(Rollout, TheGroundCarriesTheRobotAndThePeakIsOfOneTick) {
   const Parts parts;
   for (const EngineInfo& engine : engines()) {
     if (!engine.available) continue;
-    RolloutSetup setup = episode_setup(parts.spec, parts.suite, *parts.robot);
+    RolloutSetup setup = parts.setup();
     int ticks = 0;
     setup.stop_asked = [&ticks] { return ++ticks > 50; };
     Scene scene;

@@ -11,6 +11,7 @@
 #include "duet/metrics/catalogue.h"
 #include "duet/rollout/play_back.h"
 #include "duet/rows/row_identity.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
 
@@ -39,13 +40,8 @@ struct Kept {
 
 // Runs one episode of the suite and keeps it.
 Kept run_and_keep(const Suite& suite, const PairedMotion& clip, const std::string& folder) {
-  const EpisodeSpec spec{.clip = &clip,
-                         .engine = suite.engines.front(),
-                         .controller = "vmc",
-                         .policy = "replay",
-                         .seed = 3,
-                         .perturbation = suite.perturbations.front().name};
-  Kept kept{run_episode(spec, suite, {"hash"}, test::g1(), folder), ""};
+  const auto experiment = test::experiment_of(suite, {clip});
+  Kept kept{experiment->run(test::first_of(*experiment, 3), {.trajectories = folder}), ""};
   for (const auto& entry : std::filesystem::directory_iterator(folder)) kept.file = entry.path().string();
   return kept;
 }

@@ -9,6 +9,7 @@
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/execution/runner.h"
 #include "duet/policies/catalogue/registry.h"
+#include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 
 namespace duet {
@@ -19,14 +20,15 @@ class WaveThatSucceeds : public testing::Test {
  protected:
   [[nodiscard]] EpisodeRow scored() const {
     EpisodeRow row;
-    score_rollout(rollout_, setup_, suite_, readings_of(suite_), *robot_, row);
+    score_rollout(rollout_, setup_, rules_, *robot_, row);
     return row;
   }
 
   std::shared_ptr<const RobotModel> robot_ = test::g1();
-  PairedMotion clip_ = test::paired(Task::kWave, *robot_);
-  Suite suite_ = test::playback_suite();
-  RolloutSetup setup_ = episode_setup({&clip_, "playback", "pd", "replay", "main", 0, 1}, suite_, *robot_);
+  std::shared_ptr<const Experiment> experiment_ =
+      test::experiment_of(test::playback_suite(), {test::paired(Task::kWave, *robot_)});
+  ScoringRules rules_;
+  RolloutSetup setup_ = experiment_->setup(test::first_of(*experiment_));
   Rollout rollout_ = [this] {
     const auto policy = make_policy("replay_dense", robot_);
     return play_back(setup_, *policy);
@@ -54,8 +56,8 @@ TEST_F(WaveThatSucceeds, IsNoneWhereTheRobotFellOrTheEpisodeEndedInAnyOtherWay) 
 TEST_F(WaveThatSucceeds, SuccessIsTheVerdictOfTheSuitesDetectorAndThresholdsAlone) {
   for (const DetectorVersion version : {DetectorVersion::kRobot, DetectorVersion::kPaper})
     for (const ThresholdSet set : kThresholdSets) {
-      suite_.detector = version;
-      suite_.thresholds = set;
+      rules_.detector = version;
+      rules_.thresholds = set;
       const EpisodeRow row = scored();
       const auto own = std::find_if(row.verdicts.begin(), row.verdicts.end(), [&](const Verdict& verdict) {
         return verdict.version == to_string(version) && verdict.thresholds == to_string(set);
@@ -66,7 +68,7 @@ TEST_F(WaveThatSucceeds, SuccessIsTheVerdictOfTheSuitesDetectorAndThresholdsAlon
 }
 
 TEST_F(WaveThatSucceeds, TheRulesOfTheActAreAskedWhereTheSuiteAsksForThem) {
-  suite_.thresholds = ThresholdSet::kAct;
+  rules_.thresholds = ThresholdSet::kAct;
   EXPECT_EQ(scored().verdicts.size(), 6U);
 }
 
@@ -89,7 +91,7 @@ TEST_F(WaveThatSucceeds, ShorterThanEightFramesHasNoMetricsAndEightHas) {
     part.recording.q_target.resize(frames);
     part.recording.partner = part.recording.partner.slice(0, frames);
     EpisodeRow row;
-    score_rollout(part, setup_, suite_, readings_of(suite_), *robot_, row);
+    score_rollout(part, setup_, rules_, *robot_, row);
     EXPECT_EQ(row.metrics.contains("dof_error"), frames == 8) << frames;
   }
 }

@@ -33,13 +33,13 @@ int exit_code(const RunSummary& summary) {
   return has_faults(summary.outcomes) ? kExitErrors : kExitOk;
 }
 
-std::string describe(const RunSummary& summary, const Suite& suite, const std::string& output) {
+// `how`: the start of its episodes, and the partner.
+std::string describe(const RunSummary& summary, const std::string& how, const std::string& output) {
   std::vector<std::string> outcomes;
   for (const auto& [outcome, count] : summary.outcomes) outcomes.push_back(fmt::format("{} {}", count, outcome));
-  std::string text = fmt::format("{} of {} episodes in {} ({} were there, {} run now{}{}); start: {}, partner: {}\n",
+  std::string text = fmt::format("{} of {} episodes in {} ({} were there, {} run now{}{}); {}\n",
                                  summary.already_there + summary.run, summary.planned, output, summary.already_there,
-                                 summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "),
-                                 to_string(suite.start), to_string(suite.partner));
+                                 summary.run, outcomes.empty() ? "" : ": ", fmt::join(outcomes, ", "), how);
   for (const auto* absent : {&summary.absent_engines, &summary.absent_controllers, &summary.absent_policies})
     for (const auto& [name, reason] : *absent)
       text += fmt::format("{}; its episodes are rows with outcome `unsupported`\n", reason);
@@ -59,11 +59,11 @@ constexpr double kGrace = 1.0;
   std::_Exit(exit_code(end));
 }
 
-RunSummary run_watched(const Suite& suite, const RunArguments& arguments, Progress& progress) {
+RunSummary run_watched(Suite suite, const RunArguments& arguments, Progress& progress) {
   const StopSign stop(arguments.options.time_limit, arguments.options.begin);
   const StopWatch watch(stop, kGrace, end_at_once);
   try {
-    return run_suite(suite, arguments.output, arguments.options, progress);
+    return run_suite(std::move(suite), arguments.output, arguments.options, progress);
   } catch (const StorageError& error) {
     throw StorageError(
         fmt::format("{}; the run has stopped and the same command goes on where it stopped", error.what()));
@@ -96,7 +96,7 @@ void print_plan(const Session& session, const Suite& suite) {
 
 void run_suite_command(Session& session, RunArguments arguments) {
   catch_interrupts();
-  const Suite suite = suite_of(arguments.suite);
+  Suite suite = suite_of(arguments.suite);
   if (arguments.dry_run) {
     print_plan(session, suite);
     return;
@@ -108,12 +108,13 @@ void run_suite_command(Session& session, RunArguments arguments) {
   if (!arguments.certificate.empty())
     arguments.options.certificate = certificate_json(load_certificate(arguments.certificate));
   Progress progress(session.progress());
-  const RunSummary summary = run_watched(suite, arguments, progress);
+  const std::string how = fmt::format("start: {}, partner: {}", to_string(suite.start), to_string(suite.partner));
+  const RunSummary summary = run_watched(std::move(suite), arguments, progress);
   session.exit_code = exit_code(summary);
   for (const std::string& warning : summary.warnings) warn(warning);
   warn_of_timeouts(summary.outcomes);
   if (!summary.first_error.empty()) warn(errors_sentence(summary.outcomes.at("error"), summary.first_error));
-  note(session, describe(summary, suite, arguments.output));
+  note(session, describe(summary, how, arguments.output));
   Run run = open_run(arguments.output, RowExtent::kLean);
   std::vector<std::string> notes;
   if (std::string partial = completeness(run); !partial.empty()) notes.push_back(std::move(partial));
