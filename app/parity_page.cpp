@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
-#include "duet/report/page/report_parts.h"
-#include "duet/report/tables/axis.h"
+#include "duet/report/page/analysis_html.h"
 #include "duet/report/tables/escape_html.h"
 
 namespace duet {
@@ -17,14 +18,9 @@ constexpr double kDotRadius = 3.6, kKeyLine = 18.0;
 constexpr int kColours = 8;  // --t1 to --t8 of the style sheet
 
 constexpr const char* kStyle = R"css(
-.plots{display:grid;grid-template-columns:repeat(auto-fill,minmax(480px,1fr));gap:18px 22px;margin-top:14px}
-figure{margin:0;border:1px solid var(--line);border-radius:6px;background:var(--panel);padding:12px 14px 6px;break-inside:avoid}
-figcaption{font-size:14px;margin-bottom:6px}
+.plots{grid-template-columns:repeat(auto-fill,minmax(480px,1fr))}
 figcaption b{display:block}
-figcaption span,td.note{color:var(--soft)}
-td.note{white-space:normal;text-align:left;min-width:260px;font-size:12.5px}
-tr.fail td.verdict{color:var(--human);font-weight:700}
-tr.deviation td.verdict{color:var(--other);font-weight:600}
+tbody td{white-space:normal}
 @media(max-width:560px){.plots{grid-template-columns:1fr}}
 )css";
 
@@ -34,6 +30,30 @@ text{font:12px system-ui,sans-serif;fill:#555}text.title{font-weight:700;font-si
 polyline{fill:none;stroke-width:1.6}
 @media(prefers-color-scheme:dark){text{fill:#a6adb6}text.title{fill:#e7e8ea}.grid{stroke:#3a4048}}
 )css";
+
+// An axis of decades: its range and ticks are whole ones.
+struct DecadeAxis {
+  double from, to;                                                                // [px], of the lowest and the highest
+  double low = std::numeric_limits<double>::infinity(), high = -low, step = 1.0;  // decimal logarithms
+
+  void take(double value) {
+    low = std::min(low, std::floor(std::log10(value)));
+    high = std::max(high, std::max(std::ceil(std::log10(value)), low + 1.0));
+  }
+  // Ticks of two or more decades where there are more than `most`.
+  void thin(int most) { step = std::max(1.0, std::ceil((high - low) / most)); }
+  [[nodiscard]] bool empty() const { return low > high; }
+  [[nodiscard]] double at(double value) const { return from + (to - from) * (std::log10(value) - low) / (high - low); }
+  [[nodiscard]] std::vector<double> ticks() const {
+    std::vector<double> values;
+    for (double decade = low; decade <= high; decade += step) values.push_back(std::pow(10.0, decade));
+    return values;
+  }
+  static std::string label(double tick) {
+    const double decade = std::round(std::log10(tick));
+    return std::abs(decade) <= 3.0 ? fmt::format("{:g}", std::pow(10.0, decade)) : fmt::format("1e{:g}", decade);
+  }
+};
 
 bool plottable(const conformance::AccuracyPoint& point) {
   return std::isfinite(point.error) && point.error > 0.0 && std::isfinite(point.cost) && point.cost > 0.0;
@@ -45,16 +65,25 @@ const AccuracyCurve* curve_of(const CertifiedEngine& engine, const std::string& 
   return found == engine.accuracy.end() ? nullptr : &*found;
 }
 
-std::string grid_svg(const PlotAxis& x, const PlotAxis& y) {
+std::string grid_svg(const DecadeAxis& x, const DecadeAxis& y) {
   std::string svg;
   for (const double tick : x.ticks())
     svg +=
         fmt::format(R"(<line class="grid" x1="{0:.1f}" y1="{1}" x2="{0:.1f}" y2="{2}"/>)", x.at(tick), kTop, kBottom);
-  return svg + axis_ticks(x, kBottom, "CPU seconds per simulated second") + grid_lines(y, kLeft, kRight);
+  for (const double tick : x.ticks())
+    svg += fmt::format(R"(<text x="{:.1f}" y="{:.0f}" text-anchor="middle">{}</text>)", x.at(tick), kBottom + 17.0,
+                       DecadeAxis::label(tick));
+  svg += fmt::format(R"(<text x="{:.0f}" y="{:.0f}" text-anchor="middle">CPU seconds per simulated second</text>)",
+                     (x.from + x.to) / 2.0, kBottom + 35.0);
+  for (const double tick : y.ticks())
+    svg += fmt::format(
+        R"(<line class="grid" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.1f}" y2="{2:.1f}"/><text x="{3:.0f}" y="{4:.1f}" text-anchor="end">{5}</text>)",
+        kLeft, kRight, y.at(tick), kLeft - 7.0, y.at(tick) + 4.0, DecadeAxis::label(tick));
+  return svg;
 }
 
-std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const PlotAxis& x,
-                      const PlotAxis& y) {
+std::string curve_svg(const CertifiedEngine& engine, const AccuracyCurve& curve, int colour, const DecadeAxis& x,
+                      const DecadeAxis& y) {
   std::string points, dots;
   for (const conformance::AccuracyPoint& point : curve.points) {
     if (!plottable(point)) continue;
@@ -116,66 +145,48 @@ std::string plots_html(const Certificate& certificate) {
       figures);
 }
 
+std::string section_html(const std::string& id, const TitledTable& titled) {
+  return fmt::format("<section id=\"{}\"><h2>{}</h2>{}</section>\n", id, escape_html(titled.title),
+                     titled_table_html({.caption = titled.caption, .table = titled.table}));
+}
+
 std::string summary_html(const Certificate& certificate) {
-  std::string rows;
+  TitledTable titled{.title = "Engines"};
+  titled.table = {.header = {"Engine", "Version", "Profile", "Step [ms]", "Passed", "Asserted deviations", "Failed"},
+                  .label_columns = 3};
   for (const CertifiedEngine& engine : certificate.engines)
-    rows += fmt::format(
-        "<tr><th><a href=\"#{0}\">{0}</a></th><td class=\"l\">{1}</td><td class=\"l\">{2}</td><td>{3:g}</td>"
-        "<td>{4}</td><td>{5}</td><td>{6}</td></tr>\n",
-        escape_html(engine.name), escape_html(engine.version), escape_html(engine.profile), 1e3 * engine.dt,
-        engine.tally.passed, engine.tally.deviations, engine.tally.failed);
-  return fmt::format(
-      "<section><div class=\"scroll\"><table><thead><tr><th class=\"l\">Engine</th><th class=\"l\">Version</th>"
-      "<th class=\"l\">Profile</th><th>Step [ms]</th><th>Passed</th><th>Asserted "
-      "deviations</th><th>Failed</th></tr></thead>"
-      "<tbody>\n{}</tbody></table></div></section>\n",
-      rows);
+    titled.table.rows.push_back({engine.name, engine.version, engine.profile, fmt::format("{:g}", 1e3 * engine.dt),
+                                 fmt::format("{}", engine.tally.passed), fmt::format("{}", engine.tally.deviations),
+                                 fmt::format("{}", engine.tally.failed)});
+  return section_html("engines", titled);
 }
 
 std::string deviations_html(const Certificate& certificate) {
   if (certificate.deviations.empty()) return "";
-  std::string rows;
+  TitledTable titled{
+      .title = "Asserted deviations",
+      .caption = "Known differences: the suite expects them up to their bound, and fails where one is gone."};
+  titled.table = {.header = {"Engine", "Scene", "Quantity", "Bound", "Reason"}, .label_columns = 3};
   for (const CertifiedDeviation& entry : certificate.deviations)
-    rows += fmt::format(
-        "<tr><th>{}</th><td class=\"l\">{}</td><td class=\"l\">{}</td><td>{:g}</td><td class=\"note\">{}</td></tr>\n",
-        escape_html(entry.engine), escape_html(entry.scene), escape_html(entry.quantity), entry.bound,
-        escape_html(entry.reason));
-  return fmt::format(
-      "<section id=\"deviations\"><h2>Asserted deviations</h2><p>Known differences: the suite expects them up to their "
-      "bound, "
-      "and fails where one is gone.</p><div class=\"scroll\"><table><thead><tr><th class=\"l\">Engine</th><th "
-      "class=\"l\">Scene"
-      "</th><th class=\"l\">Quantity</th><th>Bound</th><th "
-      "class=\"l\">Reason</th></tr></thead><tbody>\n{}</tbody></table></div>"
-      "</section>\n",
-      rows);
-}
-
-std::string measurement_row(const CertifiedMeasurement& entry) {
-  const conformance::Measurement& found = entry.found;
-  const char* style = entry.verdict == conformance::Verdict::kPass   ? ""
-                      : entry.verdict == conformance::Verdict::kFail ? " class=\"fail\""
-                                                                     : " class=\"deviation\"";
-  return fmt::format(
-      "<tr{}><th>{}</th><td class=\"l\">{}</td><td>{:g}</td><td>{:.4g}</td><td>{:.4g}</td><td>{:.2g}{}</td>"
-      "<td class=\"l\">{}</td><td class=\"l verdict\">{}</td><td class=\"note\">{}</td></tr>\n",
-      style, escape_html(found.scene), escape_html(found.quantity), 1e3 * found.dt, found.value, found.expected,
-      found.relative ? 100.0 * found.tolerance : found.tolerance, found.relative ? " %" : "", escape_html(found.unit),
-      conformance::to_string(entry.verdict), escape_html(found.note));
+    titled.table.rows.push_back(
+        {entry.engine, entry.scene, entry.quantity, fmt::format("{:g}", entry.bound), entry.reason});
+  return section_html("deviations", titled);
 }
 
 std::string engine_html(const CertifiedEngine& engine) {
-  std::string rows;
-  for (const CertifiedMeasurement& entry : engine.measurements) rows += measurement_row(entry);
-  return fmt::format(
-      "<section id=\"{0}\"><h2>{0} <span class=\"unit\">{1}</span></h2><div class=\"scroll\"><table "
-      "class=\"compact\"><thead><tr>"
-      "<th class=\"l\">Scene</th><th class=\"l\">Quantity</th><th>Step "
-      "[ms]</th><th>Found</th><th>Expected</th><th>Tolerance</th>"
-      "<th class=\"l\">Unit</th><th class=\"l\">Verdict</th><th "
-      "class=\"l\">Against</th></tr></thead><tbody>\n{2}</tbody></table>"
-      "</div></section>\n",
-      escape_html(engine.name), escape_html(engine.version), rows);
+  TitledTable titled{.title = engine.name, .caption = engine.version};
+  titled.table = {
+      .header = {"Scene", "Quantity", "Step [ms]", "Found", "Expected", "Tolerance", "Unit", "Verdict", "Against"},
+      .label_columns = 2};
+  for (const CertifiedMeasurement& entry : engine.measurements) {
+    const conformance::Measurement& found = entry.found;
+    titled.table.rows.push_back({found.scene, found.quantity, fmt::format("{:g}", 1e3 * found.dt),
+                                 fmt::format("{:.4g}", found.value), fmt::format("{:.4g}", found.expected),
+                                 fmt::format("{:.2g}{}", found.relative ? 100.0 * found.tolerance : found.tolerance,
+                                             found.relative ? " %" : ""),
+                                 found.unit, std::string(conformance::to_string(entry.verdict)), found.note});
+  }
+  return section_html(escape_html(engine.name), titled);
 }
 
 std::string navigation_html(const Certificate& certificate) {
@@ -189,7 +200,7 @@ std::string navigation_html(const Certificate& certificate) {
 }  // namespace
 
 std::string accuracy_plot_svg(const std::vector<CertifiedEngine>& engines, const std::string& scene) {
-  PlotAxis x{.from = kLeft, .to = kRight, .logarithmic = true}, y{.from = kBottom, .to = kTop, .logarithmic = true};
+  DecadeAxis x{.from = kLeft, .to = kRight}, y{.from = kBottom, .to = kTop};
   for (const CertifiedEngine& engine : engines) {
     const AccuracyCurve* curve = curve_of(engine, scene);
     if (curve == nullptr) continue;
@@ -200,8 +211,8 @@ std::string accuracy_plot_svg(const std::vector<CertifiedEngine>& engines, const
     }
   }
   if (x.empty()) return "";
-  x.round_decades(20);
-  y.round_decades(8);
+  x.thin(20);
+  y.thin(8);
   std::string svg =
       fmt::format(R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}: error against cost">)",
                   kPlotWidth, kPlotHeight, escape_html(scene));
@@ -237,24 +248,22 @@ std::string parity_svg(const Certificate& certificate) {
                      width, height, kPictureStyle, panels);
 }
 
-std::string parity_page(const Certificate& certificate) {
+std::string parity_page(const Certificate& certificate, const std::string& style) {
   std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width,initial-scale=1\"><title>duet: parity of physics "
-      "engines</title><style>{}{}</style></head>"
-      "<body>\n",
-      report_style(), kStyle);
-  html += fmt::format(
       "<header><h1>Parity of physics engines</h1><p class=\"machine\">duet {} · {} · effort {} · {}</p>"
       "<p>The same robots, scenes, torque law and contacts in every engine, each against a closed form or against our "
-      "own "
-      "integration. <code>duet validate --effort {}</code> makes this page again.</p></header>\n",
+      "own integration. <code>duet validate --effort {}</code> makes this page again.</p></header>\n",
       escape_html(certificate.program), escape_html(certificate.machine), escape_html(certificate.effort),
       escape_html(certificate.created_at), escape_html(certificate.effort));
   html += navigation_html(certificate) + "<main>\n" + summary_html(certificate) + plots_html(certificate) +
           deviations_html(certificate);
   for (const CertifiedEngine& engine : certificate.engines) html += engine_html(engine);
-  return html + fmt::format("</main><footer>Digest {}</footer></body></html>\n", escape_html(certificate.digest));
+  html += fmt::format("</main><footer>Digest {}</footer>", escape_html(certificate.digest));
+  return fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width,initial-scale=1\"><meta name=\"color-scheme\" content=\"light dark\"><title>duet: "
+      "parity of physics engines</title><style>{}{}</style></head><body>\n{}</body></html>\n",
+      style, kStyle, html);
 }
 
 }  // namespace duet

@@ -9,7 +9,8 @@
 
 namespace duet {
 
-std::string parity_page(const Certificate& certificate);
+// `style`: the style sheet of pages, load_viewer("report"); plain without it.
+std::string parity_page(const Certificate& certificate, const std::string& style);
 
 // Four of the scenes as one picture that stands alone, for a README or a paper; "" where none of them was run.
 std::string parity_svg(const Certificate& certificate);

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include "duet/core/require.h"
-#include "duet/report/page/report_parts.h"
+#include "duet/report/page/key_frames.h"
+#include "duet/report/tables/escape_html.h"
 
 namespace duet {
 namespace {

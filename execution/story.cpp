@@ -180,8 +180,6 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   content.title = tables.board.suite.label;
   content.environment = run.info.environment;
   content.notes = notes_of(suite);
-  content.entries = tables.leaderboard;
-  content.board = tables.board;
   content.analyses = std::move(analyses);
   content.columns = metric_columns();
   content.episodes = listed_episodes(tables.rows, replays);

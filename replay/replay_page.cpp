@@ -3,12 +3,8 @@
 #include <fmt/format.h>
 
 #include <cstdint>
-#include <filesystem>
 
 #include "duet/archives/zip/deflate.h"
-#include "duet/core/file.h"
-#include "duet/core/require.h"
-#include "duet/core/share.h"
 #include "duet/replay/replay_columns.h"
 #include "duet/replay/replay_header.h"
 #include "duet/report/tables/escape_html.h"
@@ -16,19 +12,6 @@
 
 namespace duet {
 namespace {
-
-// The file beside the program that was built, or where the shipped files are.
-std::string viewer_file(const std::string& name) {
-  std::error_code ignored;
-  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  std::vector<std::string> places = {(program.parent_path() / "viewer" / name).string()};
-  for (const std::string& share : share_folders()) places.push_back(fmt::format("{}/viewer/{}", share, name));
-  try {
-    return first_existing("viewer/" + name, places);
-  } catch (const MissingError& error) {
-    throw MissingError(fmt::format("{}; a build makes it where esbuild is installed", error.what()));
-  }
-}
 
 std::string verdict_text(const ReplayTrack& track) {
   if (!track.kept || !track.kept->row.success) return "not judged";
@@ -58,11 +41,6 @@ std::string table_html(const ReplayContent& content) {
   return html;
 }
 
-// A script element's text ends at this, wherever it stands.
-void require_embeddable(std::string_view text, std::string_view end, const char* what) {
-  require(text.find(end) == std::string_view::npos, "{}: expected no '{}' in it", what, end);
-}
-
 ReplayContent part_of(const ReplayContent& content, std::size_t begin, std::size_t end) {
   ReplayContent part = content;
   part.scenes.assign(content.scenes.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -78,10 +56,6 @@ ReplayPage page_of(const ReplayContent& part, const ViewerBundle& viewer) {
 
 }  // namespace
 
-ViewerBundle load_viewer(const std::string& page) {
-  return {read_text(viewer_file(page + ".js")), read_text(viewer_file(page + ".css"))};
-}
-
 std::string replay_data(const ReplayContent& content) {
   ReplayColumns columns;
   const std::string header = dumped(replay_header(content, columns));
@@ -92,22 +66,12 @@ std::string replay_data(const ReplayContent& content) {
 }
 
 std::string viewer_page(const ViewerPage& page, const ReplayContent& content, const ViewerBundle& viewer) {
-  require_embeddable(viewer.script, "</script", "the viewer's script");
-  require_embeddable(viewer.style, "</style", "the viewer's style sheet");
-  return fmt::format(
-             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
-             "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-             "<meta name=\"color-scheme\" content=\"light dark\"><meta name=\"generator\" content=\"duet\">"
-             "<title>{}</title>\n<style>{}</style></head>\n<body>\n<header "
-             "id=\"head\"><h1>{}</h1></header>\n"
-             "<main id=\"app\"><noscript><p class=\"note\">{}</p></noscript></main>\n<footer>",
-             escape_html(page.title), viewer.style, escape_html(page.heading), escape_html(page.without_script)) +
-         page.footer +
-         fmt::format(
-             "</footer>\n<script type=\"application/octet-stream\" "
-             "id=\"duet-replay\">{}</script>\n<script>{}</script>\n"
-             "</body></html>\n",
-             base64(deflated(replay_data(content))), viewer.script);
+  const std::string body = fmt::format(
+      "<header id=\"head\"><h1>{}</h1></header>\n"
+      "<main id=\"app\"><noscript><p class=\"note\">{}</p></noscript></main>\n<footer>{}</footer>\n",
+      escape_html(page.heading), escape_html(page.without_script), page.footer);
+  return html_page(page.title, body,
+                   {"duet-replay", "application/octet-stream", base64(deflated(replay_data(content)))}, viewer);
 }
 
 std::string replay_page(const ReplayContent& content, const ViewerBundle& viewer) {

@@ -7,17 +7,9 @@
 #include <vector>
 
 #include "duet/replay/replay_content.h"
+#include "duet/report/page/html_page.h"
 
 namespace duet {
-
-// Script and style sheet that a page is made with.
-struct ViewerBundle {
-  std::string script, style;
-};
-
-// Loads the page of this name ("replay", "rate"): in viewer/ beside the program, or of the folders of core/share.h.
-// Throws MissingError naming the file, the places looked at and what makes it.
-ViewerBundle load_viewer(const std::string& page = "replay");
 
 // Texts around the data of a page that a viewer draws.
 struct ViewerPage {

@@ -1,7 +1,7 @@
-// Any analysis as a section of the HTML report.
+#include "duet/report/page/analysis_html.h"
+
 #include <fmt/format.h>
 
-#include "duet/report/page/report_parts.h"
 #include "duet/report/tables/escape_html.h"
 
 namespace duet {
@@ -10,19 +10,19 @@ namespace {
 std::string cell_html(const std::string& cell, bool label) {
   const std::size_t bracket = cell.find(" [");
   const bool interval = bracket != std::string::npos && cell.ends_with(']') && !label;
-  if (label) return fmt::format(R"(<th scope="row" class="l">{}</th>)", escape_html(cell));
+  if (label) return fmt::format(R"(<th scope="row">{}</th>)", escape_html(cell));
   if (!interval) {
-    const bool over_limit = cell.ends_with('*') || cell.ends_with("*)");
-    const char* mark = over_limit ? R"( class="over")" : cell == "-" ? R"( class="zero")" : "";
+    const bool stands_out = cell.ends_with('*') || cell.ends_with("*)") || cell == "FAIL";
+    const char* mark = stands_out ? R"( class="over")" : cell == "-" ? R"( class="zero")" : "";
     return fmt::format("<td{}>{}</td>", mark, escape_html(cell));
   }
-  return fmt::format(R"(<td><span class="rate">{}</span><span class="ci">{}</span></td>)",
+  return fmt::format(R"(<td><span class="rate">{}</span> <span class="ci">{}</span></td>)",
                      escape_html(cell.substr(0, bracket)), escape_html(cell.substr(bracket + 1)));
 }
 
 std::string table_html(const TitledTable& titled) {
   const TextTable& table = titled.table;
-  std::string html = R"(<div class="scroll" tabindex="0"><table class="compact">)";
+  std::string html = R"(<div class="scroll" tabindex="0"><table>)";
   if (!titled.caption.empty()) html += fmt::format("<caption>{}</caption>", escape_html(titled.caption));
   html += "<thead><tr>";
   for (std::size_t i = 0; i < table.header.size(); ++i) {
@@ -36,16 +36,6 @@ std::string table_html(const TitledTable& titled) {
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>";
-}
-
-std::string titled_table_html(const TitledTable& titled) {
-  std::string html = titled.title.empty() ? "" : fmt::format("<h3>{}</h3>", escape_html(titled.title));
-  if (!titled.table.rows.empty()) html += table_html(titled);
-  if (titled.table.rows.empty() && !titled.caption.empty()) {
-    html += fmt::format("<p>{}</p>", escape_html(titled.caption));
-  }
-  for (const std::string& note : titled.notes) html += fmt::format("<p>{}</p>", escape_html(note));
-  return html + "\n";
 }
 
 // Tables of one group fold together where there are several groups; the first is unfolded.
@@ -64,33 +54,47 @@ std::string grouped_html(const std::vector<TitledTable>& tables) {
   return html;
 }
 
-std::string plot_groups_html(const std::vector<PlotGroup>& groups, bool titled) {
+std::string plot_groups_html(const std::vector<PlotGroup>& groups, bool titled, nlohmann::json& drawn) {
   std::string html;
   for (const PlotGroup& group : groups) {
     if (group.plots.empty() || group.title.empty() == titled) continue;
     if (titled) html += fmt::format("<h3>{}</h3>", escape_html(group.title));
     if (!group.note.empty()) html += fmt::format("<p>{}</p>", escape_html(group.note));
-    html += plots_html(group.plots);
+    html += plots_html(group.plots, drawn);
   }
   return html;
 }
 
 }  // namespace
 
-std::string analysis_html(const Analysis& analysis) {
+std::string titled_table_html(const TitledTable& titled) {
+  std::string html = titled.title.empty() ? "" : fmt::format("<h3>{}</h3>", escape_html(titled.title));
+  if (!titled.table.rows.empty()) html += table_html(titled);
+  if (titled.table.rows.empty() && !titled.caption.empty()) {
+    html += fmt::format("<p>{}</p>", escape_html(titled.caption));
+  }
+  for (const std::string& note : titled.notes) html += fmt::format("<p>{}</p>", escape_html(note));
+  return html + "\n";
+}
+
+std::string plots_html(const std::vector<LinePlot>& plots, nlohmann::json& drawn) {
+  std::string html;
+  for (const LinePlot& plot : plots) {
+    nlohmann::json json = plot_json(plot);
+    if (json.is_null()) continue;
+    html += fmt::format("<figure data-plot=\"{}\"><figcaption>{}</figcaption></figure>", drawn.size(),
+                        escape_html(plot.title));
+    drawn.push_back(std::move(json));
+  }
+  return html.empty() ? "" : fmt::format("<div class=\"plots\">{}</div>\n", html);
+}
+
+std::string analysis_html(const Analysis& analysis, nlohmann::json& drawn) {
   std::string html;
   if (!analysis.warning.empty()) html += fmt::format("<p class=\"warning\">{}</p>\n", escape_html(analysis.warning));
   for (const std::string& note : analysis.notes) html += fmt::format("<p>{}</p>\n", escape_html(note));
-  html += plot_groups_html(analysis.plots, false) + analysis.drawing + grouped_html(analysis.tables);
-  return html + plot_groups_html(analysis.plots, true);
-}
-
-std::string plots_html(const std::vector<LinePlot>& plots) {
-  std::string html = R"(<div class="plots">)";
-  for (const LinePlot& plot : plots)
-    if (const std::string svg = line_plot_svg(plot); !svg.empty())
-      html += fmt::format(R"(<figure><figcaption>{}</figcaption>{}</figure>)", escape_html(plot.title), svg);
-  return html + "</div>\n";
+  html += plot_groups_html(analysis.plots, false, drawn) + analysis.drawing + grouped_html(analysis.tables);
+  return html + plot_groups_html(analysis.plots, true, drawn);
 }
 
 }  // namespace duet

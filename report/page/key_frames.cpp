@@ -1,5 +1,5 @@
-// Key frames of a clip as stick figures: an orthographic side view, in millimetres, at right angles to the line between
-// the two agents and the same for all frames of a clip.
+#include "duet/report/page/key_frames.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,7 +7,6 @@
 #include <limits>
 #include <optional>
 
-#include "duet/report/page/report_parts.h"
 #include "duet/report/tables/escape_html.h"
 
 namespace duet {

@@ -1,30 +1,19 @@
 // The content of a report.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "duet/report/page/key_frames.h"
 #include "duet/report/page/training_curves.h"
-#include "duet/report/ranking/board.h"
-#include "duet/report/ranking/leaderboard.h"
 #include "duet/report/tables/analysis.h"
 #include "duet/report/tables/metric_column.h"
+#include "duet/rows/episode_row.h"
 
 namespace duet {
 
-struct StickFigure {
-  std::string label;                       // "human", "robot", "source"
-  std::vector<Eigen::Vector3d> points;     // [m], frame W
-  std::vector<std::pair<int, int>> bones;  // indices in points
-};
-struct KeyFrame {
-  std::string label;  // "start", "act", "end", with its time
-  std::vector<StickFigure> figures;
-};
 struct ClipStory {  // one retargeted clip or rolled-out episode
   std::string title, task;
   std::vector<KeyFrame> frames;
@@ -39,14 +28,12 @@ struct ReportReplay {
 };
 struct ReportContent {
   std::string title;
-  Board board;                        // the first screen
   std::vector<EpisodeRow> episodes;   // section "Episodes": of many those of listed_episodes
   std::size_t all_episodes = 0;       // of which `episodes` are some; 0: they are all
   std::vector<ReportReplay> replays;  // in that section
   nlohmann::json environment;
-  std::vector<std::string> notes;  // options and caveats printed with the tables
-  std::vector<LeaderboardEntry> entries;
-  std::vector<Analysis> analyses;     // a section each, but for the leaderboard, whose table of entries can be sorted
+  std::vector<std::string> notes;     // options and caveats printed with the tables
+  std::vector<Analysis> analyses;     // a section each; the board first, with its sentences in the header
   std::vector<MetricColumn> columns;  // how to head metric columns
   std::map<std::string, std::map<std::string, double>> retargeting;  // task -> metric -> mean ("all" included)
   std::vector<ClipStory> stories;

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 
+#include "duet/archives/zip/deflate.h"
 #include "duet/core/names.h"
+#include "duet/report/page/engine_plot.h"
 #include "duet/report/page/foot_plots.h"
-#include "duet/report/page/report_parts.h"
 #include "duet/report/ranking/policy_table.h"
 #include "duet/report/studies/studies.h"
 #include "duet/rows/groups/row_groups.h"
@@ -18,9 +19,11 @@ namespace {
 Analysis engines_with_plot(const RunTables& tables) {
   Analysis analysis = engine_analysis(tables.engines, tables.certificate);
   if (tables.engines.engines.size() > 1)
-    analysis.drawing = engine_plot_html(tables.engines) +
-                       "<p>Dots: success in each engine with its interval; bar: the mean over engines, on the shade of "
-                       "its interval.</p>\n";
+    analysis.drawing = fmt::format(
+        "<figure><img src=\"data:image/svg+xml;base64,{}\" alt=\"Success per engine with intervals, and the mean over "
+        "engines\"><figcaption>Dots: success in each engine with its interval; bar: the mean over engines, on the "
+        "shade of its interval.</figcaption></figure>\n",
+        base64(engine_plot_svg(tables.engines)));
   return analysis;
 }
 

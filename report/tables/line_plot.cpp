@@ -4,95 +4,53 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "duet/core/require.h"
-#include "duet/report/tables/axis.h"
-#include "duet/report/tables/escape_html.h"
+#include "duet/rows/json_fields.h"
 
 namespace duet {
 namespace {
 
-constexpr double kLeft = 62.0, kRight = 584.0, kLineTop = 26.0, kBottom = 190.0;
-constexpr int kWidth = 600, kHeight = 232, kKeyWidth = 140, kKeyLine = 17, kColours = 9;
+constexpr std::size_t kLossPoints = 120;  // a report has a plot of many terms for each clip
 
-struct Frame {
-  PlotAxis x{.from = kLeft, .to = kRight}, y{.from = kBottom, .to = kLineTop};
-};
-
-bool is_point(const LineSeries& series, std::size_t i) {
-  return std::isfinite(series.x[i]) && std::isfinite(series.y[i]);
-}
-
-std::string grid(const Frame& frame, const LinePlot& plot) {
-  return grid_lines(frame.y, kLeft, kRight) +
-         fmt::format(R"(<line class="axis" x1="{0:.0f}" x2="{1:.0f}" y1="{2:.0f}" y2="{2:.0f}"/>)", kLeft, kRight,
-                     kBottom) +
-         axis_ticks(frame.x, kBottom, plot.x_label) +
-         fmt::format(R"(<text x="{:.0f}" y="14">{}</text>)", kLeft, escape_html(plot.y_label));
-}
-
-std::string path_of(const LineSeries& series, const Frame& frame) {
-  const std::size_t count = series.x.size(), drawn = std::min(count, kPlotPoints);
-  std::string path;
-  bool pen_down = false;
-  for (std::size_t i = 0; i < drawn; ++i) {
-    const std::size_t at = drawn < 2 ? i : i * (count - 1) / (drawn - 1);
-    if (!is_point(series, at)) {
-      pen_down = false;
-      continue;
-    }
-    path += fmt::format("{}{:.1f} {:.1f}", pen_down ? "L" : "M", frame.x.at(series.x[at]), frame.y.at(series.y[at]));
-    if (!pen_down) path += fmt::format("L{:.1f} {:.1f}", frame.x.at(series.x[at]), frame.y.at(series.y[at]));
-    pen_down = true;
+nlohmann::json numbers_json(const std::vector<double>& values, std::size_t most) {
+  const std::size_t count = std::min(values.size(), most);
+  nlohmann::json list = nlohmann::json::array();
+  for (std::size_t i = 0; i < count; ++i) {
+    const double value = values[count < 2 ? i : i * (values.size() - 1) / (count - 1)];
+    list.push_back(number_or_null(std::strtod(fmt::format("{:.{}g}", value, kPlotDigits).c_str(), nullptr)));
   }
-  return path;
+  return list;
 }
 
-std::string series_svg(const LineSeries& series, std::size_t number, const Frame& frame) {
-  return fmt::format(R"(<path style="stroke:var(--t{});stroke-linecap:round" d="{}"/>)", number % kColours,
-                     path_of(series, frame));
-}
-
-// Below the plot, three series a line; nothing for one series, which the axis names.
-std::string legend(const LinePlot& plot) {
-  if (plot.series.size() < 2) return "";
-  std::string svg;
-  const int per_line = 3;
-  for (std::size_t i = 0; i < plot.series.size(); ++i) {
-    const int line = static_cast<int>(i) / per_line, place = static_cast<int>(i) % per_line;
-    const int x = kWidth - per_line * kKeyWidth + place * kKeyWidth, y = kHeight + 4 + line * kKeyLine;
-    svg += fmt::format(R"svg(<path style="stroke:var(--t{})" d="M{} {}h18"/>)svg", i % kColours, x, y - 4);
-    svg += fmt::format(R"(<text class="key" x="{}" y="{}">{}</text>)", x + 24, y, escape_html(plot.series[i].name));
-  }
-  return svg;
-}
-
-int height_of(const LinePlot& plot) {
-  const auto lines = static_cast<int>((plot.series.size() + 2) / 3);
-  return plot.series.size() < 2 ? kHeight : kHeight + 4 + kKeyLine * lines - 6;
+bool has_point(const LineSeries& series) {
+  for (std::size_t i = 0; i < series.x.size(); ++i)
+    if (std::isfinite(series.x[i]) && std::isfinite(series.y[i])) return true;
+  return false;
 }
 
 }  // namespace
 
-std::string line_plot_svg(const LinePlot& plot) {
-  Frame frame;
+nlohmann::json plot_json(const LinePlot& plot) {
+  const std::size_t most = plot.loss ? kLossPoints : kPlotPoints;
+  nlohmann::json list = nlohmann::json::array();
+  const std::vector<double>* last = nullptr;
   for (const LineSeries& series : plot.series) {
     require(series.x.size() == series.y.size(), "line plot '{}': series '{}' has {} x but {} y", plot.title,
             series.name, series.x.size(), series.y.size());
-    for (std::size_t i = 0; i < series.x.size(); ++i) {
-      if (!is_point(series, i)) continue;
-      frame.x.take(series.x[i]);
-      frame.y.take(series.y[i]);
-    }
+    if (!has_point(series)) continue;
+    nlohmann::json& json = list.emplace_back(nlohmann::json{{"name", series.name}});
+    if (last == nullptr || *last != series.x) json["x"] = numbers_json(series.x, most);
+    json["y"] = numbers_json(series.y, most);
+    last = &series.x;
   }
-  if (frame.x.empty()) return "";
-  frame.x.round(6);
-  frame.y.round(5);
-  std::string svg = fmt::format(R"(<svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">)", kWidth,
-                                height_of(plot), escape_html(plot.title));
-  svg += grid(frame, plot);
-  for (std::size_t i = 0; i < plot.series.size(); ++i) svg += series_svg(plot.series[i], i, frame);
-  return svg + legend(plot) + "</svg>";
+  if (list.empty()) return nullptr;
+  return {{"title", plot.title},
+          {"x_label", plot.x_label},
+          {"y_label", plot.y_label},
+          {"loss", plot.loss},
+          {"series", std::move(list)}};
 }
 
 }  // namespace duet

@@ -209,7 +209,8 @@ class TrustTable : public testing::Test {
       const std::vector<Analysis> analyses = run_analyses(tables);
       for (const auto& [name, text] : analysis_files(analyses, "md")) write_file(inside(folder, name), text);
       for (const auto& [name, text] : analysis_files(analyses, "csv")) write_file(out + "/" + name, text);
-      write_file(out + "/report.html", html_report(report_content(run, tables, analyses, {}, episodes, {}, 1, quiet_)));
+      write_file(out + "/report.html",
+                 html_report(report_content(run, tables, analyses, {}, episodes, {}, 1, quiet_), {}));
     });
     attempt([&] { publish_run(folder, out + "/published", published_inputs(folder, false)); });
     attempt([&] { merge_runs({folder}, {.output = out + "/merged"}); });

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "duet/report/page/report_parts.h"
+#include "duet/report/page/analysis_html.h"
 
 namespace duet {
 namespace {
@@ -144,27 +144,33 @@ TEST(Analysis, JsonHasTheSameNamesAndEveryNoteOnce) {
   EXPECT_EQ(json.at("figures").at(2).at("text"), "better");
 }
 
+std::string html_of(const Analysis& analysis) {
+  nlohmann::json drawn = nlohmann::json::array();
+  return analysis_html(analysis, drawn);
+}
+
 TEST(Analysis, HtmlFoldsGroupsWhereThereAreSeveral) {
   Analysis analysis = example();
   analysis.warning = "Beware <all>.";
-  EXPECT_THAT(analysis_html(analysis),
+  EXPECT_THAT(html_of(analysis),
               AllOf(HasSubstr("<p class=\"warning\">Beware &lt;all&gt;.</p>"), HasSubstr("<h3>First</h3>"),
-                    HasSubstr("<span class=\"rate\">1.5</span><span class=\"ci\">[1.0, 2.0]</span>"),
+                    HasSubstr("<span class=\"rate\">1.5</span> <span class=\"ci\">[1.0, 2.0]</span>"),
                     Not(HasSubstr("<details"))));
   analysis.tables = {table("First", "a"), table("Second", "a"), table("Third", "b")};
-  const std::string html = analysis_html(analysis);
+  const std::string html = html_of(analysis);
   EXPECT_THAT(html, AllOf(HasSubstr("<details open><summary>a</summary><h3>First</h3>"),
                           HasSubstr("</details>\n<details><summary>b</summary><h3>Third</h3>")));
   analysis.tables.pop_back();
-  EXPECT_THAT(analysis_html(analysis), Not(HasSubstr("<details")));
+  EXPECT_THAT(html_of(analysis), Not(HasSubstr("<details")));
 }
 
 TEST(Analysis, PlotsWithATitleStandBelowTheTables) {
   const LinePlot plot{.title = "steps", .x_label = "x", .y_label = "y", .series = {{"s", {0.0, 1.0}, {0.0, 1.0}}}};
   Analysis analysis = example();
   analysis.plots = {{.plots = {plot}}, {.title = "Steps", .note = "One each.", .plots = {plot}}, {.title = "No plots"}};
-  const std::string html = analysis_html(analysis);
-  EXPECT_LT(html.find("<svg"), html.find("<h3>First"));
+  const std::string html = html_of(analysis);
+  EXPECT_LT(html.find("<figure data-plot=\"0\"><figcaption>steps<"), html.find("<h3>First"));
+  EXPECT_GT(html.find("<figure data-plot=\"1\">"), html.find("<h3>Steps"));
   EXPECT_GT(html.find("<h3>Steps</h3><p>One each.</p>"), html.find("<h3>Second"));
   EXPECT_THAT(html, Not(HasSubstr("No plots")));
 }

@@ -4,7 +4,7 @@
 
 #include <sstream>
 
-#include "duet/report/page/report_parts.h"
+#include "duet/report/page/html_report.h"
 #include "duet/report/ranking/leaderboard.h"
 #include "duet/statistics/by_clip.h"
 #include "tests/rows/rows.h"
@@ -232,8 +232,10 @@ TEST(BoardVerdict, EndsWithASuiteThatOnlyBearsTheName) {
   EXPECT_EQ(board_verdict(made).back(), "tiny 1.0.0 is NOT it.");
   const Analysis analysis = board_analysis(made);
   EXPECT_EQ(analysis.title, "Board: tiny 1.0.0, NOT it");
+  ReportContent page;
+  page.analyses = {analysis};
   for (const std::string& text : {analysis_markdown(analysis), analysis_csv(analysis), analysis_latex(analysis),
-                                  analysis_json(analysis).dump(), verdict_html(made), board_screen(made, {})})
+                                  analysis_json(analysis).dump(), html_report(page, {}), board_screen(made, {})})
     EXPECT_THAT(text, HasSubstr("tiny 1.0.0 is NOT it."));
 }
 
@@ -263,26 +265,6 @@ TEST(BoardScreen, ShowsEveryRowWhereThereIsRoom) {
       board_screen(board_of({{"a", times(40, '1')}, {"b", times(40, '0')}, {"null", times(40, '0'), "null"}}), {});
   EXPECT_THAT(text, AllOf(HasSubstr("\n  1  a "), HasSubstr("\n  2  b "), HasSubstr("\n  -  null (stands still) "),
                           Not(HasSubstr("more (--tables)"))));
-}
-
-Board with_contacts(long over) {
-  BoardRow row{.controller = "wbc_sim", .policy = "dstar", .perturbation = "clean", .arm = "main", .rank = 1};
-  row.rates.resize(1);
-  row.rates[0].engine = "mujoco";
-  row.contact = BoardContact{.episodes = 5, .touched = 4, .over = over, .worst_ratio = 0.5};
-  return {.rows = {row}};
-}
-
-TEST(BoardHtml, OnlyTouchesOverALimitAreMarked) {
-  EXPECT_THAT(board_html(with_contacts(0)), Not(HasSubstr("class=\"over\"")));
-  EXPECT_THAT(board_html(with_contacts(1)), HasSubstr("<td data-v=\"1\" class=\"over\">1 of 4"));
-}
-
-TEST(BoardHtml, ReferencesHaveNoRank) {
-  const std::string html = board_html(board_of({{"a", times(40, '1')}, {"null", times(40, '0'), "null"}}));
-  EXPECT_THAT(html, HasSubstr("<tr class=\"control\"><td class=\"l rank\" data-v=\"\">"));
-  EXPECT_THAT(html, HasSubstr("null (stands still)"));
-  EXPECT_THAT(html, HasSubstr("data-policy=\"null arm\""));
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <regex>
 
 #include "duet/report/page/foot_plots.h"
-#include "duet/report/page/report_parts.h"
+#include "duet/report/page/key_frames.h"
 #include "duet/report/page/run_analyses.h"
 #include "duet/report/tables/escape_html.h"
 #include "tests/rows/rows.h"
@@ -34,13 +34,24 @@ std::vector<KeyFrame> meeting() {
           {"act 1.00 s", {person("source", 1.1, 0.0), person("human", 0.5, 0.0), person("robot", 1.0, 0.0)}}};
 }
 
+Analysis entries_of(const std::vector<EpisodeRow>& rows) { return leaderboard_analysis(leaderboard(rows), {}); }
+
+// Without a viewer: plain tables.
+std::string html_of(const ReportContent& content) { return html_report(content, {}); }
+
+nlohmann::json data_of(const std::string& html) {
+  const std::string begin = "id=\"duet-report\">";
+  const std::size_t at = html.find(begin) + begin.size();
+  return nlohmann::json::parse(html.substr(at, html.find("</script>", at) - at));
+}
+
 ReportContent content() {
   ReportContent content;
   content.title = "Tiny <run> & \"more\"";
   content.environment = {{"machine", "A processor, 2 cores"},
                          {"build", {{"version", "0.1.0"}, {"commit", "abcdef0123456789"}}}};
   content.notes = {"<script>alert('x')</script>"};
-  content.entries = leaderboard({episode("replay", "hug", 0, true), episode("null", "hug", 0, false, "null")});
+  content.analyses = {entries_of({episode("replay", "hug", 0, true), episode("null", "hug", 0, false, "null")})};
   content.columns = {{"jpe", "Joint position error", "m", "lower"}, {"contact_f1", "Contact F1", "1", "higher"}};
   content.retargeting = {{"all", {{"jpe", 0.0625}}}, {"hug", {{"jpe", 0.125}, {"contact_f1", 0.5}, {"unlisted", 7.0}}}};
   content.stories = {{"clip <1>", "hug", meeting(), {{"total", {10.0, 1.0, 0.1}}}, {{"jpe", 0.03}}},
@@ -54,10 +65,10 @@ std::string unbalanced_tag(const std::string& html) {
   std::vector<std::string> open;
   std::string text = html.substr(html.find("<html"));
   text.erase(text.find("<style>"), text.find("</style>") - text.find("<style>"));
-  text.erase(text.find("<script>"), text.find("</script>") - text.find("<script>"));
+  text.erase(text.find("<script "), text.rfind("</script>") - text.find("<script "));
   for (auto it = std::sregex_iterator(text.begin(), text.end(), tag); it != std::sregex_iterator(); ++it) {
     const std::string name = (*it)[2];
-    if (name == "meta" || (*it)[3] == "/" || name == "style" || name == "script") continue;
+    if (name == "meta" || name == "img" || (*it)[3] == "/" || name == "style" || name == "script") continue;
     if ((*it)[1] != "/") {
       open.push_back(name);
     } else if (open.empty() || open.back() != name) {
@@ -70,18 +81,22 @@ std::string unbalanced_tag(const std::string& html) {
 }
 
 TEST(HtmlReport, IsOneFileThatNeedsNoNetwork) {
-  const std::string html = html_report(content());
+  const std::string html = html_report(content(), {"/* a script */", "/* a style */"});
   EXPECT_THAT(html, testing::StartsWith("<!DOCTYPE html>"));
   EXPECT_EQ(unbalanced_tag(html), "");
   for (const char* outside : {"http:", "https:", "src=", "@import", "url(", "<link"})
     EXPECT_THAT(html, Not(HasSubstr(outside)));
-  EXPECT_THAT(html, AllOf(HasSubstr("prefers-color-scheme:dark"), HasSubstr("@media print"), HasSubstr("lang=\"en\"")));
+  EXPECT_THAT(html, AllOf(HasSubstr("<style>/* a style */</style>"), HasSubstr("<script>/* a script */</script>"),
+                          HasSubstr("lang=\"en\""), HasSubstr("<noscript>")));
 }
 
 TEST(HtmlReport, EscapesEveryText) {
   ReportContent hostile = content();
   const std::string evil = "\"><script>x</script>&'";
-  hostile.entries[0].policy = hostile.entries[0].engine = evil;
+  std::vector<EpisodeRow> rows = {episode(evil, "hug", 0, true)};
+  rows[0].engine = evil;
+  hostile.analyses = {entries_of(rows)};
+  hostile.replays = {{.file = evil, .scene = evil, .name = evil, .keys = {evil}}};
   hostile.columns[0].title = hostile.columns[0].unit = evil;
   hostile.retargeting[evil] = {{evil, 1.0}};
   hostile.stories[0].title = hostile.stories[0].task = evil;
@@ -89,28 +104,17 @@ TEST(HtmlReport, EscapesEveryText) {
   hostile.stories[0].loss[evil] = {1.0};
   hostile.stories[0].metrics[evil] = 1.0;
   hostile.environment[evil] = evil;
-  const std::string html = html_report(hostile);
+  const std::string html = html_of(hostile);
   EXPECT_THAT(html, AllOf(Not(HasSubstr("<script>x")), Not(HasSubstr("<script>alert")),
                           HasSubstr("Tiny &lt;run&gt; &amp; &quot;more&quot;")));
   EXPECT_EQ(unbalanced_tag(html), "");
+  EXPECT_EQ(data_of(html).at("replays").begin().value(), evil);
   EXPECT_EQ(escape_html("<a b=\"c\">&'"), "&lt;a b=&quot;c&quot;&gt;&amp;&#39;");
   EXPECT_EQ(escape_html("clip \x1b[31m7"), "clip \\x1b[31m7");
 }
 
-TEST(HtmlReport, APolicyThatDiedIsNamedAndCounted) {
-  ReportContent tiny = content();
-  EXPECT_THAT(html_report(tiny), Not(HasSubstr("Plans lost")));
-  for (LeaderboardEntry& entry : tiny.entries) {
-    if (entry.policy == "null") continue;
-    entry.policy_dead = 2;
-    entry.policy_fault = "its process ended with <exit> status 2";
-  }
-  EXPECT_THAT(html_report(tiny), AllOf(HasSubstr("Plans lost"), HasSubstr("<td data-v=\"2\">dead in 2</td>"),
-                                       HasSubstr("ended with &lt;exit&gt; status 2")));
-}
-
 TEST(HtmlReport, ShowsMachineNotesTablesAndClips) {
-  const std::string html = html_report(content());
+  const std::string html = html_of(content());
   for (const char* piece : {"A processor, 2 cores · duet 0.1.0 (abcdef0123)", "id=\"leaderboard\"",
                             "id=\"retargeting\"", "id=\"clips\"", "<details><summary>", "Joint position error",
                             "0.0625", "unlisted", "start 0.00 s", "data-task=\"wave\"", "null (control)"}) {
@@ -130,15 +134,37 @@ std::vector<EpisodeRow> two_engines() {
   return rows;
 }
 
-// At 420 px the engine's and the controller's columns would leave no room for the success.
-TEST(HtmlReport, NarrowScreensHaveTheSuccessBesideThePolicy) {
+TEST(HtmlReport, HoldsTheDataOfWhatTheViewerDraws) {
   ReportContent shown = content();
-  shown.entries = leaderboard(two_engines());
-  const std::string html = html_report(shown);
-  EXPECT_THAT(html,
-              AllOf(HasSubstr("@media(max-width:600px)"), HasSubstr(".context{display:none}.where{display:block}"),
-                    HasSubstr("<td class=\"l context\">"),
-                    HasSubstr("<th scope=\"row\" class=\"l\">replay<span class=\"where\">ode</span></th>")));
+  const RunTables tables = run_tables(two_engines(), {}, nullptr);
+  shown.analyses = run_analyses(tables);
+  shown.replays = {{.file = "replay.html", .scene = "s", .name = "n", .keys = {"0123456789abcdef0123"}}};
+  const nlohmann::json data = data_of(html_of(shown));
+  EXPECT_EQ(data.at("schema"), "duet.report/1");
+  // The figures are those of the JSON files, so far as they are drawn.
+  const nlohmann::json whole = analysis_json(run_analysis(tables, "leaderboard")).at("figures");
+  for (const nlohmann::json& figure : data.at("leaderboard").at("figures"))
+    EXPECT_THAT(whole, testing::Contains(figure)) << figure.dump();
+  const auto named = [&](const char* analysis, const char* name) {
+    return std::ranges::count_if(data.at(analysis).at("figures"), [&](const auto& f) { return f.at("name") == name; });
+  };
+  EXPECT_EQ(named("board", "mean_success"), 1);
+  EXPECT_EQ(named("leaderboard", "success"), 6);  // three engines, a task and all
+  EXPECT_EQ(named("leaderboard", "jpe"), 0);
+  EXPECT_EQ(data.at("tasks").at(0), (nlohmann::json{{"name", "hug"}, {"title", "Hug"}}));
+  EXPECT_EQ(data.at("metrics").at("jpe").at("direction"), "lower");
+  EXPECT_EQ(data.at("replays"), (nlohmann::json{{"0123456789abcdef", "replay.html"}}));
+  const nlohmann::json& loss = data.at("plots").at(0);
+  EXPECT_EQ(loss.at("loss"), true);
+  EXPECT_EQ(loss.at("series").at(0), (nlohmann::json{{"name", "total"}, {"x", {0, 1, 2}}, {"y", {10.0, 1.0, 0.1}}}));
+}
+
+TEST(HtmlReport, TheVerdictComesFirst) {
+  ReportContent shown = content();
+  shown.analyses = run_analyses(run_tables(two_engines(), {}, nullptr));
+  const std::string html = html_of(shown);
+  EXPECT_LT(html.find("<div class=\"answer\"><p class=\"first\">"), html.find("id=\"board\""));
+  EXPECT_LT(html.find("id=\"board\""), html.find("id=\"leaderboard\""));
 }
 
 TEST(HtmlReport, HasASectionAcrossEngines) {
@@ -150,15 +176,16 @@ TEST(HtmlReport, HasASectionAcrossEngines) {
   }
   RunTables tables = run_tables(rows, {.all = {}, .drifting = across.columns}, nullptr);
   across.analyses = {run_analysis(tables, "engines")};
-  std::string html = html_report(across);
+  std::string html = html_of(across);
   EXPECT_EQ(unbalanced_tag(html), "");
-  EXPECT_THAT(html, AllOf(HasSubstr("id=\"engines\""), HasSubstr("Across engines"), HasSubstr("class=\"intervals\""),
-                          HasSubstr("Success per engine"), HasSubstr("Time until engines part"),
+  EXPECT_THAT(html, AllOf(HasSubstr("id=\"engines\""), HasSubstr("Across engines"),
+                          HasSubstr("src=\"data:image/svg+xml;base64,"), HasSubstr("Success per engine"),
+                          HasSubstr("Time until engines part"),
                           HasSubstr("No parity certificate is attached (duet validate makes one)."),
                           Not(HasSubstr("<script>x")), Not(HasSubstr("http:"))));
   tables.certificate = {{"schema", "duet.certificate/1"}, {"engines", {{{"name", evil}, {"passed", 20}}}}};
   across.analyses = {run_analysis(tables, "engines")};
-  html = html_report(across);
+  html = html_of(across);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html,
               AllOf(HasSubstr("Parity certificate"), HasSubstr("<td>20</td>"), Not(HasSubstr("<script>x")),
@@ -167,10 +194,10 @@ TEST(HtmlReport, HasASectionAcrossEngines) {
 
 TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
   ReportContent solid = content();
-  EXPECT_THAT(html_report(solid), Not(HasSubstr("Contact with people")));
+  EXPECT_THAT(html_of(solid), Not(HasSubstr("Contact with people")));
   std::vector<EpisodeRow> rows = two_engines();
   solid.analyses = {contact_analysis(rows)};
-  EXPECT_THAT(html_report(solid), Not(HasSubstr("<details open>")));
+  EXPECT_THAT(html_of(solid), Not(HasSubstr("<details open>")));
   const std::string evil = "\"><script>x</script>&'";
   for (EpisodeRow& row : rows) {
     row.forces["human." + evil + ".peak_n"] = 150.0;
@@ -178,7 +205,7 @@ TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
     if (row.engine == "ode") row.engine = row.policy = evil;
   }
   solid.analyses = {contact_analysis(rows)};
-  const std::string html = html_report(solid);
+  const std::string html = html_of(solid);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html, AllOf(HasSubstr("id=\"contacts\""), HasSubstr("class=\"warning\">Limits: unverified"),
                           HasSubstr("<td class=\"over\">150 (1.50*)</td>"), HasSubstr("<details open>"),
@@ -186,7 +213,7 @@ TEST(HtmlReport, ShowsContactWithPeopleOnlyWhereThereIsASolidPartner) {
 }
 
 TEST(HtmlReport, EmptyContentHasNoEmptySections) {
-  const std::string html = html_report({});
+  const std::string html = html_of({});
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(html, Not(HasSubstr("<section")));
 }
@@ -199,8 +226,9 @@ TEST(HtmlReport, NeverPrintsNan) {
   broken.stories[0].loss["holes"] = {1.0, nan, 0.5};
   broken.retargeting["hug"]["jpe"] = nan;
   broken.stories[0].metrics["jpe"] = nan;
-  const std::string html = html_report(broken);
+  const std::string html = html_of(broken);
   EXPECT_FALSE(std::regex_search(html.substr(html.find("<body>")), std::regex(R"([^a-z](nan|inf)[^a-z])")));
+  EXPECT_EQ(data_of(html).at("plots").at(0).at("series").size(), 2U);  // a term without a value is left out
 }
 
 TEST(KeyFrames, AreSeenAcrossTheLineBetweenTheAgents) {
@@ -235,31 +263,6 @@ TEST(KeyFrames, OddInputIsDrawnAsFarAsItGoes) {
   EXPECT_THAT(key_frames_svg({{"loose", {loose}}}), HasSubstr("class=\"other"));
 }
 
-TEST(LossPlot, ChoosesItsAxis) {
-  EXPECT_THAT(loss_plot_svg({{"total", {100.0, 1.0, 0.5}}}), HasSubstr("(logarithmic)"));
-  EXPECT_THAT(loss_plot_svg({{"total", {3.0, 2.0, 1.0}}}), Not(HasSubstr("(logarithmic)")));
-  EXPECT_THAT(loss_plot_svg({{"total", {-3.0, 200.0}}}), Not(HasSubstr("(logarithmic)")));
-  EXPECT_THAT(loss_plot_svg({{"total", {0.0, 0.0}}}), HasSubstr("0"));
-  EXPECT_EQ(loss_plot_svg({}), "");
-  EXPECT_EQ(loss_plot_svg({{"total", {}}}), "");
-}
-
-TEST(LossPlot, LongCurvesStaySmallAndKeepTheirEnds) {
-  std::vector<double> values(100000);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 1.0 + static_cast<double>(values.size() - i);
-  const std::string svg = loss_plot_svg({{"total", values}});
-  EXPECT_LT(svg.size(), 6000U);
-  EXPECT_THAT(svg, HasSubstr("M52.0 "));
-  EXPECT_THAT(svg, HasSubstr("L420.0 "));
-}
-
-TEST(IntervalBar, SpansTheUnitInterval) {
-  const std::string bar =
-      interval_bar_svg(0.5, {.low = 0.0, .high = 1.0}, std::numeric_limits<double>::quiet_NaN(), 110);
-  EXPECT_THAT(bar, AllOf(HasSubstr("x1=\"5.0\" x2=\"105.0\""), HasSubstr("cx=\"55.0\""), Not(HasSubstr("null"))));
-  EXPECT_THAT(interval_bar_svg(0.5, {.low = 0.4, .high = 0.6}, 0.25, 110), HasSubstr("class=\"null\" x1=\"30.0\""));
-}
-
 EpisodeRow walking(const std::string& controller, int number, Outcome outcome) {
   EpisodeRow row = test::engine_episode("mujoco", "replay", number, true, controller);
   row.outcome = outcome;
@@ -271,7 +274,7 @@ EpisodeRow walking(const std::string& controller, int number, Outcome outcome) {
 TEST(HtmlReport, TrainingStandsBelowTheResults) {
   ReportContent shown = content();
   shown.curves = {parse_curves("steps,return\n0,1\n10,2\n", "curves.csv")};
-  const std::string html = html_report(shown);
+  const std::string html = html_of(shown);
   EXPECT_GT(html.find("id=\"training\""), html.find("id=\"clips\""));
 }
 
@@ -280,12 +283,12 @@ TEST(HtmlReport, ShowsControllersStepsAndTraining) {
   ReportContent shown = content();
   shown.analyses = run_analyses(run_tables(rows, {}, nullptr));
   shown.curves = {parse_curves("steps,return\n0,1\n10,2\n", "<curves>.csv")};
-  const std::string html = html_report(shown);
+  const std::string html = html_of(shown);
   EXPECT_EQ(unbalanced_tag(html), "");
   EXPECT_THAT(
       html, AllOf(HasSubstr("id=\"controllers\""), HasSubstr("another experiment"), HasSubstr("height of the sole [m]"),
                   HasSubstr("id=\"training\""), HasSubstr("&lt;curves&gt;.csv"), HasSubstr("return against steps")));
-  EXPECT_THAT(html_report(content()), AllOf(Not(HasSubstr("id=\"controllers\"")), Not(HasSubstr("id=\"training\""))));
+  EXPECT_THAT(html_of(content()), AllOf(Not(HasSubstr("id=\"controllers\"")), Not(HasSubstr("id=\"training\""))));
 }
 
 TEST(HtmlReport, ShowsPoliciesPerturbationsAndReactivity) {
@@ -302,13 +305,13 @@ TEST(HtmlReport, ShowsPoliciesPerturbationsAndReactivity) {
   }
   ReportContent shown = content();
   shown.analyses = run_analyses(run_tables(rows, {}, nullptr));
-  const std::string html = html_report(shown);
+  const std::string html = html_of(shown);
   EXPECT_EQ(unbalanced_tag(html), "");
-  EXPECT_THAT(
-      html, AllOf(HasSubstr("id=\"policies\""), HasSubstr("id=\"degradation\""), HasSubstr("id=\"reactivity\""),
-                  HasSubstr("success [%]"), HasSubstr("shift of the partner&#39;s onset"), Not(HasSubstr("<dstar>"))));
+  EXPECT_THAT(html,
+              AllOf(HasSubstr("id=\"policies\""), HasSubstr("id=\"degradation\""), HasSubstr("id=\"reactivity\""),
+                    HasSubstr("success [%]"), HasSubstr("shift of the partner's onset"), Not(HasSubstr("<dstar>"))));
   for (const char* section : {"id=\"policies\"", "id=\"degradation\"", "id=\"reactivity\""})
-    EXPECT_THAT(html_report(content()), Not(HasSubstr(section)));
+    EXPECT_THAT(html_of(content()), Not(HasSubstr(section)));
 }
 
 TEST(FootPlots, OneEpisodePerControllerThatEndedWellFirst) {

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/report/page/interval_plot.h"
 #include "duet/report/ranking/leaderboard_rows.h"
 #include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
@@ -336,15 +335,6 @@ TEST(LeaderboardFigures, ThereIsNoLiftWithoutANullArm) {
     EXPECT_TRUE(std::isnan(found.value));
     EXPECT_TRUE(std::isnan(found.interval.low));
   }
-}
-
-TEST(IntervalPlot, StandsAloneAndEscapes) {
-  const std::string svg =
-      interval_plot_svg(leaderboard({episode("a<b", "hug", 0, true), episode("c", "hug", 0, true)}));
-  EXPECT_THAT(svg,
-              AllOf(testing::StartsWith("<svg xmlns="), HasSubstr("a&lt;b"), HasSubstr("prefers-color-scheme:dark"),
-                    HasSubstr("100.0 [20.7, 100.0]"), Not(HasSubstr("nan"))));
-  EXPECT_THAT(interval_plot_svg({}), testing::EndsWith("</svg>\n"));
 }
 
 }  // namespace

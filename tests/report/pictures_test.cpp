@@ -1,14 +1,14 @@
-// Every plotter's drawing of a small input, as it was looked at: tests/report/pictures. Where one is drawn otherwise
-// on purpose, the test's message says which file to look at and to copy.
+// The drawings that stand alone, of a small input, as it was looked at: tests/report/pictures. Where one is drawn
+// otherwise on purpose, the test's message says which file to look at and to copy.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "duet/core/file.h"
 #include "duet/report/engines/cross_engine.h"
-#include "duet/report/page/interval_plot.h"
-#include "duet/report/page/report_parts.h"
-#include "duet/report/tables/line_plot.h"
+#include "duet/report/page/engine_plot.h"
+#include "duet/report/page/key_frames.h"
 #include "tests/rows/rows.h"
 
 namespace duet {
@@ -18,31 +18,12 @@ using test::engine_episode;
 using test::episode;
 
 void expect_picture(const std::string& name, const std::string& svg) {
-  const std::string recorded = std::string(DUET_SOURCE_DIR) + "/tests/report/pictures/" + name + ".svg";
+  const std::string recorded = fmt::format("{}/tests/report/pictures/{}.svg", DUET_SOURCE_DIR, name);
   const std::string found = testing::TempDir() + name + ".svg";
   write_file(found, svg + "\n");
   ASSERT_TRUE(std::filesystem::exists(recorded)) << "look at " << found << " and copy it to " << recorded;
   EXPECT_EQ(read_file(recorded), svg + "\n") << "look at " << found << " and copy it to " << recorded;
   std::filesystem::remove(found);
-}
-
-TEST(Pictures, LinePlots) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  expect_picture("line_plot", line_plot_svg({.title = "feet",
-                                             .x_label = "time [s]",
-                                             .y_label = "height [m]",
-                                             .series = {{"left", {0.0, 0.5, 1.0, 2.5}, {0.02, 0.13, -0.04, 0.0}},
-                                                        {"right", {0.0, 0.5, 1.0, 1.5}, {0.1, nan, 0.05, 0.11}}}}));
-  expect_picture("line_plot_level", line_plot_svg({"level", "x", "y", {{"one", {3.0, 4.0}, {7.0, 7.0}}}}));
-}
-
-TEST(Pictures, LossPlots) {
-  expect_picture("loss_plot", loss_plot_svg({{"contact", {3.0, 2.5, 2.0, 1.9}}, {"total", {4.0, 3.0, 2.25, 2.0}}}));
-  expect_picture("loss_plot_logarithmic", loss_plot_svg({{"total", {250.0, 10.0, 0.75, 0.0, 0.5}}}));
-}
-
-TEST(Pictures, IntervalBars) {
-  expect_picture("interval_bar", interval_bar_svg(0.75, {.low = 0.5, .high = 0.9}, 0.25, 110));
 }
 
 std::vector<EpisodeRow> rows_of_two_engines() {
@@ -56,7 +37,6 @@ std::vector<EpisodeRow> rows_of_two_engines() {
 }
 
 TEST(Pictures, PlotsOfSuccess) {
-  expect_picture("interval_plot", interval_plot_svg(leaderboard(rows_of_two_engines())));
   expect_picture("engine_plot", engine_plot_svg(cross_engine(rows_of_two_engines(), {})));
 }
 

@@ -15,8 +15,8 @@
 #include "duet/core/shell_word.h"
 #include "duet/execution/story.h"
 #include "duet/replay/report_replays.h"
+#include "duet/report/page/engine_plot.h"
 #include "duet/report/page/html_report.h"
-#include "duet/report/page/interval_plot.h"
 #include "duet/report/page/run_analyses.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/rows/groups/database.h"
@@ -115,7 +115,8 @@ std::string html_text(const Run& run, const RunTables& tables, const std::vector
   ReportContent content = report_content(run, tables, analyses, std::move(replays), !arguments.no_clips,
                                          arguments.curves, arguments.threads, progress);
   content.notes.insert(content.notes.begin(), notes.begin(), notes.end());
-  return html_report(content);
+  const ViewerBundle viewer = viewer_or_plain("report", content.notes);
+  return html_report(content, viewer);
 }
 
 void run_report(const Session& session, const ReportArguments& arguments) {

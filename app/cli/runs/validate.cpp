@@ -12,6 +12,7 @@
 #include "duet/core/file_batch.h"
 #include "duet/core/require.h"
 #include "duet/experiment/suite/profile.h"
+#include "duet/report/page/html_page.h"
 #include "duet/report/tables/text_table.h"
 #include "duet/rows/json_fields.h"
 
@@ -122,9 +123,12 @@ void run_validate(Session& session, const ValidateArguments& arguments) {
       note(session, stale);
   if (!arguments.output.empty()) {
     const std::filesystem::path folder = arguments.output;
+    std::vector<std::string> notes;
+    const ViewerBundle viewer = viewer_or_plain("report", notes);
+    for (const std::string& plain : notes) note(session, plain);
     FileBatch batch;
     batch.write(folder / "certificate.json", dumped(json, 1) + "\n");
-    batch.write(folder / "parity.html", parity_page(certificate));
+    batch.write(folder / "parity.html", parity_page(certificate, viewer.style));
     if (const std::string picture = parity_svg(certificate); !picture.empty())
       batch.write(folder / "parity.svg", picture);
     batch.put_in_place();

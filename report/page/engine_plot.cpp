@@ -1,4 +1,4 @@
-#include "duet/report/page/interval_plot.h"
+#include "duet/report/page/engine_plot.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/report/page/report_parts.h"
 #include "duet/report/ranking/leaderboard_rows.h"
 #include "duet/report/tables/escape_html.h"
 
@@ -26,23 +25,6 @@ text{font:13px system-ui,sans-serif;fill:#1d2024}.s{fill:#5b626b;font-size:11px}
 @media(prefers-color-scheme:dark){text{fill:#e7e8ea}.s{fill:#a6adb6}.g{stroke:#3a4048}.b{stroke:#74aef0}.d{fill:#74aef0}
 .n,.m{stroke:#f0965a}.r{fill:#f0965a}}
 </style>)";
-
-struct Line {
-  std::string label;
-  const LeaderboardEntry* entry;
-  bool is_control;
-};
-
-std::vector<Line> lines_of(const std::vector<LeaderboardRow>& rows, const std::string& task) {
-  const RowLabels labels = row_labels(rows);
-  std::vector<Line> lines;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    std::string label;
-    for (const std::string& cell : labels.cells[i]) label.append(label.empty() ? "" : " / ").append(cell);
-    if (const LeaderboardEntry* entry = rows[i].find(task)) lines.push_back({label, entry, rows[i].arm != "main"});
-  }
-  return lines;
-}
 
 std::string axis(int left, int height) {
   std::string svg;
@@ -66,20 +48,6 @@ std::string dot_with_interval(double rate, const Interval& interval, const char*
 // No font metrics here: 7.2 px a character is a little more than the average of common fonts at 13 px.
 int label_width(std::size_t characters) {
   return 24 + static_cast<int>(7.2 * static_cast<double>(std::max<std::size_t>(characters, 6)));
-}
-
-std::string drawn(const Line& line, int left, int y) {
-  const auto x = [&](double fraction) { return x_of(fraction, left); };
-  const LeaderboardEntry& entry = *line.entry;
-  std::string svg = fmt::format(R"(<g{}><text x="{}" y="{}" text-anchor="end">{}</text>)",
-                                line.is_control ? R"( class="c")" : "", left - 14, y + 4, escape_html(line.label));
-  svg += dot_with_interval(entry.success, entry.interval, "d", left, y);
-  if (std::isfinite(entry.null_success)) {
-    svg += fmt::format(R"(<line class="n" x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}"/>)", x(entry.null_success), y - 8,
-                       y + 8);
-  }
-  return svg + fmt::format(R"(<text x="{}" y="{}">{}</text></g>)", left + kPlotWidth + 16, y + 4,
-                           escape_html(percent(entry.success, entry.interval)));
 }
 
 // Room for "mean 100.0 [100.0, 100.0]" beside the plot.
@@ -160,31 +128,6 @@ std::string engine_plot_svg(const CrossEngine& result) {
       R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="{2}">{3}{4}</svg>)"
       "\n",
       drawing.width, drawing.height, kEnginePlotLabel, kStyle, drawing.body);
-}
-
-std::string engine_plot_html(const CrossEngine& result) {
-  const Drawing drawing = engine_drawing(result);
-  return fmt::format(
-      R"(<svg class="intervals" viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="{2}">{3}</svg>)",
-      drawing.width, drawing.height, kEnginePlotLabel, drawing.body);
-}
-
-std::string interval_plot_svg(const std::vector<LeaderboardEntry>& entries, const std::string& task) {
-  const std::vector<LeaderboardRow> rows = leaderboard_rows(entries);
-  const std::vector<Line> lines = lines_of(rows, task);
-  std::size_t longest = 6;
-  for (const Line& line : lines) longest = std::max(longest, line.label.size());
-  const int left = label_width(longest);
-  const int height = kTop + kRowHeight * static_cast<int>(lines.size()) + 8;
-  const int width = left + kPlotWidth + rate_width("");
-  std::string svg = fmt::format(
-      R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="{2}: success with intervals">)",
-      width, height, escape_html(task_title(task)));
-  svg += kStyle + axis(left, height);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    svg += drawn(lines[i], left, kTop + kRowHeight / 2 + kRowHeight * static_cast<int>(i));
-  }
-  return svg + "</svg>\n";
 }
 
 }  // namespace duet
