@@ -200,8 +200,8 @@ Interval ClusterBootstrap::percentiles(int clusters, double level, const Statist
   }
   std::erase_if(found, [](double value) { return std::isnan(value); });
   if (found.empty()) return kNoInterval;
-  std::ranges::sort(found);
-  return {.low = quantile_of_sorted(found, 0.5 - 0.5 * level), .high = quantile_of_sorted(found, 0.5 + 0.5 * level)};
+  const double low = quantile(found, 0.5 - 0.5 * level);
+  return {.low = low, .high = quantile(std::move(found), 0.5 + 0.5 * level)};
 }
 
 Interval ClusterBootstrap::ratio(std::span<const double> above, std::span<const double> below,
@@ -226,16 +226,39 @@ Interval ClusterBootstrap::ratio(std::span<const double> above, std::span<const 
   });
 }
 
+namespace {
+
+// weighted_median of values whose order is known.
+double median_in_order(std::span<const double> values, std::span<const double> weights,
+                       std::span<const std::size_t> order) {
+  const double half = 0.5 * std::accumulate(weights.begin(), weights.end(), 0.0);
+  double below = 0.0;
+  for (auto i = order.begin(); i != order.end(); ++i) {
+    if (weights[*i] == 0.0) continue;
+    below += weights[*i];
+    if (below > half) return values[*i];
+    if (below < half) continue;
+    const auto next = std::find_if(i + 1, order.end(), [&](std::size_t j) { return weights[j] > 0.0; });
+    return 0.5 * (values[*i] + values[*next]);
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
 Interval ClusterBootstrap::weighted_median(std::span<const double> values, std::span<const double> weights,
                                            std::span<const int> cluster, double level) {
   require_samples(values, weights, cluster, "weight");
   const ClusterPlaces places = places_of(cluster);
+  std::vector<std::size_t> order(values.size());  // by value, which draws do not change
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return values[i]; });
   std::vector<double> times(places.clusters), drawn_weights(values.size());
   return percentiles(static_cast<int>(places.clusters), level, [&](std::span<const int> drawn) {
     std::ranges::fill(times, 0.0);
     for (const int number : drawn) times[static_cast<std::size_t>(number)] += 1.0;
     for (std::size_t i = 0; i < values.size(); ++i) drawn_weights[i] = times[places.of[i]] * weights[i];
-    return duet::weighted_median(values, drawn_weights);
+    return median_in_order(values, drawn_weights, order);
   });
 }
 

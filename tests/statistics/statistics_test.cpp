@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "duet/core/order_statistics.h"
 #include "duet/core/random.h"
 #include "tests/support.h"
 
@@ -378,6 +379,27 @@ TEST(ClusterBootstrap, AnOutlierMovesTheRatioAndNotTheWeightedMedian) {
   ClusterBootstrap bootstrap(500, 1);
   EXPECT_LT(bootstrap.ratio(robot, partner, clusters, 0.8).low, 0.0);
   EXPECT_EQ(bootstrap.weighted_median(robot, partner, clusters, 0.8).low, 1.0);
+}
+
+// Sorted once for all draws, it is the median that sorts for each of them.
+TEST(ClusterBootstrap, WeightedMedianIsThatOfEachDraw) {
+  Random random(7, 0);
+  std::vector<double> values, weights;
+  std::vector<int> clusters;
+  for (int i = 0; i < 60; ++i) {
+    values.push_back(0.25 * random.below(20));  // with ties
+    weights.push_back(0.125 * (1 + random.below(9)));
+    clusters.push_back(i / 4);
+  }
+  ClusterBootstrap bootstrap(500, 3);
+  const Interval found = bootstrap.weighted_median(values, weights, clusters);
+  const Interval of_each = bootstrap.weighted(clusters, [&](std::span<const double> times) {
+    std::vector<double> drawn(weights.size());
+    for (std::size_t i = 0; i < drawn.size(); ++i) drawn[i] = times[i] * weights[i];
+    return weighted_median(values, drawn);
+  });
+  EXPECT_EQ(found.low, of_each.low);
+  EXPECT_EQ(found.high, of_each.high);
 }
 
 TEST(ClusterBootstrap, WeightedMedianRefusesWeightsThatAreNotAboveZero) {
