@@ -1,4 +1,4 @@
-// Rows by engine, success per engine and the stability of ranks.
+// Rows by engine and success per engine.
 #include "duet/report/engines/cross_engine.h"
 
 #include <algorithm>
@@ -88,92 +88,6 @@ EngineSuccess success_of(const Combination& combination, const EpisodesOfEngines
   return success;
 }
 
-using Item = std::pair<std::string, std::string>;
-
-// Items with their mean success in two engines.
-struct ItemRates {
-  std::vector<Item> items;
-  std::vector<double> in_a, in_b;
-};
-
-const EngineRate* rate_in(const EngineSuccess& success, const std::string& engine) {
-  for (const EngineRate& rate : success.engines) {
-    if (rate.engine == engine && rate.n > 0) return &rate;
-  }
-  return nullptr;
-}
-
-template <typename ItemOf>
-ItemRates item_rates(const std::vector<EngineSuccess>& success, const std::string& a, const std::string& b,
-                     ItemOf item_of) {
-  std::map<Item, std::pair<std::vector<double>, std::vector<double>>> rates;
-  for (const EngineSuccess& entry : success) {
-    const EngineRate* in_a = rate_in(entry, a);
-    const EngineRate* in_b = rate_in(entry, b);
-    if (in_a == nullptr || in_b == nullptr) continue;
-    auto& [of_a, of_b] = rates[item_of(entry)];
-    of_a.push_back(in_a->rate);
-    of_b.push_back(in_b->rate);
-  }
-  ItemRates result;
-  for (const auto& [item, values] : rates) {
-    result.items.push_back(item);
-    result.in_a.push_back(mean_of(values.first));
-    result.in_b.push_back(mean_of(values.second));
-  }
-  return result;
-}
-
-using ItemPairs = std::set<std::pair<Item, Item>>;
-
-// Collects all pairs of items, and those in opposite order in the two engines.
-void collect_pairs(const ItemRates& rates, ItemPairs& all, ItemPairs& swapped) {
-  for (std::size_t i = 0; i < rates.items.size(); ++i) {
-    for (std::size_t j = i + 1; j < rates.items.size(); ++j) {
-      const std::pair<Item, Item> pair = {rates.items[i], rates.items[j]};
-      const std::vector<double> a = {rates.in_a[i], rates.in_a[j]};
-      const std::vector<double> b = {rates.in_b[i], rates.in_b[j]};
-      all.insert(pair);
-      if (kendall(a, b).discordant > 0) swapped.insert(pair);
-    }
-  }
-}
-
-template <typename ItemOf>
-RankStability stability_of(const char* of, const std::vector<EngineSuccess>& success, ItemOf item_of) {
-  std::set<std::string> engines;
-  std::set<Item> items;
-  for (const EngineSuccess& entry : success) {
-    items.insert(item_of(entry));
-    for (const EngineRate& rate : entry.engines) engines.insert(rate.engine);
-  }
-  RankStability stability;
-  stability.of = of;
-  stability.items = static_cast<long>(items.size());
-  ItemPairs all;
-  ItemPairs swapped;
-  std::vector<double> defined;
-  for (auto a = engines.begin(); a != engines.end(); ++a) {
-    for (auto b = std::next(a); b != engines.end(); ++b) {
-      const ItemRates rates = item_rates(success, *a, *b, item_of);
-      const RankAgreement agreement = kendall(rates.in_a, rates.in_b);
-      stability.engines.push_back({.engine_a = *a,
-                                   .engine_b = *b,
-                                   .items = static_cast<long>(rates.items.size()),
-                                   .pairs = agreement.pairs,
-                                   .swapped = agreement.discordant,
-                                   .tau_b = agreement.tau_b});
-      collect_pairs(rates, all, swapped);
-      if (std::isfinite(agreement.tau_b)) defined.push_back(agreement.tau_b);
-    }
-  }
-  stability.mean_tau_b = mean_of(defined);
-  stability.defined = static_cast<long>(defined.size());
-  stability.item_pairs = static_cast<long>(all.size());
-  stability.swapped = static_cast<long>(swapped.size());
-  return stability;
-}
-
 std::string comma_separated(const std::set<std::string>& words) {
   std::string text;
   for (const std::string& word : words) {
@@ -224,22 +138,6 @@ std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEng
   return success;
 }
 
-std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success) {
-  std::set<std::string> controllers;
-  std::set<std::string> policies;
-  for (const EngineSuccess& entry : success) {
-    controllers.insert(entry.controller);
-    policies.insert(entry.policy);
-  }
-  std::vector<RankStability> ranks = {stability_of(
-      "combinations", success, [](const EngineSuccess& entry) { return Item(entry.controller, entry.policy); })};
-  if (controllers.size() < 2 || policies.size() < 2) return ranks;
-  ranks.push_back(
-      stability_of("controllers", success, [](const EngineSuccess& entry) { return Item(entry.controller, ""); }));
-  ranks.push_back(stability_of("policies", success, [](const EngineSuccess& entry) { return Item("", entry.policy); }));
-  return ranks;
-}
-
 CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<MetricColumn>& metrics,
                          const CrossEngineOptions& options) {
   const EngineRows by_engine(rows, options.arm);
@@ -251,8 +149,7 @@ CrossEngine cross_engine(const std::vector<EpisodeRow>& rows, const std::vector<
   result.metrics = metrics;
   if (result.engines.size() < 2) return result;
   result.success = engine_success(by_engine, options);
-  result.ranks = rank_stability(result.success);
-  add_rank_reliability(by_engine, options, result.ranks);
+  result.ranks = rank_stability(by_engine, result.success, options);
   result.drift = metric_drift(by_engine, metrics, options);
   result.parting = engine_parting(by_engine, options);
   result.forces = force_agreement(by_engine);

@@ -42,18 +42,38 @@ class EngineRows {
 };
 
 std::vector<EngineSuccess> engine_success(const EngineRows& rows, const CrossEngineOptions& options);
-std::vector<RankStability> rank_stability(const std::vector<EngineSuccess>& success);
-// Sets what rank_stability leaves: violation, change of the winner, all intervals.
-void add_rank_reliability(const EngineRows& rows, const CrossEngineOptions& options, std::vector<RankStability>& ranks);
+
+// Whether engines put items in the same order by success; `of` says which items, an item's success is the mean over all
+// that it was run with. For every two engines `tau_b` over the items of both (NaN where they are fewer than 2, or all
+// tied in one of the engines) and `swapped`, pairs of items in opposite order, of those that both ran. For "all" the
+// number of `items`; `mean_tau_b` over the pairs of engines where it is defined; over those that both ran two items or
+// more `rank_violation`, mean_maximum_rank_violation with each engine of a pair as the reference in turn, and
+// `winner_changes`, the share without a best item in common; `swapped` between some two engines. Intervals draw clips
+// again within their task; NaN where there are none.
+Estimates rank_stability(const EngineRows& rows, const std::vector<EngineSuccess>& success,
+                         const CrossEngineOptions& options);
 // For each item the largest difference of its rate in the reference to that of an item that `other` puts on another
 // side of it; the mean over items. Rates of the same items, one or more. Source: SIMPLER, arXiv 2405.05941, section IV.
 double mean_maximum_rank_violation(std::span<const double> reference, std::span<const double> other);
 // 1 where no item that is best in `a` is best in `b`, else 0: items that are tied for the best all win.
 double winner_change(std::span<const double> a, std::span<const double> b);
-std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
-                                      const CrossEngineOptions& options);
-std::vector<EngineParting> engine_parting(const EngineRows& rows, const CrossEngineOptions& options);
-std::vector<ForceAgreement> force_agreement(const EngineRows& rows);
+
+// "bullet vs mujoco"
+std::string versus(const std::string& a, const std::string& b);
+
+// `drift`: an engine's value of the metric `of` minus that of playback in the same episode, whatever playback's
+// controller, mean over pairs with a bootstrap over clips; `playback`: its own mean over these.
+Estimates metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
+                       const CrossEngineOptions& options);
+// When the states of two engines part in the same episode, over the episodes with traces that can be compared (same
+// points, same rate): the first frame in which a point differs by more than the distance asked for, or the end by a
+// fall or divergence in one of the two alone. Censored at the end of the shorter trace. Quartiles in seconds,
+// Kaplan-Meier; NaN: not reached. `without_trace`: episodes of both engines that cannot be compared.
+Estimates engine_parting(const EngineRows& rows, const CrossEngineOptions& options);
+// One contact force over the engines, per episode of two or more engines that have it; episodes in which no engine has
+// any force are left out, and so are names that end with no unit. Medians over episodes: `typical_force`, the engines'
+// median; `force_spread`, (max - min) / mean over engines; `force_ratio`, an engine's value over the engines' median.
+Estimates force_agreement(const EngineRows& rows);
 
 // Time at which two rows of one episode part, or to which they have not. Null where their traces cannot be compared.
 std::optional<Lifetime> time_together(const EpisodeRow& a, const EpisodeRow& b, double distance);

@@ -1,12 +1,12 @@
 // Options and results of a comparison of engines (report/engines/cross_engine.h).
 #pragma once
 
-#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "duet/report/tables/estimate.h"
 #include "duet/report/tables/metric_column.h"
 #include "duet/rows/row_file.h"
 #include "duet/statistics/statistics.h"
@@ -46,62 +46,6 @@ struct EngineSuccess {
   double excess_sd = 0.0;  // tau by moments: sqrt(max(0, sd^2 - noise_sd^2))
 };
 
-struct EnginePairRanks {
-  std::string engine_a, engine_b;
-  long items = 0;      // that both engines ran
-  long pairs = 0;      // of items
-  long swapped = 0;    // pairs in opposite order in the two engines
-  double tau_b = 0.0;  // NaN: not defined (fewer than 2 items, or all tied in one of the engines)
-};
-
-// Whether engines put items in the same order by success; an item's success is the mean over all that it was run with.
-struct RankStability {
-  std::string of;  // "combinations" (of controller and policy), "controllers", "policies"
-  long items = 0;
-  std::vector<EnginePairRanks> engines;
-  double mean_tau_b = 0.0;  // over the pairs of engines where it is defined; NaN where nowhere
-  long defined = 0;         // those pairs of engines
-  long item_pairs = 0;      // pairs of items that some two engines both ran
-  long swapped = 0;         // of them, those that some two engines put in opposite order
-  // Over the pairs of engines that both ran two items or more, with intervals that draw clips again within their task;
-  // NaN where there are none.
-  Interval tau_interval = {};   // of mean_tau_b, over the draws in which it is defined
-  double rank_violation = 0.0;  // mean_maximum_rank_violation, each engine of a pair as the reference in turn
-  Interval violation_interval = {};
-  double winner_changes = 0.0;  // share of pairs of engines without a best item in common
-  Interval winner_interval = {};
-};
-
-// An engine's value of a metric minus that of playback in the same episode, whatever playback's controller.
-struct MetricDrift {
-  std::string controller, engine, metric;
-  long pairs = 0;
-  double playback = 0.0;  // mean over the pairs
-  double mean = 0.0;      // of the differences
-  Interval interval;      // bootstrap over clips
-};
-
-// When the states of two engines part in the same episode: the first frame of the traces in which a point differs by
-// more than the distance asked for, or the end by a fall or divergence in one of the two alone. Censored at the end of
-// the shorter trace. [s], Kaplan-Meier; NaN: not reached.
-struct EngineParting {
-  std::string controller, engine_a, engine_b;
-  long pairs = 0;  // episodes with traces that can be compared: same points, same rate
-  long parted = 0;
-  long without_trace = 0;  // episodes of both engines that cannot
-  double lower_quartile = 0.0, median = 0.0, upper_quartile = 0.0;
-};
-
-// One contact force over the engines, per episode of two or more engines that have it; episodes in which no engine has
-// any force are left out, and so are names that end with no unit.
-struct ForceAgreement {
-  std::string name, unit;
-  long episodes = 0;
-  double typical = 0.0;                 // median over episodes of the engines' median [unit]
-  double spread = 0.0;                  // median over episodes of (max - min) / mean over engines
-  std::map<std::string, double> ratio;  // engine -> median over episodes of its value over the engines' median
-};
-
 struct CrossEngine {
   std::vector<RunEngine> engines;  // physics engines by name; fewer than two: nothing below is filled
   bool has_playback = false;
@@ -109,10 +53,10 @@ struct CrossEngine {
   double parting_distance = 0.05;
   std::vector<MetricColumn> metrics;   // as asked for
   std::vector<EngineSuccess> success;  // by perturbation, controller, policy
-  std::vector<RankStability> ranks;    // controllers and policies alone where there are several of both
-  std::vector<MetricDrift> drift;      // by controller, metric as asked for, engine
-  std::vector<EngineParting> parting;  // by controller, engines
-  std::vector<ForceAgreement> forces;  // by name
+  Estimates ranks;                     // controllers and policies alone where there are several of both
+  Estimates drift;                     // by controller, metric as asked for, engine
+  Estimates parting;                   // by controller, engines
+  Estimates forces;                    // by name
 };
 
 }  // namespace duet

@@ -129,8 +129,10 @@ std::optional<Lifetime> time_together(const Traced& a, const Traced& b, double d
 
 }  // namespace
 
-std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
-                                      const CrossEngineOptions& options) {
+std::string versus(const std::string& a, const std::string& b) { return a + " vs " + b; }
+
+Estimates metric_drift(const EngineRows& rows, const std::vector<MetricColumn>& metrics,
+                       const CrossEngineOptions& options) {
   std::map<DriftKey, DriftDifferences> gathered;
   ClipNumbers clips;
   for (const auto& [combination, episodes] : rows.physics()) {
@@ -141,16 +143,15 @@ std::vector<MetricDrift> metric_drift(const EngineRows& rows, const std::vector<
     }
   }
   ClusterBootstrap bootstrap(options.intervals.resamples, options.intervals.seed);
-  std::vector<MetricDrift> drift;
+  Estimates drift;
   for (const auto& [key, differences] : gathered) {
-    const auto& [controller, metric, engine] = key;
-    drift.push_back({.controller = controller,
-                     .engine = engine,
-                     .metric = metrics[metric].name,
-                     .pairs = static_cast<long>(differences.values.size()),
-                     .playback = mean_of(differences.playback),
-                     .mean = mean_of(differences.values),
-                     .interval = bootstrap.mean(differences.values, differences.clips, options.intervals.level)});
+    const auto& [controller, place, engine] = key;
+    const MetricColumn& metric = metrics[place];
+    const EstimatesOf of{{.engine = engine, .controller = controller, .of = metric.name}, drift};
+    const auto pairs = static_cast<long>(differences.values.size());
+    of.add("playback", pairs, mean_of(differences.playback), kNoInterval, metric.unit);
+    of.add("drift", pairs, mean_of(differences.values),
+           bootstrap.mean(differences.values, differences.clips, options.intervals.level), metric.unit);
   }
   return drift;
 }
@@ -159,7 +160,7 @@ std::optional<Lifetime> time_together(const EpisodeRow& a, const EpisodeRow& b, 
   return time_together({a, a.trace}, {b, b.trace}, distance);
 }
 
-std::vector<EngineParting> engine_parting(const EngineRows& rows, const CrossEngineOptions& options) {
+Estimates engine_parting(const EngineRows& rows, const CrossEngineOptions& options) {
   std::map<EnginePair, Watched> watched;
   for (const auto& [combination, episodes] : rows.physics()) {
     for (const auto& [id, row_of] : episodes) {
@@ -176,39 +177,36 @@ std::vector<EngineParting> engine_parting(const EngineRows& rows, const CrossEng
       }
     }
   }
-  std::vector<EngineParting> parting;
+  Estimates parting;
   for (const auto& [key, pair] : watched) {
     const auto& [controller, a, b] = key;
-    parting.push_back({.controller = controller,
-                       .engine_a = a,
-                       .engine_b = b,
-                       .pairs = static_cast<long>(pair.lifetimes.size()),
-                       .parted = std::count_if(pair.lifetimes.begin(), pair.lifetimes.end(),
-                                               [](const Lifetime& lifetime) { return lifetime.ended; }),
-                       .without_trace = pair.without_trace,
-                       .lower_quartile = kaplan_meier_quantile(pair.lifetimes, 0.25),
-                       .median = kaplan_meier_quantile(pair.lifetimes, 0.5),
-                       .upper_quartile = kaplan_meier_quantile(pair.lifetimes, 0.75)});
+    const EstimatesOf of{{.engine = versus(a, b), .controller = controller}, parting};
+    const auto pairs = static_cast<long>(pair.lifetimes.size());
+    for (const auto& [name, share] : {std::pair("parting_lower_quartile", 0.25), std::pair("parting_median", 0.5),
+                                      std::pair("parting_upper_quartile", 0.75)})
+      of.add(name, pairs, kaplan_meier_quantile(pair.lifetimes, share), kNoInterval, "s");
+    of.count("parted", pairs, std::ranges::count(pair.lifetimes, true, &Lifetime::ended));
+    of.count("without_trace", {}, pair.without_trace);
   }
   return parting;
 }
 
-std::vector<ForceAgreement> force_agreement(const EngineRows& rows) {
-  std::vector<ForceAgreement> agreement;
+Estimates force_agreement(const EngineRows& rows) {
+  Estimates agreement;
   for (const std::string& name : force_names(rows)) {
     ForceSamples samples;
     for (const auto& [combination, episodes] : rows.physics()) {
       for (const auto& [id, row_of] : episodes) gather_force(force_in(row_of, name), samples);
     }
     if (samples.typical.empty()) continue;
-    ForceAgreement force{.name = name,
-                         .unit = force_unit(name),
-                         .episodes = static_cast<long>(samples.typical.size()),
-                         .typical = quantile(samples.typical, 0.5),
-                         .spread = quantile(samples.spread, 0.5),
-                         .ratio = {}};
-    for (const auto& [engine, ratios] : samples.ratio) force.ratio[engine] = quantile(ratios, 0.5);
-    agreement.push_back(std::move(force));
+    EstimatesOf of{{.engine = "all", .of = name}, agreement};
+    const auto episodes = static_cast<long>(samples.typical.size());
+    of.add("typical_force", episodes, quantile(samples.typical, 0.5), kNoInterval, force_unit(name));
+    of.add("force_spread", episodes, quantile(samples.spread, 0.5));
+    for (const auto& [engine, ratios] : samples.ratio) {
+      of.keys.engine = engine;
+      of.add("force_ratio", episodes, quantile(ratios, 0.5));
+    }
   }
   return agreement;
 }

@@ -1,8 +1,9 @@
-// How far the order of items in one engine can be relied on in another: figures over the pairs of engines, each with an
-// interval from clips that are drawn again within their task.
+// Whether engines put items in the same order by success, and how far the order in one can be relied on in another:
+// estimates over the pairs of engines, with intervals from clips that are drawn again within their task.
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "duet/core/random.h"
 #include "duet/core/require.h"
@@ -46,8 +47,9 @@ struct RankedEntries {
 
 using RankItem = std::pair<std::string, std::string>;
 
-RankItem item_named(const std::string& of, const Combination& combination) {
-  return {of == "policies" ? "" : combination.controller, of == "controllers" ? "" : combination.policy};
+// An item of "combinations", "controllers" or "policies".
+RankItem item_named(const std::string& of, const std::string& controller, const std::string& policy) {
+  return {of == "policies" ? "" : controller, of == "controllers" ? "" : policy};
 }
 
 // Entries over the episodes that all engines of a combination ran, as its success is.
@@ -56,8 +58,10 @@ RankedEntries ranked_entries(const EngineRows& rows, const std::string& of) {
   std::map<RankItem, std::size_t> items;
   std::map<std::string, std::map<std::string, std::size_t>> clips;
   for (const auto& [combination, episodes] : rows.physics()) {
-    RankedEntry entry{.item = items.try_emplace(item_named(of, combination), items.size()).first->second,
-                      .engines = {}};
+    RankedEntry entry{
+        .item =
+            items.try_emplace(item_named(of, combination.controller, combination.policy), items.size()).first->second,
+        .engines = {}};
     std::map<std::string, bool> engines;
     for (const auto& [id, row_of] : episodes)
       for (const auto& [engine, row] : row_of) engines[engine] = true;
@@ -156,15 +160,89 @@ Interval interval_of(std::vector<double> values, double level) {
   return {.low = quantile_of_sorted(values, 0.5 - 0.5 * level), .high = quantile_of_sorted(values, 0.5 + 0.5 * level)};
 }
 
-void add_figures(const EngineRows& rows, const CrossEngineOptions& options, RankStability& ranks) {
-  const RankedEntries all = ranked_entries(rows, ranks.of);
-  std::vector<double> weights(all.clips, 1.0);
-  const RankFigures found = figures_of(all, weights);
-  ranks.rank_violation = found.violation;
-  ranks.winner_changes = found.winner_changes;
-  Random random(options.intervals.seed, stream_key({"rank_reliability", ranks.of}));
-  std::vector<double> tau_b, violation, winner_changes;
-  const int resamples = ranks.items < 2 ? 0 : std::min(options.intervals.resamples, kMostRankResamples);
+// Items with their mean success in two engines.
+struct ItemRates {
+  std::vector<RankItem> items;
+  std::vector<double> in_a, in_b;
+};
+
+const EngineRate* rate_in(const EngineSuccess& success, const std::string& engine) {
+  for (const EngineRate& rate : success.engines) {
+    if (rate.engine == engine && rate.n > 0) return &rate;
+  }
+  return nullptr;
+}
+
+ItemRates item_rates(const std::vector<EngineSuccess>& success, const std::string& a, const std::string& b,
+                     const std::string& of) {
+  std::map<RankItem, std::pair<std::vector<double>, std::vector<double>>> rates;
+  for (const EngineSuccess& entry : success) {
+    const EngineRate* in_a = rate_in(entry, a);
+    const EngineRate* in_b = rate_in(entry, b);
+    if (in_a == nullptr || in_b == nullptr) continue;
+    auto& [of_a, of_b] = rates[item_named(of, entry.controller, entry.policy)];
+    of_a.push_back(in_a->rate);
+    of_b.push_back(in_b->rate);
+  }
+  ItemRates result;
+  for (const auto& [item, values] : rates) {
+    result.items.push_back(item);
+    result.in_a.push_back(mean_of(values.first));
+    result.in_b.push_back(mean_of(values.second));
+  }
+  return result;
+}
+
+using ItemPairs = std::set<std::pair<RankItem, RankItem>>;
+
+// Collects all pairs of items, and those in opposite order in the two engines.
+void collect_pairs(const ItemRates& rates, ItemPairs& all, ItemPairs& swapped) {
+  for (std::size_t i = 0; i < rates.items.size(); ++i) {
+    for (std::size_t j = i + 1; j < rates.items.size(); ++j) {
+      const std::pair<RankItem, RankItem> pair = {rates.items[i], rates.items[j]};
+      const std::vector<double> a = {rates.in_a[i], rates.in_a[j]};
+      const std::vector<double> b = {rates.in_b[i], rates.in_b[j]};
+      all.insert(pair);
+      if (kendall(a, b).discordant > 0) swapped.insert(pair);
+    }
+  }
+}
+
+struct EnginePairs {
+  std::set<std::string> engines;
+  ItemPairs all, swapped;
+  std::vector<double> defined;  // tau-b of the pairs of engines that have one
+  long count = 0;               // of the pairs of engines
+};
+
+// Adds tau-b and swapped pairs of items for every two engines.
+EnginePairs add_engine_pairs(const std::vector<EngineSuccess>& success, EstimatesOf of) {
+  EnginePairs pairs;
+  for (const EngineSuccess& entry : success)
+    for (const EngineRate& rate : entry.engines) pairs.engines.insert(rate.engine);
+  for (auto a = pairs.engines.begin(); a != pairs.engines.end(); ++a) {
+    for (auto b = std::next(a); b != pairs.engines.end(); ++b) {
+      const ItemRates rates = item_rates(success, *a, *b, of.keys.of);
+      const RankAgreement agreement = kendall(rates.in_a, rates.in_b);
+      of.keys.engine = versus(*a, *b);
+      of.add("tau_b", static_cast<long>(rates.items.size()), agreement.tau_b);
+      of.count("swapped", agreement.pairs, agreement.discordant);
+      collect_pairs(rates, pairs.all, pairs.swapped);
+      if (std::isfinite(agreement.tau_b)) pairs.defined.push_back(agreement.tau_b);
+      ++pairs.count;
+    }
+  }
+  return pairs;
+}
+
+struct RankIntervals {
+  Interval tau_b, violation, winner_changes;
+};
+
+RankIntervals drawn_again(const RankedEntries& all, const std::string& of, const IntervalOptions& options,
+                          int resamples) {
+  Random random(options.seed, stream_key({"rank_reliability", of}));
+  std::vector<double> weights(all.clips), tau_b, violation, winner_changes;
   for (int i = 0; i < resamples; ++i) {
     std::fill(weights.begin(), weights.end(), 0.0);
     for (const std::vector<std::size_t>& clips : all.clips_of_task)
@@ -175,9 +253,24 @@ void add_figures(const EngineRows& rows, const CrossEngineOptions& options, Rank
     violation.push_back(drawn.violation);
     winner_changes.push_back(drawn.winner_changes);
   }
-  ranks.tau_interval = interval_of(std::move(tau_b), options.intervals.level);
-  ranks.violation_interval = interval_of(std::move(violation), options.intervals.level);
-  ranks.winner_interval = interval_of(std::move(winner_changes), options.intervals.level);
+  return {interval_of(std::move(tau_b), options.level), interval_of(std::move(violation), options.level),
+          interval_of(std::move(winner_changes), options.level)};
+}
+
+void add_ranks(const EngineRows& rows, const std::vector<EngineSuccess>& success, const std::string& name,
+               const IntervalOptions& options, Estimates& into) {
+  EstimatesOf of{{.of = name}, into};
+  const EnginePairs pairs = add_engine_pairs(success, of);
+  const RankedEntries all = ranked_entries(rows, name);
+  const RankFigures found = figures_of(all, std::vector<double>(all.clips, 1.0));
+  const RankIntervals intervals =
+      drawn_again(all, name, options, all.items < 2 ? 0 : std::min(options.resamples, kMostRankResamples));
+  of.keys.engine = "all";
+  of.count("items", {}, static_cast<long>(all.items));
+  of.add("mean_tau_b", static_cast<long>(pairs.defined.size()), mean_of(pairs.defined), intervals.tau_b);
+  of.add("rank_violation", pairs.count, found.violation, intervals.violation);
+  of.add("winner_changes", pairs.count, found.winner_changes, intervals.winner_changes);
+  of.count("swapped", static_cast<long>(pairs.all.size()), static_cast<long>(pairs.swapped.size()));
 }
 
 }  // namespace
@@ -205,9 +298,18 @@ double winner_change(std::span<const double> a, std::span<const double> b) {
   return shared ? 0.0 : 1.0;
 }
 
-void add_rank_reliability(const EngineRows& rows, const CrossEngineOptions& options,
-                          std::vector<RankStability>& ranks) {
-  for (RankStability& of : ranks) add_figures(rows, options, of);
+Estimates rank_stability(const EngineRows& rows, const std::vector<EngineSuccess>& success,
+                         const CrossEngineOptions& options) {
+  std::set<std::string> controllers, policies;
+  for (const EngineSuccess& entry : success) {
+    controllers.insert(entry.controller);
+    policies.insert(entry.policy);
+  }
+  std::vector<std::string> names = {"combinations"};
+  if (controllers.size() > 1 && policies.size() > 1) names.insert(names.end(), {"controllers", "policies"});
+  Estimates ranks;
+  for (const std::string& name : names) add_ranks(rows, success, name, options.intervals, ranks);
+  return ranks;
 }
 
 }  // namespace duet

@@ -177,6 +177,10 @@ TEST(CrossEngineComparison, RefusesMixedSuitesAndEpisodesThatAreThereTwice) {
               HasSubstr("the episode hug hug-0 0 of mujoco/vmc/replay clean (main arm) is there twice"));
 }
 
+Estimate rank_of(const Estimates& ranks, const char* of, const char* engines, const char* name) {
+  return *find_estimate(ranks, {.engine = engines, .of = of, .name = name});
+}
+
 TEST(RankStability, CountsSwapsAndTau) {
   Rows rows;
   // Success of policies a, b, c: 1, 2, 3 of 4 in mujoco; 1, 3, 2 in ode; 3, 2, 1 in bullet.
@@ -185,21 +189,18 @@ TEST(RankStability, CountsSwapsAndTau) {
     add_rate(rows, engine, "b", b, 4);
     add_rate(rows, engine, "c", c, 4);
   }
-  const std::vector<RankStability> ranks = compared(rows).ranks;
-  ASSERT_EQ(ranks.size(), 1U);  // one controller: policies alone would be the same
-  EXPECT_EQ(ranks[0].of, "combinations");
-  EXPECT_EQ(ranks[0].items, 3);
-  ASSERT_EQ(ranks[0].engines.size(), 3U);
-  const EnginePairRanks& bullet_mujoco = ranks[0].engines[0];
-  EXPECT_EQ(bullet_mujoco.engine_a + bullet_mujoco.engine_b, "bulletmujoco");
-  EXPECT_EQ(bullet_mujoco.swapped, 3);
-  EXPECT_DOUBLE_EQ(bullet_mujoco.tau_b, -1.0);
-  EXPECT_DOUBLE_EQ(ranks[0].engines[1].tau_b, -1.0 / 3.0);  // bullet, ode: only b and c in the same order
-  EXPECT_DOUBLE_EQ(ranks[0].engines[2].tau_b, 1.0 / 3.0);   // mujoco, ode
-  EXPECT_EQ(ranks[0].engines[2].swapped, 1);
-  EXPECT_DOUBLE_EQ(ranks[0].mean_tau_b, -1.0 / 3.0);
-  EXPECT_EQ(ranks[0].item_pairs, 3);
-  EXPECT_EQ(ranks[0].swapped, 3);
+  const Estimates ranks = compared(rows).ranks;
+  EXPECT_THAT(values_of(ranks, &Estimate::of), testing::ElementsAre("combinations"));  // one controller
+  const auto of = [&](const char* engines, const char* name) { return rank_of(ranks, "combinations", engines, name); };
+  EXPECT_EQ(of("all", "items").value, 3.0);
+  EXPECT_EQ(of("bullet vs mujoco", "swapped").value, 3.0);
+  EXPECT_DOUBLE_EQ(of("bullet vs mujoco", "tau_b").value, -1.0);
+  EXPECT_DOUBLE_EQ(of("bullet vs ode", "tau_b").value, -1.0 / 3.0);  // only b and c in the same order
+  EXPECT_DOUBLE_EQ(of("mujoco vs ode", "tau_b").value, 1.0 / 3.0);
+  EXPECT_EQ(of("mujoco vs ode", "swapped").value, 1.0);
+  EXPECT_DOUBLE_EQ(of("all", "mean_tau_b").value, -1.0 / 3.0);
+  EXPECT_EQ(of("all", "swapped").n, 3);
+  EXPECT_EQ(of("all", "swapped").value, 3.0);
 }
 
 TEST(RankStability, OfControllersAndPoliciesAloneIsOfTheirMeans) {
@@ -213,31 +214,32 @@ TEST(RankStability, OfControllersAndPoliciesAloneIsOfTheirMeans) {
   };
   add("mujoco", 4, 2, 3, 1);
   add("ode", 3, 1, 4, 2);
-  const std::vector<RankStability> ranks = compared(rows).ranks;
-  ASSERT_EQ(ranks.size(), 3U);
-  EXPECT_EQ(ranks[0].items, 4);
+  const Estimates ranks = compared(rows).ranks;
+  EXPECT_THAT(values_of(ranks, &Estimate::of), testing::ElementsAre("combinations", "controllers", "policies"));
+  EXPECT_EQ(rank_of(ranks, "combinations", "all", "items").value, 4.0);
   // Two of six pairs are swapped: those between controllers for one policy.
-  EXPECT_EQ(ranks[0].engines[0].swapped, 2);
-  EXPECT_DOUBLE_EQ(ranks[0].mean_tau_b, 2.0 / 6.0);
-  EXPECT_EQ(ranks[1].of, "controllers");
-  EXPECT_DOUBLE_EQ(ranks[1].mean_tau_b, -1.0);  // x 6, y 4 in mujoco; x 4, y 6 in ode
-  EXPECT_EQ(ranks[2].of, "policies");
-  EXPECT_DOUBLE_EQ(ranks[2].mean_tau_b, 1.0);  // a 7, b 3 in both
+  EXPECT_EQ(rank_of(ranks, "combinations", "mujoco vs ode", "swapped").value, 2.0);
+  EXPECT_DOUBLE_EQ(rank_of(ranks, "combinations", "all", "mean_tau_b").value, 2.0 / 6.0);
+  // x 6, y 4 in mujoco; x 4, y 6 in ode
+  EXPECT_DOUBLE_EQ(rank_of(ranks, "controllers", "all", "mean_tau_b").value, -1.0);
+  EXPECT_DOUBLE_EQ(rank_of(ranks, "policies", "all", "mean_tau_b").value, 1.0);  // a 7, b 3 in both
 }
 
 TEST(RankStability, IsNotDefinedForOneCombinationOrTiesThroughout) {
   Rows rows;
   add_rate(rows, "mujoco", "a", 1, 4);
   add_rate(rows, "ode", "a", 2, 4);
-  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).mean_tau_b));
-  EXPECT_EQ(compared(rows).ranks.at(0).items, 1);
+  const auto of = [&](const char* engines, const char* name) {
+    return rank_of(compared(rows).ranks, "combinations", engines, name);
+  };
+  EXPECT_TRUE(std::isnan(of("all", "mean_tau_b").value));
+  EXPECT_EQ(of("all", "items").value, 1.0);
   add_rate(rows, "mujoco", "b", 1, 4);
   add_rate(rows, "ode", "b", 3, 4);
-  const RankStability tied = compared(rows).ranks.at(0);
-  EXPECT_EQ(tied.items, 2);
-  EXPECT_EQ(tied.defined, 0);
-  EXPECT_TRUE(std::isnan(tied.engines.at(0).tau_b));
-  EXPECT_EQ(tied.swapped, 0);
+  EXPECT_EQ(of("all", "items").value, 2.0);
+  EXPECT_EQ(of("all", "mean_tau_b").n, 0);
+  EXPECT_TRUE(std::isnan(of("mujoco vs ode", "tau_b").value));
+  EXPECT_EQ(of("all", "swapped").value, 0.0);
 }
 
 TEST(RankStability, MeanMaximumRankViolationIsThatOfSimpler) {
@@ -273,23 +275,24 @@ TEST(RankStability, FiguresHaveIntervalsThatDrawClipsAgain) {
     add_rate(rows, engine, "a", a, 12);
     add_rate(rows, engine, "b", b, 12);
   }
-  const RankStability ranks = compared(rows).ranks.at(0);
-  EXPECT_NEAR(ranks.rank_violation, 0.5 * (6.0 / 12.0 + 4.0 / 12.0), 1e-12);
-  EXPECT_EQ(ranks.winner_changes, 1.0);
-  EXPECT_EQ(ranks.mean_tau_b, -1.0);
-  EXPECT_LE(ranks.violation_interval.low, ranks.rank_violation);
-  EXPECT_GE(ranks.violation_interval.high, ranks.rank_violation);
-  EXPECT_LT(ranks.violation_interval.low, ranks.violation_interval.high);
-  EXPECT_GE(ranks.tau_interval.low, -1.0);
-  EXPECT_LE(ranks.winner_interval.high, 1.0);
-  EXPECT_EQ(compared(rows).ranks.at(0).violation_interval.low, ranks.violation_interval.low);
+  const auto of = [&](const char* name) { return rank_of(compared(rows).ranks, "combinations", "all", name); };
+  const Estimate violation = of("rank_violation");
+  EXPECT_NEAR(violation.value, 0.5 * (6.0 / 12.0 + 4.0 / 12.0), 1e-12);
+  EXPECT_EQ(of("winner_changes").value, 1.0);
+  EXPECT_EQ(of("mean_tau_b").value, -1.0);
+  EXPECT_LE(violation.interval.low, violation.value);
+  EXPECT_GE(violation.interval.high, violation.value);
+  EXPECT_LT(violation.interval.low, violation.interval.high);
+  EXPECT_GE(of("mean_tau_b").interval.low, -1.0);
+  EXPECT_LE(of("winner_changes").interval.high, 1.0);
+  EXPECT_EQ(of("rank_violation").interval.low, violation.interval.low);
   std::reverse(rows.begin(), rows.end());
-  EXPECT_EQ(compared(rows).ranks.at(0).violation_interval.low, ranks.violation_interval.low);
+  EXPECT_EQ(of("rank_violation").interval.low, violation.interval.low);
   rows.clear();
   add_rate(rows, "mujoco", "a", 1, 4);
   add_rate(rows, "ode", "a", 2, 4);
-  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).rank_violation));
-  EXPECT_TRUE(std::isnan(compared(rows).ranks.at(0).violation_interval.low));
+  EXPECT_TRUE(std::isnan(of("rank_violation").value));
+  EXPECT_TRUE(std::isnan(of("rank_violation").interval.low));
 }
 
 TEST(MetricDrift, IsEngineMinusPlaybackInTheSameEpisode) {
@@ -306,21 +309,22 @@ TEST(MetricDrift, IsEngineMinusPlaybackInTheSameEpisode) {
   rows.back().metrics = {{"jpe", 99.0}};
   rows.push_back(engine_episode("mujoco", "other", 0, true));
   rows.back().metrics = {{"jpe", 99.0}};
-  const std::vector<MetricDrift> drift =
+  const Estimates drift =
       cross_engine(rows, {{"awd", "", "m", "lower"}, {"jpe", "", "m", "lower"}}, few_resamples()).drift;
-  ASSERT_EQ(drift.size(), 2U);  // playback has no awd
-  EXPECT_EQ(drift[0].engine, "mujoco");
-  EXPECT_EQ(drift[0].controller, "vmc");
-  EXPECT_EQ(drift[0].metric, "jpe");
-  EXPECT_EQ(drift[0].pairs, 6);
-  EXPECT_NEAR(drift[0].mean, 0.02, 1e-15);
-  EXPECT_NEAR(drift[0].playback, 0.25, 1e-15);
+  EXPECT_THAT(values_of(drift, &Estimate::of), testing::ElementsAre("jpe"));  // playback has no awd
+  EXPECT_THAT(values_of(drift, &Estimate::engine), testing::ElementsAre("mujoco", "ode"));
+  const auto of = [&](const char* engine, const char* name) {
+    return *find_estimate(drift, {.engine = engine, .controller = "vmc", .of = "jpe", .name = name});
+  };
+  EXPECT_EQ(of("mujoco", "drift").n, 6);
+  EXPECT_EQ(of("mujoco", "drift").unit, "m");
+  EXPECT_NEAR(of("mujoco", "drift").value, 0.02, 1e-15);
+  EXPECT_NEAR(of("mujoco", "playback").value, 0.25, 1e-15);
   // Two clips, one with 0.01 throughout, one with 0.03: one in four resamples has only the one or only the other.
-  EXPECT_NEAR(drift[0].interval.low, 0.01, 1e-15);
-  EXPECT_NEAR(drift[0].interval.high, 0.03, 1e-15);
-  EXPECT_EQ(drift[1].engine, "ode");
-  EXPECT_EQ(drift[1].pairs, 2);
-  EXPECT_NEAR(drift[1].mean, -0.5, 1e-15);
+  EXPECT_NEAR(of("mujoco", "drift").interval.low, 0.01, 1e-15);
+  EXPECT_NEAR(of("mujoco", "drift").interval.high, 0.03, 1e-15);
+  EXPECT_EQ(of("ode", "drift").n, 2);
+  EXPECT_NEAR(of("ode", "drift").value, -0.5, 1e-15);
 }
 
 TEST(ForceAgreement, IsPerEpisodeAndThenTheMedian) {
@@ -337,16 +341,18 @@ TEST(ForceAgreement, IsPerEpisodeAndThenTheMedian) {
   add(3, {{"mujoco", 500.0}});
   add(4, {{"mujoco", 0.0}, {"ode", 0.0}, {"bullet", 300.0}});  // spread 3, median 0: no ratio
   rows[0].forces["ground.mean_n"] = 343.0;                     // in one engine only
-  const std::vector<ForceAgreement> forces = compared(rows).forces;
-  ASSERT_EQ(forces.size(), 1U);
-  EXPECT_EQ(forces[0].name, "human.peak_n");
-  EXPECT_EQ(forces[0].unit, "N");
-  EXPECT_EQ(forces[0].episodes, 3);
-  EXPECT_DOUBLE_EQ(forces[0].typical, 100.0);
-  EXPECT_DOUBLE_EQ(forces[0].spread, 30.0 / 110.0);
-  EXPECT_DOUBLE_EQ(forces[0].ratio.at("mujoco"), 1.0);
-  EXPECT_DOUBLE_EQ(forces[0].ratio.at("ode"), 1.05);
-  EXPECT_DOUBLE_EQ(forces[0].ratio.at("bullet"), 1.1);
+  const Estimates forces = compared(rows).forces;
+  EXPECT_THAT(values_of(forces, &Estimate::of), testing::ElementsAre("human.peak_n"));
+  const auto of = [&](const char* engine, const char* name) {
+    return *find_estimate(forces, {.engine = engine, .of = "human.peak_n", .name = name});
+  };
+  EXPECT_EQ(of("all", "typical_force").unit, "N");
+  EXPECT_EQ(of("all", "typical_force").n, 3);
+  EXPECT_DOUBLE_EQ(of("all", "typical_force").value, 100.0);
+  EXPECT_DOUBLE_EQ(of("all", "force_spread").value, 30.0 / 110.0);
+  EXPECT_DOUBLE_EQ(of("mujoco", "force_ratio").value, 1.0);
+  EXPECT_DOUBLE_EQ(of("ode", "force_ratio").value, 1.05);
+  EXPECT_DOUBLE_EQ(of("bullet", "force_ratio").value, 1.1);
 }
 
 TEST(ForceUnit, IsTheEndingOfTheName) {

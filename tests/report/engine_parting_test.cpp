@@ -86,13 +86,14 @@ TEST(EngineParting, QuartilesAreThoseOfKaplanAndMeier) {
   rows.push_back(traced("ode", 2, std::vector<int>(5, 0)));
   rows.push_back(traced("ode", 3, moved_at(3)));
   rows.push_back(traced("ode", 4, {}));
-  const EngineParting parting = cross_engine(rows, {}, {.intervals = {.resamples = 200}}).parting.at(0);
-  EXPECT_EQ(parting.pairs, 4);
-  EXPECT_EQ(parting.parted, 3);
-  EXPECT_EQ(parting.without_trace, 1);
-  EXPECT_DOUBLE_EQ(parting.lower_quartile, 0.3);
-  EXPECT_DOUBLE_EQ(parting.median, 0.3);
-  EXPECT_DOUBLE_EQ(parting.upper_quartile, 0.7);
+  const Estimates parting = cross_engine(rows, {}, {.intervals = {.resamples = 200}}).parting;
+  const auto of = [&](const char* name) { return *find_estimate(parting, {.name = name}); };
+  EXPECT_EQ(of("parted").n, 4);
+  EXPECT_EQ(of("parted").value, 3.0);
+  EXPECT_EQ(of("without_trace").value, 1.0);
+  EXPECT_DOUBLE_EQ(of("parting_lower_quartile").value, 0.3);
+  EXPECT_DOUBLE_EQ(of("parting_median").value, 0.3);
+  EXPECT_DOUBLE_EQ(of("parting_upper_quartile").value, 0.7);
 }
 
 }  // namespace
