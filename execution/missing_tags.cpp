@@ -10,33 +10,12 @@
 
 #include "duet/core/require.h"
 #include "duet/core/synthetic_id.h"
+#include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/episode_tags.h"
 #include "duet/experiment/plan/shipped_suites.h"
 
 namespace duet {
 namespace {
-
-// The clips that a suite synthesises, by id, as it calls them.
-std::map<std::string, Tags> synthetic_clips(const Suite& suite) {
-  std::map<std::string, Tags> clips;
-  const SuiteClips& from = suite.clips;
-  const std::size_t count = from.files.empty() ? from.synth_per_task : from.files.size() * from.synth_per_file;
-  const char* manner = from.synth_like == Likeness::kPeople ? "people" : "synth";
-  for (const Task task : suite.tasks) {
-    for (std::size_t i = 0; i < count; ++i) {
-      std::string id = synthetic_clip_id(manner, to_string(task), from.synth_seed, static_cast<int>(i));
-      if (from.synth_tracked) id += "-tracked";
-      const Tags tags = {{std::string(kPeopleTag), std::string(kSyntheticPeople)}};
-      if (from.variants.empty()) clips.emplace(id, tags);
-      for (const ClipVariant& variant : from.variants) {
-        Tags of = tags_of(variant);
-        of.insert(tags.begin(), tags.end());
-        clips.emplace(fmt::format("{}-{}", id, variant.name), std::move(of));
-      }
-    }
-  }
-  return clips;
-}
 
 // The tags of the rows' clips, from their suite and the ids that it gives.
 class ClipTags {
@@ -44,13 +23,11 @@ class ClipTags {
   ClipTags(const Suite& suite, const std::vector<EpisodeRow>& rows)
       : both_(suite.clips.roles == ClipRoles::kBoth), twins_(suite.clips.synth_per_file > 0) {
     for (const EpisodeRow& row : rows) own_role_.emplace(row.clip, row.clip);
-    synthetic_ = synthetic_clips(suite);
+    synthetic_ = synthetic_clips(suite.tasks, suite.clips);
     if (!both_) return;
-    for (const auto& [id, tags] : synthetic_)
-      for (const std::string& other : other_roles(id)) take_role(other, id);
+    for (const auto& [id, tags] : synthetic_) take_roles(id);
     for (const auto& [id, same] : std::map<std::string, std::string>(own_role_))
-      if (id == own_role_.at(id))
-        for (const char* other : {"-A", "-B"}) take_role(id + other, id);
+      if (id == own_role_.at(id)) take_roles(id);
   }
 
   [[nodiscard]] Tags of(const std::string& clip) const {
@@ -63,15 +40,13 @@ class ClipTags {
   }
 
  private:
-  // The names that set_reactor gives a clip in which the robot takes the other person's place.
-  static std::vector<std::string> other_roles(const std::string& id) {
-    std::vector<std::string> others = {id + "-A", id + "-B"};
-    if (id.ends_with("-A") || id.ends_with("-B")) others.push_back(id.substr(0, id.size() - 2));
-    return others;
-  }
-  void take_role(const std::string& other, const std::string& id) {
-    const auto found = own_role_.find(other);
-    if (found != own_role_.end() && !synthetic_.contains(other)) found->second = id;
+  // The rows of the clip's other role are of the clip, whichever person it is of.
+  void take_roles(const std::string& id) {
+    for (const char before : {'A', 'B'}) {
+      const std::string other = id_in_other_role(id, before);
+      const auto found = own_role_.find(other);
+      if (found != own_role_.end() && !synthetic_.contains(other)) found->second = id;
+    }
   }
 
   bool both_, twins_;  // files have synthesised clips beside them

@@ -68,8 +68,8 @@ bool names_card_by_path(const SuiteController& controller) {
 
 class Keeper {
  public:
-  Keeper(const Suite& suite, const std::string& folder, FileDigests files) : folder_(folder), files_(std::move(files)) {
-    kept_.suite = suite;
+  Keeper(Suite suite, const std::string& folder, FileDigests files) : folder_(folder), files_(std::move(files)) {
+    kept_.suite = std::move(suite);
   }
 
   KeptSuite keep() {
@@ -349,8 +349,8 @@ Suite rebased(Suite suite, const std::string& from, const std::string& to) {
   return suite;
 }
 
-KeptSuite kept_suite(const Suite& suite, const std::string& folder, const FileDigests& files) {
-  return Keeper(suite, folder, files).keep();
+KeptSuite kept_suite(Suite suite, const std::string& folder, const FileDigests& files) {
+  return Keeper(std::move(suite), folder, files).keep();
 }
 
 void keep_inputs(const KeptSuite& kept, const std::string& folder) {
@@ -375,18 +375,18 @@ Suite suite_of_head(const Run& run) {
   return suite;
 }
 
-std::string clips_fault(const Run& run, const Suite& suite) {
-  if (suite.clips.files.empty()) return "";
+std::string clips_fault(const Run& run, const std::vector<std::string>& clips) {
+  if (clips.empty()) return "";
   if (!has_inputs(run.path)) return "the run has no index of what it was made from";
   std::size_t i = 0;
   for (const RunInput& input : read_inputs(run.path)) {
-    if (input.of != kClips || i == suite.clips.files.size()) continue;
-    const std::string& file = suite.clips.files[i++];
+    if (input.of != kClips || i == clips.size()) continue;
+    const std::string& file = clips[i++];
     const std::string name = shown(fs::path(file).filename().string());
     if (!fs::exists(file)) return fmt::format("'{}' is not there", name);
     if (sha256_file(file) != input.sha256) return fmt::format("'{}' is not what the run was made from", name);
   }
-  return i < suite.clips.files.size() ? "the run's index does not list all of them" : "";
+  return i < clips.size() ? "the run's index does not list all of them" : "";
 }
 
 Suite suite_of_run(const Run& run, const InputPlaces& places) {

@@ -34,7 +34,7 @@ struct KeptSuite {
 // Plans what `folder` is to keep of a suite. Clips of more than kMostClipBytes in all stay where they are. Writes
 // nothing; throws InputError for a file that cannot be read. `files`: digests of what is loaded (RunIdentity::files).
 inline constexpr std::uintmax_t kMostClipBytes = std::uintmax_t{1} << 28;
-KeptSuite kept_suite(const Suite& suite, const std::string& folder, const FileDigests& files = {});
+KeptSuite kept_suite(Suite suite, const std::string& folder, const FileDigests& files = {});
 
 // Copies what is not in `folder` yet and writes inputs.json, in this order. Throws InputError for a file that is
 // another one by now than the run has loaded.
@@ -66,9 +66,9 @@ Suite suite_of_run(const Run& run, const InputPlaces& places = {});
 // run keeps and suite.yaml names elsewhere: a run that came from others has no say over what is read in its place.
 Suite suite_of_head(const Run& run);
 
-// Why the clips of a suite_of_head cannot be shown, as the end of a sentence: one is not there, or is not what the run
-// was made from. Empty where they can.
-std::string clips_fault(const Run& run, const Suite& suite);
+// Why the clips of a suite_of_head, these files, cannot be shown, as the end of a sentence: one is not there, or is not
+// what the run was made from. Empty where they can.
+std::string clips_fault(const Run& run, const std::vector<std::string>& clips);
 
 // The kept files of a run that are published: those of its index and no others. `without_clips`: but for the
 // clips, of which the index then has the SHA-256 alone. Throws InputError for a file that is not what the index says.

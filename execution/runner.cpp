@@ -27,24 +27,24 @@ RunPart part_of(const RunOptions& options) {
 }
 
 // Throws for what no decision can be of.
-void check_decision_of(const RunOptions& options, const Suite& suite) {
+void check_decision_of(const RunOptions& options, bool is_commanded) {
   if (!options.decide.asked()) return;
   check_decision(options.decide);
   require(options.policies.empty(), "--until-decided names the policies that run: leave --policies out");
-  if (!suite.references.empty())
-    throw InputError("--until-decided: expected a suite of clips, found one of walking commands");
+  if (is_commanded) throw InputError("--until-decided: expected a suite of clips, found one of walking commands");
 }
 
-bool plays_back(const Suite& suite, const RunOptions& options) {
-  return suite.runs_in(kPlaybackEngine) && chosen(options.engines, kPlaybackEngine);
+// `engines`: of a suite.
+bool plays_back(const std::vector<std::string>& engines, const RunOptions& options) {
+  return std::ranges::find(engines, kPlaybackEngine) != engines.end() && chosen(options.engines, kPlaybackEngine);
 }
 
 // Engines of the suite that this machine lacks, each with its reason. Throws MissingError where no other is left.
-std::map<std::string, std::string> absent_engines(const Suite& suite, const RunOptions& options) {
+std::map<std::string, std::string> absent_engines(const std::vector<std::string>& named, const RunOptions& options) {
   std::map<std::string, std::string> absent;
-  int present = plays_back(suite, options) ? 1 : 0;
+  int present = plays_back(named, options) ? 1 : 0;
   for (const EngineInfo& engine : engines()) {
-    if (!suite.runs_in(engine.name) || !chosen(options.engines, engine.name)) continue;
+    if (std::ranges::find(named, engine.name) == named.end() || !chosen(options.engines, engine.name)) continue;
     if (engine.available)
       ++present;
     else
@@ -56,14 +56,15 @@ std::map<std::string, std::string> absent_engines(const Suite& suite, const RunO
 
 // Throws MissingError where all policies are absent, or all controllers and nothing is left that runs without one.
 void check_actors(const Experiment& experiment, const RunOptions& options) {
-  const Suite& suite = experiment.suite();
-  const auto& absent = experiment.bodies().absent();
-  const auto& absent_policies = experiment.bodies().absent_policies();
-  const std::size_t policies = suite.policies.size() - left_out(part_of(options).policies, suite.policy_names()).size();
+  const auto& [absent, absent_policies] = std::tie(experiment.bodies().absent(), experiment.bodies().absent_policies());
+  const auto wanted = [](const std::vector<std::string>& chosen, const std::vector<std::string>& names) {
+    return names.size() - left_out(chosen, names).size();
+  };
+  const std::size_t policies = wanted(part_of(options).policies, experiment.suite().policy_names());
   if (!absent_policies.empty() && absent_policies.size() == policies)
     throw MissingError(absent_policies.begin()->second);
-  const std::size_t wanted = suite.controllers.size() - left_out(options.controllers, suite.controller_names()).size();
-  if (!absent.empty() && absent.size() == wanted && !plays_back(suite, options))
+  const std::size_t controllers = wanted(options.controllers, experiment.suite().controller_names());
+  if (!absent.empty() && absent.size() == controllers && !plays_back(experiment.suite().engines, options))
     throw MissingError(absent.begin()->second);
 }
 
@@ -73,11 +74,11 @@ std::string no_locks_warning(const std::string& folder, const std::string& reaso
 }
 
 // The settings under profile_digest, for people. The suite says less; another machine's engines may add other defaults.
-std::string settings_here(const Suite& suite) {
+std::string settings_here(const std::vector<std::string>& engines, const Profile& profile) {
   std::string text;
-  for (const std::string& engine : suite.engines)
+  for (const std::string& engine : engines)
     if (engine != kPlaybackEngine && is_available(engine))
-      text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, suite.profile.settings(engine)));
+      text += fmt::format("# {} here: {}\n", engine, resolved_settings(engine, profile.settings(engine)));
   return text;
 }
 
@@ -85,12 +86,11 @@ std::string settings_here(const Suite& suite) {
 
 RunInfo new_run_info(const Experiment& experiment, const KeptSuite& kept, const std::vector<std::string>& argv,
                      const nlohmann::json& certificate) {
-  const Suite& suite = experiment.suite();
   const RunIdentity& identity = experiment.identity();
-  return {.suite = suite.name,
-          .suite_version = suite.version,
+  return {.suite = kept.suite.name,
+          .suite_version = kept.suite.version,
           .suite_hash = identity.suite_hash,
-          .suite_yaml = resolved_yaml(kept.suite) + settings_here(suite),
+          .suite_yaml = resolved_yaml(kept.suite) + settings_here(kept.suite.engines, kept.suite.profile),
           .argv = argv,
           .created_at = utc_now(),
           .environment = capture_environment(),
@@ -128,9 +128,11 @@ std::vector<Task> tasks_of(const std::vector<PairedMotion>& clips) {
 }
 
 // Says in the folder and in the summary what was asked for.
-void ask_for(const Suite& suite, const std::vector<Task>& clips, const RunOptions& options, RunDirectory& run,
+void ask_for(const Experiment& experiment, const std::vector<Task>& clips, const RunOptions& options, RunDirectory& run,
              RunSummary& summary) {
-  const auto count = [&](const std::vector<RunPart>& parts) { return count_episodes(suite, clips, parts); };
+  const auto count = [&](const std::vector<RunPart>& parts) {
+    return count_episodes(experiment.suite(), clips, parts);
+  };
   summary.planned = count({part_of(options)});
   run.ask_for(part_of(options), count({RunPart()}), count);
 }
@@ -223,7 +225,8 @@ void run_missing(const Experiment& experiment, const RunOptions& options, const 
 }
 
 // The suite hash says nothing of policies and engines; a folder is of those that its suite.yaml names.
-void require_names_of(const std::string& directory, const Suite& suite) {
+void require_names_of(const std::string& directory, const std::vector<std::string>& policies,
+                      const std::vector<std::string>& engines) {
   const std::string path = (std::filesystem::path(directory) / "suite.yaml").string();
   if (!has_inputs(directory)) return;  // a run that was killed before its first episode, or none
   const Suite there = parse_suite(read_text(path), path);
@@ -236,19 +239,20 @@ void require_names_of(const std::string& directory, const Suite& suite) {
                         "joins two)",
                         directory, kind, fmt::join(known, ", "), name));
   };
-  require_all("policies", there.policy_names(), suite.policy_names());
-  require_all("engines", there.engines, suite.engines);
+  require_all("policies", there.policy_names(), policies);
+  require_all("engines", there.engines, engines);
 }
 
 // In suite.yaml, where policies have taken the place of others of their names: their options.
-void say_replaced(const std::string& directory, const Suite& suite, const std::vector<std::string>& replaced) {
+void say_replaced(const std::string& directory, const std::vector<SuitePolicy>& policies,
+                  const std::vector<std::string>& replaced) {
   if (replaced.empty()) return;
   const std::string path = inside(directory, "suite.yaml");
   const std::string before = read_text(path);
   const Suite there = parse_suite(before, path);
   std::string text = before;
   for (const SuitePolicy& old : there.policies)
-    for (const SuitePolicy& now : suite.policies) {
+    for (const SuitePolicy& now : policies) {
       if (now.name != old.name || std::ranges::find(replaced, now.name) == replaced.end()) continue;
       for (const auto& [option, value] : now.options) {
         const auto found = old.options.find(option);
@@ -262,33 +266,33 @@ void say_replaced(const std::string& directory, const Suite& suite, const std::v
 
 }  // namespace
 
-RunSummary run_suite(Suite given, const std::string& directory, const RunOptions& options, Progress& progress) {
-  given.require_clips();
-  check_filters(options, given);
-  check_filters(part_of(options), given);
-  check_decision_of(options, given);
+RunSummary run_suite(Suite suite, const std::string& directory, const RunOptions& options, Progress& progress) {
+  suite.require_clips();
+  check_filters(options, suite);
+  check_filters(part_of(options), suite);
+  check_decision_of(options, suite.is_commanded());
   RunSummary summary;
-  summary.absent_engines = absent_engines(given, options);
-  ExperimentOptions loaded = only(part_of(options), given);
+  summary.absent_engines = absent_engines(suite.engines, options);
+  ExperimentOptions loaded = only(part_of(options), suite);
   loaded.called = options.called;
-  Experiment experiment(std::move(given), std::move(loaded));
-  const Suite& suite = experiment.suite();
+  Experiment experiment(std::move(suite), std::move(loaded));
   check_actors(experiment, options);
   for (const std::string& note : experiment.bodies().notes()) progress.note(note);
   summary.absent_controllers = experiment.bodies().absent();
   summary.absent_policies = experiment.bodies().absent_policies();
-  const KeptSuite kept = kept_suite(suite, directory, experiment.identity().files);
+  const KeptSuite kept = kept_suite(experiment.suite(), directory, experiment.identity().files);
   const RunInfo info = new_run_info(experiment, kept, options.argv, options.certificate);
-  require_names_of(directory, suite);
+  require_names_of(directory, kept.suite.policy_names(), kept.suite.engines);
   RunDirectory run = RunDirectory::open(directory, info, options.retry_errors, options.replaced);
-  say_replaced(directory, suite, options.replaced);
+  say_replaced(directory, experiment.suite().policies, options.replaced);
   keep_inputs(kept, directory);
   if (!run.lock_refusal().empty()) summary.warnings.push_back(no_locks_warning(directory, run.lock_refusal()));
   const StopSign stop(options.time_limit, options.begin, options.stop_asked);
   try {
-    if (suite.clips.files.empty()) ask_for(suite, suite.tasks_of_own_clips(), options, run, summary);
+    const bool made = experiment.suite().clips.files.empty();
+    if (made) ask_for(experiment, experiment.suite().tasks_of_own_clips(), options, run, summary);
     experiment.prepare(options.threads, progress, {.keep_in = directory, .stop = &stop});
-    if (!suite.clips.files.empty()) ask_for(suite, tasks_of(experiment.bodies().clips()), options, run, summary);
+    if (!made) ask_for(experiment, tasks_of(experiment.bodies().clips()), options, run, summary);
     run_missing(experiment, options, stop, progress, run, summary);
   } catch (const Stopped&) {
     summary.end = stop.end();

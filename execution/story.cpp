@@ -186,7 +186,7 @@ ReportContent report_content(const Run& run, const RunTables& tables, std::vecto
   content.all_episodes = tables.rows.size();
   content.replays = std::move(replays);
   if (!with_clips || !suite.references.empty()) return content;
-  if (const std::string fault = clips_fault(run, suite); !fault.empty()) {
+  if (const std::string fault = clips_fault(run, suite.clips.files); !fault.empty()) {
     content.notes.push_back(fmt::format("Key frames and loss curves of the clips are left out: {}.", fault));
     return content;
   }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "duet/core/require.h"
@@ -20,12 +21,31 @@ struct ScoredTracks {
   std::vector<int> hands;                                            // left, right
 };
 
-void check_frames(const PairedMotion& motion, const RobotModel& robot) {
+// What is scored, wherever it comes from.
+struct ScoredMotion {
+  ScoredMotion(const PairedMotion& motion)  // NOLINT(google-explicit-constructor): the same parts
+      : robot(motion.robot),
+        partner(motion.partner.joints),
+        source_partner(motion.source_partner.joints),
+        source_reactor(motion.source_reactor.joints),
+        reshaped(motion.reshaped) {}
+  ScoredMotion(const RobotMotion& executed, const PointTracks& person, const ActSource& source)
+      : robot(executed),
+        partner(person),
+        source_partner(source.partner.joints),
+        source_reactor(source.reactor.joints),
+        reshaped(source.reshaped) {}
+
+  const RobotMotion& robot;
+  const PointTracks &partner, &source_partner, &source_reactor, &reshaped;
+};
+
+void check_frames(const ScoredMotion& motion, const RobotModel& robot) {
   const auto check = [&](int frames, const char* name) {
-    require(frames == motion.frames(), "retargeting metrics: {} has {} frames, but robot has {}", name, frames,
-            motion.frames());
+    require(frames == motion.robot.frames(), "retargeting metrics: {} has {} frames, but robot has {}", name, frames,
+            motion.robot.frames());
   };
-  require(motion.frames() > 0, "retargeting metrics: the paired motion is empty");
+  require(motion.robot.frames() > 0, "retargeting metrics: the paired motion is empty");
   check(static_cast<int>(motion.robot.q.cols()), "robot.q");
   check(motion.partner.frames(), "partner");
   check(motion.source_partner.frames(), "source_partner");
@@ -35,7 +55,7 @@ void check_frames(const PairedMotion& motion, const RobotModel& robot) {
           "retargeting metrics: the joints of the motion are not those of {} in its order", robot.name);
 }
 
-ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) {
+ScoredTracks scored_tracks(const ScoredMotion& motion, const RobotModel& robot) {
   check_frames(motion, robot);
   const int pairs = static_cast<int>(robot.pairs.size());
   std::vector<int> frames, pair_points, robot_points, human_points;
@@ -55,14 +75,14 @@ ScoredTracks scored_tracks(const PairedMotion& motion, const RobotModel& robot) 
   const PointTracks points = frame_tracks(robot, motion.robot, frames);
   tracks.robot_pairs = points.select(pair_points);
   tracks.robot = points.select(robot_points);
-  tracks.source_initiator = motion.source_partner.joints.select(human_points);
-  tracks.source_responder = motion.source_reactor.joints.select(human_points);
-  tracks.initiator = motion.partner.joints.select(human_points);
+  tracks.source_initiator = motion.source_partner.select(human_points);
+  tracks.source_responder = motion.source_reactor.select(human_points);
+  tracks.initiator = motion.partner.select(human_points);
   return tracks;
 }
 
 // Motions of other retargeters say nothing of a reshaped person: there is nothing to be in error against.
-double jpe_of(const ScoredTracks& tracks, const PairedMotion& motion, JpeFrame frame) {
+double jpe_of(const ScoredTracks& tracks, const ScoredMotion& motion, JpeFrame frame) {
   return motion.reshaped.empty() ? std::numeric_limits<double>::quiet_NaN()
                                  : jpe(tracks.robot_pairs, motion.reshaped, frame);
 }
@@ -135,10 +155,8 @@ void add_jerk(const PointTracks& points, double rate_hz, const std::string& suff
   out["jerk_std" + suffix] = j.std;
 }
 
-}  // namespace
-
-std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
-                                                  const MetricReadings& readings) {
+std::map<std::string, double> metrics_of(const ScoredMotion& motion, const RobotModel& robot,
+                                         const MetricReadings& readings) {
   const ScoredTracks tracks = scored_tracks(motion, robot);
   const Eigen::MatrixXd magnitudes = hinge_magnitudes(motion.robot.q);
   std::map<std::string, double> out;
@@ -149,6 +167,33 @@ std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, co
   out["angle_std"] = angle_std(magnitudes, readings.angle_std, readings.ddof);
   add_jerk(tracks.robot_pairs, motion.robot.rate_hz, "", readings, out);
   return out;
+}
+
+int act_begin(const Recording& recording) { return std::min(recording.phases.act_begin, recording.frames()); }
+
+}  // namespace
+
+std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
+                                                  const MetricReadings& readings) {
+  return metrics_of(motion, robot, readings);
+}
+
+int act_frames(const Recording& recording) {
+  return std::min(recording.phases.act_end, recording.frames()) - act_begin(recording);
+}
+
+std::map<std::string, double> retargeting_metrics(const Recording& recording, const ActSource& source,
+                                                  const RobotModel& robot, const MetricReadings& readings) {
+  const int begin = act_begin(recording), frames = act_frames(recording);
+  RobotMotion executed;
+  executed.joint_names = robot.joint_names();
+  executed.q.resize(robot.dof(), frames);
+  for (int t = 0; t < frames; ++t) {
+    executed.root.push_back(recording.robot[begin + t].X_WB);
+    executed.q.col(t) = recording.robot[begin + t].q;
+  }
+  const PointTracks person = recording.partner.slice(begin, begin + frames);
+  return metrics_of({executed, person, source}, robot, readings);
 }
 
 std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,

@@ -1,5 +1,5 @@
 // The 18 retargeting metrics of supplement C.2.1. Inputs are raw tracks so that any retargeter can be scored; the last
-// function takes duet's own PairedMotion.
+// functions take duet's own PairedMotion, or a recording.
 #pragma once
 
 #include <array>
@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "duet/core/point_tracks.h"
+#include "duet/core/recording.h"
 #include "duet/metrics/readings.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/robots/robot_model.h"
@@ -65,6 +66,18 @@ std::vector<HingeGroup> hinge_groups(const RobotModel& robot);
 // Jerk is of the robot's 16 pair points.
 std::map<std::string, double> retargeting_metrics(const PairedMotion& motion, const RobotModel& robot,
                                                   const MetricReadings& readings = {});
+// References that an executed act is held against, over the frames that it had before its episode ended.
+struct ActSource {
+  HumanMotion partner;   // H_p as in the clip, whatever the perturbation made of it
+  HumanMotion reactor;   // H_s
+  PointTracks reshaped;  // empty: not known
+};
+// Frames of the recording that are of the act (A.4.4 changes what is before and after).
+int act_frames(const Recording& recording);
+// The 18 of the act that a recording executed, in the place of the retargeted motion: they then say what the engine and
+// the controller cost.
+std::map<std::string, double> retargeting_metrics(const Recording& recording, const ActSource& source,
+                                                  const RobotModel& robot, const MetricReadings& readings = {});
 // The metrics that a robot's motion has by itself: large_angle_ratio, angle_std, jerk_mean, jerk_std.
 std::map<std::string, double> motion_metrics(const RobotMotion& motion, const RobotModel& robot,
                                              const MetricReadings& readings = {});

@@ -7,6 +7,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/synthetic_id.h"
 #include "duet/motion/npz_fields.h"
 #include "duet/motion/phase_proposal.h"
 
@@ -143,12 +144,7 @@ InteractionClip load_clip(const std::string& path) { return read_clip(Npz::load(
 
 void set_reactor(InteractionClip& clip, Person reactor) {
   if (clip.reactor == reactor) return;
-  const std::string before = clip.reactor == Person::kA ? "-A" : "-B", after = reactor == Person::kA ? "-A" : "-B";
-  if (clip.id.size() > before.size() && clip.id.ends_with(before)) {
-    clip.id.resize(clip.id.size() - before.size());
-  } else {
-    clip.id += after;
-  }
+  clip.id = id_in_other_role(clip.id, clip.reactor == Person::kA ? 'A' : 'B');
   clip.reactor = reactor;
 }
 

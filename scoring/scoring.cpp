@@ -203,25 +203,6 @@ ActSource act_source(const Recording& recording, const RolloutSetup& setup) {
           clip.reshaped.empty() ? PointTracks() : clip.reshaped.slice(begin, end)};
 }
 
-PairedMotion executed_act(const Recording& recording, const ActSource& source, const RobotModel& robot) {
-  const int begin = std::min(recording.phases.act_begin, recording.frames());
-  const int frames = std::min(recording.phases.act_end, recording.frames()) - begin;
-  PairedMotion motion;
-  motion.task = task_of(recording);
-  motion.phases = {0, frames};
-  motion.partner.joints = recording.partner.slice(begin, begin + frames);
-  motion.source_partner = source.partner;
-  motion.source_reactor = source.reactor;
-  motion.reshaped = source.reshaped;
-  motion.robot.joint_names = robot.joint_names();
-  motion.robot.q.resize(robot.dof(), frames);
-  for (int t = 0; t < frames; ++t) {
-    motion.robot.root.push_back(recording.robot[begin + t].X_WB);
-    motion.robot.q.col(t) = recording.robot[begin + t].q;
-  }
-  return motion;
-}
-
 std::string state_hash(const Recording& recording) {
   Sha256 hash;
   for (const RobotState& state : recording.robot) hash.update(state);
@@ -277,9 +258,8 @@ void score_recording(const Recording& recording, const ActSource& source, const 
   add_finite(onsets(recording, robot), row.metrics);
   if (recording.frames() < kShortestScored) return;
   add_finite(controller_diagnostics(recording, rules.readings.diagnostics), row.metrics);
-  const PairedMotion executed = executed_act(recording, source, robot);
-  if (executed.frames() >= kShortestScored)
-    add_finite(retargeting_metrics(executed, robot, rules.readings.metrics), row.metrics);
+  if (act_frames(recording) >= kShortestScored)
+    add_finite(retargeting_metrics(recording, source, robot, rules.readings.metrics), row.metrics);
 }
 
 void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const ScoringRules& rules,

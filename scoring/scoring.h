@@ -3,19 +3,13 @@
 #pragma once
 
 #include "duet/experiment/suite/suite.h"
-#include "duet/metrics/readings.h"
+#include "duet/metrics/retargeting.h"
 #include "duet/rollout/act_episode.h"
 #include "duet/rows/episode_row.h"
 
 namespace duet {
 
-// References that the executed act is held against: the people of the clip and the reshaped one, over the frames that
-// the act had before the episode ended.
-struct ActSource {
-  HumanMotion partner;   // H_p as in the clip, whatever the perturbation made of it
-  HumanMotion reactor;   // H_s
-  PointTracks reshaped;  // empty: not known
-};
+// The people of the clip and the reshaped one, over the frames that the act had before the episode ended.
 ActSource act_source(const Recording& recording, const RolloutSetup& setup);
 
 // How a suite judges.
@@ -47,10 +41,6 @@ StateTrace state_trace(const Recording& recording, const RobotModel& robot);
 
 // Heights of the soles, 25 times a second. Empty for a robot whose soles are not on two links.
 FootTrace foot_trace(const Recording& recording, const RobotModel& robot);
-
-// The executed motion in the place of the retargeted one, over the act (A.4.4 changes what is before and after): the 18
-// metrics then say what the engine and the controller cost. As many frames as the act had before the episode ended.
-PairedMotion executed_act(const Recording& recording, const ActSource& source, const RobotModel& robot);
 
 // SHA-256 over the states at 50 Hz.
 std::string state_hash(const Recording& recording);

@@ -16,6 +16,7 @@
 #include "duet/core/parallel.h"
 #include "duet/core/random.h"
 #include "duet/core/require.h"
+#include "duet/core/synthetic_id.h"
 #include "duet/core/text.h"
 #include "duet/experiment/plan/prepared_clips.h"
 #include "duet/experiment/suite/suite_names.h"
@@ -44,6 +45,13 @@ struct ClipSource {
   std::variant<std::string, SyntheticClip> from;  // a file, or what is synthesised
   bool other_role = false;
 };
+
+std::string id_of(const SyntheticClip& clip) {
+  std::string id = synthetic_clip_id(clip.like == Likeness::kPeople ? "people" : "synth", to_string(clip.task),
+                                     clip.seed, clip.index);
+  if (clip.tracked) id = tracked_clip_id(id);
+  return clip.variant == nullptr ? id : id + "-" + clip.variant->name;
+}
 
 // The tags of a suite's own clip, as its rows say them.
 Tags tags_of(const SyntheticClip& clip) {
@@ -152,7 +160,7 @@ InteractionClip synthesize(const SyntheticClip& source) {
   InteractionClip clip = synthesize(source.task, options);
   if (source.tracked) clip = tracked(clip, {}, source.seed);
   clip = with_padding(std::move(clip), frozen);
-  if (source.variant != nullptr) clip.id += "-" + source.variant->name;
+  clip.id = id_of(source);
   return clip;
 }
 
@@ -348,17 +356,31 @@ std::vector<PairedMotion> empty_clips(const std::vector<SuiteReference>& referen
 }
 
 // Lists, beside clips of files, the synthesised ones of the same tasks, so many for each.
-std::vector<ClipSource> list_twins(const std::vector<LoadedMotion>& read, const Suite& suite) {
+std::vector<ClipSource> list_twins(const std::vector<LoadedMotion>& read, const std::vector<Task>& tasks,
+                                   const SuiteClips& clips) {
   std::vector<ClipSource> sources;
-  for (const Task task : suite.tasks) {
+  for (const Task task : tasks) {
     const auto of_task = [&](const LoadedMotion& motion) { return motion.motion.task == task; };
-    const auto count = static_cast<int>(std::ranges::count_if(read, of_task) / (suite.clips.copies()));
-    add_synthetic(task, count * suite.clips.synth_per_file, true, suite.clips, sources);
+    const auto count = static_cast<int>(std::ranges::count_if(read, of_task) / clips.copies());
+    add_synthetic(task, count * clips.synth_per_file, true, clips, sources);
   }
-  return in_roles(sources, suite.clips.roles);
+  return in_roles(sources, clips.roles);
 }
 
 }  // namespace
+
+std::map<std::string, Tags> synthetic_clips(const std::vector<Task>& tasks, const SuiteClips& clips) {
+  const int files = static_cast<int>(clips.files.size());
+  std::vector<ClipSource> sources;
+  for (const Task task : tasks)
+    add_synthetic(task, files > 0 ? files * clips.synth_per_file : clips.synth_per_task, files > 0, clips, sources);
+  std::map<std::string, Tags> tags;
+  for (const ClipSource& source : sources) {
+    const auto& clip = std::get<SyntheticClip>(source.from);
+    tags.emplace(id_of(clip), tags_of(clip));
+  }
+  return tags;
+}
 
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& prepare) {
@@ -369,7 +391,8 @@ std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& ro
                       prepare.files);
   };
   std::vector<LoadedMotion> made = make(list_sources(suite.tasks, suite.clips));
-  if (suite.clips.synth_per_file > 0) std::ranges::move(make(list_twins(made, suite)), std::back_inserter(made));
+  if (suite.clips.synth_per_file > 0)
+    std::ranges::move(make(list_twins(made, suite.tasks, suite.clips)), std::back_inserter(made));
   std::vector<PairedMotion> clips = by_task(std::move(made), suite.tasks);
   if (clips.empty()) throw InputError(fmt::format("{}: no clip is left for the tasks of the suite", suite.file));
   for (const PairedMotion& clip : clips) check_robot(clip, robot);

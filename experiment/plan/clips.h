@@ -1,6 +1,7 @@
 // The clips of a suite, retargeted and ready to roll out: synthesised or read, one PairedMotion each.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,6 +47,10 @@ LoadedMotion load_or_retarget(const Npz& npz, const RobotModel& robot, const Pai
 // (experiment/work/stop_sign.h) where it was asked to stop.
 std::vector<PairedMotion> prepare_clips(const Suite& suite, const RobotModel& robot, int threads, Progress& progress,
                                         const PrepareOptions& options = {});
+
+// The clips that a suite synthesises itself, in their own role, by id with the tags of their rows. Beside files it has
+// at most so many.
+std::map<std::string, Tags> synthetic_clips(const std::vector<Task>& tasks, const SuiteClips& clips);
 
 // Clips that are no suite's: `per_task` of each task, for training. People stand 2.5 to 5.5 s before the act, half of
 // them frozen in its first frame as padded recordings are.

@@ -8,6 +8,7 @@
 
 #include "duet/core/random.h"
 #include "duet/core/require.h"
+#include "duet/core/synthetic_id.h"
 #include "duet/motion/people/source_clip.h"
 
 namespace duet {
@@ -137,7 +138,7 @@ InteractionClip tracked(const InteractionClip& clip, const Tracker& tracker, std
     return seen(one, other, tracker, frames, {seed, stream_key({"tracked", clip.id, who})},
                 misplaced(tracker, {seed, stream_key({"misplaced", clip.id, who})}));
   };
-  RawPeople raw{.id = clip.id + "-tracked",
+  RawPeople raw{.id = tracked_clip_id(clip.id),
                 .name = clip.id,
                 .layout = &joint_layout("kinect-15"),
                 .joints = {person("a", clip.a, clip.b), person("b", clip.b, clip.a)},

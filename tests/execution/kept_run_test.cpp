@@ -235,10 +235,10 @@ TEST_F(KeptRun, AFileInThePlaceOfAKeptOneIsRefused) {
               HasSubstr("contact_limits: expected the file 'inputs/contact_limits.yaml' that the run keeps"));
   write_file(scratch_ / "run/suite.yaml", suite);
   const duet::Run run = load_run(scratch_ / "run");
-  EXPECT_EQ(clips_fault(run, suite_of_head(run)), "");
+  EXPECT_EQ(clips_fault(run, suite_of_head(run).clips.files), "");
   fs::remove(scratch_ / "run/inputs/inputs.json");  // and with it what the clips are to be
   replace_in(scratch_ / "run/suite.yaml", "contact_limits: \"inputs/contact_limits.yaml\"\n", "");
-  EXPECT_EQ(clips_fault(run, suite_of_head(load_run(scratch_ / "run"))),
+  EXPECT_EQ(clips_fault(run, suite_of_head(load_run(scratch_ / "run")).clips.files),
             "the run has no index of what it was made from");
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "duet/backends/factory.h"
 #include "duet/controllers/catalogue/registry.h"
@@ -94,6 +95,31 @@ TEST_F(WaveThatSucceeds, ShorterThanEightFramesHasNoMetricsAndEightHas) {
     score_rollout(part, setup_, rules_, *robot_, row);
     EXPECT_EQ(row.metrics.contains("dof_error"), frames == 8) << frames;
   }
+}
+
+// The 18 of a recording are those of the motion that its act is, cut out and put beside the same people.
+TEST_F(WaveThatSucceeds, MetricsOfTheActAreThoseOfTheMotionThatItIs) {
+  const Recording& recording = rollout_.recording;
+  const ActSource source = act_source(recording, setup_);
+  const int begin = recording.phases.act_begin, frames = act_frames(recording);
+  ASSERT_EQ(frames, recording.phases.act_end - begin);
+  PairedMotion motion;
+  motion.partner.joints = recording.partner.slice(begin, begin + frames);
+  motion.source_partner = source.partner;
+  motion.source_reactor = source.reactor;
+  motion.reshaped = source.reshaped;
+  motion.robot.q.resize(robot_->dof(), frames);
+  for (int t = 0; t < frames; ++t) {
+    motion.robot.root.push_back(recording.robot[begin + t].X_WB);
+    motion.robot.q.col(t) = recording.robot[begin + t].q;
+  }
+  const std::map<std::string, double> expected = retargeting_metrics(motion, *robot_);
+  const std::map<std::string, double> found = retargeting_metrics(recording, source, *robot_);
+  ASSERT_EQ(found.size(), 18U);
+  for (const auto& [name, value] : expected)
+    if (std::isfinite(value)) {
+      EXPECT_EQ(found.at(name), value) << name;
+    }
 }
 
 }  // namespace
