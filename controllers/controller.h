@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/episode_facts.h"
 #include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
 
@@ -13,13 +14,6 @@ namespace duet {
 
 // The options that a suite may set of one controller, by name ("network", "waist", ...); values as written there.
 using ControllerOptions = std::map<std::string, std::string>;
-
-// How often a controller met a number that is not finite, and what it did (controllers/guard.h).
-struct ControllerFaults {
-  int observations = 0;  // ticks on which the state or the reference was not finite
-  int actions = 0;       // ticks on which the command was not finite
-  bool stopped = false;  // the safe stop was entered
-};
 
 class Controller {
  public:

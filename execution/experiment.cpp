@@ -206,7 +206,7 @@ void Experiment::simulate(const EpisodeSpec& spec, const EpisodeOverrides& overr
   const Rollout rollout = overrides.world ? overrides.world(setup, *policy) : executed(spec, setup, *policy, row);
   if (rollout.interrupted) throw EpisodeInterrupted();
   if (const PolicyFaults& faults = rollout.policy_faults; faults.dead) {
-    row.policy_faults = {faults.late, faults.invalid, true, faults.message};
+    row.policy_faults = faults;
     throw std::runtime_error(faults.message);
   }
   ScoringRules rules = rules_;

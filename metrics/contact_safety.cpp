@@ -175,10 +175,10 @@ ContactSafety::Pair* ContactSafety::find_or_open(const Contact& contact) {
     if (pairs_[p].event.link == contact.link && pairs_[p].event.capsule == contact.other) return &pairs_[p];
   if (open_ == pairs_.size()) return nullptr;
   Pair& pair = pairs_[open_++];
-  pair.event = {.link = contact.link,
-                .capsule = contact.other,
-                .region = capsules_[contact.other].region,
-                .begin = static_cast<double>(step_) * dt_};
+  pair.event = {{.begin_s = static_cast<double>(step_) * dt_},
+                contact.link,
+                contact.other,
+                capsules_[contact.other].region};
   pair.mean.clear();
   pair.patch_radius = patch_radius(contact.link, contact.other);
   pair.begin = step_;
@@ -196,12 +196,12 @@ double ContactSafety::patch_radius(int link, int capsule) const {
 void ContactSafety::end_step(Pair& pair) {
   ContactEvent& event = pair.event;
   const double force = pair.sum.norm();
-  event.windowed_mean = std::max(event.windowed_mean, pair.mean.push(force));
+  event.windowed_mean_n = std::max(event.windowed_mean_n, pair.mean.push(force));
   if (pair.last == step_) {
-    event.duration = static_cast<double>(step_ - pair.begin + 1) * dt_;
-    event.peak_force = std::max(event.peak_force, force);
-    event.impulse += force * dt_;
-    event.depth = std::max(event.depth, pair.depth);
+    event.duration_s = static_cast<double>(step_ - pair.begin + 1) * dt_;
+    event.peak_n = std::max(event.peak_n, force);
+    event.impulse_ns += force * dt_;
+    event.depth_m = std::max(event.depth_m, pair.depth);
     bear(regions_[event.region], force, pair.depth, pair.patch_radius);
   }
   pair.sum.setZero();
@@ -274,7 +274,7 @@ ContactSafetyResult ContactSafety::result() const {
       ++result.events_left_out;
   }
   std::sort(result.events.begin(), result.events.end(), [](const ContactEvent& a, const ContactEvent& b) {
-    return std::tie(a.begin, a.link, a.capsule) < std::tie(b.begin, b.link, b.capsule);
+    return std::tie(a.begin_s, a.link, a.capsule) < std::tie(b.begin_s, b.link, b.capsule);
   });
   sum_up(result);
   return result;

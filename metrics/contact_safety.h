@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "duet/core/contact.h"
+#include "duet/core/episode_facts.h"
 #include "duet/metrics/contact_limits.h"
 #include "duet/metrics/sliding_window.h"
 #include "duet/robots/human_body.h"
@@ -76,17 +77,11 @@ struct RegionContact {
   ContactVerdict verdict = ContactVerdict::kWithin;  // a ratio of exactly 1 is within
 };
 
-// One contact of one robot link with one capsule.
-struct ContactEvent {
+// A contact as it is measured: by indices, from the first step's begin.
+struct ContactEvent : ContactFacts {
   int link = -1;
-  int capsule = -1;            // in HumanBody::capsules
-  int region = -1;             // in ContactSafetyResult::regions
-  double begin = 0.0;          // from the first step's begin [s]
-  double duration = 0.0;       // bridged gaps included [s]
-  double peak_force = 0.0;     // [N]
-  double impulse = 0.0;        // of the force's magnitude [N s]
-  double depth = 0.0;          // largest [m]
-  double windowed_mean = 0.0;  // as of a region [N]
+  int capsule = -1;  // in HumanBody::capsules
+  int region = -1;   // in ContactSafetyResult::regions
 };
 
 struct ContactSafetyResult {

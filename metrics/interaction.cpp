@@ -185,8 +185,8 @@ PartnerTouch partner_touch(const ContactSafetyResult& safety, const RobotModel& 
   const int hands[] = {robot.frames[robot.track_frame("lhand")].link, robot.frames[robot.track_frame("rhand")].link};
   std::vector<Interval> at_hands, at_trunk;
   for (const ContactEvent& event : safety.events) {
-    const Interval interval{std::max(event.begin, window.begin / rate_hz),
-                            std::min(event.begin + event.duration, window.end / rate_hz)};
+    const Interval interval{std::max(event.begin_s, window.begin / rate_hz),
+                            std::min(event.begin_s + event.duration_s, window.end / rate_hz)};
     if (interval.end <= interval.begin) continue;
     const std::string& region = human.capsules[static_cast<std::size_t>(event.capsule)].region;
     if (region == "hand" && (event.link == hands[0] || event.link == hands[1])) at_hands.push_back(interval);
@@ -238,7 +238,7 @@ DetectorResult judge_interaction(Task task, const InteractionEvidence& e) {
   result.margins = {{"touch", touch.margin}, {"force", 1.0 - settled}, {"reply", -lead.over}};
   if (!e.touch) add_body(agents, result);
   for (const auto& [name, margin] : act.margins) result.margins["act." + name] = margin;
-  result.success = std::ranges::all_of(result.parts, [](const auto& part) { return part.second; });
+  result.success = std::all_of(result.parts.begin(), result.parts.end(), [](const auto& part) { return part.second; });
   return result;
 }
 

@@ -96,12 +96,12 @@ class QueuedPolicy final : public Policy {
   std::vector<Reference> plan(const Observation& observation) override {
     if (faults_.dead) return {};
     if (!is_finite(observation))
-      return faults_.leave_out(name(), observation.tick, "observation: expected finite numbers, found others");
+      return leave_out(faults_, name(), observation.tick, "observation: expected finite numbers, found others");
     const auto place = std::make_shared<PlanQueue::Place>();
     place->request = request_of(observation);
     if (!queue_->ask(place, context_.stop_asked)) return {};
     if (place->state == PlanQueue::Place::State::kInvalid)
-      return faults_.leave_out(name(), observation.tick, place->message);
+      return leave_out(faults_, name(), observation.tick, place->message);
     if (place->state == PlanQueue::Place::State::kRefused) {
       faults_.dead = true;
       faults_.message = fmt::format("policy '{}': tick {}: {}", name(), observation.tick, place->message);

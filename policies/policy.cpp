@@ -18,9 +18,9 @@ bool is_finite(const ObservationFrame& frame) {
 
 }  // namespace
 
-std::vector<Reference> PolicyFaults::leave_out(std::string_view policy, int tick, std::string_view problem) {
-  ++invalid;
-  if (message.empty()) message = fmt::format("policy '{}': tick {}: {}", policy, tick, problem);
+std::vector<Reference> leave_out(PolicyFaults& faults, std::string_view policy, int tick, std::string_view problem) {
+  ++faults.invalid;
+  if (faults.message.empty()) faults.message = fmt::format("policy '{}': tick {}: {}", policy, tick, problem);
   return {};
 }
 

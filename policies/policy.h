@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/episode_facts.h"
 #include "duet/core/point_tracks.h"
 #include "duet/core/robot_motion.h"
 #include "duet/core/robot_state.h"
@@ -56,17 +57,8 @@ struct EpisodeContext {
   std::function<bool()> stop_asked = {};  // asked while a policy waits for a program; true: give up, no fault
 };
 
-// Faults since reset, of policies that can fail: a process that is late or dies, a network whose numbers are not
-// finite. A plan that fails is left out; the scheduler then holds the last one (F).
-struct PolicyFaults {
-  int late = 0;         // no plan in time
-  int invalid = 0;      // not finite, of the wrong size, not unit
-  bool dead = false;    // gives no plan any more
-  std::string message;  // of the first fault
-  [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
-  // Counts a plan of `policy` that is left out; returns no plan.
-  std::vector<Reference> leave_out(std::string_view policy, int tick, std::string_view problem);
-};
+// Counts a plan of `policy` that is left out; returns no plan.
+std::vector<Reference> leave_out(PolicyFaults& faults, std::string_view policy, int tick, std::string_view problem);
 
 // Throws MissingError, which names policy and tasks, unless it was made for the task: its episode is `unsupported`.
 void require_known_task(std::string_view policy, std::span<const Task> known, Task task);
@@ -83,7 +75,7 @@ class Policy {
   // policy knows more than its anchors can say: half a second between anchors leaves 75 % of a swing of 0.5 Hz and 23 %
   // of one of 1 Hz (docs/deviations.md). Empty: no plan this time (see PolicyFaults).
   virtual std::vector<Reference> plan(const Observation& observation);
-  [[nodiscard]] virtual PolicyFaults faults() const { return {}; }
+  [[nodiscard]] virtual PolicyFaults faults() const { return {}; }  // since reset
 };
 
 // The options that a suite may set of one policy, by name ("network", "prompt", ...); values as written there.

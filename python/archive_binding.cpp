@@ -184,7 +184,7 @@ std::string detect_in(const Archive& archive, const std::string& task, const std
   for (const auto& [name, value] : result.values) values[name] = number_or_null(value);
   for (const auto& [name, value] : result.margins) margins[name] = number_or_null(value);
   return dumped(nlohmann::json({{"success", result.success},
-                                {"parts", result.parts},
+                                {"parts", result.parts.map()},
                                 {"values", values},
                                 {"margins", margins},
                                 {"frames", result.frames}}));

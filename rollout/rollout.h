@@ -4,13 +4,13 @@
 #pragma once
 
 #include <functional>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "duet/backends/backend.h"
 #include "duet/controllers/controller.h"
+#include "duet/core/episode_facts.h"
 #include "duet/core/recording.h"
 #include "duet/metrics/contact_safety.h"
 #include "duet/policies/policy.h"
@@ -27,11 +27,6 @@ namespace duet {
 struct GroundForce {
   double mean = 0.0;  // of the vertical component over all physics steps [N]
   double peak = 0.0;  // largest magnitude of the mean over 20 ms [N]
-};
-
-// Wall time of the policy's plans [ms]; NaN where it made none.
-struct PlanTimes {
-  double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
 };
 
 // The conditions of an episode that do not depend on who leads the robot, nor on how long it lasts.

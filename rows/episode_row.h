@@ -52,10 +52,10 @@ struct EpisodeRow {
   long contacts_total = 0;           // those that are left out included
   StateTrace trace;
   FootTrace feet;
-  RowFaults faults;
+  ControllerFaults faults;
   int late_plans = 0;
-  RowPolicyFaults policy_faults;
-  RowPolicyTime policy_ms;
+  PolicyFaults policy_faults;
+  PlanTimes policy_ms;
   std::string state_hash;  // SHA-256 over the state trajectory
   std::string started_at;  // UTC, ISO 8601
 
@@ -75,8 +75,8 @@ struct RowFieldUse {
 };
 
 struct RowField {
-  JsonMember<EpisodeRow, RowTags, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace, RowFaults,
-             RowPolicyFaults, RowPolicyTime>
+  JsonMember<EpisodeRow, RowTags, std::vector<Verdict>, std::vector<RowContact>, StateTrace, FootTrace, ControllerFaults,
+             PolicyFaults, PlanTimes>
       json;
   RowFieldUse use = {};
 };

@@ -12,7 +12,7 @@
 
 #include "duet/core/outcome.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/named_values.h"
+#include "duet/core/named_values.h"
 
 namespace duet {
 

@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "duet/rows/episode_row.h"
-#include "duet/rows/named_values.h"
+#include "duet/core/named_values.h"
 
 namespace duet {
 

@@ -30,23 +30,23 @@ constexpr auto kTraceMembers = std::to_array<JsonMember<StateTrace>>({
     {"mm", &StateTrace::mm, "one list per frame: x, y, z of each point in turn, frame W", "mm"},
 });
 
-constexpr auto kFaultMembers = std::to_array<JsonMember<RowFaults>>({
-    {"observations", &RowFaults::observations, "ticks on which the state or the reference was not finite"},
-    {"actions", &RowFaults::actions, "ticks on which the command was not finite"},
-    {"stopped", &RowFaults::stopped, "whether it ended in its safe stop"},
+constexpr auto kFaultMembers = std::to_array<JsonMember<ControllerFaults>>({
+    {"observations", &ControllerFaults::observations, "ticks on which the state or the reference was not finite"},
+    {"actions", &ControllerFaults::actions, "ticks on which the command was not finite"},
+    {"stopped", &ControllerFaults::stopped, "whether it ended in its safe stop"},
 });
 
-constexpr auto kPolicyFaultMembers = std::to_array<JsonMember<RowPolicyFaults>>({
-    {"late", &RowPolicyFaults::late, "plans that did not come in time"},
-    {"invalid", &RowPolicyFaults::invalid, "plans that could not be used: not finite, of the wrong size, not unit"},
-    {"dead", &RowPolicyFaults::dead, "whether it gave no plan any more; the outcome is then `error`"},
-    {"message", &RowPolicyFaults::message, "of the first fault"},
+constexpr auto kPolicyFaultMembers = std::to_array<JsonMember<PolicyFaults>>({
+    {"late", &PolicyFaults::late, "plans that did not come in time"},
+    {"invalid", &PolicyFaults::invalid, "plans that could not be used: not finite, of the wrong size, not unit"},
+    {"dead", &PolicyFaults::dead, "whether it gave no plan any more; the outcome is then `error`"},
+    {"message", &PolicyFaults::message, "of the first fault"},
 });
 
-constexpr auto kPolicyTimeMembers = std::to_array<JsonMember<RowPolicyTime>>({
-    {"p50", &RowPolicyTime::p50, "median; null where no plan was asked for", "ms"},
-    {"p95", &RowPolicyTime::p95, "95th percentile", "ms"},
-    {"max", &RowPolicyTime::max, "longest", "ms"},
+constexpr auto kPolicyTimeMembers = std::to_array<JsonMember<PlanTimes>>({
+    {"p50", &PlanTimes::p50, "median; null where no plan was asked for", "ms"},
+    {"p95", &PlanTimes::p95, "95th percentile", "ms"},
+    {"max", &PlanTimes::max, "longest", "ms"},
 });
 
 constexpr auto kFootMembers = std::to_array<JsonMember<FootTrace>>({
@@ -111,15 +111,15 @@ std::span<const JsonMember<StateTrace>> part_members<StateTrace>() {
   return kTraceMembers;
 }
 template <>
-std::span<const JsonMember<RowFaults>> part_members<RowFaults>() {
+std::span<const JsonMember<ControllerFaults>> part_members<ControllerFaults>() {
   return kFaultMembers;
 }
 template <>
-std::span<const JsonMember<RowPolicyFaults>> part_members<RowPolicyFaults>() {
+std::span<const JsonMember<PolicyFaults>> part_members<PolicyFaults>() {
   return kPolicyFaultMembers;
 }
 template <>
-std::span<const JsonMember<RowPolicyTime>> part_members<RowPolicyTime>() {
+std::span<const JsonMember<PlanTimes>> part_members<PlanTimes>() {
   return kPolicyTimeMembers;
 }
 template <>

@@ -2,25 +2,23 @@
 // object, declared once: its struct here and its members' table in row_objects.cpp.
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "duet/core/episode_facts.h"
 #include "duet/core/episode_tags.h"
 #include "duet/rows/json_members.h"
 
 namespace duet {
 
-struct Verdict {           // of one detector
+// The verdict of one detector. Values and margins: NaN where undefined (null in JSON, as for any other that is not
+// finite).
+struct Verdict : DetectorFacts {
   std::string version;     // "paper", "robot", "interaction"
   std::string thresholds;  // "paper", "strict", "act"
-  bool success = false;
-  NamedFlags parts;
-  NamedNumbers values;   // NaN where undefined (null in JSON, as for any other that is not finite)
-  NamedNumbers margins;  // likewise
-  int frames = 0;        // number of evidence frames
+  int frames = 0;          // number of evidence frames
 };
 
 // Tags of an episode (core/episode_tags.h). Rows that have the same share them.
@@ -52,44 +50,15 @@ struct StateTrace {
   std::vector<std::vector<int>> mm;  // per frame x, y, z of each point in turn [mm], frame W; empty: not recorded
 };
 
-// How often the controller met a number that is not finite, and what it did.
-struct RowFaults {
-  int observations = 0;  // ticks on which the state or the reference was not finite
-  int actions = 0;       // ticks on which the command was not finite
-  bool stopped = false;  // the safe stop was entered
-
-  [[nodiscard]] bool any() const { return observations > 0 || actions > 0 || stopped; }
-};
-
-// Faults of a policy's plans.
-struct RowPolicyFaults {
-  int late = 0, invalid = 0;  // plans that did not come in time, or were not finite, of the wrong size, not unit
-  bool dead = false;          // it gave no plan any more
-  std::string message;        // of the first fault
-
-  [[nodiscard]] bool any() const { return late > 0 || invalid > 0 || dead; }
-};
-
-// Wall time of the policy's plans [ms]; NaN where none was asked for. Differs from run to run.
-struct RowPolicyTime {
-  double p50 = std::numeric_limits<double>::quiet_NaN(), p95 = p50, max = p50;
-};
-
 // Height of the lowest point of each sole over the ground, of a robot whose controller walks.
 struct FootTrace {
   double rate_hz = 25.0;               // frame i is at i / rate_hz [s]
   std::vector<int> left_mm, right_mm;  // as long as one another [mm]; empty: not recorded
 };
 
-// One contact of one robot link with one capsule of a solid human.
-struct RowContact {
+// A contact as a row keeps it, by names.
+struct RowContact : ContactFacts {
   std::string link, region, capsule;  // "left_wrist_yaw_link", "upper_arm", "right_upper_arm"
-  double begin_s = 0.0;               // from the episode's begin [s]
-  double duration_s = 0.0;            // [s]
-  double peak_n = 0.0;                // [N]
-  double impulse_ns = 0.0;            // of the force's magnitude [N s]
-  double depth_m = 0.0;               // largest [m]
-  double windowed_mean_n = 0.0;       // largest mean over the window of the measurement, 0.1 s [N]
 };
 
 inline constexpr std::size_t kMostRowContacts = 16;
@@ -101,11 +70,11 @@ std::span<const JsonMember<Verdict>> part_members<Verdict>();
 template <>
 std::span<const JsonMember<StateTrace>> part_members<StateTrace>();
 template <>
-std::span<const JsonMember<RowFaults>> part_members<RowFaults>();
+std::span<const JsonMember<ControllerFaults>> part_members<ControllerFaults>();
 template <>
-std::span<const JsonMember<RowPolicyFaults>> part_members<RowPolicyFaults>();
+std::span<const JsonMember<PolicyFaults>> part_members<PolicyFaults>();
 template <>
-std::span<const JsonMember<RowPolicyTime>> part_members<RowPolicyTime>();
+std::span<const JsonMember<PlanTimes>> part_members<PlanTimes>();
 template <>
 std::span<const JsonMember<FootTrace>> part_members<FootTrace>();
 template <>

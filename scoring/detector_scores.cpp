@@ -121,10 +121,10 @@ nlohmann::json detectors_json(const std::vector<DetectorScore>& scores) {
     const DetectorResult& result = score.result;
     json[std::string(to_string(score.task))][score.view] = {
         {"success", result.success},
-        {"parts", result.parts},
-        {"values", numbers_or_null(result.values)},
+        {"parts", result.parts.map()},
+        {"values", numbers_or_null(result.values.map())},
         {"thresholds", numbers_or_null(thresholds(score.task, score.thresholds))},
-        {"margins", numbers_or_null(result.margins)},
+        {"margins", numbers_or_null(result.margins.map())},
         {"evidence_frames", std::count(result.frames.begin(), result.frames.end(), true)}};
   }
   return json;

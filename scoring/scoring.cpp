@@ -27,23 +27,15 @@ void add_strongest_contacts(const ContactSafetyResult& safety, const PairedMotio
   std::vector<ContactEvent> events = safety.events;
   const auto kept = static_cast<std::ptrdiff_t>(std::min(events.size(), kMostRowContacts));
   std::stable_sort(events.begin(), events.end(),
-                   [](const ContactEvent& a, const ContactEvent& b) { return a.peak_force > b.peak_force; });
+                   [](const ContactEvent& a, const ContactEvent& b) { return a.peak_n > b.peak_n; });
   events.erase(events.begin() + kept, events.end());
   std::sort(events.begin(), events.end(), [](const ContactEvent& a, const ContactEvent& b) {
-    return std::tie(a.begin, a.link, a.capsule) < std::tie(b.begin, b.link, b.capsule);
+    return std::tie(a.begin_s, a.link, a.capsule) < std::tie(b.begin_s, b.link, b.capsule);
   });
   const HumanBody human = make_human_body(bone_lengths(clip.partner));
-  for (const ContactEvent& event : events) {
-    row.contacts.push_back({.link = robot.links.at(event.link).name,
-                            .region = safety.regions.at(event.region).region,
-                            .capsule = human.capsules.at(event.capsule).name,
-                            .begin_s = event.begin,
-                            .duration_s = event.duration,
-                            .peak_n = event.peak_force,
-                            .impulse_ns = event.impulse,
-                            .depth_m = event.depth,
-                            .windowed_mean_n = event.windowed_mean});
-  }
+  for (const ContactEvent& event : events)
+    row.contacts.push_back({event, robot.links.at(event.link).name, safety.regions.at(event.region).region,
+                            human.capsules.at(event.capsule).name});
   row.contacts_total = static_cast<long>(safety.events.size()) + static_cast<long>(safety.events_left_out);
 }
 
@@ -56,7 +48,7 @@ void set_outcome(const Recording& recording, EpisodeRow& row) {
 }
 
 void set_measured(const Rollout& rollout, EpisodeRow& row) {
-  row.faults = {rollout.faults.observations, rollout.faults.actions, rollout.faults.stopped};
+  row.faults = rollout.faults;
   row.state_hash = rollout.state_hash;
   row.forces = {{"ground.mean_n", rollout.ground.mean}, {"ground.peak_n", rollout.ground.peak}};
 }
@@ -172,6 +164,12 @@ FootTrace foot_trace(const Recording& recording, const RobotModel& robot) {
   return trace;
 }
 
+NamedNumbers finite_of(const NamedNumbers& values) {
+  std::map<std::string, double> finite;
+  add_finite(values.map(), finite);
+  return finite;
+}
+
 void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out) {
   for (const auto& [name, value] : values)
     if (std::isfinite(value)) out[name] = value;
@@ -184,14 +182,9 @@ void add_finite(const std::map<std::string, double>& values, NamedNumbers& out) 
 }
 
 Verdict to_verdict(const DetectorResult& result, DetectorVersion version, ThresholdSet set) {
-  Verdict verdict;
-  verdict.version = to_string(version);
-  verdict.thresholds = to_string(set);
-  verdict.success = result.success;
-  verdict.parts = result.parts;
-  add_finite(result.values, verdict.values);
-  add_finite(result.margins, verdict.margins);
-  verdict.frames = static_cast<int>(std::count(result.frames.begin(), result.frames.end(), true));
+  Verdict verdict{result, std::string(to_string(version)), std::string(to_string(set)),
+                  static_cast<int>(std::ranges::count(result.frames, true))};
+  for (NamedNumbers* numbers : {&verdict.values, &verdict.margins}) *numbers = finite_of(*numbers);
   return verdict;
 }
 
@@ -265,9 +258,8 @@ void score_recording(const Recording& recording, const ActSource& source, const 
 void score_rollout(const Rollout& rollout, const RolloutSetup& setup, const ScoringRules& rules,
                    const RobotModel& robot, EpisodeRow& row) {
   row.late_plans = rollout.late_plans;
-  row.policy_faults = {rollout.policy_faults.late, rollout.policy_faults.invalid, rollout.policy_faults.dead,
-                       rollout.policy_faults.message};
-  row.policy_ms = {rollout.plan_times.p50, rollout.plan_times.p95, rollout.plan_times.max};
+  row.policy_faults = rollout.policy_faults;
+  row.policy_ms = rollout.plan_times;
   set_measured(rollout, row);
   add_contacts(rollout, *setup.clip, robot, row);
   score_recording(rollout.recording, act_source(rollout.recording, setup), rules, robot, row);

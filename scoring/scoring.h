@@ -52,5 +52,6 @@ inline constexpr int kShortestScored = 8;
 // Those of the values that are finite.
 void add_finite(const std::map<std::string, double>& values, std::map<std::string, double>& out);
 void add_finite(const std::map<std::string, double>& values, NamedNumbers& out);
+NamedNumbers finite_of(const NamedNumbers& values);
 
 }  // namespace duet

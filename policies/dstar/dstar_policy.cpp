@@ -63,10 +63,10 @@ class DstarPolicy final : public Policy {
 
   std::vector<Reference> plan(const Observation& observation) override {
     // A frame that is not finite may be clipped into one that is.
-    if (!is_finite(observation)) return faults_.leave_out(name_, observation.tick, "the observation is not finite");
+    if (!is_finite(observation)) return leave_out(faults_, name_, observation.tick, "the observation is not finite");
     const Anchors anchors = act(observation);
     if (!std::ranges::all_of(anchors, is_reference))
-      return faults_.leave_out(name_, observation.tick, "the network's plan is not finite");
+      return leave_out(faults_, name_, observation.tick, "the network's plan is not finite");
     return densify(anchors);
   }
 

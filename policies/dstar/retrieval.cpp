@@ -56,7 +56,7 @@ class RetrievalPolicy final : public Policy {
   // No window is near to what is not a number.
   std::vector<Reference> plan(const Observation& observation) override {
     if (is_finite(observation)) return Policy::plan(observation);
-    return faults_.leave_out(name(), observation.tick, "the observation is not finite");
+    return leave_out(faults_, name(), observation.tick, "the observation is not finite");
   }
 
   [[nodiscard]] PolicyFaults faults() const override { return faults_; }

@@ -56,11 +56,11 @@ class OnnxPolicy final : public Policy {
 
   std::vector<Reference> plan(const Observation& observation) override {
     if (!is_finite(observation))
-      return faults_.leave_out(name_, observation.tick, "observation: expected finite numbers, found others");
+      return leave_out(faults_, name_, observation.tick, "observation: expected finite numbers, found others");
     for (std::size_t i = 0; i < inputs_.size(); ++i) write(inputs_[i], observation, buffers_[i]);
     network_.run();
     DecodedPlan decoded = decoder_.decode(network_.output(plan_output_), observation.now().robot);
-    if (!decoded.fault.empty()) return faults_.leave_out(name_, observation.tick, decoded.fault);
+    if (!decoded.fault.empty()) return leave_out(faults_, name_, observation.tick, decoded.fault);
     held_ = decoded.references.front();
     return std::move(decoded.references);
   }

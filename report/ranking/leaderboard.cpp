@@ -39,7 +39,7 @@ std::map<Counterpart, const EpisodeRow*> null_arm(const RowList& rows) {
   return index;
 }
 
-void count_policy_faults(const RowPolicyFaults& faults, LeaderboardEntry& entry) {
+void count_policy_faults(const PolicyFaults& faults, LeaderboardEntry& entry) {
   entry.plans_late += faults.late;
   entry.plans_invalid += faults.invalid;
   entry.policy_dead += faults.dead ? 1 : 0;

@@ -12,7 +12,7 @@
 #include "duet/rows/episode_row.h"
 #include "duet/rows/folder/name_digests.h"
 #include "duet/rows/folder/run_info.h"
-#include "duet/rows/named_values.h"
+#include "duet/core/named_values.h"
 
 namespace duet {
 

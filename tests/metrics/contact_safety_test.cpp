@@ -51,11 +51,11 @@ TEST(ContactSafety, AConstantForceHasItsClosedForm) {
   EXPECT_EQ(event.link, 0);
   EXPECT_EQ(event.capsule, kChestA);
   EXPECT_EQ(result.regions[event.region].region, "chest");
-  EXPECT_NEAR(event.begin, 0.5, kRounding);
-  EXPECT_NEAR(event.duration, 1.0, kRounding);
-  EXPECT_EQ(event.peak_force, 50.0);
-  EXPECT_NEAR(event.impulse, 50.0, kRounding);
-  EXPECT_EQ(event.windowed_mean, 50.0);
+  EXPECT_NEAR(event.begin_s, 0.5, kRounding);
+  EXPECT_NEAR(event.duration_s, 1.0, kRounding);
+  EXPECT_EQ(event.peak_n, 50.0);
+  EXPECT_NEAR(event.impulse_ns, 50.0, kRounding);
+  EXPECT_EQ(event.windowed_mean_n, 50.0);
 }
 
 TEST(ContactSafety, AHalfSineHasItsClosedForm) {
@@ -146,8 +146,8 @@ TEST(ContactSafety, PointsOfOnePairSumAsVectorsBeforeTheyAreCompared) {
   });
   EXPECT_EQ(region(result, "chest").peak_pair_force, 60.0);
   ASSERT_EQ(result.events.size(), 1u);
-  EXPECT_EQ(result.events[0].peak_force, 60.0);
-  EXPECT_EQ(result.events[0].depth, 0.004);
+  EXPECT_EQ(result.events[0].peak_n, 60.0);
+  EXPECT_EQ(result.events[0].depth_m, 0.004);
 }
 
 TEST(ContactSafety, ASqueezeFromTwoSidesDoesNotCancel) {
@@ -168,10 +168,10 @@ TEST(ContactSafety, AlternatingLinksAreOneContactOfTheRegionAndManyEvents) {
   ASSERT_EQ(result.events.size(), 20u);
   for (int e = 0; e < 20; ++e) {
     EXPECT_EQ(result.events[e].link, e % 2);
-    EXPECT_NEAR(result.events[e].begin, 0.05 * e, kRounding);
-    EXPECT_NEAR(result.events[e].duration, 0.05, kRounding);
-    EXPECT_NEAR(result.events[e].impulse, 2.5, kRounding);
-    EXPECT_NEAR(result.events[e].windowed_mean, 25.0, kRounding);  // half of the window
+    EXPECT_NEAR(result.events[e].begin_s, 0.05 * e, kRounding);
+    EXPECT_NEAR(result.events[e].duration_s, 0.05, kRounding);
+    EXPECT_NEAR(result.events[e].impulse_ns, 2.5, kRounding);
+    EXPECT_NEAR(result.events[e].windowed_mean_n, 25.0, kRounding);  // half of the window
   }
 }
 
@@ -194,8 +194,8 @@ TEST(ContactSafety, GapsUpToTheBridgeDoNotEndAContact) {
   };
   const ContactSafetyResult bridged = with_gap(0.02);
   EXPECT_EQ(bridged.events.size(), 1u);
-  EXPECT_NEAR(bridged.events[0].duration, 1.0, kRounding);
-  EXPECT_NEAR(bridged.events[0].impulse, 50.0 * 0.98, kRounding);
+  EXPECT_NEAR(bridged.events[0].duration_s, 1.0, kRounding);
+  EXPECT_NEAR(bridged.events[0].impulse_ns, 50.0 * 0.98, kRounding);
   EXPECT_EQ(region(bridged, "chest").contacts, 1);
   const ContactSafetyResult apart = with_gap(0.022);
   EXPECT_EQ(apart.events.size(), 2u);
@@ -230,7 +230,7 @@ TEST(ContactSafety, FiguresDoNotDependOnTheStep) {
   EXPECT_NEAR(a.pressure_n_cm2, b.pressure_n_cm2, 1e-3 * a.pressure_n_cm2);
   EXPECT_NEAR(a.longest, b.longest, kRounding);
   ASSERT_EQ(fine.events.size(), coarse.events.size());
-  EXPECT_NEAR(fine.events[0].windowed_mean, coarse.events[0].windowed_mean, kSlope * 0.002);
+  EXPECT_NEAR(fine.events[0].windowed_mean_n, coarse.events[0].windowed_mean_n, kSlope * 0.002);
 }
 
 TEST(ContactSafety, ALimitThatIsReachedIsKeptAndTheNextNumberIsOver) {

@@ -134,7 +134,7 @@ TEST(Interaction, TimesOfTouchAreOfTheRightBodiesAndInTheWindow) {
   ContactSafetyResult safety;
   safety.settled_ratio = 0.5;
   const auto touch = [&](int link, int capsule, double begin, double duration) {
-    safety.events.push_back({.link = link, .capsule = capsule, .begin = begin, .duration = duration});
+    safety.events.push_back({{.begin_s = begin, .duration_s = duration}, link, capsule});
   };
   touch(hand, 0, 1.0, 0.4);
   touch(hand, 0, 1.2, 0.4);  // both at once count once

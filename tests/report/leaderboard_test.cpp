@@ -130,7 +130,7 @@ TEST(Leaderboard, WhatDidNotEndWellFailsAndIsShown) {
        {Outcome::kOk, Outcome::kFell, Outcome::kDiverged, Outcome::kTimedOut, Outcome::kError, Outcome::kUnsupported}) {
     rows.push_back(episode("replay", "hug", static_cast<int>(rows.size()), true));
     rows.back().outcome = outcome;
-    rows.back().verdicts = {Verdict{"robot", "strict", true, {}, {}, {}, 0}};
+    rows.back().verdicts = {Verdict{{.success = true}, "robot", "strict"}};
   }
   rows.push_back(episode("replay", "hug", 6, true));
   rows.back().success.reset();

@@ -53,13 +53,13 @@ inline EpisodeRow full_row() {
   row.tags = RowTags({{std::string(kKindsTag), "jitter"}, {std::string(kSizeTag), "0.05"}});
   row.message = "pelvis below 0.3 m at 2.1 s, \"sideways\"\nμ = 0.8";
   row.success = true;
-  row.verdicts = {{.version = "paper",
-                   .thresholds = "strict",
-                   .success = true,
-                   .parts = {{"contact", true}, {"duration", false}},
-                   .values = {{"distance", 0.1}},
-                   .margins = {{"overall", -0.25}},
-                   .frames = 31}};
+  row.verdicts = {{{.success = true,
+                    .parts = {{"contact", true}, {"duration", false}},
+                    .values = {{"distance", 0.1}},
+                    .margins = {{"overall", -0.25}}},
+                   "paper",
+                   "strict",
+                   31}};
   row.metrics = {{"jpe", 0.1 + 0.2}, {"hf_ratio", 1e-300}};
   row.fell = true;
   row.frames = 250;
@@ -68,15 +68,15 @@ inline EpisodeRow full_row() {
   row.contact_peak_n = 81.5;
   row.contact_impulse_ns = 3.25;
   row.forces = {{"ground.mean_n", 343.125}, {"human.chest.quasi_static_n", 12.1 + 0.2}};
-  row.contacts = {{.link = "left_wrist_yaw_link",
-                   .region = "chest",
-                   .capsule = "chest_left",
-                   .begin_s = 1.25,
-                   .duration_s = 0.1 + 0.2,
-                   .peak_n = 81.5,
-                   .impulse_ns = 3.25,
-                   .depth_m = 0.00326,
-                   .windowed_mean_n = 60.5}};
+  row.contacts = {{{.begin_s = 1.25,
+                    .duration_s = 0.1 + 0.2,
+                    .peak_n = 81.5,
+                    .impulse_ns = 3.25,
+                    .depth_m = 0.00326,
+                    .windowed_mean_n = 60.5},
+                   "left_wrist_yaw_link",
+                   "chest",
+                   "chest_left"}};
   row.contacts_total = 19;
   row.trace = {
       .rate_hz = 12.5, .points = {"root", "left_hand"}, .mm = {{0, -1, 790, 210, 180, 900}, {1, 0, 789, 2, 3, 4}}};

@@ -1,4 +1,4 @@
-#include "duet/rows/named_values.h"
+#include "duet/core/named_values.h"
 
 #include <gmock/gmock.h>
 
