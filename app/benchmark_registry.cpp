@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "duet/app/benchmarks/parts.h"
+#include "duet/app/benchmarks/benchmark.h"
 #include "duet/app/part.h"
 #include "duet/motion/synthesis/synthesis.h"
 

@@ -2,12 +2,11 @@
 
 #include <fmt/format.h>
 
-#include "duet/backends/conformance/deviations.h"
+#include "duet/backends/conformance/conformance.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/core/version.h"
+#include "duet/core/share.h"
 #include "duet/rows/folder/environment.h"
 #include "duet/rows/json_fields.h"
 

@@ -9,8 +9,6 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/short_names.h"
-#include "duet/core/text.h"
 #include "duet/rows/json_fields.h"
 
 namespace duet::cli {

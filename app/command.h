@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 
 namespace duet::cli {
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "duet/core/field.h"
+#include "duet/motion/synthesis_options.h"
 
 namespace duet {
 
@@ -18,5 +19,10 @@ std::vector<OptionSection> controller_option_sections();  // of those that ship,
 std::vector<OptionSection> policy_option_sections();      // likewise, and of descriptors by their kind
 std::vector<OptionSection> engine_option_sections();      // of the engines that are there
 std::vector<OptionSection> synth_option_sections();
+
+// Options of `duet synth`, declared once.
+
+// Fields with the widest ranges; check_synthesis_options (motion/synthesis/synthesis.h) narrows by task and manner.
+const FieldTable<SynthesisOptions>& synthesis_fields();
 
 }  // namespace duet

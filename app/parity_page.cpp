@@ -1,5 +1,3 @@
-#include "duet/app/parity_page.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,8 +5,9 @@
 #include <limits>
 #include <vector>
 
-#include "duet/report/page/analysis_html.h"
-#include "duet/report/tables/escape_html.h"
+#include "duet/app/certificate.h"
+#include "duet/report/page/html_page.h"
+#include "duet/report/tables/line_plot.h"
 
 namespace duet {
 namespace {

@@ -6,16 +6,16 @@
 #include <chrono>
 #include <numbers>
 
-#include "duet/core/pose.h"
-#include "duet/core/text.h"
+#include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/external/channel_values.h"
 #include "duet/policies/external/descriptor.h"
-#include "duet/policies/external/onnx_policy.h"
+#include "duet/policies/external/external_policy.h"
 #include "duet/policies/language.h"
-#include "duet/policies/observation_history.h"
-#include "duet/retarget/pair.h"
+#include "duet/policies/policy.h"
+#include "duet/retarget/solver/pair.h"
 
 namespace duet {
 namespace {

@@ -22,8 +22,6 @@
 #include "duet/app/version.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/short_names.h"
-#include "duet/core/text.h"
 
 namespace duet::cli {
 namespace {

@@ -8,11 +8,11 @@
 #include "duet/app/part.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/experiment/suite_file/suite_keys.h"
+#include "duet/experiment/suite_file/suite_key.h"
 #include "duet/io/channel.h"
 #include "duet/retarget/options.h"
-#include "duet/rollout/perturbations/perturbation_kinds.h"
-#include "duet/rows/groups/row_field_list.h"
+#include "duet/rollout/perturbations/perturbation_kind.h"
+#include "duet/rows/groups/database.h"
 
 namespace duet {
 namespace {

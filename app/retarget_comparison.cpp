@@ -5,13 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/backends/thread_clock.h"
-#include "duet/core/parallel.h"
-#include "duet/metrics/grounding.h"
-#include "duet/metrics/object_metrics.h"
+#include "duet/backends/physics_backend.h"
+#include "duet/core/machine.h"
+#include "duet/metrics/locomotion.h"
 #include "duet/metrics/retargeting.h"
 #include "duet/report/tables/text_table.h"
-#include "duet/retarget/pair.h"
+#include "duet/retarget/solver/pair.h"
 
 namespace duet {
 namespace {

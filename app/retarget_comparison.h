@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/retarget/options.h"
 #include "duet/robots/robot_model.h"

@@ -5,8 +5,8 @@
 
 #include <vector>
 
-#include "duet/backends/factory.h"
-#include "duet/core/version.h"
+#include "duet/backends/engine_module.h"
+#include "duet/core/share.h"
 
 namespace duet {
 

@@ -5,11 +5,8 @@
 
 #include <algorithm>
 
-#include "duet/core/no_data.h"
-#include "duet/core/number.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/split.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

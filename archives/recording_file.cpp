@@ -5,9 +5,8 @@
 #include <cmath>
 
 #include "duet/archives/npy/npz.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

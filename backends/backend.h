@@ -4,18 +4,48 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "duet/backends/scene.h"
-#include "duet/core/contact.h"
-#include "duet/core/outcome.h"
 #include "duet/core/robot_state.h"
+#include "duet/core/task.h"
+#include "duet/robots/dynamics.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
+
+// A scene is plain data: one robot on flat ground z = 0, and a human partner made of capsules. The same scene goes to
+// every engine.
+
+// ghost: the partner touches nothing (as in the supplement). solid: contacts act on the robot and are reported.
+enum class PartnerMode { kNone, kGhost, kSolid };
+
+// Friction is stated per pair of bodies (docs/architecture.md, 4); the adapter finds values that give it.
+struct PairFriction {
+  double robot_ground = 0.8;
+  double robot_human = 0.5;
+  double robot_robot = 0.5;
+};
+
+// Settings of one engine by name (iterations, solver, ...), as its module lists them: EngineModule::options.
+using EngineOptions = std::map<std::string, std::string>;
+
+struct Scene {
+  std::shared_ptr<const RobotModel> robot;  // shared by all episodes and threads; read-only
+  HumanBody human;                          // its capsules carry the skin
+  PartnerMode partner = PartnerMode::kGhost;
+  PairFriction friction;
+  double dt = 0.002;  // physics step [s]
+  // In W [m/s^2]. A tilted one is an incline.
+  Eigen::Vector3d gravity = {0.0, 0.0, -kGravity};
+  bool self_collision = true;  // the pairs of RobotModel::self_collision touch
+  EngineOptions options;       // of the engine that it goes to; what is not named has the engine's default
+};
 
 // Everything that a continuation depends on, as the engine stores it. Only for the same engine, scene and binary.
 struct Snapshot {
@@ -46,10 +76,10 @@ class Backend {
   // Puts the robot into `state`; clears contacts, warm starts and pushes, and takes the partner away until the next
   // set_partner(): the same state gives bitwise the same continuation. Throws std::invalid_argument for wrong sizes,
   // values that are not finite and a quaternion that is not unit; in an engine also for links that overlap or are below
-  // the ground by more than start_overlap.h allows, by name.
+  // the ground by more than narrow_phase.h allows, by name.
   void reset(const RobotState& state);
   // Partner joints now; each following step moves them on at `velocities` until the next call. The first call after a
-  // reset throws std::invalid_argument in an engine where the solid partner is inside the robot (start_overlap.h).
+  // reset throws std::invalid_argument in an engine where the solid partner is inside the robot (narrow_phase.h).
   void set_partner(const HumanJoints& joints, const HumanJoints& velocities);
   // One physics step of scene().dt with the torque law of JointCommand evaluated inside it. kDiverged is final until
   // reset: state() then stays at the last finite one. Throws std::invalid_argument for wrong sizes, values that are not

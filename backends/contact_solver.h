@@ -1,5 +1,5 @@
 // Contacts and joint stops of one step as soft unilateral rows with Coulomb's cone, seen through an inertia A = M + S
-// (backends/implicit_law.h). For engines without a contact solver of their own.
+// (backends/physics_backend.h). For engines without a contact solver of their own.
 // With the velocity v0 that the step would end with, the impulses p [N s] and the velocity u of the other side,
 //   v = v0 + A^-1 J^T p,   0 <= p_n  complementary to  n (J v - u) + cfm p_n / dt - erp depth / dt >= 0,
 //   |p_t| <= friction p_n, against the slip where equal.
@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "duet/backends/narrow_phase.h"
-#include "duet/robots/tree_factor.h"
+#include "duet/robots/dynamics.h"
 
 namespace duet {
 

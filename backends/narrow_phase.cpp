@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "duet/core/require.h"
+
 namespace duet {
 namespace {
 
@@ -171,6 +173,86 @@ void NarrowPhase::collide_human(const MovingPartner& partner) {
            .v_other_W = capsule_velocity(human_.capsules[k], partner, p_W)});
     }
   }
+}
+
+namespace {
+
+constexpr double kShortest = 1e-9;  // [m]
+
+}  // namespace
+
+void MovingPartner::set(const HumanJoints& new_joints, const HumanJoints& new_velocities) {
+  present = true;
+  joints = new_joints;
+  velocities = new_velocities;
+}
+
+void MovingPartner::append_to(std::vector<double>& values) const {
+  values.push_back(present ? 1.0 : 0.0);
+  values.insert(values.end(), joints.data(), joints.data() + joints.size());
+  values.insert(values.end(), velocities.data(), velocities.data() + velocities.size());
+}
+
+void MovingPartner::read_from(std::span<const double> values) {
+  present = values[0] != 0.0;
+  std::copy_n(values.data() + 1, joints.size(), joints.data());
+  std::copy_n(values.data() + 1 + joints.size(), velocities.size(), velocities.data());
+}
+
+CapsulePose capsule_pose(const HumanCapsule& capsule, const HumanJoints& joints) {
+  const std::array<Eigen::Vector3d, 2> ends = capsule.ends(joints);
+  const Eigen::Vector3d axis = ends[1] - ends[0];
+  const double length = axis.norm();
+  const Eigen::Vector3d p_WC = 0.5 * (ends[0] + ends[1]);
+  if (length < kShortest) return {{Eigen::Quaterniond::Identity(), p_WC}, 0.0};  // two joints in one place: a sphere
+  return {{Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis), p_WC}, 0.5 * length};
+}
+
+Eigen::Vector3d capsule_velocity(const HumanCapsule& capsule, const MovingPartner& partner,
+                                 const Eigen::Vector3d& p_W) {
+  const std::array<Eigen::Vector3d, 2> ends = capsule.ends(partner.joints);
+  const std::array<Eigen::Vector3d, 2> end_velocities = capsule.ends(partner.velocities);
+  const Eigen::Vector3d axis = ends[1] - ends[0];
+  const double length_squared = axis.squaredNorm();
+  const double along = length_squared > 0.0 ? axis.dot(p_W - ends[0]) / length_squared : 0.0;
+  return end_velocities[0] + std::clamp(along, 0.0, 1.0) * (end_velocities[1] - end_velocities[0]);
+}
+
+namespace {
+
+ContactPoint deepest(const Scene& scene, const RobotState& state, const MovingPartner& partner, bool with_human) {
+  Kinematics kinematics(*scene.robot);
+  kinematics.update(state.X_WB, state.q);
+  NarrowPhase narrow_phase(scene, scene.robot->shapes.size() * scene.human.capsules.size());
+  ContactPoint found;
+  for (const ContactPoint& point : narrow_phase.collide(kinematics, partner))
+    if ((point.side == ContactSide::kHuman) == with_human && point.depth > found.depth) found = point;
+  return found;
+}
+
+}  // namespace
+
+void refuse_robot_overlap(const Scene& scene, const RobotState& state) {
+  const ContactPoint point = deepest(scene, state, {}, false);
+  if (point.depth <= kRobotOverlap) return;
+  const std::vector<RobotLink>& links = scene.robot->links;
+  if (point.side == ContactSide::kGround)
+    throw std::invalid_argument(
+        fmt::format("Backend::reset: {} is {:.3f} m below the ground", links[point.link].name, point.depth));
+  throw std::invalid_argument(fmt::format("Backend::reset: {} and {} overlap by {:.3f} m", links[point.link].name,
+                                          links[point.other].name, point.depth));
+}
+
+void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints) {
+  if (scene.partner != PartnerMode::kSolid) return;
+  MovingPartner partner;
+  partner.set(joints, HumanJoints::Zero());
+  const ContactPoint point = deepest(scene, state, partner, true);
+  if (point.depth <= kPartnerOverlap) return;
+  throw std::invalid_argument(
+      fmt::format("Backend::set_partner: {} (region {}) of the partner and {} overlap by {:.3f} m",
+                  scene.human.capsules[point.other].name, scene.human.capsules[point.other].region,
+                  scene.robot->links[point.link].name, point.depth));
 }
 
 }  // namespace duet

@@ -5,15 +5,44 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <span>
 #include <vector>
 
-#include "duet/backends/partner.h"
-#include "duet/backends/scene.h"
-#include "duet/core/contact.h"
+#include "duet/backends/backend.h"
+#include "duet/core/robot_state.h"
+#include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
+
+// The partner as engines see it: joints that move on at constant velocity between two calls of set_partner, and the
+// pose and the velocity of each capsule. No allocation.
+
+struct MovingPartner {
+  bool present = false;  // false until set: engines keep its capsules where they touch nothing
+  HumanJoints joints = HumanJoints::Zero();
+  HumanJoints velocities = HumanJoints::Zero();
+
+  void set(const HumanJoints& new_joints, const HumanJoints& new_velocities);
+  void advance(double dt) { joints += dt * velocities; }
+
+  // For snapshots: kValues numbers, appended or read back.
+  static constexpr int kValues = 1 + 2 * 3 * 24;
+  void append_to(std::vector<double>& values) const;
+  void read_from(std::span<const double> values);
+};
+
+// The axis of a capsule along z of its frame, as RobotShape has it.
+struct CapsulePose {
+  Pose X_WC;
+  double half_length = 0.0;  // [m], without caps
+};
+CapsulePose capsule_pose(const HumanCapsule& capsule, const HumanJoints& joints);
+
+// Velocity of the point of the capsule nearest to p_W: linear between the velocities of its ends (a spin about its own
+// axis is not known from joints). [m/s], frame W.
+Eigen::Vector3d capsule_velocity(const HumanCapsule& capsule, const MovingPartner& partner, const Eigen::Vector3d& p_W);
 
 struct ContactPoint {
   int link = -1;  // as in Contact: of the robot, touched by the other side
@@ -71,5 +100,17 @@ struct NearestPoints {
 };
 NearestPoints nearest_points(const Eigen::Vector3d& a1, const Eigen::Vector3d& b1, const Eigen::Vector3d& a2,
                              const Eigen::Vector3d& b2);
+
+// An episode that begins with bodies inside one another would be thrown apart: refused by name in every engine alike.
+// A light touch at the start (soles, a hand on a shoulder) is allowed.
+
+inline constexpr double kRobotOverlap = 0.03;    // of a declared pair, or of a link with the ground [m]
+inline constexpr double kPartnerOverlap = 0.10;  // of a link with a capsule of the solid partner [m]
+
+// For Backend::reset. Throws std::invalid_argument naming the deepest overlap beyond kRobotOverlap.
+void refuse_robot_overlap(const Scene& scene, const RobotState& state);
+// For the first Backend::set_partner after a reset: the same for the solid partner and kPartnerOverlap. A partner of
+// another mode is never refused.
+void refuse_partner_overlap(const Scene& scene, const RobotState& state, const HumanJoints& joints);
 
 }  // namespace duet

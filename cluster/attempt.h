@@ -50,7 +50,7 @@ class AttemptWriter {
   // `how`: "complete", "stopped", "storage".
   void ended(const std::string& how);
   [[nodiscard]] const std::string& journal() const { return journal_; }
-  // The journal's file descriptor, for crash_note.h.
+  // The journal's file descriptor, for attempt.h.
   [[nodiscard]] int descriptor() const { return descriptor_; }
 
  private:
@@ -100,5 +100,22 @@ std::int64_t file_system_time(const std::string& run);
 // Whether the attempt may be at work still: it has not ended, its process is there or on another node, and its journal
 // was written to less than `silence` seconds before `now`.
 bool may_be_alive(const AttemptRecord& attempt, std::int64_t now, double silence);
+
+// The last note of a worker that crashes: which episode its thread was at, and the signal. A handler can reach nothing
+// but globals, and there is one for the process.
+
+// From now on SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT append "crashed KEY SIGNAL" to this file before they end the
+// program as they would; -1: they do not any more.
+void note_crashes_in(int descriptor);
+
+// This thread is at an episode, as long as the object lives. Also a stack for the handler, so that a stack that
+// overflows is noted.
+class CrashScope {
+ public:
+  explicit CrashScope(std::string_view key);
+  ~CrashScope();
+  CrashScope(const CrashScope&) = delete;
+  CrashScope& operator=(const CrashScope&) = delete;
+};
 
 }  // namespace duet

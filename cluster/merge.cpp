@@ -10,13 +10,13 @@
 #include "duet/cluster/attempt.h"
 #include "duet/cluster/shard_plan.h"
 #include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/require.h"
-#include "duet/core/scratch_folder.h"
 #include "duet/execution/run_inputs.h"
-#include "duet/experiment/suite/suite_names.h"
-#include "duet/rows/folder/folder_lock.h"
+#include "duet/experiment/suite/suite.h"
+#include "duet/rows/folder/run_files.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/merge/run_union.h"
+#include "duet/rows/merge/row_merge.h"
 
 namespace duet {
 namespace {

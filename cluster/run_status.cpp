@@ -9,10 +9,9 @@
 
 #include "duet/cluster/attempt.h"
 #include "duet/cluster/work_shard.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/rows/merge/merge_files.h"
-#include "duet/rows/row_identity.h"
-#include "duet/rows/row_scan.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 namespace {

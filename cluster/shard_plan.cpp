@@ -7,15 +7,14 @@
 #include <cmath>
 #include <filesystem>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/rows/episode_row.h"
-#include "duet/rows/folder/name_digests.h"
 #include "duet/rows/folder/run_files.h"
+#include "duet/rows/folder/run_info.h"
 #include "duet/rows/json_fields.h"
 
 namespace duet {

@@ -1,5 +1,3 @@
-#include "duet/cluster/slurm_script.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sys/wait.h>
@@ -11,10 +9,10 @@
 #include <map>
 #include <memory>
 
+#include "duet/cluster/run_status.h"
 #include "duet/core/file_batch.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/shell_word.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -36,7 +36,7 @@ if(part_libraries)
 endif()
 
 # Headers that only files of their own room include: an engine's adapter, kernels, steps of one implementation.
-set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|hardware/dds)/|motion/synthesis/(people_stage|render|stage)\\.h$|_parts\\.h$|kernels?_body\\.h$|/(kernel_(types|frame|ground|object)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
+set(internal "(^|/)(backends/(mujoco|bullet|ode|simbody|dart)|hardware/dds)/|motion/synthesis/(people_stage|render|stage)\\.h$|_parts\\.h$|kernels?_body\\.h$|/(kernel_(frame|ground|object)|lane_(problem|lbfgs)|(double_lbfgs|lbfgs_(memory|body)|pair_kernel))\\.h$|/network_engines\\.h$|/libtorch_peer\\.h$")
 foreach(room IN LISTS rooms ITEMS app)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${room}/*.h)
   list(FILTER headers EXCLUDE REGEX "${internal}")

@@ -168,7 +168,7 @@ def read(name):
 
 
 def operator_sets():
-    oldest, newest = re.search(r"kOldestOpset = (\d+), kNewestOpset = (\d+)", read("nn/onnx_model.h")).groups()
+    oldest, newest = re.search(r"kOldestOpset = (\d+), kNewestOpset = (\d+)", read("nn/onnx/onnx_model.h")).groups()
     return f"{oldest} to {newest}"
 
 
@@ -187,7 +187,7 @@ def sbu_refused():
 
 FACTS = [
     (r"(\d+) more were refused", sbu_refused, "the recordings of SBU that the gates refuse (docs/datasets.md)"),
-    (r"operator sets (\d+ to \d+)", operator_sets, "the ONNX operator sets that nn/onnx_model.h takes"),
+    (r"operator sets (\d+ to \d+)", operator_sets, "the ONNX operator sets that nn/onnx/onnx_model.h takes"),
     (r"(?i)(?:at (?=\w+ levels)|(?=\w+ levels from easy))(\w+) levels", levels, "the levels of suites/hard.yaml, level 0 counted"),
     (r"every suite but ((?:`\w+\.yaml`(?:, | and )?)+)", solid_suites, "the suites whose partner is solid"),
 ]

@@ -15,7 +15,7 @@ echo "circles of units: $circles"
 
 # Where a controller's act() is called: controllers wrap one another, hardware/walker commands over the wire and steps
 # no engine, benchmarks time it alone.
-loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers/|app/benchmarks/|parts/[a-z]*/[a-z]*_benchmark\.cpp)|^hardware/walker\.cpp$')
+loops=$(files_with 'controller_?(->|\.)act\(' | grep -vE '^(controllers/|app/benchmarks/|parts/[a-z]*/[a-z]*_benchmark\.cpp)|^hardware/guard/walker\.cpp$')
 echo "places that step a robot under a controller: $(wc -l <<<"$loops")"
 indented <<<"$loops"
 

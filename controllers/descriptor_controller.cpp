@@ -11,12 +11,12 @@
 
 #include "duet/controllers/observer.h"
 #include "duet/controllers/root_conversion.h"
-#include "duet/core/clock.h"
+#include "duet/core/field.h"
 #include "duet/core/names.h"
-#include "duet/core/option.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/io/bound_network.h"
-#include "duet/io/joint_binding.h"
+#include "duet/io/channel.h"
 #include "duet/robots/roles.h"
 
 namespace duet {

@@ -1,5 +1,3 @@
-#include "duet/controllers/network_facts.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -10,9 +8,8 @@
 #include <string_view>
 #include <utility>
 
-#include "duet/core/number.h"
+#include "duet/controllers/descriptor_controller.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "duet/core/clock.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 namespace {

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "duet/core/names.h"
-#include "duet/core/number.h"
 #include "duet/core/require.h"
 
 namespace duet {

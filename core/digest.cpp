@@ -8,7 +8,6 @@
 #include <stdexcept>
 
 #include "duet/core/file.h"
-#include "duet/core/read_observer.h"
 
 namespace duet {
 namespace {

@@ -9,8 +9,7 @@
 #include <string_view>
 
 #include "duet/core/names.h"
-#include "duet/core/number.h"
-#include "duet/core/text.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

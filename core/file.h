@@ -2,9 +2,13 @@
 // system's reason.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <new>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "duet/core/require.h"
 
@@ -64,5 +68,76 @@ class LineAppender {
   bool complete_ = true;   // nothing but complete lines is in the file
   bool regular_ = true;    // a device or a pipe cannot be cut
 };
+
+// Detection of a file that is no data at all, by its first bytes: a pointer of Git LFS, a page that a server sent, text
+// in another encoding, a document of an office. Thread-safe.
+
+inline constexpr std::size_t kToldBytes = 1024;  // from the beginning of a file, enough for every kind
+
+// A sentence without the file's name ("this is a Git LFS pointer, ..."); "" where the bytes may be data.
+std::string no_data_fault(std::string_view first_bytes);
+
+// Throws InputError ("'FILE': this is ...") for the first bytes of a file. A file that is named ".html" may be a page.
+void refuse_no_data(const std::string& path, std::string_view first_bytes);
+
+// Text without the byte order mark that some editors write before UTF-8.
+std::string_view without_byte_order_mark(std::string_view text);
+
+// Text of any system: without that mark, and with "\n" in the place of "\r\n" and of "\r" alone.
+std::string plain_text(std::string text);
+
+// A callback that is told of each file that a thread reads whole (core/file.h), so that a reader knows nothing of those
+// who want to know what it read. One per thread; only core/digest.h uses it.
+
+using ReadObserver = void (*)(const std::string& path, std::string_view bytes);
+
+// This thread's; null: nobody is told.
+ReadObserver& read_observer();
+
+// A file that a policy or a controller loads: part of what it is, wherever it lies.
+struct LoadedFile {
+  std::string role;  // "network", "library", "descriptor", "command wave.py": an option's name where one gives its path
+  std::string path;
+};
+
+using LoadedFiles = std::vector<LoadedFile>;
+
+// Files that others made, for whoever reads them: what is no data at all is said by name (file.h), text of any
+// system becomes plain. Thread-safe.
+
+// read_file() of what a reader reads. Throws InputError also where the file is empty.
+std::string read_data(const std::string& path, std::int64_t most = kMostFileBytes);
+
+// The same of text that is read line by line (CSV, BVH, lists of names): without a byte order mark, with "\n" in the
+// place of "\r\n" and of "\r" alone.
+std::string read_plain_text(const std::string& path, std::int64_t most = kMostTextBytes);
+
+// At most `most` bytes from the beginning, as they are. Throws InputError where the file cannot be read.
+std::string read_head(const std::string& path, std::size_t most);
+
+// Throws what read_data() would throw at the first bytes, for whoever reads a file in parts. A folder is let be.
+void require_data(const std::string& path);
+
+// Names the file in errors that are found only after it was read. Thread-safe.
+
+// "FILE: MESSAGE", or the message alone where it names the file already.
+std::string naming_file_message(const std::string& path, const std::string& message);
+
+// The result of `work`. Its InputError, std::invalid_argument and std::bad_alloc become an InputError that names the
+// file.
+template <typename Work>
+decltype(auto) naming_file(const std::string& path, Work&& work) {
+  try {
+    return std::forward<Work>(work)();
+  } catch (const StorageError&) {
+    throw;  // the disk's fault, not the file's
+  } catch (const InputError& error) {
+    throw InputError(naming_file_message(path, error.what()));
+  } catch (const std::invalid_argument& error) {
+    throw InputError(naming_file_message(path, error.what()));
+  } catch (const std::bad_alloc&) {
+    throw InputError(naming_file_message(path, "there is not enough memory for it"));
+  }
+}
 
 }  // namespace duet

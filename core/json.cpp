@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "duet/core/episode_tags.h"
+#include "duet/core/task.h"
 
 namespace duet {
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "duet/core/text.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {
@@ -101,6 +101,44 @@ void check_options(std::string_view kind, std::string_view name, const std::map<
       throw std::invalid_argument(
           fmt::format("{} '{}': {}", kind, name, unknown_name_message("option", option, known)));
   }
+}
+
+bool is_plain_letter(char letter) {
+  constexpr std::string_view kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_.+-";
+  return kLetters.find(letter) != std::string_view::npos;
+}
+
+bool is_plain_name(std::string_view name) {
+  return !name.empty() && name.front() != '+' && name.front() != '-' && std::ranges::all_of(name, is_plain_letter);
+}
+
+std::string plain_name_message(std::string_view name) {
+  return fmt::format("expected letters, digits and _ . + - only, none of + and - first, found '{}'", name);
+}
+
+std::string synthetic_clip_id(std::string_view manner, std::string_view task, std::uint64_t seed, int index) {
+  return fmt::format("{}-{}-s{}-{:04}", manner, task, seed, index);
+}
+
+std::string tracked_clip_id(const std::string& id) { return id + "-tracked"; }
+
+std::string id_in_other_role(const std::string& id, char before) {
+  const std::string own = before == 'A' ? "-A" : "-B", other = before == 'A' ? "-B" : "-A";
+  return id.size() > own.size() && id.ends_with(own) ? id.substr(0, id.size() - own.size()) : id + other;
+}
+
+std::string shell_word(std::string_view text) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_./:=,+-@%";
+  if (!text.empty() && text.find_first_not_of(kPlain) == std::string_view::npos) return std::string(text);
+  std::string word = "'";
+  for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return word + "'";
+}
+
+std::string shell_words(const std::vector<std::string>& words) {
+  std::string line;
+  for (const std::string& word : words) line += (line.empty() ? "" : " ") + shell_word(word);
+  return line;
 }
 
 }  // namespace duet

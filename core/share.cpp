@@ -2,16 +2,18 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
-#include "duet/core/build_tree.h"
 #include "duet/core/require.h"
 
 // Defined by a program that was linked against an installed duet (cmake/duet_location.cpp.in), absent elsewhere.
 extern "C" const char* duet_installed_prefix() __attribute__((weak));
-// Defined in a module that another program loads (python/module_file.cpp), absent elsewhere.
+// Defined in a module that another program loads (python/module.cpp), absent elsewhere.
 extern "C" const char* duet_module_file() __attribute__((weak));
 
 namespace duet {
@@ -57,5 +59,43 @@ std::string first_existing(std::string_view what, const std::vector<std::string>
     if (fs::exists(place, ignored)) return place;
   throw MissingError(fmt::format("no {}: looked at {}", what, fmt::join(places, ", ")));
 }
+
+namespace {
+
+// Lines that CMake writes of the project `duet`, also where it is a part of another.
+constexpr std::string_view kSources = "duet_SOURCE_DIR:STATIC=", kBuild = "duet_BINARY_DIR:STATIC=";
+
+// A cache of somebody else, in a folder above the program, says nothing.
+bool of_one_owner(const fs::path& a, const fs::path& b) {
+  struct stat of_a = {}, of_b = {};
+  return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 && of_a.st_uid == of_b.st_uid;
+}
+
+BuildTree tree_in(const fs::path& cache) {
+  BuildTree tree;
+  std::ifstream file(cache);
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(kSources)) tree.sources = line.substr(kSources.size());
+    if (line.starts_with(kBuild)) tree.build = line.substr(kBuild.size());
+  }
+  return tree;
+}
+
+}  // namespace
+
+std::optional<BuildTree> build_tree_of(const std::string& program) {
+  std::error_code ignored;
+  const fs::path file = fs::canonical(program, ignored);
+  for (fs::path folder = file.parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
+    const fs::path cache = folder / "CMakeCache.txt";
+    if (!fs::is_regular_file(cache, ignored)) continue;
+    const BuildTree tree = of_one_owner(file, cache) ? tree_in(cache) : BuildTree();
+    if (tree.sources.empty() || tree.build.empty()) return std::nullopt;
+    return tree;
+  }
+  return std::nullopt;
+}
+
+const char* duet_version() { return DUET_VERSION; }
 
 }  // namespace duet

@@ -1,6 +1,7 @@
 // Files that ship with duet: robot cards, engine profiles, limit tables; and where an installed duet keeps its own.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -8,7 +9,7 @@
 namespace duet {
 
 // The file `relative` ("profiles/parity.yaml") in $DUET_SHARE, else in share/duet of one of `installed_prefixes`, else,
-// where none of them is there, in the sources of a program that lies where it was built (core/build_tree.h). Throws
+// where none of them is there, in the sources of a program that lies where it was built (core/share.h). Throws
 // MissingError naming `what` ("robot card") and the places looked at.
 std::string share_file(std::string_view what, std::string_view relative);
 
@@ -23,5 +24,19 @@ std::vector<std::string> share_folders();
 
 // The first of `places` that exists; throws MissingError naming them all where none does.
 std::string first_existing(std::string_view what, const std::vector<std::string>& places);
+
+// The tree in which a program was built, found from where the program lies: no path of a build is in a program, and one
+// that was copied or installed elsewhere has no such tree.
+
+struct BuildTree {
+  std::string sources, build;  // folders of duet
+};
+
+// The tree of the nearest CMakeCache.txt above `program` that is of the same owner as the program and names duet's
+// sources. None where there is no such file.
+std::optional<BuildTree> build_tree_of(const std::string& program);
+
+// The version of duet: that of the CMake project, and written nowhere else.
+const char* duet_version();  // "0.1.0"
 
 }  // namespace duet

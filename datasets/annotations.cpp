@@ -6,9 +6,12 @@
 #include <cmath>
 
 #include "duet/archives/csv.h"
-#include "duet/core/data_file.h"
+#include "duet/core/file.h"
+#include "duet/core/machine.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
+#include "duet/motion/interaction_clip.h"
+#include "duet/motion/synthesis/synthesis.h"
 #include "duet/report/tables/text_table.h"
 
 namespace duet {
@@ -109,6 +112,64 @@ void annotate(InteractionClip& clip, const Annotation& annotation) {
                                  *annotation.act_begin, *annotation.act_end, clip.frames() / clip.rate_hz()));
   clip.phases = {.act_begin = begin, .act_end = end};
   clip.source["phases"] = "annotated";
+}
+
+namespace {
+
+PhaseError error_of(const InteractionClip& clip) {
+  const Phases known = clip.phases, proposed = propose_phases(clip.a, clip.b, clip.task);
+  const int shared =
+      std::max(0, std::min(known.act_end, proposed.act_end) - std::max(known.act_begin, proposed.act_begin));
+  const int both = known.act_end - known.act_begin + proposed.act_end - proposed.act_begin - shared;
+  return {.task = clip.task,
+          .begin = (proposed.act_begin - known.act_begin) / clip.rate_hz(),
+          .end = (proposed.act_end - known.act_end) / clip.rate_hz(),
+          .overlap = static_cast<double>(shared) / both};
+}
+
+std::vector<std::string> row_of(const std::string& name, const std::vector<PhaseError>& errors) {
+  std::vector<double> begin, end, overlap;
+  for (const PhaseError& error : errors) {
+    begin.push_back(std::abs(error.begin));
+    end.push_back(std::abs(error.end));
+    overlap.push_back(error.overlap);
+  }
+  const auto cell = [](const std::vector<double>& values, double p) {
+    return fmt::format("{:.2f}", quantile(values, p));
+  };
+  return {name,
+          std::to_string(errors.size()),
+          cell(begin, 0.5),
+          cell(begin, 0.9),
+          cell(end, 0.5),
+          cell(end, 0.9),
+          cell(overlap, 0.5)};
+}
+
+}  // namespace
+
+std::vector<PhaseError> phase_errors(std::span<const Task> tasks, int count, std::uint64_t seed, int threads) {
+  std::vector<PhaseError> errors(tasks.size() * static_cast<std::size_t>(count));
+  parallel_for_each(static_cast<int>(errors.size()), threads, [&](int i) {
+    SynthesisOptions options;
+    options.seed = seed;
+    options.index = i % count;
+    errors[static_cast<std::size_t>(i)] = error_of(synthesize(tasks[static_cast<std::size_t>(i / count)], options));
+  });
+  return errors;
+}
+
+TextTable phase_error_table(std::span<const PhaseError> errors) {
+  TextTable table{
+      .header = {"task", "clips", "begin, median s", "begin, p90 s", "end, median s", "end, p90 s", "overlap, median"},
+      .rows = {}};
+  for (const Task task : all_tasks()) {
+    std::vector<PhaseError> own;
+    std::ranges::copy_if(errors, std::back_inserter(own), [&](const PhaseError& error) { return error.task == task; });
+    if (!own.empty()) table.rows.push_back(row_of(std::string(to_string(task)), own));
+  }
+  if (table.rows.size() > 1) table.rows.push_back(row_of("all", {errors.begin(), errors.end()}));
+  return table;
 }
 
 }  // namespace duet

@@ -3,13 +3,17 @@
 // hand where it is wrong.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "duet/core/task.h"
 #include "duet/motion/interaction_clip.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 
@@ -31,5 +35,20 @@ std::string annotations_csv(const std::vector<Annotation>& annotations);
 Annotation annotation_of(const InteractionClip& clip);
 // Times are rounded to frames and cut to the clip's. Throws InputError for an act outside the clip, naming it.
 void annotate(InteractionClip& clip, const Annotation& annotation);
+
+// How far the phases that duet proposes lie from those that are known: synthesis knows the act of every clip that it
+// makes (supplement B.4 annotated by hand).
+
+struct PhaseError {
+  Task task = Task::kHug;
+  double begin = 0.0, end = 0.0;  // proposed minus known [s]
+  double overlap = 0.0;           // of the two acts: shared over both together
+};
+
+// Errors of `count` clips a task, synthesised from `seed`; their own phases are hidden from the proposal.
+std::vector<PhaseError> phase_errors(std::span<const Task> tasks, int count, std::uint64_t seed, int threads);
+
+// Per task and in total: clips, median and 90th percentile of the size of both errors [s], median overlap.
+TextTable phase_error_table(std::span<const PhaseError> errors);
 
 }  // namespace duet

@@ -1,5 +1,3 @@
-#include "duet/datasets/dataset_export.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,10 +8,11 @@
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/json.h"
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
-#include "duet/datasets/dataset_files.h"
-#include "duet/datasets/dataset_folder.h"
+#include "duet/datasets/dataset.h"
+#include "duet/datasets/dataset_card.h"
+#include "duet/datasets/entry.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/rows/json_fields.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "duet/core/task.h"
-#include "duet/metrics/interaction_statistics.h"
+#include "duet/metrics/clip_statistics.h"
 #include "duet/report/tables/text_table.h"
 
 namespace duet {

@@ -8,15 +8,15 @@
 #include <utility>
 
 #include "duet/archives/recording_file.h"
-#include "duet/backends/factory.h"
-#include "duet/core/awake_time.h"
-#include "duet/core/clock.h"
+#include "duet/backends/engine_module.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
-#include "duet/experiment/plan/episode_tags.h"
-#include "duet/experiment/work/interrupt.h"
+#include "duet/core/robot_state.h"
+#include "duet/experiment/plan/episode.h"
 #include "duet/experiment/work/run_work.h"
+#include "duet/experiment/work/stop_sign.h"
 #include "duet/rows/groups/row_groups.h"
-#include "duet/scoring/episode_recording.h"
+#include "duet/scoring/scoring.h"
 
 namespace duet {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
 #include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/episode.h"

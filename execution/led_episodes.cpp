@@ -7,7 +7,7 @@
 #include <new>
 #include <utility>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/experiment/work/run_work.h"

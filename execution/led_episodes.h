@@ -15,7 +15,7 @@
 
 #include "duet/execution/experiment.h"
 #include "duet/experiment/suite/suite.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/policies/plan_queue.h"
 
 namespace duet {

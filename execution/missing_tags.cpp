@@ -8,10 +8,10 @@
 #include <tuple>
 #include <utility>
 
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/synthetic_id.h"
 #include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/episode_tags.h"
+#include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/shipped_suites.h"
 
 namespace duet {

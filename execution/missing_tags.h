@@ -1,4 +1,4 @@
-// Tags (core/episode_tags.h) of rows from before there were any: from the suite that their run keeps.
+// Tags (core/task.h) of rows from before there were any: from the suite that their run keeps.
 #pragma once
 
 #include <vector>

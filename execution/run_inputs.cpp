@@ -10,14 +10,13 @@
 #include <map>
 #include <numeric>
 
-#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/core/text.h"
-#include "duet/experiment/suite/suite_names.h"
-#include "duet/robots/card_reader.h"
+#include "duet/experiment/suite/suite.h"
+#include "duet/robots/card.h"
 #include "duet/rows/folder/run_files.h"
 #include "duet/rows/json_fields.h"
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/rows/folder/published.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet {

@@ -6,14 +6,14 @@
 #include <map>
 #include <utility>
 
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/run_identity.h"
 #include "duet/experiment/plan/shipped_suites.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/robots/kinematics.h"

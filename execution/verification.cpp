@@ -8,15 +8,14 @@
 #include <tuple>
 #include <unordered_map>
 
-#include "duet/core/parallel.h"
-#include "duet/core/random.h"
+#include "duet/core/machine.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/execution/runner.h"
 #include "duet/metrics/detector.h"
-#include "duet/rows/folder/name_digests.h"
-#include "duet/rows/folder/published.h"
+#include "duet/rows/folder/run_directory.h"
+#include "duet/rows/folder/run_info.h"
 
 namespace duet {
 namespace {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/rows/folder/run_directory.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 

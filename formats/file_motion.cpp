@@ -7,9 +7,9 @@
 #include <limits>
 #include <numbers>
 
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/formats/column_binding.h"
+#include "duet/formats/motion_layout.h"
 #include "duet/formats/motion_support.h"
 #include "duet/robots/kinematics.h"
 

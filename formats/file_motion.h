@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/recording.h"
 #include "duet/formats/motion_layout.h"
 #include "duet/robots/robot_model.h"
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "duet/formats/file_motion.h"
 #include "duet/formats/motion_source.h"
@@ -36,5 +37,19 @@ struct RobotMotionFormat {
   // null: only read. `motion` is valid, has the robot's joints in its order and the rate that it is written at.
   MotionFiles (*write)(const RobotMotion& motion, const RobotModel& robot, const RobotMotionWriting& writing) = nullptr;
 };
+
+// Robot motions in pickles: GMR, TWIST, TWIST2 and GMT; PHC, ASAP and SONIC's motion libraries.
+std::vector<RobotMotionFormat> pickle_formats();
+
+// Motions as rows of generalised positions: MuJoCo's qpos in archives (OmniRetarget, LocoMuJoCo, SPIDER), PHUMA's
+// arrays, and duet's own files.
+std::vector<RobotMotionFormat> qpos_formats();
+
+// Motions as tables of numbers: Unitree's and LAFAN1's, BONES-SEED's, hhtools'.
+std::vector<RobotMotionFormat> table_formats();
+
+// Motions for tracking policies, with the poses and velocities of all bodies: BeyondMimic's and holosoma's archives,
+// SONIC's folders.
+std::vector<RobotMotionFormat> tracking_formats();
 
 }  // namespace duet

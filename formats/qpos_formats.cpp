@@ -1,15 +1,12 @@
-#include "duet/formats/qpos_formats.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "duet/archives/recording_file.h"
-#include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/formats/file_arrays.h"
-#include "duet/formats/link_motion.h"
+#include "duet/formats/format_row.h"
+#include "duet/formats/motion_source.h"
+#include "duet/formats/motion_support.h"
 
 namespace duet {
 namespace {

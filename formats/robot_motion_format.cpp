@@ -7,11 +7,8 @@
 #include "duet/core/file_batch.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/formats/pickle_formats.h"
-#include "duet/formats/qpos_formats.h"
-#include "duet/formats/table_formats.h"
-#include "duet/formats/tracking_formats.h"
-#include "duet/robots/origin.h"
+#include "duet/formats/format_row.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,3 @@
-#include "duet/formats/table_formats.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,10 +7,9 @@
 #include <filesystem>
 #include <numbers>
 
-#include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/formats/file_arrays.h"
+#include "duet/formats/format_row.h"
+#include "duet/formats/motion_source.h"
 
 namespace duet {
 namespace {

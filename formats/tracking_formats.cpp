@@ -1,5 +1,3 @@
-#include "duet/formats/tracking_formats.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,11 +5,10 @@
 #include <numeric>
 #include <string_view>
 
-#include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/formats/file_arrays.h"
-#include "duet/formats/link_motion.h"
+#include "duet/formats/format_row.h"
+#include "duet/formats/motion_source.h"
+#include "duet/formats/motion_support.h"
 
 namespace duet {
 namespace {

@@ -4,13 +4,53 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "duet/io/gait_clock.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
+
+// The clock that walking networks are shown, and the gate that tells when a command is one to stand. Nothing allocates
+// after construction.
+
+// A command below both is one to stand.
+struct StandBounds {
+  double speed = 0.0;     // in the plane [m/s]
+  double yaw_rate = 0.0;  // [rad/s]
+};
+
+// Whether a walker is told to stand, and since when it walks.
+class StandGate {
+ public:
+  explicit StandGate(const std::optional<StandBounds>& bounds = {}) : bounds_(bounds) {}  // none: never to stand
+
+  void reset() { walking_tick_ = -1; }
+  // The command of a tick: velocity in the plane [m/s] and yaw rate [rad/s].
+  void update(double forward, double lateral, double yaw_rate);
+
+  [[nodiscard]] bool stands() const { return stands_; }              // of the last update
+  [[nodiscard]] long walking_tick() const { return walking_tick_; }  // 0 at the first tick of walking
+
+ private:
+  std::optional<StandBounds> bounds_;
+  bool stands_ = false;
+  long walking_tick_ = -1;
+};
+
+struct GaitClock {
+  double frequency_hz = 0.0;
+  std::vector<double> phases{};    // at the start [rad]
+  std::vector<double> standing{};  // phases held while told to stand, one each; empty: the clock goes on
+  std::optional<double> stance{};  // share of a turn, in (0, 1), that takes the first half of the wave
+};
+
+// Angle of one of the clock's phases [rad]. `tick`: since the start. With `standing` the clock starts at its phases
+// whenever the gate lets it go.
+double gait_angle(const GaitClock& clock, std::size_t phase, long tick, const StandGate& gate);
 
 // Where channels are named. A channel that a format does not name cannot be shown there.
 enum class ChannelFormat {
@@ -109,5 +149,15 @@ std::vector<std::string> channel_keys(ChannelKind kind);
 bool takes_key(ChannelKind kind, std::string_view key);
 // Numbers that it shows.
 int channel_size(const Channel& channel, const ChannelWidths& widths);
+
+// Joints that a file names, found in a robot by their names.
+
+struct JointBinding {
+  std::vector<int> indices;          // in the robot, in the file's order; -1: the robot lacks it
+  std::vector<std::string> absent;   // named, but not the robot's
+  std::vector<std::string> unnamed;  // the robot's, but not named
+};
+
+JointBinding bind_by_name(std::span<const std::string> names, const RobotModel& robot);
 
 }  // namespace duet

@@ -1,11 +1,15 @@
 #include "duet/metrics/catalogue.h"
 
 #include <array>
+#include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/metrics/retargeting.h"
 
 namespace duet {
 namespace {
@@ -15,14 +19,14 @@ constexpr auto kUp = Direction::kHigher;
 constexpr auto kPlain = Direction::kNone;
 constexpr auto kRetarget = MetricGroup::kRetargeting;
 constexpr auto kOther = MetricGroup::kOtherReading;
-constexpr auto kStanding = MetricGroup::kGrounding;
+constexpr auto kStandingGroup = MetricGroup::kGrounding;
 constexpr auto kThing = MetricGroup::kObject;
 constexpr auto kControl = MetricGroup::kController;
 constexpr auto kEpisode = MetricGroup::kEpisode;
 constexpr std::string_view kC21 = "supplement C.2.1";
 constexpr std::string_view kS4 = "supplement A.4.6, Table S4";
-constexpr std::string_view kGround = "duet: how a retargeted motion stands (metrics/grounding.h)";
-constexpr std::string_view kCarried = "duet: hands and a carried object (metrics/object_metrics.h)";
+constexpr std::string_view kGround = "duet: how a retargeted motion stands (metrics/locomotion.h)";
+constexpr std::string_view kCarried = "duet: hands and a carried object (metrics/retargeting.h)";
 constexpr std::string_view kDetectors = "supplement C.3.1, Algorithms 1-6";
 constexpr std::string_view kWalking = "duet: walking by command (metrics/locomotion.h)";
 constexpr std::string_view kSafety = "duet: contact safety";
@@ -52,20 +56,20 @@ constexpr auto kCatalogue = std::to_array<MetricInfo>({
     {"jpe.pelvis", "m", kDown, kOther, "Joint position error, pelvis-aligned", kC21},
     {"large_angle_ratio.entry", "1", kDown, kOther, "Large-angle ratio, per joint", kC21},
 
-    {"sole_height", "m", kDown, kStanding, "Soles off the floor while standing, median", kGround},
-    {"sole_height_max", "m", kDown, kStanding, "Soles off the floor while standing, largest", kGround},
-    {"foot_skate", "m/s", kDown, kStanding, "Skate of the soles in stance, mean", kGround},
-    {"foot_skate_max", "m/s", kDown, kStanding, "Skate of the soles in stance, 99th percentile", kGround},
-    {"penetration", "m", kDown, kStanding, "Robot in the partner, mean depth", kGround},
-    {"penetration_max", "m", kDown, kStanding, "Robot in the partner, deepest", kGround},
-    {"self_penetration_max", "m", kDown, kStanding, "Robot in itself, deepest", kGround},
-    {"bone_change_max", "m", kDown, kStanding, "Partner's arm bones change, most", kGround},
-    {"joint_speed_max", "rad/s", kDown, kStanding, "Joint speed, peak", kGround},
-    {"joint_acceleration_max", "rad/s^2", kDown, kStanding, "Joint acceleration, peak", kGround},
-    {"limit_violations", "1", kDown, kStanding, "Joint limits violated", kGround},
-    {"speed_violations", "1", kDown, kStanding, "Limits of joint speed violated", kGround},
-    {"root_roll_max", "rad", kDown, kStanding, "Roll of the base, peak", kGround},
-    {"root_tilt_max", "rad", kDown, kStanding, "Tilt of the base, peak", kGround},
+    {"sole_height", "m", kDown, kStandingGroup, "Soles off the floor while standing, median", kGround},
+    {"sole_height_max", "m", kDown, kStandingGroup, "Soles off the floor while standing, largest", kGround},
+    {"foot_skate", "m/s", kDown, kStandingGroup, "Skate of the soles in stance, mean", kGround},
+    {"foot_skate_max", "m/s", kDown, kStandingGroup, "Skate of the soles in stance, 99th percentile", kGround},
+    {"penetration", "m", kDown, kStandingGroup, "Robot in the partner, mean depth", kGround},
+    {"penetration_max", "m", kDown, kStandingGroup, "Robot in the partner, deepest", kGround},
+    {"self_penetration_max", "m", kDown, kStandingGroup, "Robot in itself, deepest", kGround},
+    {"bone_change_max", "m", kDown, kStandingGroup, "Partner's arm bones change, most", kGround},
+    {"joint_speed_max", "rad/s", kDown, kStandingGroup, "Joint speed, peak", kGround},
+    {"joint_acceleration_max", "rad/s^2", kDown, kStandingGroup, "Joint acceleration, peak", kGround},
+    {"limit_violations", "1", kDown, kStandingGroup, "Joint limits violated", kGround},
+    {"speed_violations", "1", kDown, kStandingGroup, "Limits of joint speed violated", kGround},
+    {"root_roll_max", "rad", kDown, kStandingGroup, "Roll of the base, peak", kGround},
+    {"root_tilt_max", "rad", kDown, kStandingGroup, "Tilt of the base, peak", kGround},
 
     {"object_distance_error", "m", kDown, kThing, "Hand to object, change of distance", kCarried},
     {"object_distance_error.partner", "m", kDown, kThing, "Partner's hand to object, change of distance", kCarried},
@@ -134,6 +138,63 @@ const MetricInfo& metric_of_reading(std::string_view name) {
     if (fits && (found == nullptr || info.name.size() > found->name.size())) found = &info;
   }
   return found != nullptr ? *found : metric_info(name);
+}
+
+namespace {
+
+// The texts that a MetricInfo only looks at.
+struct MetricTexts {
+  std::string name, unit, title, source;
+};
+
+struct AddedMetric {
+  std::string name;
+  std::unique_ptr<const MetricTexts> texts;
+  MetricInfo info;
+  MotionMetric metric;
+};
+
+// The one list that changes while a program runs: what a program adds has to be found by name wherever metrics are
+// read.
+OpenRegistry<AddedMetric>& added_metrics() {
+  static OpenRegistry<AddedMetric> registry;
+  return registry;
+}
+
+AddedMetric copied(const MetricInfo& info, MotionMetric metric) {
+  auto texts = std::make_unique<const MetricTexts>(
+      MetricTexts{std::string(info.name), std::string(info.unit), std::string(info.title), std::string(info.source)});
+  const MetricInfo own = {texts->name,  texts->unit,  info.direction, MetricGroup::kRetargeting,
+                          texts->title, texts->source};
+  return {texts->name, std::move(texts), own, std::move(metric)};
+}
+
+std::vector<std::string> catalogue_names() {
+  std::vector<std::string> names;
+  for (const MetricInfo& info : metric_catalogue()) names.emplace_back(info.name);
+  return names;
+}
+
+}  // namespace
+
+void register_metric(const MetricInfo& info, MotionMetric metric) {
+  require(metric != nullptr, "metric '" + std::string(info.name) + "': expected a function, found none");
+  added_metrics().add("metric", copied(info, std::move(metric)), catalogue_names());
+}
+
+std::vector<MetricInfo> motion_metric_infos() {
+  std::vector<MetricInfo> infos;
+  for (const MetricInfo& info : metric_catalogue())
+    if (info.group == MetricGroup::kRetargeting) infos.push_back(info);
+  for (const AddedMetric* added : added_metrics().all()) infos.push_back(added->info);
+  return infos;
+}
+
+std::map<std::string, double> score_motion(const PairedMotion& motion, const RobotModel& robot,
+                                           const MetricReadings& readings) {
+  std::map<std::string, double> scores = retargeting_metrics(motion, robot, readings);
+  for (const AddedMetric* added : added_metrics().all()) scores[added->name] = added->metric(motion, robot);
+  return scores;
 }
 
 }  // namespace duet

@@ -8,22 +8,83 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "duet/core/contact.h"
 #include "duet/core/episode_facts.h"
+#include "duet/core/robot_state.h"
 #include "duet/metrics/contact_limits.h"
-#include "duet/metrics/sliding_window.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
+
+// Mean and minimum over the last samples of a signal that arrives one by one. The signal counts as zero before its
+// first sample. No allocation after construction.
+
+class SlidingMean {
+ public:
+  explicit SlidingMean(int length) : samples_(length, 0.0) {}
+
+  // The mean over the last `length` samples, this one included.
+  double push(double sample) {
+    sum_ += sample - samples_[next_];
+    samples_[next_] = sample;
+    if (++next_ == samples_.size()) {
+      next_ = 0;
+      sum_ = std::accumulate(samples_.begin(), samples_.end(), 0.0);  // rounding errors live one window at most
+    }
+    return sum_ / static_cast<double>(samples_.size());
+  }
+
+  void clear() {
+    samples_.assign(samples_.size(), 0.0);
+    next_ = 0;
+    sum_ = 0.0;
+  }
+
+ private:
+  std::vector<double> samples_;
+  std::size_t next_ = 0;
+  double sum_ = 0.0;
+};
+
+class SlidingMinimum {
+ public:
+  explicit SlidingMinimum(int length) : candidates_(length) {}
+
+  // The minimum over the last `length` samples, this one included; 0 before there are so many. Samples are >= 0.
+  double push(double sample) {
+    const auto length = static_cast<std::int64_t>(candidates_.size());
+    if (size_ > 0 && candidates_[first_].index <= count_ - length) {
+      first_ = (first_ + 1) % candidates_.size();
+      --size_;
+    }
+    while (size_ > 0 && last().sample >= sample) --size_;
+    ++size_;
+    last() = {count_++, sample};
+    return count_ < length ? 0.0 : candidates_[first_].sample;
+  }
+
+ private:
+  struct Candidate {
+    std::int64_t index = 0;
+    double sample = 0.0;
+  };
+
+  Candidate& last() { return candidates_[(first_ + size_ - 1) % candidates_.size()]; }
+
+  std::vector<Candidate> candidates_;  // ring: samples that may still become the minimum, rising
+  std::size_t first_ = 0, size_ = 0;
+  std::int64_t count_ = 0;
+};
 
 struct ContactSafetyOptions {
   double hold = 0.5;          // what lasts longer is quasi-static [s]

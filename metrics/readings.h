@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/tasks/detector_readings.h"
+#include "duet/tasks/task_definition.h"
 
 namespace duet {
 

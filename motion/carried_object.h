@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/core/point_tracks.h"
-#include "duet/core/pose.h"
+#include "duet/core/recording.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 
@@ -36,5 +36,18 @@ CarriedObject mirrored(const CarriedObject& object);
 // "object_position" (T, 3), "object_quat_wxyz" (T, 4), "object_keypoints" (O, 3); none of them without an object.
 void put_object(Npz& npz, const CarriedObject& object);
 CarriedObject get_object(const Npz& npz);
+
+// Which points of a carried object stand for it, from a file of the user: the object's mesh, a box, or points.
+
+// Points of the object in its own frame [m], at most kMostObjectKeypoints: of a mesh (Wavefront .obj, its vertices), or
+// of JSON: {"points": [[x, y, z], ...]}, or {"box": [x, y, z]} with its full lengths and, where it is not about the
+// object's origin, "centre": its eight corners and its centre. More points than that are thinned to the ones that lie
+// farthest from each other, the one farthest from their mean first. Throws InputError naming file, place, expected and
+// found.
+Eigen::Matrix3Xd read_object_keypoints(const std::string& path);
+
+// The `count` points that lie farthest from each other, in the order in which they are found; all where there are no
+// more. Ties go to the first.
+Eigen::Matrix3Xd farthest_points(const Eigen::Matrix3Xd& points, int count);
 
 }  // namespace duet

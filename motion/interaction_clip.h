@@ -10,7 +10,6 @@
 #include "duet/core/task.h"
 #include "duet/motion/carried_object.h"
 #include "duet/motion/human_motion.h"
-#include "duet/motion/person.h"
 
 namespace duet {
 
@@ -47,8 +46,8 @@ struct InteractionClip {
 void validate(const InteractionClip& clip);
 
 // NPZ with the keys of docs/file-formats.md. Loading validates, and proposes the phases where the file has none
-// (motion/phase_proposal.h; `source` then has "phases": "proposed"). Throw InputError naming the file, the key and the
-// fault. Saving validates first (std::invalid_argument).
+// (motion/interaction_clip.h; `source` then has "phases": "proposed"). Throw InputError naming the file, the key and
+// the fault. Saving validates first (std::invalid_argument).
 void save_clip(const InteractionClip& clip, const std::string& path);
 InteractionClip load_clip(const std::string& path);
 // The same without a file; `name` stands in messages.
@@ -67,5 +66,12 @@ InteractionClip padded(const InteractionClip& clip, double before, double after)
 
 // Mirror image in the plane y = 0 with left and right joints (also of the contact windows) exchanged.
 InteractionClip mirrored(const InteractionClip& clip);
+
+// Automatic proposal of the three phases for a clip without annotations (supplement B.4 annotated by hand).
+
+// Phases from the two motions alone: the approach ends when the roots' distance stops shrinking and the hands begin the
+// act; the follow-up begins when the hands are back and the roots part. Always act_begin < act_end. The method stands
+// in docs/conventions.md.
+Phases propose_phases(const HumanMotion& a, const HumanMotion& b, Task task);
 
 }  // namespace duet

@@ -7,7 +7,6 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -10,7 +10,6 @@
 #include "duet/core/require.h"
 #include "duet/core/task.h"
 #include "duet/motion/human_motion.h"
-#include "duet/motion/person.h"
 
 namespace duet {
 

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/episode_tags.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/recording.h"
+#include "duet/core/task.h"
 #include "duet/motion/interaction_clip.h"
 
 namespace duet {
@@ -27,7 +27,7 @@ struct PairedMotion {
       loss;  // per term ("total", "kin", "con", "hum", "temp", "pose"), one per iteration
   std::map<std::string, std::string> settings;  // every option of the solver, kernel and robot, as text
   CarriedObject object = {};                    // of the clip, where it was there; empty: none
-  Tags tags = {};                               // of a suite's clip, for its rows (core/episode_tags.h)
+  Tags tags = {};                               // of a suite's clip, for its rows (core/task.h)
 
   [[nodiscard]] int frames() const { return robot.frames(); }
 };
@@ -44,5 +44,10 @@ PairedMotion load_paired_motion(const std::string& path);
 std::string paired_motion_bytes(const PairedMotion& motion, ZipMethod method = ZipMethod::kDeflated);
 PairedMotion parse_paired_motion(std::string_view bytes, const std::string& name);
 PairedMotion read_paired_motion(const Npz& npz);
+
+// A digest that tells whether two motions come from one clip, whatever they were called: for data splits.
+
+// SHA-256 over task, phases and both people's joints as they were before retargeting, to a tenth of a millimetre.
+std::string clip_digest(const PairedMotion& motion);
 
 }  // namespace duet

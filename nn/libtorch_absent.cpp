@@ -1,6 +1,6 @@
 // Stands for nn/libtorch_network.cpp where libtorch was not found.
 #include "duet/core/require.h"
-#include "duet/nn/network_engines.h"
+#include "duet/nn/network.h"
 
 namespace duet {
 

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "duet/core/require.h"
-#include "duet/nn/network_engines.h"
+#include "duet/nn/network.h"
 
 namespace duet {
 namespace {

@@ -5,9 +5,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/nn/safetensors.h"
 
 namespace duet {
 
@@ -45,5 +47,13 @@ class MlpRunner {
   Eigen::VectorXf input_;
   std::vector<Layer> layers_;
 };
+
+// Multilayer perceptrons among the tensors of a file: `<prefix>.<layer>.weight` (out, in) and `<prefix>.<layer>.bias`.
+
+void add_mlp(SafeTensors& tensors, const std::string& prefix, const Mlp& mlp);
+
+// Throws InputError (file, tensor, expected, found): no layer 0, a missing bias, shapes that do not fit one another,
+// weights that are not finite.
+Mlp read_mlp(const SafeTensors& tensors, const std::string& prefix, const std::string& file);
 
 }  // namespace duet

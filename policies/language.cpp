@@ -12,9 +12,8 @@
 
 #include "duet/archives/npy/npz.h"
 #include "duet/core/names.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/policies/function_words.h"
 #include "duet/tasks/task_definition.h"
 
 namespace duet {
@@ -228,5 +227,18 @@ double cosine(const std::vector<float>& a, const std::vector<float>& b) {
   }
   return aa > 0.0 && bb > 0.0 ? ab / std::sqrt(aa * bb) : 0.0;
 }
+
+namespace {
+
+constexpr std::string_view kFunctionWords[] = {
+    "a",    "an",  "and", "are",  "as",   "at",   "be",    "by",     "can",  "do",    "for",    "from",   "give",
+    "go",   "he",  "her", "him",  "his",  "i",    "in",    "into",   "is",   "it",    "its",    "let",    "lets",
+    "make", "me",  "my",  "now",  "of",   "off",  "on",    "one",    "or",   "other", "out",    "person", "please",
+    "our",  "she", "so",  "some", "that", "the",  "their", "them",   "then", "they",  "this",   "to",     "towards",
+    "up",   "us",  "we",  "with", "you",  "your", "human", "people", "big",  "very",  "partner"};
+
+}  // namespace
+
+std::span<const std::string_view> function_words() { return kFunctionWords; }
 
 }  // namespace duet

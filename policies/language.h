@@ -40,4 +40,8 @@ std::span<const std::string_view> task_paraphrases(Task task);
 
 double cosine(const std::vector<float>& a, const std::vector<float>& b);
 
+// English words that say little: the built-in language encoder leaves them out of phrases. The tasks' definitions say
+// which words mean tasks (tasks/task_definition.h).
+std::span<const std::string_view> function_words();
+
 }  // namespace duet

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "duet/core/require.h"
-#include "duet/policies/observation_history.h"
+#include "duet/policies/policy.h"
 #include "duet/policies/scheduler.h"
 
 namespace duet {

@@ -2,6 +2,8 @@
 // A.3.1, F).
 #pragma once
 
+#include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -12,15 +14,28 @@
 #include <vector>
 
 #include "duet/core/episode_facts.h"
-#include "duet/core/point_tracks.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/recording.h"
 #include "duet/core/robot_state.h"
-#include "duet/core/skeleton.h"
 #include "duet/core/task.h"
-#include "duet/policies/densify.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {
+
+// The five anchors of a plan, and the 50 Hz references between them (supplement F, Algorithm 8).
+
+inline constexpr int kAnchors = 5;             // at t + {0, 0.5, 1, 1.5, 2} s
+inline constexpr double kAnchorSpacing = 0.5;  // [s]
+inline constexpr int kTicksPerAnchor = 25;
+inline constexpr int kTicksPerPlan = 10;  // 5 Hz on the 50 Hz clock
+
+using Anchors = std::array<Reference, kAnchors>;
+
+// Algorithm 8: anchors of a call -> 100 references on the 50 Hz grid, i/50 s after the call. Positions and joints
+// linear, rotation slerp.
+std::vector<Reference> densify(const Anchors& anchors);
+
+// Positions and joints linear, rotation slerp (shorter arc); s = 0 gives a to the bit.
+Reference interpolate(const Reference& a, const Reference& b, double s);
 
 inline constexpr int kHistoryFrames = 12;     // observation history, the current frame included, at 50 Hz
 inline constexpr int kObservationSize = 149;  // human root 3, SMPL joints 72, robot 74 (supplement A.2.1)
@@ -93,5 +108,31 @@ struct PolicyInfo {
 
 // Makes one policy per episode of what it has loaded once. Thread-safe.
 using PolicyMaker = std::function<std::unique_ptr<Policy>()>;
+
+// The last kHistoryFrames frames that a policy sees, the first one repeated until there are as many. One owner, not
+// thread-safe.
+
+class ObservationHistory {
+ public:
+  void reset() { empty_ = true; }
+  // The frame of the current tick.
+  void add(const ObservationFrame& frame);
+  // Refers to this history: valid until the next add. Throws std::invalid_argument before the first add.
+  [[nodiscard]] Observation at(int tick) const;
+
+ private:
+  std::array<ObservationFrame, kHistoryFrames> frames_;  // oldest first
+  bool empty_ = true;
+};
+
+// The network's view of a history: to_vector of each frame, (149, kHistoryFrames) for 29 joints, oldest first.
+Eigen::MatrixXd to_matrix(const Observation& observation, const Eigen::Vector3d& start_position);
+
+// A policy that was made for one robot, on another whose joints have the same names: HOMIE's G1, whose waist and hands
+// are locked. The policy sees joints that the body lacks at neutral and at rest, and what it wants of them is left out.
+
+// Throws std::invalid_argument where the two have no joint in common.
+std::unique_ptr<Policy> on_other_body(std::unique_ptr<Policy> policy, std::shared_ptr<const RobotModel> made_for,
+                                      const RobotModel& body);
 
 }  // namespace duet

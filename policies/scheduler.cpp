@@ -7,8 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include "duet/core/clock.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 
 namespace duet {
 namespace {

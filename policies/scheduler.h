@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "duet/policies/densify.h"
+#include "duet/policies/policy.h"
 
 namespace duet {
 

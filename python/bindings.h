@@ -14,7 +14,7 @@ namespace duet::python {
 
 namespace py = pybind11;
 
-void add_plans(py::module_& module);        // plans_binding.cpp
+void add_plans(py::module_& module);        // environment_binding.cpp
 void add_evaluation(py::module_& module);   // evaluation_binding.cpp
 void add_archive(py::module_& module);      // archive_binding.cpp
 void add_environment(py::module_& module);  // environment_binding.cpp

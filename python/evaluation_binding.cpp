@@ -13,10 +13,9 @@
 #include <thread>
 #include <utility>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
+#include "duet/core/machine.h"
 #include "duet/core/names.h"
-#include "duet/core/parallel.h"
-#include "duet/core/plain_name.h"
 #include "duet/core/require.h"
 #include "duet/execution/missing_tags.h"
 #include "duet/execution/runner.h"

@@ -1,9 +1,10 @@
 // The module duet._duet (docs/using-duet.md).
+#include <dlfcn.h>
 #include <pybind11/pybind11.h>
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/version.h"
+#include "duet/core/share.h"
 #include "duet/python/bindings.h"
 
 PYBIND11_MODULE(_duet, module) {
@@ -17,4 +18,14 @@ PYBIND11_MODULE(_duet, module) {
   duet::python::add_evaluation(module);
   duet::python::add_archive(module);
   duet::python::add_environment(module);
+}
+
+extern "C" __attribute__((visibility("default"))) const char* duet_module_file();
+
+extern "C" const char* duet_module_file() {
+  static const char* const file = [] {
+    Dl_info info{};
+    return dladdr(reinterpret_cast<const void*>(&duet_module_file), &info) != 0 ? info.dli_fname : "";
+  }();
+  return file;
 }

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 
+#include "duet/core/require.h"
+#include "duet/metrics/detector.h"
 #include "duet/motion/human_motion.h"
-#include "duet/replay/detector_trace.h"
 #include "duet/replay/robot_outline.h"
 #include "duet/robots/human_body.h"
 #include "duet/rows/json_fields.h"
@@ -277,6 +280,132 @@ nlohmann::json replay_header(const ReplayContent& content, ReplayColumns& column
           {"robots", std::move(maker.robots)},
           {"partners", std::move(maker.partners)},
           {"scenes", std::move(scenes)}};
+}
+
+namespace {
+
+constexpr double kMostSteps = 32767.0;  // to either side of a column's middle
+constexpr std::int16_t kNotANumber = INT16_MIN;
+
+struct ColumnScale {
+  double base = 0.0, step = 1.0;
+};
+
+ColumnScale scale_of(const Eigen::Ref<const Eigen::VectorXd>& column, double step) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double value : column) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  if (low > high) return {0.0, step};
+  const double base = low + (high - low) / 2.0;
+  return {base, std::max(step, (high - low) / (2.0 * kMostSteps))};
+}
+
+std::int16_t quantised(double value, const ColumnScale& scale) {
+  if (!std::isfinite(value)) return kNotANumber;
+  return static_cast<std::int16_t>(std::lround(std::clamp((value - scale.base) / scale.step, -kMostSteps, kMostSteps)));
+}
+
+}  // namespace
+
+nlohmann::json ReplayColumns::add(const Eigen::Ref<const Eigen::MatrixXd>& values, double step) {
+  require(step > 0.0, "replay columns: expected a positive step");
+  const auto rows = static_cast<std::size_t>(values.rows()), size = rows * static_cast<std::size_t>(values.cols());
+  nlohmann::json bases = nlohmann::json::array(), steps = nlohmann::json::array();
+  const std::size_t at = bytes_.size();
+  bytes_.resize(at + 2 * size);  // the low bytes of all values, then the high ones
+  for (Eigen::Index k = 0; k < values.cols(); ++k) {
+    const ColumnScale scale = scale_of(values.col(k), step);
+    bases.push_back(scale.base);
+    steps.push_back(scale.step);
+    std::uint16_t before = 0, before_that = 0;
+    for (std::size_t t = 0; t < rows; ++t) {
+      const auto value = static_cast<std::uint16_t>(quantised(values(static_cast<Eigen::Index>(t), k), scale));
+      const auto second = static_cast<std::uint16_t>(value - 2 * before + before_that);  // modulo 65536
+      const std::size_t place = at + static_cast<std::size_t>(k) * rows + t;
+      bytes_[place] = static_cast<char>(second & 0xff);
+      bytes_[place + size] = static_cast<char>(second >> 8);
+      before_that = before;
+      before = value;
+    }
+  }
+  return {{"at", at}, {"rows", rows}, {"bases", std::move(bases)}, {"steps", std::move(steps)}};
+}
+
+namespace {
+
+// The tracks up to a frame; those that are empty stay so.
+Agent first_frames(const Agent& agent, Eigen::Index frames) {
+  Agent part;
+  for (Eigen::Matrix3Xd Agent::*track :
+       {&Agent::lhand, &Agent::rhand, &Agent::head, &Agent::root, &Agent::torso, &Agent::lshoulder, &Agent::rshoulder})
+    part.*track = (agent.*track).leftCols(std::min(frames, (agent.*track).cols()));
+  return part;
+}
+
+bool is_finite(const Recording& recording) {
+  for (const RobotState& state : recording.robot)
+    if (!state.q.allFinite() || !state.X_WB.p.allFinite() || !state.X_WB.R.coeffs().allFinite()) return false;
+  return true;
+}
+
+std::string unit_of(Task task, const std::string& name, ThresholdSet set) {
+  try {
+    return std::string(threshold_unit(task, name, set));
+  } catch (const std::invalid_argument&) {
+    return "";  // a margin over several thresholds ("overall")
+  }
+}
+
+void name_margins(const DetectorResult& result, Task task, DetectorTrace& trace) {
+  const Thresholds tau = thresholds(task, trace.set);
+  for (const auto& [name, margin] : result.margins) {
+    trace.names.push_back(name);
+    const auto threshold = tau.find(name);
+    trace.thresholds.push_back(threshold == tau.end() ? 1.0 : threshold->second);
+    trace.units.push_back(unit_of(task, name, trace.set));
+  }
+}
+
+void add_margins(const DetectorResult& result, Eigen::Index sample, DetectorTrace& trace) {
+  trace.success.push_back(result.success);
+  for (std::size_t k = 0; k < trace.names.size(); ++k) {
+    const auto found = result.margins.find(trace.names[k]);
+    const double margin = found == result.margins.end() ? NAN : found->second;
+    trace.margins(sample, static_cast<Eigen::Index>(k)) = std::isfinite(margin) ? margin : NAN;
+  }
+}
+
+}  // namespace
+
+DetectorTrace detector_trace(const Recording& recording, const RobotModel& robot, DetectorVersion version,
+                             ThresholdSet set, const DetectorReadings& readings, int stride) {
+  require(recording.task.has_value(), "detector trace: expected a recording of a task, found one of none");
+  DetectorTrace trace{.version = version,
+                      .set = set,
+                      .evidence = {},
+                      .names = {},
+                      .thresholds = {},
+                      .units = {},
+                      .frames = {},
+                      .success = {},
+                      .margins = {}};
+  if (recording.partner.empty() || recording.frames() == 0 || !is_finite(recording)) return trace;
+  const Agent human = human_agent(recording.partner), machine = robot_agent(robot, recording.robot);
+  const DetectorResult whole = detect(*recording.task, human, machine, version, set, readings);
+  trace.evidence = whole.frames;
+  name_margins(whole, *recording.task, trace);
+  for (int t = stride - 1; t < recording.frames() - 1; t += stride) trace.frames.push_back(t);
+  trace.frames.push_back(recording.frames() - 1);
+  trace.margins.resize(static_cast<Eigen::Index>(trace.frames.size()), static_cast<Eigen::Index>(trace.names.size()));
+  for (std::size_t i = 0; i + 1 < trace.frames.size(); ++i)
+    add_margins(detect(*recording.task, first_frames(human, trace.frames[i] + 1),
+                       first_frames(machine, trace.frames[i] + 1), version, set, readings),
+                static_cast<Eigen::Index>(i), trace);
+  add_margins(whole, static_cast<Eigen::Index>(trace.frames.size()) - 1, trace);
+  return trace;
 }
 
 }  // namespace duet

@@ -1,5 +1,3 @@
-#include "duet/replay/replay_mcap.h"
-
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -14,6 +12,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/motion/human_motion.h"
+#include "duet/replay/replay_content.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/rows/json_fields.h"

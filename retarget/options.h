@@ -7,9 +7,36 @@
 #include <vector>
 
 #include "duet/core/field.h"
-#include "duet/retarget/contact_keypoints.h"
+#include "duet/robots/robot_model.h"
 
 namespace duet {
+
+// Which joints of the person and points of the robot stand for each other in PAIR's contact term, K_H and K_R of
+// supplement A.1.1, and with what weight: data that a user may name ("By redefining task contact keypoints", Fig. S3).
+
+inline constexpr double kObjectByRule = -1.0;
+
+struct ContactKeypoint {
+  int smpl = 0;                   // SMPL-24 joint of the person
+  std::string frame = {};         // of the robot; empty: what its card pairs with that joint
+  double weight = 1.0;            // w_i: a distance between keypoints i and j counts w_i w_j times
+  double object = kObjectByRule;  // likewise for its distances from a carried object, or by the rule
+  bool operator==(const ContactKeypoint&) const = default;
+};
+
+// "left_hand:2,right_hand:2:1,left_wrist@left_wrist_yaw_link": joint[@frame][:weight[:object]], by commas. Throws
+// std::invalid_argument that says what was expected: an unknown joint, one that is named twice, a weight that is no
+// finite number of zero or more.
+std::vector<ContactKeypoint> parse_contact_keypoints(const std::string& text);
+std::string format_contact_keypoints(const std::vector<ContactKeypoint>& keypoints);
+
+// The robot's frame of each. Throws std::invalid_argument naming the robot: a frame that it has not, a joint that its
+// card pairs with nothing.
+std::vector<int> robot_frames(const RobotModel& robot, const std::vector<ContactKeypoint>& keypoints);
+
+// Weights of the distances from an object where the rule decides: 1 for hands, or for wrists where there is no hand
+// among the keypoints, else 0.
+std::vector<double> object_weights(const std::vector<ContactKeypoint>& keypoints);
 
 struct PairWeights {  // supplement A.1.2, stage 1
   double kin = 1.0;
@@ -77,7 +104,7 @@ struct PairOptions {
   double step_speed = 1.2;      // at most, mean over a step of a foot, where `ground` is on [m/s]
   RestPose rest_pose = RestPose::kZero;
   double contact_range = 0.0;  // robot-human distances count fully up to half of it and not at all beyond; 0: all [m]
-  bool joint_speeds = false;   // no joint of the result is quicker than its limit (retarget/joint_speeds.h)
+  bool joint_speeds = false;   // no joint of the result is quicker than its limit (retarget/solver/pair.h)
   std::string smpl_path;       // SMPL shape basis (NPZ); empty: bone-length scaling of Table S7
 };
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
+#include "duet/core/recording.h"
 #include "duet/motion/human_motion.h"
 #include "duet/retarget/pair_chain.h"
 

@@ -2,15 +2,19 @@
 // Names are not yet looked up; every entry keeps its place for later messages.
 #pragma once
 
+#include <yaml-cpp/yaml.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "duet/core/pose.h"
+#include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 
@@ -108,10 +112,40 @@ struct RobotCard {
   std::vector<CardRegions> self_collision;
   CardRoles roles;
   std::vector<std::string> files;              // the card, what it extends, and so on
-  std::map<std::string, std::string> content;  // of every key but `extends` and `urdf`, in one spelling: card_digest.h
+  std::map<std::string, std::string> content;  // of every key but `extends` and `urdf`, in one spelling: card.h
 };
 
 // Names of tracks that detectors know.
 inline constexpr const char* kTrackNames[] = {"head", "lhand", "rhand", "torso", "lshoulder", "rshoulder"};
+
+// The roles of a card: read from it, and looked up in the robot that it makes. docs/file-formats.md, "Robot card".
+
+// Replaces what the keys of `card`, which stands in `file`, say. Throws InputError as YamlSection does.
+void read_roles(const YamlSection& card, const std::string& file, CardRoles& roles);
+
+// Sets roles, fall, stance and root_bounds of a robot that has everything else. A joint that the card locks is left
+// out. Throws InputError with file and line: unknown names, legs or arms whose sides do not mirror one another joint by
+// joint, a joint that is given two sides, an angle or a range outside the joint's limits.
+void bind_roles(const RobotCard& card, RobotModel& robot);
+
+// Reads a card and what it extends. Format: docs/file-formats.md, "Robot card".
+
+// Cards that one may extend in a row.
+inline constexpr int kMostExtended = 8;
+
+// `file` names the card and is where `extends` starts from; what it extends is read and is a card of its own, whose
+// keys stand where the card has none. Throws InputError as YamlSection does, and for a cycle, naming both files.
+RobotCard parse_card(const std::string& text, const std::string& file);
+
+// Which robot a row was run on. The digest of a robot is of the URDF's bytes and of what its card says with all that it
+// extends, in one spelling: comments, the order of keys, the way numbers are written and how keys are spread over files
+// do not count. Cards of before that rule had the digest of their own bytes, and published rows carry it: those that
+// still say the same keep it.
+
+// Values of a card's keys but `extends` and `urdf`: in one spelling, mappings by key, numbers in the shortest form.
+std::map<std::string, std::string> content_of(const YAML::Node& card);
+
+// SHA-256, hex.
+std::string robot_digest(std::string_view urdf, const std::map<std::string, std::string>& content);
 
 }  // namespace duet

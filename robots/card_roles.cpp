@@ -1,5 +1,3 @@
-#include "duet/robots/card_roles.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -10,7 +8,8 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/robots/origin.h"
+#include "duet/robots/card.h"
+#include "duet/robots/robot_model.h"
 #include "duet/robots/roles.h"
 #include "duet/robots/yaml_schema.h"
 

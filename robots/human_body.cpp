@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
 
 namespace duet {
 namespace {

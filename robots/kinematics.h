@@ -6,8 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/recording.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet {

@@ -10,14 +10,10 @@
 
 #include "duet/core/file.h"
 #include "duet/core/names.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
 #include "duet/robots/card.h"
-#include "duet/robots/card_digest.h"
-#include "duet/robots/card_reader.h"
-#include "duet/robots/card_roles.h"
 #include "duet/robots/kinematics.h"
-#include "duet/robots/origin.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/urdf.h"
 

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "duet/core/pose.h"
 #include "duet/core/robot_state.h"
 
 namespace duet {
@@ -127,7 +126,7 @@ struct RobotModel {
   FallRule fall;                     // where the card has none: 0.57 of the standing height
   std::optional<StanceSize> stance;  // of the card
   std::optional<RootBounds> root_bounds;
-  std::string digest;  // SHA-256 over the URDF and what the card says, with what it extends (robots/card_digest.h)
+  std::string digest;  // SHA-256 over the URDF and what the card says, with what it extends (robots/card.h)
 
   [[nodiscard]] int dof() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] std::vector<std::string> joint_names() const;
@@ -170,5 +169,22 @@ std::string card_path(const std::string& name_or_path);
 // The robot of a card by name or path, or where that is empty of the one that stands in, to be shared by episodes and
 // threads.
 std::shared_ptr<const RobotModel> load_shared_robot(const std::string& name_or_path = "");
+
+// Where the frame of a robot's base is. A URDF may have its origin anywhere, as exports from CAD do; heights that mean
+// the body (a fall, standing, a root that is followed) need it near the pelvis. load_robot moves it there where it is
+// further away than kOriginShare of the pelvis's height over the soles, and nothing else knows of it but files that
+// hold the URDF's own origin.
+
+inline constexpr double kOriginShare = 0.4;  // the T1's trunk is .23 of it from the pelvis, the G1's pelvis 0
+
+// The same robot with its base's origin at `p_B`, given in the base's frame [m].
+RobotModel with_origin_at(RobotModel robot, const Eigen::Vector3d& p_B);
+
+// The URDF's origin of the base, in the base's frame [m]: zero but for a robot whose origin was moved.
+Eigen::Vector3d urdf_origin(const RobotModel& robot);
+
+// Notes for the user on how a card's files were read, in sentences: an origin that was moved, what of the URDF is not
+// simulated. `card`: by name or path. Throws as load_robot.
+std::vector<std::string> robot_notes(const std::string& card);
 
 }  // namespace duet

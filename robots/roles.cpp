@@ -1,10 +1,15 @@
 #include "duet/robots/roles.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <utility>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
+#include "duet/core/require.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {
@@ -92,6 +97,111 @@ Pose pelvis_in_base(const RobotModel& robot, const Eigen::VectorXd& q) {
 bool base_is_pelvis(const RobotModel& robot) {
   const RobotFrame* const pelvis = pelvis_frame(robot);
   return pelvis == nullptr || (pelvis->link == 0 && pelvis->X_LF.p.isZero(0.0) && pelvis->X_LF.R.vec().isZero(0.0));
+}
+
+namespace {
+
+// Joints that are no leg's.
+std::vector<int> upper_joints(const RobotModel& robot) {
+  const std::vector<int> legs = leg_joints(robot);
+  std::vector<int> upper;
+  for (int j = 0; j < robot.dof(); ++j)
+    if (!std::binary_search(legs.begin(), legs.end(), j)) upper.push_back(j);
+  return upper;
+}
+
+}  // namespace
+
+void walk_straight(RobotMotion& motion, const Phases& phases, const Pose& start) {
+  if (phases.act_begin == 0) return;
+  const Pose goal = motion.root[static_cast<std::size_t>(phases.act_begin)];
+  for (int t = 0; t < phases.act_begin; ++t)
+    motion.root[static_cast<std::size_t>(t)] = interpolate(start, goal, static_cast<double>(t) / phases.act_begin);
+}
+
+void raise_upper_body(RobotMotion& motion, const Phases& phases, const RobotModel& robot, int frames) {
+  const std::vector<int> upper = upper_joints(robot);
+  const Eigen::VectorXd goal = motion.q.col(phases.act_begin);
+  const int begin = std::max(0, phases.act_begin - frames);
+  for (int t = 0; t < phases.act_begin; ++t) {
+    const double s = t < begin ? 0.0 : static_cast<double>(t - begin) / (phases.act_begin - begin);
+    for (const int j : upper) motion.q(j, t) = (1.0 - s) * robot.neutral[j] + s * goal[j];
+  }
+}
+
+void lower_upper_body(RobotMotion& motion, const Phases& phases, const RobotModel& robot, double frames) {
+  const std::vector<int> upper = upper_joints(robot);
+  const Eigen::VectorXd last = motion.q.col(phases.act_end - 1);
+  for (int t = phases.act_end; t < motion.frames(); ++t) {
+    const double s = frames > 0.0 ? std::min(1.0, (t - phases.act_end + 1) / frames) : 1.0;
+    for (const int j : upper) motion.q(j, t) = (1.0 - s) * last[j] + s * robot.neutral[j];
+  }
+}
+
+void hold_frame(RobotMotion& motion, const RobotModel& robot, int begin, int end, int source) {
+  const std::vector<int> legs = leg_joints(robot);
+  for (int t = begin; t < end; ++t) {
+    motion.root[static_cast<std::size_t>(t)] = Pose(motion.root[static_cast<std::size_t>(source)]);
+    for (const int j : legs) motion.q(j, t) = motion.q(j, source);
+  }
+}
+
+Pose mildly_turned(const Pose& start, const Pose& goal, double mild_yaw) {
+  const double turn = std::remainder(yaw_of(start.R) - yaw_of(goal.R), 2.0 * std::numbers::pi);
+  const double back = std::clamp(turn, -mild_yaw, mild_yaw) - turn;
+  return {(yaw_rotation(back) * start.R).normalized(), start.p};
+}
+
+void sim_to_real(RobotMotion& motion, const Phases& phases, const RobotModel& robot, double mild_yaw) {
+  require(motion.joint_names == robot.joint_names() && motion.q.rows() == robot.dof(),
+          "sim to real: expected the {} joints of robot '{}' in its order, found {}", robot.dof(), robot.name,
+          fmt::join(motion.joint_names, ", "));
+  require(0 <= phases.act_begin && phases.act_begin < phases.act_end && phases.act_end <= motion.frames(),
+          "sim to real: expected an act inside [0, {}), found [{}, {})", motion.frames(), phases.act_begin,
+          phases.act_end);
+  require(std::isfinite(mild_yaw) && mild_yaw >= 0.0, "sim to real: expected a turn of 0 or more, found {} rad",
+          mild_yaw);
+  const Pose goal = motion.root[static_cast<std::size_t>(phases.act_begin)];
+  walk_straight(motion, phases, mildly_turned(motion.root.front(), goal, mild_yaw));
+  raise_upper_body(motion, phases, robot, kSimToRealRamp);
+  lower_upper_body(motion, phases, robot, kSimToRealRamp);
+  hold_frame(motion, robot, phases.act_end, motion.frames(), phases.act_end - 1);
+}
+
+JointMap::JointMap(const std::vector<std::string>& from, const RobotModel& to) : neutral_(to.neutral) {
+  for (const std::string& name : to.joint_names()) {
+    const auto found = std::find(from.begin(), from.end(), name);
+    source_.push_back(found == from.end() ? -1 : static_cast<int>(found - from.begin()));
+  }
+  const bool common = std::ranges::any_of(source_, [](int joint) { return joint >= 0; });
+  require(common || from.empty() || source_.empty(),
+          "expected a motion with joints of robot '{}' ('{}', ...), found one of '{}', ...", to.name,
+          source_.empty() ? "" : to.joints.front().name, from.empty() ? "" : from.front());
+}
+
+Eigen::VectorXd JointMap::fill(const Eigen::VectorXd& values, Eigen::VectorXd filled) const {
+  for (std::size_t j = 0; j < source_.size(); ++j)
+    if (source_[j] >= 0) filled[static_cast<Eigen::Index>(j)] = values[source_[j]];
+  return filled;
+}
+
+Eigen::VectorXd JointMap::rates(const Eigen::VectorXd& v) const {
+  return fill(v, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(source_.size())));
+}
+
+RobotState JointMap::state(const RobotState& state) const {
+  RobotState moved = state;
+  moved.q = positions(state.q);
+  moved.v = rates(state.v);
+  return moved;
+}
+
+RobotMotion on_body(const RobotMotion& motion, const RobotModel& body) {
+  if (motion.joint_names == body.joint_names()) return motion;
+  const JointMap map(motion.joint_names, body);
+  RobotMotion moved{motion.rate_hz, body.joint_names(), motion.root, Eigen::MatrixXd(body.dof(), motion.frames())};
+  for (int t = 0; t < motion.frames(); ++t) moved.q.col(t) = map.positions(motion.q.col(t));
+  return moved;
 }
 
 }  // namespace duet

@@ -12,7 +12,7 @@
 
 #include "duet/core/field.h"
 #include "duet/core/names.h"
-#include "duet/robots/yaml_fields.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 

@@ -12,6 +12,9 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/field.h"
+#include "duet/core/task.h"
+
 namespace duet {
 
 class YamlSection {
@@ -58,5 +61,55 @@ YAML::Node parse_yaml(const std::string& text, const std::string& file);
 
 // The content of a node, for the "found" part of a message: "'text'", "a list", "a mapping", "nothing".
 std::string describe(const YAML::Node& node);
+
+// Tables of fields (core/field.h) read from YAML: strictly, with file, line, key, what was expected and what was found.
+
+// The value of a key that is there, as text. Throws InputError for a list, a mapping, nothing and "".
+std::string field_node_text(const YamlSection& section, const FieldWords& words, const std::string& values);
+
+template <typename Owner>
+std::vector<const char*> field_keys(const FieldTable<Owner>& table) {
+  std::vector<const char*> keys;
+  keys.reserve(table.size());
+  for (const Field<Owner>& known : table) keys.push_back(known.name.c_str());
+  return keys;
+}
+
+// Sets the field where the section has its key. Throws InputError.
+template <typename Owner>
+void read_field(const YamlSection& section, const Field<Owner>& known, Owner& owner) {
+  const char* key = known.name.c_str();
+  if (!section.has(key)) return raise_default(known, owner);
+  const std::string text = field_node_text(section, known, known.values);
+  if (const std::string expected = set_field(known, owner, text); !expected.empty())
+    section.fail(section.line(key), field_refusal(known, expected, text));
+}
+
+// All of them, in the order of the table.
+template <typename Owner>
+void read_fields(const YamlSection& section, const FieldTable<Owner>& table, Owner& owner) {
+  for (const Field<Owner>& known : table) read_field(section, known, owner);
+}
+
+// Numbers of a YAML mapping inside their range.
+
+struct Range {
+  double low, high;
+  bool with_low;  // whether `low` itself is allowed
+};
+
+// The number under `key`, or `fallback`. Throws InputError (file, line, key, expected, found) outside the range.
+double in_range(const YamlSection& section, const char* key, double fallback, const Range& range);
+
+// The mapping `tags` of an item of a suite (core/task.h).
+
+inline constexpr const char* kTagsKey = "tags";
+
+// None where the key is absent. `of`: what the item is, kOfPerturbation for one. Throws InputError: a name that is no
+// plain one or that duet gives itself, a value that is no plain name, a level, stage or seed that is no whole number.
+Tags read_tags(const YamlSection& item, std::string_view of);
+
+// ", tags: {level: 3}", to stand in a mapping behind another key; "" for none.
+std::string tags_yaml(const Tags& tags);
 
 }  // namespace duet

@@ -6,13 +6,11 @@
 #include <cmath>
 #include <utility>
 
-#include "duet/core/clock.h"
 #include "duet/core/digest.h"
 #include "duet/core/require.h"
-#include "duet/rollout/control_period.h"
-#include "duet/rollout/deadline.h"
-#include "duet/rollout/kinematic_follower.h"
-#include "duet/rollout/perturbations/disturbance.h"
+#include "duet/core/robot_state.h"
+#include "duet/rollout/perturbations/perturbation.h"
+#include "duet/rollout/world.h"
 
 namespace duet {
 namespace {

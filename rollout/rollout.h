@@ -15,7 +15,6 @@
 #include "duet/metrics/contact_safety.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
-#include "duet/rollout/deadline.h"
 #include "duet/rollout/perturbations/perturbation.h"
 #include "duet/rollout/reference_source.h"
 #include "duet/rollout/world.h"
@@ -37,7 +36,7 @@ struct EpisodeConditions {
   Perturbation perturbation;
   std::uint64_t perturbation_seed = 0;
   FallRule fall;              // the robot's own, RobotModel::fall
-  double wall_limit = 120.0;  // what a ReferenceSource takes is not counted (rollout/deadline.h) [s]
+  double wall_limit = 120.0;  // what a ReferenceSource takes is not counted (rollout/world.h) [s]
   EpisodeClock clock = {};
   std::optional<ContactLimits> limits;  // that contacts with a solid partner are held against
   std::function<bool()> stop_asked;     // polled once a tick; the episode then ends as kTimedOut with `interrupted`
@@ -60,7 +59,7 @@ struct Rollout {
   std::optional<ContactSafetyResult> safety;  // of a solid partner, at physics rate
   ControllerFaults faults;
   bool interrupted = false;
-  // Faults and times of the policy, where one leads (rollout/policy_reference.h):
+  // Faults and times of the policy, where one leads (rollout/act_episode.h):
   int late_plans = 0;
   PolicyFaults policy_faults;
   PlanTimes plan_times;

@@ -10,7 +10,6 @@
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,3 @@
-#include "duet/rows/row_scan.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,8 +14,8 @@
 
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/rows/json_fields.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 namespace {

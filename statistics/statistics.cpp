@@ -7,8 +7,7 @@
 #include <map>
 #include <numeric>
 
-#include "duet/core/order_statistics.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 
 namespace duet {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "duet/tasks/rules/agent.h"
-#include "duet/tasks/rules/frame_windows.h"
+#include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 

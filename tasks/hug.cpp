@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "duet/tasks/rules/agent.h"
-#include "duet/tasks/rules/frame_windows.h"
+#include "duet/tasks/rules/evidence.h"
 #include "duet/tasks/synthesis/act.h"
 #include "duet/tasks/task_definition.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/training/checkpoint.h"
+#include "duet/training/agent.h"
 #include "duet/training/threads.h"
 
 namespace duet {

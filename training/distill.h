@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "duet/training/agent.h"
-#include "duet/training/iteration_report.h"
 #include "duet/training/wbc_environment.h"
 
 namespace duet {

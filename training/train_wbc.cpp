@@ -9,7 +9,7 @@
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/training/pace.h"
+#include "duet/training/threads.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/controllers/wbc_sim/network.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/training/distill.h"
 #include "duet/training/ppo.h"
 

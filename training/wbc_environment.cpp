@@ -6,11 +6,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "duet/backends/factory.h"
-#include "duet/core/clock.h"
-#include "duet/policies/densify.h"
-#include "duet/rollout/control_period.h"
-#include "duet/training/domain.h"
+#include "duet/backends/engine_module.h"
+#include "duet/core/robot_state.h"
+#include "duet/policies/policy.h"
+#include "duet/rollout/world.h"
+#include "duet/training/wbc_task.h"
 
 namespace duet {
 namespace {

@@ -7,11 +7,11 @@
 #include <span>
 
 #include "duet/backends/backend.h"
-#include "duet/controllers/wbc_sim/network.h"
 #include "duet/controllers/wbc_sim/observation.h"
 #include "duet/controllers/wbc_sim/tracker.h"
-#include "duet/core/random.h"
-#include "duet/rollout/reference_stream.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
+#include "duet/core/numbers.h"
+#include "duet/rollout/reference_source.h"
 #include "duet/training/wbc_task.h"
 
 namespace duet {
@@ -105,6 +105,17 @@ class WbcEnvironment {
   bool touches_itself_ = false;
   Eigen::Matrix<double, 3, 2> feet_before_ = Eigen::Matrix<double, 3, 2>::Zero();  // ankles a tick ago
   TrackingStatistics statistics_;
+};
+
+// The report of one iteration of a training of WBC-Sim: of the oracle's PPO and of the student's distillation.
+struct IterationReport {
+  long iteration = 0, steps = 0;  // of the environment, from the training's beginning
+  int episodes = 0, falls = 0;
+  double episode_seconds = 0.0, episode_return = 0.0;  // oracle: mean over the episodes that ended
+  double rate = 0.0;                                   // of learning
+  double divergence = 0.0, std = 0.0;                  // oracle
+  double loss = 0.0;                                   // student: mean squared difference of an action
+  TrackingStatistics tracking;
 };
 
 }  // namespace duet

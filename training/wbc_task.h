@@ -2,13 +2,18 @@
 // the training goes through. Plain data.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "duet/backends/scene.h"
-#include "duet/controllers/wbc_sim/gait.h"
-#include "duet/rollout/reference_stream.h"
+#include "duet/backends/backend.h"
+#include "duet/controllers/wbc_sim/tracker.h"
+#include "duet/core/numbers.h"
+#include "duet/robots/robot_model.h"
+#include "duet/rollout/reference_source.h"
 
 namespace duet {
 
@@ -84,5 +89,29 @@ double lift_cost(double above);
 // Action: joint target = base + scale a, |a| <= kActionBound; base is the tracker's q.
 inline constexpr double kLegScale = 0.35, kUpperScale = 0.25;  // [rad]
 Eigen::VectorXd action_scale(const RobotModel& robot);
+
+// Domain randomisation of A.3.2: bodies that are not quite the nominal one.
+
+// The nominal body with other masses and another centre of mass of the torso. Gains, friction, kicks and pushes are the
+// environment's.
+std::shared_ptr<const RobotModel> draw_body(const RobotModel& nominal, const DomainOptions& options, Random& random);
+
+// The robot's left-right symmetry: what an observation or an action would be in the mirrored situation. The joints
+// of its card's legs and arms change places, and what turns about x or z changes sign.
+
+// y[i] = sign[i] x[from[i]].
+struct Mirror {
+  std::vector<int> from;
+  std::vector<float> sign;
+
+  void append(const Mirror& block, int offset);  // of a block that begins at `offset`
+  void apply(std::span<const float> x, std::span<float> y) const;
+  [[nodiscard]] int size() const { return static_cast<int>(from.size()); }
+};
+
+// Throws std::invalid_argument where a link has no counterpart.
+Mirror mirror_joints(const RobotModel& robot);
+Mirror mirror_actor(const RobotModel& robot);                                  // kOracle's observation
+Mirror mirror_critic(const RobotModel& robot, const std::vector<int>& links);  // actor and bodies
 
 }  // namespace duet

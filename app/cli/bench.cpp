@@ -6,10 +6,10 @@
 #include "duet/app/benchmarks/benchmark.h"
 #include "duet/app/part.h"
 #include "duet/app/version.h"
+#include "duet/core/machine.h"
 #include "duet/core/names.h"
-#include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/core/version.h"
+#include "duet/core/share.h"
 #include "duet/rows/folder/environment.h"
 
 namespace duet::cli {

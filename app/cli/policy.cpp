@@ -4,8 +4,7 @@
 #include "duet/app/command.h"
 #include "duet/app/policy_check.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/experiment/plan/trust.h"
+#include "duet/experiment/plan/bodies.h"
 #include "duet/policies/catalogue/registry.h"
 
 namespace duet::cli {

@@ -8,8 +8,8 @@
 
 #include "duet/core/require.h"
 #include "duet/execution/missing_tags.h"
-#include "duet/policies/densify.h"
-#include "duet/rows/groups/distinct_episodes.h"
+#include "duet/policies/policy.h"
+#include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
 
 namespace duet::cli {

@@ -7,13 +7,9 @@
 #include <cmath>
 
 #include "duet/archives/npy/npy.h"
-#include "duet/archives/npy/npy_header.h"
 #include "duet/archives/zip/zip.h"
-#include "duet/core/data_file.h"
 #include "duet/core/file.h"
-#include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

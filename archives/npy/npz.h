@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/archives/npy/npy_array.h"
+#include "duet/archives/npy/npy.h"
 #include "duet/archives/zip/zip.h"
-#include "duet/core/point_tracks.h"
+#include "duet/core/recording.h"
 
 namespace duet {
 

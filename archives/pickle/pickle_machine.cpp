@@ -7,11 +7,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "duet/archives/pickle/pickle_numpy.h"
+#include "duet/archives/pickle/pickle_machine.h"
 #include "duet/archives/pickle/pickle_objects.h"
-#include "duet/archives/pickle/pickle_stream.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

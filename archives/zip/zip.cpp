@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 #include <zip.h>
+#include <zlib.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <memory>
 
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {
@@ -181,6 +184,71 @@ std::string zip_bytes(const std::vector<ZipEntry>& entries, ZipMethod method) {
     throw InputError(fmt::format("cannot make an archive: {}", zip_strerror(archive.get())));
   static_cast<void>(archive.release());  // NOLINT(bugprone-unused-return-value): closed, and freed by that
   return read_source(target.get());
+}
+
+std::string deflated(std::string_view bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::string stream(size, '\0');
+  const int status =
+      compress2(reinterpret_cast<Bytef*>(stream.data()), &size, reinterpret_cast<const Bytef*>(bytes.data()),
+                static_cast<uLong>(bytes.size()), Z_BEST_COMPRESSION);
+  if (status != Z_OK) throw InputError("zlib cannot be set up");
+  stream.resize(size);
+  return stream;
+}
+
+std::string base64(std::string_view bytes) {
+  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t taken = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8 | (k < taken ? static_cast<std::uint8_t>(bytes[i + k]) : std::uint32_t{0});
+    for (std::size_t k = 0; k < 4; ++k) text.push_back(k <= taken ? kDigits[group >> (18 - 6 * k) & 63] : '=');
+  }
+  return text;
+}
+
+namespace {
+
+// Ends the stream whatever happens.
+struct Inflater {
+  Inflater() {
+    constexpr int kZlibOrGzip = MAX_WBITS + 32;
+    if (inflateInit2(&stream, kZlibOrGzip) != Z_OK) throw InputError("zlib cannot be set up");
+  }
+  ~Inflater() { inflateEnd(&stream); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+  z_stream stream{};
+};
+
+}  // namespace
+
+std::string inflated(std::string_view bytes, const std::string& name, std::size_t limit) {
+  Inflater inflater;
+  z_stream& stream = inflater.stream;
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));  // zlib does not write to it
+  if (bytes.size() > std::numeric_limits<uInt>::max())
+    throw InputError(fmt::format("'{}': above {} compressed bytes", name, std::numeric_limits<uInt>::max()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  std::string content;
+  char buffer[1 << 16];
+  for (int status = Z_OK; status != Z_STREAM_END;) {
+    stream.next_out = reinterpret_cast<Bytef*>(buffer);
+    stream.avail_out = sizeof buffer;
+    status = inflate(&stream, Z_NO_FLUSH);
+    if (status == Z_BUF_ERROR || (status == Z_OK && stream.avail_in == 0 && stream.avail_out == sizeof buffer))
+      throw InputError(fmt::format("'{}': the compressed stream is truncated after {} bytes", name, bytes.size()));
+    if (status != Z_OK && status != Z_STREAM_END)
+      throw InputError(fmt::format("'{}': byte {}: the compressed stream is damaged ({})", name, stream.total_in,
+                                   stream.msg != nullptr ? stream.msg : "zlib"));
+    content.append(buffer, sizeof buffer - stream.avail_out);
+    if (content.size() > limit) throw InputError(fmt::format("'{}': inflates to more than {} bytes", name, limit));
+  }
+  return content;
 }
 
 }  // namespace duet

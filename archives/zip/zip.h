@@ -40,4 +40,19 @@ enum class ZipMethod { kDeflated, kStored };
 // In the order given, with the time stamp 1980-01-01: the same entries give the same bytes.
 std::string zip_bytes(const std::vector<ZipEntry>& entries, ZipMethod method = ZipMethod::kDeflated);
 
+// Bytes made small enough to travel in a text: a zlib stream, and base64 (RFC 4648). Thread-safe.
+
+// A whole zlib stream of `bytes`; `inflated` and a browser's DecompressionStream("deflate") read it. The same bytes
+// give the same stream with one version of zlib.
+std::string deflated(std::string_view bytes);
+
+// With padding, without line ends.
+std::string base64(std::string_view bytes);
+
+// zlib and gzip streams in memory. Thread-safe.
+
+// The content of a whole zlib or gzip stream. Throws InputError naming `name`: truncated, damaged, more than `limit`
+// bytes (a few kilobytes can hold a terabyte of zeros; memory grows with what comes out and no further).
+std::string inflated(std::string_view bytes, const std::string& name, std::size_t limit);
+
 }  // namespace duet

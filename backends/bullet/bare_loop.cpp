@@ -1,7 +1,7 @@
 #include "duet/backends/bullet/bare_loop.h"
 
 #include "duet/backends/bullet/bullet_world.h"
-#include "duet/backends/thread_clock.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/core/require.h"
 
 namespace duet {

@@ -6,10 +6,8 @@
 #include <vector>
 
 #include "duet/backends/bullet/articulation.h"
-#include "duet/backends/bullet/row_solver.h"
-#include "duet/backends/engine_options.h"
-#include "duet/backends/implicit_law.h"
-#include "duet/backends/link_pushes.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 

@@ -1,6 +1,6 @@
 // The conformance suite: small scenes that every physics engine runs through the public Backend interface, each against
 // a closed form or against our own integration of our own dynamics. A scene measures; a verdict comes from a stated
-// tolerance and from one table of asserted deviations (deviations.h). docs/conformance.md. Thread-safe: no state.
+// tolerance and from one table of asserted deviations (conformance.h). docs/conformance.md. Thread-safe: no state.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/engine_module.h"
 
 namespace duet::conformance {
 
@@ -102,5 +103,11 @@ Tally tally(const EngineReport& report);
 // Known deviations of this engine that deviate no more: the quantity was measured and every one passed. Only for the
 // default options at 2 ms, which they are about; empty for other settings.
 std::vector<std::string> stale_deviations(const EngineReport& report);
+
+// Known deviations of engines, by name of the engine (backends/engine_module.h).
+
+// The deviations that the engine's module states; none for an engine that is not there.
+std::span<const EngineDeviation> deviations(const std::string& engine);
+const EngineDeviation* find_deviation(const std::string& engine, std::string_view scene, std::string_view quantity);
 
 }  // namespace duet::conformance

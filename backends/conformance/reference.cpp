@@ -2,7 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "duet/robots/roles.h"
 
 namespace duet::conformance {
 namespace {
@@ -136,5 +140,159 @@ double energy_above_base(const RobotModel& robot, const RobotState& state, doubl
 }
 
 double largest_joint_error(const RobotState& a, const RobotState& b) { return (a.q - b.q).cwiseAbs().maxCoeff(); }
+
+namespace {
+
+RobotLink solid(const std::string& name, double mass, const Eigen::Vector3d& moments) {
+  RobotLink link;
+  link.name = name;
+  link.mass = mass;
+  link.inertia = moments.asDiagonal();
+  return link;
+}
+
+RobotShape sphere(const Eigen::Vector3d& p_L, double radius) {
+  RobotShape shape;
+  shape.X_LS.p = p_L;
+  shape.radius = radius;
+  shape.region = "foot";
+  return shape;
+}
+
+RobotLink heavy_base() { return solid("base", kBaseMass, Eigen::Vector3d::Constant(kBaseMass)); }
+
+RobotJoint hinge(const std::string& name, double limit, double effort, double armature) {
+  RobotJoint joint;
+  joint.name = name;
+  joint.lower = -limit;
+  joint.upper = limit;
+  joint.effort = effort;
+  joint.velocity = 100.0;
+  joint.armature = armature;
+  return joint;
+}
+
+std::shared_ptr<const RobotModel> finished(RobotModel robot, const std::string& name) {
+  robot.name = name;
+  robot.neutral = Eigen::VectorXd::Zero(robot.dof());
+  return std::make_shared<const RobotModel>(std::move(robot));
+}
+
+}  // namespace
+
+std::shared_ptr<const RobotModel> tumbling_box() {
+  RobotModel robot;
+  robot.links = {solid("box", 10.0,
+                       {10.0 * (0.4 * 0.4 + 0.9 * 0.9) / 12.0, 10.0 * (0.1 * 0.1 + 0.9 * 0.9) / 12.0,
+                        10.0 * (0.1 * 0.1 + 0.4 * 0.4) / 12.0})};
+  return finished(robot, "box");
+}
+
+std::shared_ptr<const RobotModel> sledge() {
+  RobotModel robot;
+  robot.links = {solid("sledge", 10.0, {0.4, 0.5, 0.6})};
+  for (const double x : {-0.2, 0.2})
+    for (const double y : {-0.2, 0.2}) {
+      robot.feet.push_back(static_cast<int>(robot.shapes.size()));
+      robot.shapes.push_back(sphere({x, y, 0.02 - kSledgeHeight}, 0.02));
+    }
+  return finished(robot, "sledge");
+}
+
+std::shared_ptr<const RobotModel> ball(double mass, double radius) {
+  RobotModel robot;
+  robot.links = {solid("ball", mass, Eigen::Vector3d::Constant(0.4 * mass * radius * radius))};
+  robot.shapes = {sphere(Eigen::Vector3d::Zero(), radius)};
+  robot.feet = {0};
+  return finished(robot, "ball");
+}
+
+std::shared_ptr<const RobotModel> wheel() {
+  RobotModel robot;
+  RobotLink rim = solid("rim", 2.0, {0.03, 0.03, kWheelInertia});
+  rim.parent = 0;
+  robot.links = {heavy_base(), rim};
+  robot.joints = {hinge("axle", 1.0, kWheelEffort, kWheelArmature)};
+  return finished(robot, "wheel");
+}
+
+std::shared_ptr<const RobotModel> rods(int links) {
+  RobotModel robot;
+  robot.links = {heavy_base()};
+  for (int i = 0; i < links; ++i) {
+    RobotLink rod = solid("rod" + std::to_string(i), kRodMass, {kRodInertia, kRodInertia, 0.1 * kRodInertia});
+    rod.parent = i;
+    rod.axis = Eigen::Vector3d::UnitY();
+    rod.com = {0.0, 0.0, -0.5 * kRodLength};
+    if (i > 0) rod.X_PL.p = {0.0, 0.0, -kRodLength};
+    robot.links.push_back(rod);
+    robot.joints.push_back(hinge("hinge" + std::to_string(i), 3.1, 100.0, 0.0));
+  }
+  return finished(robot, "rods");
+}
+
+std::shared_ptr<const RobotModel> without_stops(const RobotModel& robot) {
+  RobotModel copy = robot;
+  for (RobotJoint& joint : copy.joints) {
+    joint.lower = -10.0;
+    joint.upper = 10.0;
+  }
+  return std::make_shared<const RobotModel>(std::move(copy));
+}
+
+RobotState state_at(const RobotModel& robot, const Eigen::Vector3d& p_WB) {
+  RobotState state;
+  state.X_WB.p = p_WB;
+  state.q = robot.neutral;
+  state.v = Eigen::VectorXd::Zero(robot.dof());
+  return state;
+}
+
+JointCommand no_torque(const RobotModel& robot) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(robot.dof());
+  return {zero, zero, zero, zero};
+}
+
+void hold_base(Backend& backend) {
+  backend.push(0, -backend.scene().robot->links[0].mass * backend.scene().gravity, backend.state().X_WB.p);
+}
+
+namespace {
+
+constexpr double kPendulumHeight = 0.65;              // of the centre of mass over the ankles [m]
+constexpr double kPosition = 1.5, kSpeed = 0.35;      // ankle angle per angle of the pendulum [1], [s]
+constexpr double kStiffness = 150.0, kDamping = 4.0;  // of the ankles; the card's 40 N m/rad do not hold the crouch
+constexpr double kMostPitch = 0.3, kMostRoll = 0.2;   // [rad]
+
+}  // namespace
+
+AnkleBalance::AnkleBalance(const RobotModel& robot)
+    : robot_(&robot), kinematics_(robot), jacobian_(Eigen::MatrixXd::Zero(3, 6 + robot.dof())) {
+  for (const std::vector<int>& leg : robot.roles.legs)
+    for (const int ankle : {leg[leg.size() - 2], leg.back()}) (is_roll(robot, ankle) ? roll_ : pitch_).push_back(ankle);
+}
+
+JointCommand AnkleBalance::command(const RobotState& state, const Eigen::VectorXd& q) {
+  kinematics_.update(state.X_WB, state.q);
+  Eigen::Vector3d feet = Eigen::Vector3d::Zero();
+  for (const int foot : robot_->feet)
+    feet += kinematics_.shape_position(foot) / static_cast<double>(robot_->feet.size());
+  kinematics_.center_of_mass_jacobian(jacobian_);
+  Eigen::VectorXd v(6 + robot_->dof());
+  v << state.v_WB, state.w_WB_B, state.v;
+  const Eigen::Vector3d lean = (kinematics_.center_of_mass() - feet) / kPendulumHeight;
+  const Eigen::Vector3d rate = jacobian_ * v / kPendulumHeight;
+  JointCommand command = robot_->default_command(q);
+  for (const std::vector<int>& ankles : {pitch_, roll_})
+    for (const int joint : ankles) {
+      command.kp[joint] = kStiffness;
+      command.kd[joint] = kDamping;
+    }
+  for (const int joint : pitch_)
+    command.q_target[joint] += std::clamp(kPosition * lean.x() + kSpeed * rate.x(), -kMostPitch, kMostPitch);
+  for (const int joint : roll_)
+    command.q_target[joint] -= std::clamp(0.5 * (kPosition * lean.y() + kSpeed * rate.y()), -kMostRoll, kMostRoll);
+  return command;
+}
 
 }  // namespace duet::conformance

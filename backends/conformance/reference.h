@@ -3,9 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 
-#include "duet/core/random.h"
+#include "duet/backends/backend.h"
+#include "duet/core/numbers.h"
 #include "duet/robots/dynamics.h"
+#include "duet/robots/kinematics.h"
 
 namespace duet::conformance {
 
@@ -32,5 +35,52 @@ Momentum momentum_of(const RobotModel& robot, const RobotState& state);
 double energy_above_base(const RobotModel& robot, const RobotState& state, double gravity);
 
 double largest_joint_error(const RobotState& a, const RobotState& b);  // [rad]
+
+// Robots small enough for closed forms, and what they are commanded. Internal to backends/conformance.
+
+// The box of Open Robotics' benchmark of free bodies: 10 kg, 0.1 x 0.4 x 0.9 m. No shape.
+std::shared_ptr<const RobotModel> tumbling_box();
+
+// 10 kg on four spheres of 20 mm, 0.4 m apart, its origin 0.1 m over the ground.
+inline constexpr double kSledgeHeight = 0.1;
+std::shared_ptr<const RobotModel> sledge();
+
+// A solid ball with one sphere.
+std::shared_ptr<const RobotModel> ball(double mass, double radius);
+
+// On a base of 1e6 kg that a push of its weight holds up (hold_base): the joints are alone.
+inline constexpr double kBaseMass = 1e6;
+
+// A wheel about z, limits +-1 rad, effort 10 N m.
+inline constexpr double kWheelInertia = 0.05, kWheelArmature = 0.03, kWheelEffort = 10.0;
+std::shared_ptr<const RobotModel> wheel();
+
+// `links` rods of 1 kg and 1 m in a row, hinged about y, hanging down at q = 0.
+inline constexpr double kRodMass = 1.0, kRodLength = 1.0, kRodInertia = 1.0 / 12.0;
+std::shared_ptr<const RobotModel> rods(int links);
+
+// The same robot without stops, for flight that our integration does not stop either.
+std::shared_ptr<const RobotModel> without_stops(const RobotModel& robot);
+
+RobotState state_at(const RobotModel& robot, const Eigen::Vector3d& p_WB);  // neutral pose, at rest
+JointCommand no_torque(const RobotModel& robot);
+// The push that carries the base's weight. Reset takes it away.
+void hold_base(Backend& backend);
+
+// Ankle feedback on the centre of mass, so that a robot under plain PD stands. Internal to backends/conformance.
+class AnkleBalance {
+ public:
+  // Keeps a reference. The legs of its card have two joints or more, the last two are the ankle's.
+  explicit AnkleBalance(const RobotModel& robot);
+  // The card's gains about `q`, with stiffer ankles that are moved by the feedback of `state`; call it every kPeriod.
+  static constexpr double kPeriod = 0.01;  // [s]
+  JointCommand command(const RobotState& state, const Eigen::VectorXd& q);
+
+ private:
+  const RobotModel* robot_;
+  Kinematics kinematics_;
+  Eigen::MatrixXd jacobian_;
+  std::vector<int> pitch_, roll_;  // joints of the ankles
+};
 
 }  // namespace duet::conformance

@@ -8,10 +8,8 @@
 #include <tuple>
 
 #include "duet/backends/conformance/conformance.h"
-#include "duet/backends/conformance/deviations.h"
-#include "duet/backends/conformance/scenes.h"
 #include "duet/backends/conformance/trial.h"
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 
@@ -186,6 +184,19 @@ std::vector<std::string> stale_deviations(const EngineReport& report) {
                                   measured ? "every measurement passes, remove the entry" : "no such quantity"));
   }
   return stale;
+}
+
+std::span<const EngineDeviation> deviations(const std::string& engine) {
+  const EngineModule* module = find_engine_module(engine);
+  return module == nullptr ? std::span<const EngineDeviation>() : module->deviations;
+}
+
+const EngineDeviation* find_deviation(const std::string& engine, std::string_view scene, std::string_view quantity) {
+  const std::span<const EngineDeviation> known = deviations(engine);
+  const auto found = std::ranges::find_if(known, [&](const EngineDeviation& entry) {
+    return entry.scene == scene && quantity.starts_with(entry.quantity);
+  });
+  return found == known.end() ? nullptr : &*found;
 }
 
 }  // namespace duet::conformance

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "duet/backends/factory.h"
-#include "duet/backends/thread_clock.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/robots/robot_cards.h"
 
 namespace duet::conformance {

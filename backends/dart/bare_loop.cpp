@@ -1,7 +1,7 @@
 #include "duet/backends/dart/bare_loop.h"
 
 #include "duet/backends/dart/dart_world.h"
-#include "duet/backends/thread_clock.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/core/require.h"
 
 namespace duet {

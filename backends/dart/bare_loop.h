@@ -1,7 +1,7 @@
 // The cost of DART itself: the loop against which the overhead of Backend::step is measured.
 #pragma once
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
 #include "duet/core/robot_state.h"
 
 namespace duet {

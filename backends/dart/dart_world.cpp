@@ -12,8 +12,7 @@
 
 #include "duet/backends/backend.h"
 #include "duet/backends/dart/contact_rows.h"
-#include "duet/backends/dart/group_solver.h"
-#include "duet/backends/dart/implicit_hinge.h"
+#include "duet/backends/dart/link_responses.h"
 
 namespace duet {
 namespace {

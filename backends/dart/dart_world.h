@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
+#include "duet/backends/backend.h"
 #include "duet/backends/dart/alignment.h"
-#include "duet/backends/engine_options.h"
-#include "duet/backends/link_pushes.h"
+#include "duet/backends/engine_module.h"
 #include "duet/backends/narrow_phase.h"
-#include "duet/backends/scene.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/core/robot_state.h"
 
 namespace dart::dynamics {
@@ -52,7 +52,7 @@ class DartWorld {
   void read_torques(Eigen::VectorXd& torques) const;  // of the law in the last step
 
  private:
-  struct Law {                      // of one joint in the coming step, as in backends/implicit_law.h
+  struct Law {                      // of one joint in the coming step, as in backends/physics_backend.h
     double drive = 0.0;             // t0 [N m]
     double implicit_inertia = 0.0;  // s - armature [kg m^2]
     double torque = 0.0;            // [N m]

@@ -4,7 +4,7 @@
 
 #include "duet/backends/mujoco/mujoco_law.h"
 #include "duet/backends/mujoco/mujoco_model.h"
-#include "duet/backends/thread_clock.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/core/require.h"
 
 namespace duet {

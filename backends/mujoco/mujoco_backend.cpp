@@ -8,15 +8,11 @@
 #include <tuple>
 
 #include "duet/backends/engine_module.h"
-#include "duet/backends/link_pushes.h"
 #include "duet/backends/mujoco/bare_loop.h"
-#include "duet/backends/mujoco/mjcf.h"
 #include "duet/backends/mujoco/mujoco_law.h"
 #include "duet/backends/mujoco/mujoco_model.h"
-#include "duet/backends/mujoco/mujoco_options.h"
-#include "duet/backends/mujoco/mujoco_skin.h"
-#include "duet/backends/partner.h"
-#include "duet/backends/start_overlap.h"
+#include "duet/backends/narrow_phase.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 namespace {

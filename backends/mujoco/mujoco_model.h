@@ -3,10 +3,12 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
-#include "duet/backends/scene.h"
-#include "duet/core/contact.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/robot_state.h"
 
 struct mjModel_;
@@ -43,5 +45,32 @@ MujocoModel compile_mujoco(const Scene& scene);
 
 void write_state(const RobotState& state, const MujocoModel& from, mjData_& to);
 void read_state(const MujocoModel& from, RobotState& state);
+
+// The scene as an MJCF document, made in memory: no file of the robot's vendor is read. Names in it are indices, so
+// that nothing needs escaping: links "l0", joints "j0", shapes "s0", capsules of the human "h0", and "ground".
+
+// Largest numbers of contacts and of constraint rows that the scene can have; MuJoCo's buffers have these sizes.
+struct MujocoSizes {
+  int contacts = 0;
+  int rows = 0;
+};
+MujocoSizes mujoco_sizes(const Scene& scene);
+
+std::string make_mjcf(const Scene& scene);
+
+// The settings of MuJoCo that a profile may change, and the values that hold for a scene.
+
+std::span<const EngineOption> mujoco_options();
+
+struct MujocoSettings {
+  std::string solver, cone, jacobian, integrator;
+  int iterations = 0;
+  double tolerance = 0.0;
+  double impratio = 0.0;
+  double ground_time_constant = 0.0;  // [s]
+};
+
+// Options are checked before (check_options).
+MujocoSettings mujoco_settings(const EngineOptions& options);
 
 }  // namespace duet

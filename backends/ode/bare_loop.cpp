@@ -1,8 +1,8 @@
 #include "duet/backends/ode/bare_loop.h"
 
-#include "duet/backends/ode/ode_library.h"
 #include "duet/backends/ode/ode_stepper.h"
-#include "duet/backends/thread_clock.h"
+#include "duet/backends/ode/ode_world.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/core/require.h"
 
 namespace duet {

@@ -1,5 +1,5 @@
-// The contact problem that ODE is about to solve, seen through A = M + S (backends/implicit_law.h) instead of M: with
-// the velocity v0 that the step would end with and the impulses p of contacts and joint stops,
+// The contact problem that ODE is about to solve, seen through A = M + S (backends/physics_backend.h) instead of M:
+// with the velocity v0 that the step would end with and the impulses p of contacts and joint stops,
 //   v = v0 + A^-1 J^T p,   0 <= p_n  complementary to  J_n v + cfm p_n / dt - target_n >= 0,
 //   |p_t| <= friction p_n along each of two tangents, the first along the slip that v0 would have,
 // ODE's own compliance in every row, so that redundant contacts share a load as they do in ODE. Found by pivoting on
@@ -12,7 +12,7 @@
 
 #include "duet/backends/contact_solver.h"
 #include "duet/backends/narrow_phase.h"
-#include "duet/robots/tree_factor.h"
+#include "duet/robots/dynamics.h"
 
 namespace duet {
 

@@ -3,9 +3,8 @@
 
 #include "duet/backends/engine_module.h"
 #include "duet/backends/ode/bare_loop.h"
-#include "duet/backends/ode/ode_library.h"
-#include "duet/backends/ode/ode_options.h"
 #include "duet/backends/ode/ode_stepper.h"
+#include "duet/backends/ode/ode_world.h"
 #include "duet/backends/physics_backend.h"
 
 namespace duet {

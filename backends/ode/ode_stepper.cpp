@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "duet/backends/backend.h"
-#include "duet/backends/ode/ode_library.h"
+#include "duet/backends/ode/ode_world.h"
 
 namespace duet {
 namespace {

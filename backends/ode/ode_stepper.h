@@ -7,11 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "duet/backends/implicit_law.h"
-#include "duet/backends/link_pushes.h"
 #include "duet/backends/narrow_phase.h"
 #include "duet/backends/ode/contact_forecast.h"
 #include "duet/backends/ode/ode_world.h"
+#include "duet/backends/physics_backend.h"
 
 namespace duet {
 

@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdarg>
+#include <cstdio>
 #include <numbers>
 #include <stdexcept>
+#include <vector>
 
 #include "duet/backends/backend.h"
 
@@ -278,6 +281,76 @@ void OdeWorld::read_from(std::span<const double> values) {
   clear_forces();
   clear_contacts();
   read_poses();
+}
+
+namespace {
+
+// ODE ends the process where a handler of errors returns; it is C++ inside and lets exceptions pass.
+[[noreturn]] void throw_error(int number, const char* format, va_list arguments) {
+  std::array<char, 500> text{};
+  std::vsnprintf(text.data(), text.size(), format, arguments);
+  throw std::runtime_error(fmt::format("ode: {} (error {})", text.data(), number));
+}
+
+void say_nothing(int, const char*, va_list) {}
+
+struct Library {
+  Library() {
+    if (dInitODE2(0) == 0) throw std::runtime_error("ode: the library cannot be initialised");
+    if (dCheckConfiguration("ODE_double_precision") == 0)
+      throw std::runtime_error("ode: the library was built with single precision, expected double");
+    if (dGetErrorHandler() == nullptr) dSetErrorHandler(throw_error);
+    if (dGetDebugHandler() == nullptr) dSetDebugHandler(throw_error);
+    if (dGetMessageHandler() == nullptr) dSetMessageHandler(say_nothing);
+  }
+};
+
+struct ThreadData {
+  ThreadData() {
+    if (dAllocateODEDataForThread(dAllocateMaskAll) == 0)
+      throw std::runtime_error("ode: no memory for the data of a thread");
+  }
+  ~ThreadData() { dCleanupODEAllDataForThread(); }
+  ThreadData(const ThreadData&) = delete;
+  ThreadData& operator=(const ThreadData&) = delete;
+};
+
+}  // namespace
+
+void enter_ode() {
+  static const Library library;
+  thread_local const ThreadData data;
+}
+
+std::string ode_version() { return dODE_VERSION; }
+
+std::span<const EngineOption> ode_option_table() {
+  static const std::vector<EngineOption> table = {
+      number_option("joint_erp", 0.8, 0.0, 1.0, "share of a hinge's drift that a step removes"),
+      number_option("joint_cfm", 0.0, 0.0, 1.0, "compliance of hinges [m/(N s)]"),
+      number_option("stop_erp", 0.2, 0.0, 1.0, "share of what a joint has passed its stop by that a step removes"),
+      number_option("stop_cfm", 1e-9, 0.0, 1.0, "compliance of joint stops [rad/(N m s)]"),
+      number_option("contact_erp", 0.2, 0.0, 1.0, "share of the depth of a rigid contact that a step removes"),
+      number_option("contact_cfm", 1e-8, 1e-12, 1.0, "compliance of rigid contacts and of friction [m/(N s)]"),
+      choice_option("friction", {"active", "bounded"},
+                    "active: contacts foreseen to stick have no bound on friction; a step that then breaks one is "
+                    "repeated with all bounds. bounded: all bounds in every step"),
+      integer_option("sweeps", 100, 1, 10000, "of Gauss-Seidel where the forecast of ODE's forces does not settle")};
+  return table;
+}
+
+OdeOptions ode_options(const EngineOptions& options) {
+  const std::span<const EngineOption> known = ode_option_table();
+  check_options("ode", options, known);
+  const auto softness = [&](const std::string& of) {
+    return Softness{.erp = option_number(options, known, of + "_erp"),
+                    .cfm = option_number(options, known, of + "_cfm")};
+  };
+  return {.joint = softness("joint"),
+          .stop = softness("stop"),
+          .contact = softness("contact"),
+          .stick = option_choice(options, known, "friction") == "active",
+          .sweeps = option_integer(options, known, "sweeps")};
 }
 
 }  // namespace duet

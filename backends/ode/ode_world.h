@@ -1,16 +1,36 @@
 // The robot in ODE: a free body per link, a hinge per joint, no shapes. For the files of this folder; ODE's types are
-// only named here. Each function must run in a thread that has entered ODE (ode_library.h); not thread-safe.
+// only named here. Each function must run in a thread that has entered ODE (ode_world.h); not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "duet/backends/ode/ode_options.h"
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
+#include "duet/backends/contact_solver.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/robot_state.h"
 #include "duet/robots/kinematics.h"
+
+namespace duet {
+
+// The settings of ODE that a profile may change, with their defaults.
+
+struct OdeOptions {
+  Softness joint = {};    // of hinges
+  Softness stop = {};     // of joint stops
+  Softness contact = {};  // of contacts with the ground and between links
+  bool stick = true;      // contacts that are foreseen to stick are given to ODE without a bound on friction
+  int sweeps = 0;         // of Gauss-Seidel, where the forecast of ODE's forces needs it
+};
+
+std::span<const EngineOption> ode_option_table();
+// Throws std::invalid_argument (check_options).
+OdeOptions ode_options(const EngineOptions& options);
+
+}  // namespace duet
 
 struct dxWorld;
 struct dxBody;
@@ -101,5 +121,15 @@ class OdeWorld {
   std::vector<Eigen::Matrix3d> R_WL_;
   std::vector<Eigen::Vector3d> p_WL_;
 };
+
+// The data that ODE keeps per process and per thread. Every function of this folder that calls ODE enters it first.
+
+// Starts ODE on the first call and gives this thread the data that ODE needs in each thread that steps a world; they
+// go with the thread. ODE's errors are from then on std::runtime_error "ode: ..." (by default they end the process),
+// and nothing is printed. Handlers that the program has set before are kept. Throws std::runtime_error where ODE cannot
+// start.
+void enter_ode();
+
+std::string ode_version();
 
 }  // namespace duet

@@ -1,7 +1,7 @@
 #include "duet/backends/simbody/bare_loop.h"
 
+#include "duet/backends/physics_backend.h"
 #include "duet/backends/simbody/simbody_stepper.h"
-#include "duet/backends/thread_clock.h"
 #include "duet/core/require.h"
 
 namespace duet {

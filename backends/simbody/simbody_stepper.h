@@ -1,19 +1,31 @@
-// One step around Simbody's dynamics: the torque law (backends/implicit_law.h) and contacts (backends/contact_solver.h)
-// on Simbody's mass matrix and bias, then semi-implicit Euler. A function of the state alone.
+// One step around Simbody's dynamics: the torque law (backends/physics_backend.h) and contacts
+// (backends/contact_solver.h) on Simbody's mass matrix and bias, then semi-implicit Euler. A function of the state
+// alone.
 #pragma once
 
 #include <Eigen/Core>
 #include <span>
 
 #include "duet/backends/contact_solver.h"
-#include "duet/backends/implicit_law.h"
-#include "duet/backends/link_pushes.h"
+#include "duet/backends/engine_module.h"
 #include "duet/backends/narrow_phase.h"
-#include "duet/backends/partner.h"
+#include "duet/backends/physics_backend.h"
 #include "duet/backends/simbody/simbody_model.h"
-#include "duet/backends/simbody/simbody_options.h"
 
 namespace duet {
+
+// The settings of the step around Simbody that a profile may change.
+
+struct SimbodySettings {
+  double contact_stiffness = 0.0;  // of a rigid contact point [N/m]
+  double contact_damping = 0.0;    // [N s/m]
+  double stop_erp = 0.0;
+  int sweeps = 0;
+};
+
+std::span<const EngineOption> simbody_options();
+// Throws std::invalid_argument as check_options.
+SimbodySettings simbody_settings(const EngineOptions& options);
 
 class SimbodyStepper {
  public:

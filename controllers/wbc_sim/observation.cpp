@@ -62,7 +62,7 @@ void show_sensors(ChannelKind kind, const WbcSensors& sensors, const Eigen::Vect
   }
 }
 
-auto shown(const WbcSensors& sensors, const Eigen::VectorXf& action) {
+auto sensor_writer(const WbcSensors& sensors, const Eigen::VectorXf& action) {
   return [&](const Channel& channel, ChannelWriter& out) { show_sensors(channel.kind, sensors, action, out); };
 }
 
@@ -114,7 +114,7 @@ void read_sensors(const RobotState& state, const WbcTracker& tracker, WbcSensors
 }
 
 std::span<const float> WbcObserver::update(const WbcSensors& sensors, const Eigen::VectorXf& action) {
-  writer_.update(shown(sensors, action));
+  writer_.update(sensor_writer(sensors, action));
   return writer_.input(0);
 }
 
@@ -123,7 +123,7 @@ void write_oracle(const WbcSensors& sensors, const Eigen::VectorXf& action, std:
   const ChannelWidths widths = WbcLayout(static_cast<int>(sensors.q.size())).widths();
   for (const ChannelGroup& group : wbc_observation(WbcKind::kOracle).groups) {
     const auto size = static_cast<std::size_t>(channels_size(group.channels, widths));
-    write_channels(group.channels, shown(sensors, action), rest.first(size));
+    write_channels(group.channels, sensor_writer(sensors, action), rest.first(size));
     rest = rest.subspan(size);
   }
 }

@@ -7,9 +7,9 @@
 #include <iterator>
 #include <tuple>
 
-#include "duet/core/text.h"
+#include "duet/core/require.h"
 #include "duet/metrics/interaction.h"
-#include "duet/report/tables/cells.h"
+#include "duet/report/tables/text_table.h"
 #include "duet/statistics/statistics.h"
 
 namespace duet {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "duet/core/task.h"
-#include "duet/datasets/labelled/labelled_people.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 #include "duet/report/tables/text_table.h"
-#include "duet/tasks/rules/detector_result.h"
+#include "duet/tasks/rules/agent.h"
 
 namespace duet {
 

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,7 @@ class Progress;
 class StopSign;
 
 struct PrepareOptions {
-  std::string keep_in = {};  // a run folder that keeps the clips as each is finished (experiment/plan/prepared_clips.h)
+  std::string keep_in = {};        // a run folder that keeps the clips as each is finished (experiment/plan/clips.h)
   const StopSign* stop = nullptr;  // asked before each clip
   // Digests that the files' must be (RunIdentity::files), for those that it has; InputError for another one.
   const FileDigests* files = nullptr;
@@ -72,5 +73,33 @@ bool is_dataset(const std::string& folder);
 // NPZ files below the paths given (files stay, folders are searched), sorted. Throws InputError for a path that is not
 // there or where nothing is found.
 std::vector<std::string> find_motion_files(const std::vector<std::string>& paths);
+
+// Clips that a run has synthesised and retargeted, kept in its folder until it is complete: a run that is killed while
+// it prepares goes on where it stopped. A file's name is the digest of all that made it; one that is broken, or of
+// another program, robot or option, is made anew. Thread-safe.
+
+class PreparedClips {
+ public:
+  // Keeps clips in `folder`/prepared; an empty folder keeps nothing. `made_by` is what all its clips have in common.
+  PreparedClips(std::string folder, const std::string& made_by) : folder_(std::move(folder)), made_by_(made_by) {}
+
+  [[nodiscard]] bool keeps() const { return !folder_.empty(); }
+  // `source` is what tells this clip from others. None where there is no whole file of it.
+  [[nodiscard]] std::optional<PairedMotion> find(const std::string& source) const;
+  // Keeps the clip where the disk takes it.
+  void keep(const std::string& source, const PairedMotion& clip) const;
+
+ private:
+  [[nodiscard]] std::string name_of(const std::string& source) const;
+
+  std::string folder_, made_by_;
+};
+
+// Removes them, and nothing else, from a run folder.
+void remove_prepared_clips(const std::string& folder);
+
+// This program: version, and size and time of its file (core/share.h), so that a program that was built anew trusts
+// nothing older.
+std::string program_identity();
 
 }  // namespace duet

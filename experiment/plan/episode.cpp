@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/experiment/suite/suite_names.h"
+#include "duet/experiment/suite/suite.h"
 #include "duet/robots/robot_cards.h"
 #include "duet/rows/groups/row_groups.h"
 
@@ -188,6 +190,61 @@ void require_sane_size(const Suite& suite, std::int64_t clips) {
   if (episodes > static_cast<double>(kMostEpisodes))
     throw InputError(fmt::format("{}: expected at most {} episodes, found {:.0f} ({} clips, {} episodes per clip)",
                                  suite.file, kMostEpisodes, episodes, clips, suite.episodes_per_clip));
+}
+
+std::string cost_name(const EpisodeSpec& spec) { return fmt::format("{}/{}", spec.engine, spec.controller->name); }
+
+double motion_seconds(const EpisodeSpec& spec) {
+  if (spec.reference != nullptr) return spec.reference->seconds;
+  return static_cast<double>(spec.clip->robot.frames()) / spec.clip->robot.rate_hz;
+}
+
+void EpisodeCosts::expect(const EpisodeSpec& spec) {
+  const std::lock_guard lock(mutex_);
+  work_[cost_name(spec)].left += motion_seconds(spec);
+}
+
+void EpisodeCosts::ended(const EpisodeSpec& spec, double wall_s) {
+  const double motion = motion_seconds(spec);
+  const std::lock_guard lock(mutex_);
+  Work& work = work_[cost_name(spec)];
+  work.left = std::max(work.left - motion, 0.0);
+  work.done += motion;
+  work.wall += wall_s;
+}
+
+double EpisodeCosts::share_done() const {
+  const std::lock_guard lock(mutex_);
+  double done = 0.0, left = 0.0;
+  for (const auto& [name, work] : work_) {
+    if (work.done == 0.0 && work.left > 0.0) return std::numeric_limits<double>::quiet_NaN();
+    done += work.wall;
+    if (work.done > 0.0) left += work.wall / work.done * work.left;
+  }
+  return done > 0.0 ? done / (done + left) : std::numeric_limits<double>::quiet_NaN();
+}
+
+namespace {
+
+void add_tags(std::string_view of, const Tags& tags, Tags& into) {
+  for (const auto& [name, value] : tags) into.insert_or_assign(row_tag(of, name), value);
+}
+
+}  // namespace
+
+Tags with_named_tags(Tags of_perturbation, const SuitePolicy& policy, const SuiteReference* command) {
+  Tags tags = std::move(of_perturbation);
+  if (command == nullptr)
+    add_tags(kOfPolicy, policy.tags, tags);
+  else
+    add_tags(kOfClip, command->tags, tags);
+  return tags;
+}
+
+Tags episode_tags(const EpisodeSpec& spec) {
+  Tags tags = with_named_tags(spec.perturbation_tags.map(), *spec.policy, spec.reference);
+  tags.insert(spec.clip->tags.begin(), spec.clip->tags.end());
+  return tags;
 }
 
 }  // namespace duet

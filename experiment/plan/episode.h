@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "duet/core/task.h"
 #include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/motion/paired_motion.h"
@@ -95,5 +97,42 @@ bool belongs(const EpisodeSpec& spec, Task task, const RunPart& part);
 
 // How many episodes of a suite, over clips of these tasks, belong to one of these parts.
 std::int64_t count_episodes(const Suite& suite, const std::vector<Task>& clips, const std::vector<RunPart>& parts);
+
+// The cost of an episode in each engine with each controller, and how much of a run's work is done: engines differ by a
+// factor of twenty, so that counting episodes says nothing of the time that is left. Thread-safe.
+
+// The name that costs are told apart by: "mujoco/vmc".
+std::string cost_name(const EpisodeSpec& spec);
+
+// The length of the motion that an episode follows, its start included. [s]
+double motion_seconds(const EpisodeSpec& spec);
+
+class EpisodeCosts {
+ public:
+  // Said of each episode that is to run, before any has ended.
+  void expect(const EpisodeSpec& spec);
+  // Such an episode has ended, after so much time of one core [s].
+  void ended(const EpisodeSpec& spec, double wall_s);
+  // Share of the work that is done, 0 to 1: what ended episodes took over that and what the rest will take at the mean
+  // cost of its engine and controller so far. NaN until one of each has ended.
+  [[nodiscard]] double share_done() const;
+
+ private:
+  struct Work {
+    double left = 0.0, done = 0.0;  // motion [s]
+    double wall = 0.0;              // that `done` took [s]
+  };
+  mutable std::mutex mutex_;
+  std::map<std::string, Work> work_;
+};
+
+// The values that rows hold beside names (core/task.h), made of the suite's values with the row.
+
+// The tags of an episode's perturbation, and with them those that the suite gives its policy or, where it has commands,
+// its command.
+Tags with_named_tags(Tags of_perturbation, const SuitePolicy& policy, const SuiteReference* command);
+
+// An episode's tags, with those of its clip.
+Tags episode_tags(const EpisodeSpec& spec);
 
 }  // namespace duet

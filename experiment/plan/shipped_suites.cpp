@@ -13,11 +13,10 @@
 #include "duet/core/names.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/core/text.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/run_identity.h"
 #include "duet/robots/yaml_section.h"
-#include "duet/rows/folder/name_digests.h"
+#include "duet/rows/folder/run_info.h"
 
 namespace duet {
 namespace {

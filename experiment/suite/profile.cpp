@@ -6,12 +6,12 @@
 #include <cmath>
 #include <filesystem>
 
-#include "duet/backends/factory.h"
-#include "duet/core/clock.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/core/share.h"
 #include "duet/robots/yaml_section.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
 
 namespace duet {
 

@@ -2,6 +2,7 @@
 // refused with file, line and the nearest known one. Results are comparable only within name@version.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -10,22 +11,100 @@
 #include <utility>
 #include <vector>
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
 #include "duet/controllers/controller.h"
-#include "duet/core/episode_tags.h"
 #include "duet/core/task.h"
 #include "duet/experiment/suite/profile.h"
-#include "duet/experiment/suite/suite_names.h"
-#include "duet/experiment/suite/suite_reference.h"
 #include "duet/metrics/detector.h"
 #include "duet/metrics/readings.h"
 #include "duet/motion/synthesis/synthesis.h"
+#include "duet/motion/synthesis_options.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
 #include "duet/policies/scheduler.h"
+#include "duet/robots/yaml_section.h"
 #include "duet/rollout/perturbations/perturbation.h"
+#include "duet/rollout/reference_source.h"
 
 namespace duet {
+
+// The words of suite files for what duet chooses by value.
+
+// auto: act where the controller cannot walk, else approach
+enum class SuiteStart { kAuto, kClip, kApproach, kAct, kSimToReal };
+enum class RecordTrajectories { kNone, kFailures, kAll };
+enum class ClipRoles { kOwn, kBoth };  // whom the robot replaces: whom the clip says, or each person in turn
+
+template <typename E>
+using NameTable = std::vector<std::pair<std::string, E>>;
+
+inline constexpr const char* kNullPolicy = "null";  // of the control arm
+// Whether the value of an option of that name is a file.
+bool is_path_option(std::string_view option);
+
+const NameTable<SuiteStart>& start_names();
+const NameTable<Side>& side_names();
+const NameTable<ActOutcome>& act_outcome_names();
+const NameTable<ClipRoles>& role_names();
+const NameTable<Likeness>& likeness_names();  // "rehearsed", "people"
+const NameTable<PartnerMode>& partner_names();
+const NameTable<RecordTrajectories>& record_names();
+const NameTable<DetectorVersion>& version_names();
+const NameTable<ThresholdSet>& threshold_names();
+
+std::string_view to_string(SuiteStart start);
+std::string_view to_string(PartnerMode partner);
+
+// Its names in the order of the enumerators, which count from 0: the choices of a field (core/field.h).
+template <typename E>
+std::vector<std::string> choices_of(const NameTable<E>& table) {
+  std::vector<std::string> names(table.size());
+  for (const auto& [name, value] : table) names.at(static_cast<std::size_t>(value)) = name;
+  return names;
+}
+
+template <typename E>
+std::string_view name_of(const NameTable<E>& table, E value) {
+  for (const auto& [name, known] : table)
+    if (known == value) return name;
+  return "?";
+}
+
+// The key `reference` of a suite: roots that move by command in the place of clips and policies. Does the robot walk,
+// how fast, does it fall: nobody else is there, and no clip gives the episode its length.
+
+// The policy's name in rows; their task is kWalkRows (rows/groups/row_groups.h).
+inline constexpr const char* kVelocityPolicy = "velocity";
+
+// The upper body stays in the neutral pose, in one drawn for the episode, or moves between poses drawn for it.
+enum class UpperBody { kStill, kHeld, kMoving };
+
+struct SuiteReference {
+  std::string name;                                    // in rows the clip; once per suite
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // forward, to the left [m/s], yaw rate [rad/s], in the heading
+  double seconds = 14.0;                               // of the episode
+  double begin = 0.0, end = 14.0;                      // when the command holds; else the root stands [s]
+  double pause = 0.0;                                  // above 0: on and off in turn, each for so long [s]
+  UpperBody upper_body = UpperBody::kStill;
+  Tags tags = {};  // of its rows (core/task.h); they change nothing of an episode
+
+  // Whether the command holds from the first tick to the last.
+  [[nodiscard]] bool constant() const { return begin <= 0.0 && end >= seconds && pause <= 0.0; }
+};
+
+// A mapping or a list of them. Throws InputError: file, line, expected, found.
+std::vector<SuiteReference> read_references(const YamlSection& suite, const std::string& file);
+std::string references_yaml(const std::vector<SuiteReference>& references);  // a block; "" where there are none
+
+// The reference by its name; throws std::invalid_argument with those that are there.
+const SuiteReference& reference_of(const std::vector<SuiteReference>& references, const std::string& name);
+
+StreamOptions stream_options(const SuiteReference& reference);
+
+// A controller that takes a velocity by its option `command` gets the reference's, unless the suite gives it one.
+bool takes_command(const ControllerInfo& controller);
+ControllerOptions with_command(const ControllerInfo& controller, ControllerOptions options,
+                               const SuiteReference& reference);
 
 // Adds one copy of each synthesised clip, with this hand and contact height; all else is drawn as for its index.
 struct ClipVariant {
@@ -79,7 +158,7 @@ struct SuitePolicy {
   PolicyOptions options = {};
   std::string prompt = {};        // the language command; empty: the task's own (task_prompt)
   bool shuffled_partner = false;  // sees the partner of another clip of the task: whether it looks at its partner
-  Tags tags = {};                 // of its rows (core/episode_tags.h); no part of what it is
+  Tags tags = {};                 // of its rows (core/task.h); no part of what it is
 };
 
 struct Suite {
@@ -111,7 +190,7 @@ struct Suite {
   bool null_arm = true;
   std::vector<std::string> controls = {};  // scripted control arms (policies/controls/control_policy.h)
   bool allow_programs =
-      false;  // the user's word, never a file's: policies may start programs (experiment/plan/trust.h)
+      false;  // the user's word, never a file's: policies may start programs (experiment/plan/bodies.h)
 
   // Whether commanded velocities lead its episodes, in the place of clips and policies.
   [[nodiscard]] bool is_commanded() const { return !references.empty(); }

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "duet/core/field.h"
 #include "duet/experiment/suite/suite.h"
 #include "duet/robots/yaml_section.h"
 
@@ -29,5 +31,18 @@ void set_policy_option(Suite& suite, const std::string& policy, const std::strin
 // A path of a suite file as an absolute one: relative ones start at the file's folder, or, where nothing is there but
 // in the working folder (`-s policies=[my/policy.yaml]`), at that.
 std::string from_folder_of(const Suite& suite, const std::string& file);
+
+// The key `clips` of a suite: what is synthesised or read, in which variants, and how long people stand around it.
+
+// Fields of clips.synth and clips.pad.
+const FieldTable<SuiteClips>& synth_fields();
+const FieldTable<ClipPadding>& padding_fields();
+const Field<SuiteClips>& roles_field();
+
+// Fills suite.clips; suite.file is set. Throws InputError: file, line, expected, found.
+void read_clips(const YamlSection& top, Suite& suite);
+// That each task of the suite can give what a variant asks for.
+void check_variants(const YamlSection& top, const Suite& suite);
+std::string clips_yaml(const SuiteClips& clips);
 
 }  // namespace duet

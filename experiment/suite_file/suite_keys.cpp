@@ -1,5 +1,3 @@
-#include "duet/experiment/suite_file/suite_keys.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -7,24 +5,21 @@
 #include <filesystem>
 #include <utility>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/names.h"
-#include "duet/core/plain_name.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/episode.h"
-#include "duet/experiment/suite/suite_names.h"
+#include "duet/experiment/suite/suite.h"
 #include "duet/experiment/suite_file/suite_actors.h"
-#include "duet/experiment/suite_file/suite_clips.h"
-#include "duet/experiment/suite_file/suite_key_forms.h"
-#include "duet/experiment/suite_file/suite_section.h"
+#include "duet/experiment/suite_file/suite_key.h"
 #include "duet/metrics/readings.h"
 #include "duet/policies/controls/control_policy.h"
 #include "duet/policies/scheduler.h"
 #include "duet/retarget/options.h"
 #include "duet/robots/robot_cards.h"
 #include "duet/robots/robot_model.h"
-#include "duet/robots/yaml_fields.h"
+#include "duet/robots/yaml_section.h"
 
 namespace duet {
 namespace {

@@ -5,11 +5,10 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/suite.h"
-#include "duet/experiment/suite_file/suite_clips.h"
-#include "duet/experiment/suite_file/suite_keys.h"
+#include "duet/experiment/suite_file/suite_actors.h"
+#include "duet/experiment/suite_file/suite_key.h"
 #include "duet/robots/yaml_section.h"
 
 namespace duet {

@@ -6,7 +6,7 @@
 
 #include <cstring>
 
-#include "duet/hardware/dds_place.h"
+#include "duet/hardware/wire/robot_wire.h"
 
 namespace duet {
 

@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "duet/hardware/dds_place.h"
-#include "duet/hardware/robot_wire.h"
+#include "duet/hardware/executors/sport_executor.h"
+#include "duet/hardware/wire/robot_wire.h"
 
 namespace duet {
 
@@ -22,5 +22,21 @@ std::unique_ptr<TwinWire> open_twin_wire(const DdsPlace& place);
 // SHA-256 of what DDS tells others of a type ("unitree_hg::msg::dds_::LowCmd_"): its information, then its mapping.
 // Throws std::invalid_argument for an unknown type, MissingError without DDS.
 std::string dds_type_digest(const std::string& type);
+
+// The maker's services over DDS: their calls and the arm topic, as a client (hardware/executors/sport_executor.h) and
+// as a stand-in that serves them.
+
+// Opens the wire as open_robot_wire does.
+std::unique_ptr<SportWire> open_sport_wire(const DdsPlace& place);
+
+// The other side, in a twin's domain.
+class SportServiceWire {
+ public:
+  virtual ~SportServiceWire() = default;
+  virtual bool take(RpcRequest& request) = 0;
+  virtual void respond(const RpcResponse& response) = 0;
+  virtual bool take_arms(LowCommandFrame& frame) = 0;
+};
+std::unique_ptr<SportServiceWire> open_sport_service(const DdsPlace& place);
 
 }  // namespace duet

@@ -1,6 +1,5 @@
 // A build without DDS: everything else of the room is there.
 #include "duet/core/require.h"
-#include "duet/hardware/dds/dds_sport.h"
 #include "duet/hardware/dds/dds_wire.h"
 
 namespace duet {

@@ -1,8 +1,8 @@
 #include "duet/hardware/dds/robot_side.h"
 
 #include "duet/core/require.h"
-#include "duet/hardware/homie_executor.h"
-#include "duet/hardware/leg_odometry.h"
+#include "duet/hardware/executors/homie_executor.h"
+#include "duet/hardware/wire/odometry_source.h"
 
 namespace duet {
 namespace {

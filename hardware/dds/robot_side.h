@@ -4,11 +4,9 @@
 #include <memory>
 #include <string>
 
-#include "duet/hardware/dds/dds_sport.h"
 #include "duet/hardware/dds/dds_wire.h"
-#include "duet/hardware/guard_loop.h"
-#include "duet/hardware/robot_config.h"
-#include "duet/hardware/robot_connection.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/guard/robot_connection.h"
 
 namespace duet {
 

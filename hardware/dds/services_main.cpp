@@ -10,14 +10,11 @@
 #include <optional>
 #include <thread>
 
-#include "duet/hardware/datagram_socket.h"
-#include "duet/hardware/dds/dds_sport.h"
 #include "duet/hardware/dds/dds_wire.h"
-#include "duet/hardware/guard_loop.h"
-#include "duet/hardware/homie_stand_in.h"
-#include "duet/hardware/lcm_channel.h"
-#include "duet/hardware/real_time.h"
-#include "duet/hardware/sport_stand_in.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/wire/datagram_socket.h"
+#include "duet/hardware/wire/lcm_message.h"
 
 namespace {
 

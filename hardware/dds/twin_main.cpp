@@ -9,13 +9,12 @@
 #include <cstdio>
 #include <thread>
 
-#include "duet/hardware/datagram_socket.h"
 #include "duet/hardware/dds/dds_wire.h"
-#include "duet/hardware/lcm_message.h"
-#include "duet/hardware/lock_step.h"
-#include "duet/hardware/real_time.h"
-#include "duet/hardware/twin_fault.h"
-#include "duet/hardware/twin_operator.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/twin/lock_step.h"
+#include "duet/hardware/twin/twin_operator.h"
+#include "duet/hardware/wire/datagram_socket.h"
+#include "duet/hardware/wire/lcm_message.h"
 
 namespace {
 

@@ -13,8 +13,8 @@
 
 #include "duet/core/require.h"
 #include "duet/hardware/dds/dds_wire.h"
-#include "duet/hardware/lock_step.h"
-#include "duet/hardware/real_time.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/twin/lock_step.h"
 
 extern char** environ;
 

@@ -10,12 +10,10 @@
 #include <thread>
 #include <vector>
 
-#include "duet/hardware/dds_place.h"
-#include "duet/hardware/guard_link.h"
-#include "duet/hardware/guard_loop.h"
-#include "duet/hardware/robot_wire.h"
-#include "duet/hardware/run_log.h"
-#include "duet/hardware/twin_model.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/log/run_log.h"
+#include "duet/hardware/twin/twin_model.h"
+#include "duet/hardware/wire/robot_wire.h"
 
 namespace duet {
 

@@ -6,12 +6,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "duet/core/data_file.h"
+#include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/split.h"
-#include "duet/core/text.h"
-#include "duet/motion/layouts/joint_names.h"
 #include "duet/motion/layouts/joint_recipes.h"
 
 namespace duet {

@@ -7,8 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "duet/motion/layouts/joint_recipes.h"
 
 namespace duet {
@@ -35,7 +34,7 @@ JointLayout layout_of_names(std::string name, std::vector<std::string> names);
 
 // A layout's name, or the path of a text file: of names in the order of the
 // columns, one a line ('#' begins a comment), or of lines "left_hip: NAME"
-// (motion/layouts/joint_names.h) for columns that have `own_names`. Throws InputError
+// (motion/layouts/joint_recipes.h) for columns that have `own_names`. Throws InputError
 // naming the file, or std::invalid_argument for neither.
 JointLayout read_joint_layout(const std::string& name_or_path, const std::vector<std::string>& own_names = {});
 

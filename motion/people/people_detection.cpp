@@ -6,9 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/motion/plausibility.h"
 
 namespace duet {

@@ -11,11 +11,8 @@
 #include <utility>
 
 #include "duet/archives/npy/npy.h"
-#include "duet/archives/npy/npy_header.h"
-#include "duet/core/data_file.h"
-#include "duet/core/naming_file.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/archives/npy/npy_array.h"
+#include "duet/archives/npy/npy.h"
 #include "duet/archives/pickle/pickle_node.h"
-#include "duet/core/point_tracks.h"
+#include "duet/core/recording.h"
 #include "duet/core/task.h"
 
 namespace duet {

@@ -1,11 +1,11 @@
 // How two people of a file of others become a clip: the one way that every reader of motion/people/ ends in.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "duet/motion/interaction_clip.h"
-#include "duet/motion/people/people_options.h"
 #include "duet/motion/people/raw_people.h"
 
 namespace duet {
@@ -20,5 +20,15 @@ struct SourceClip {
 // proposed where there are none. Throws InputError naming the file and the fault: nothing that can be a person, two
 // lengths, a value that is not finite, no task, no rate.
 SourceClip clip_of(const RawPeople& people, const PeopleOptions& options = {});
+
+// Joints that a tracker did not see in some frames (NaN): short gaps are filled along straight lines, longer ones are
+// refused.
+
+inline constexpr double kLongestUnseen = 0.25;  // of a joint that is not seen [s]
+
+// A sentence where gaps were filled, with `filled` the people then; "" and nothing where all values are finite. Throws
+// InputError naming person, frame and joint: a value that is not finite where the layout has no gaps, at either end of
+// the recording, or for longer than kLongestUnseen; an infinite one anywhere.
+std::string fill_gaps(const RawPeople& people, double rate_hz, std::optional<RawPeople>& filled);
 
 }  // namespace duet

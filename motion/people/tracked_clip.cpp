@@ -6,9 +6,9 @@
 #include <array>
 #include <cmath>
 
-#include "duet/core/random.h"
+#include "duet/core/names.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/core/synthetic_id.h"
 #include "duet/motion/people/source_clip.h"
 
 namespace duet {

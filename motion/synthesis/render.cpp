@@ -1,11 +1,10 @@
-#include "duet/motion/synthesis/render.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "duet/tasks/synthesis/solid.h"
+#include "duet/motion/synthesis/stage.h"
+#include "duet/tasks/synthesis/figure.h"
 
 namespace duet::synthesis {
 namespace {

@@ -1,12 +1,27 @@
 // Sets the scene: two bodies, their ways to each other and apart, and when everything happens.
 #pragma once
 
+#include <array>
+
 #include "duet/core/task.h"
-#include "duet/motion/synthesis/render.h"
+#include "duet/motion/human_motion.h"
 #include "duet/motion/synthesis_options.h"
 #include "duet/tasks/synthesis/act.h"
+#include "duet/tasks/synthesis/performer.h"
 
 namespace duet::synthesis {
+
+// From two performers to joints: pelvis heights that keep both legs within reach, then trunk, legs and arms frame by
+// frame.
+
+// The part of the scene's time that a clip shows: from `first` on, `tempo` seconds of it in each second of the clip.
+struct Showing {
+  double first = 0.0;  // [s]
+  double tempo = 1.0;
+};
+
+std::array<HumanMotion, 2> render(const std::array<Performer, 2>& people, int frames, double rate_hz,
+                                  const Showing& showing = {});
 
 struct Staged {
   Scene scene;
@@ -37,5 +52,15 @@ Performer make_performer(const Body& body, const Ways& ways, int k, double style
 
 // Makes people who turn round to leave stop looking at the partner; to be called once the act has been performed.
 void look_away(Scene& scene);
+
+// Sets the scene as recorded people do: two who stand close, a step or two, quick hands, a short touch; the clip is
+// cropped to it. Some hesitate, some break off. Figures and their sources: docs/synthesis.md and the tasks' files.
+
+// Draws what `options` (already checked) leaves open and plans everything but the act's gestures; who hesitates does so
+// here. `outcome` says how the act ends.
+Staged set_people_stage(Task task, const SynthesisOptions& options, Draws& draws, ActOutcome& outcome);
+
+// In place of the act's gestures: A, and perhaps B, reaches half way and draws back.
+void perform_abort(Scene& scene, Draws& draws);
 
 }  // namespace duet::synthesis

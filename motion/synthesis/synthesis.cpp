@@ -4,10 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/synthetic_id.h"
-#include "duet/motion/synthesis/people_stage.h"
-#include "duet/motion/synthesis/render.h"
 #include "duet/motion/synthesis/stage.h"
 #include "duet/tasks/task_definition.h"
 

@@ -9,17 +9,16 @@
 #include <fstream>
 #include <memory>
 
-#include "duet/app/benchmarks/parts.h"
-#include "duet/app/benchmarks/timer.h"
-#include "duet/backends/factory.h"
+#include "duet/app/benchmarks/benchmark.h"
+#include "duet/backends/engine_module.h"
 #include "duet/cluster/attempt.h"
 #include "duet/cluster/plan_run.h"
 #include "duet/cluster/run_status.h"
 #include "duet/cluster/work_shard.h"
 #include "duet/core/file.h"
+#include "duet/core/file_batch.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/scratch_folder.h"
-#include "duet/core/shell_word.h"
 #include "duet/execution/experiment.h"
 #include "duet/parts/cluster/part.h"
 #include "duet/rows/json_fields.h"

@@ -15,7 +15,7 @@ struct ConversionOptions {
   std::string from = {};            // format that is read; empty: recognised
   RobotMotionOptions reading = {};  // what is known better than the file says
   RobotMotionWriting writing = {};
-  bool sim_to_real = false;  // Algorithm 7, of paired motions (retarget/sim_to_real.h)
+  bool sim_to_real = false;  // Algorithm 7, of paired motions (retarget/solver/pair.h)
 };
 
 struct ConvertedMotion {

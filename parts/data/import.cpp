@@ -1,5 +1,7 @@
 // duet import: motion files of others -> duet's NPZ. Two people, in any format of motion/people/, become a clip, a
 // robot's motion, in any of formats/, a recording.
+#include "duet/parts/data/import.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,17 +10,15 @@
 #include <set>
 
 #include "duet/archives/recording_file.h"
-#include "duet/core/clock.h"
-#include "duet/core/data_file.h"
 #include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/formats/robot_motion_format.h"
 #include "duet/parts/data/part.h"
 #include "duet/parts/data/people_arguments.h"
-#include "duet/parts/data/robot_motion_options.h"
 #include "duet/people/formats/people_formats.h"
-#include "duet/rollout/play_back.h"
+#include "duet/rollout/world.h"
 
 namespace duet::cli {
 namespace {
@@ -184,6 +184,22 @@ void add_import(CLI::App& app, Session& session) {
   command->add_option("--card", arguments->card, "robot card of a robot motion, by name or path (default: the G1)");
   add_robot_motion_options(*command, arguments->robot_motion);
   command->callback([&session, arguments] { run_import(session, *arguments); });
+}
+
+void add_robot_motion_options(CLI::App& command, RobotMotionArguments& arguments) {
+  command.add_option("--quaternion", arguments.quaternion, "of a robot's root: xyzw or wxyz (default: detected)");
+  command.add_option("--joints", arguments.joints,
+                     "order of a robot's joints: depth-first or breadth-first (default: detected)");
+  command.add_option("--angles", arguments.angles, "of a robot's joints: rad or deg (default: detected)");
+  command.add_option("--motion", arguments.options.motion, "of a file with several robot motions: its name or number");
+}
+
+RobotMotionOptions options_of(const RobotMotionArguments& arguments) {
+  RobotMotionOptions options = arguments.options;
+  if (!arguments.quaternion.empty()) options.quaternion = parse_quaternion_order(arguments.quaternion);
+  if (!arguments.joints.empty()) options.joints = parse_tree_order(arguments.joints);
+  if (!arguments.angles.empty()) options.angles = parse_angle_unit(arguments.angles);
+  return options;
 }
 
 }  // namespace duet::cli

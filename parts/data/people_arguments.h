@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "duet/motion/people/people_options.h"
+#include "duet/motion/people/raw_people.h"
 
 namespace duet::cli {
 

@@ -5,7 +5,7 @@
 
 #include "duet/core/require.h"
 #include "duet/datasets/labelled/people_conditions.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/parts/data/part.h"
 #include "duet/parts/data/people_arguments.h"
 

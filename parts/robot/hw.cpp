@@ -1,4 +1,6 @@
 // duet hw: listen to a robot, guard it, plan for it, stop it; each says first what it will do. duet replay-log.
+#include "duet/parts/robot/hw.h"
+
 #include <fmt/format.h>
 
 #include <csignal>
@@ -9,17 +11,13 @@
 
 #include "duet/core/require.h"
 #include "duet/hardware/dds/robot_side.h"
-#include "duet/hardware/guard_link.h"
-#include "duet/hardware/guard_loop.h"
-#include "duet/hardware/guard_message.h"
-#include "duet/hardware/lock_step.h"
-#include "duet/hardware/person_input.h"
-#include "duet/hardware/real_time.h"
-#include "duet/hardware/robot_config.h"
-#include "duet/hardware/run_log.h"
-#include "duet/parts/robot/hw_episodes.h"
-#include "duet/parts/robot/hw_partner.h"
-#include "duet/parts/robot/hw_status.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/guard/guard_message.h"
+#include "duet/hardware/guard/person_input.h"
+#include "duet/hardware/guard/robot_connection.h"
+#include "duet/hardware/log/run_log.h"
+#include "duet/hardware/twin/lock_step.h"
+#include "duet/parts/robot/hw.h"
 #include "duet/parts/robot/part.h"
 
 namespace duet::cli {
@@ -40,7 +38,7 @@ struct HardwareArguments {
   ClipEpisodeArguments episode;
 };
 
-// Not experiment/work/interrupt.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to
+// Not experiment/work/stop_sign.h: there a second Ctrl-C ends the program at once, and a guard that is damping has to
 // finish.
 void end_on_signals() {
   asked_to_end = 0;

@@ -1,5 +1,3 @@
-#include "duet/parts/robot/hw_episodes.h"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -8,20 +6,21 @@
 #include <optional>
 
 #include "duet/controllers/catalogue/registry.h"
-#include "duet/core/clock.h"
 #include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/scratch_folder.h"
+#include "duet/core/robot_state.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/execution/runner.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/experiment/suite_file/suite_actors.h"
-#include "duet/experiment/work/interrupt.h"
 #include "duet/experiment/work/run_work.h"
+#include "duet/experiment/work/stop_sign.h"
 #include "duet/hardware/dds/twin_over_dds.h"
-#include "duet/hardware/guarded_episode.h"
-#include "duet/hardware/twin_in_process.h"
+#include "duet/hardware/episodes/guarded_episode.h"
+#include "duet/hardware/twin/lock_step.h"
+#include "duet/parts/robot/hw.h"
 
 namespace duet::cli {
 namespace {

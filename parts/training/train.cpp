@@ -4,14 +4,20 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "duet/app/cli/field_options.h"
-#include "duet/core/parallel.h"
+#include "duet/app/cli/arguments.h"
+#include "duet/core/file.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
-#include "duet/experiment/work/interrupt.h"
+#include "duet/core/share.h"
+#include "duet/experiment/plan/shipped_suites.h"
+#include "duet/experiment/work/stop_sign.h"
 #include "duet/parts/training/part.h"
+#include "duet/policies/dstar/network.h"
 #include "duet/robots/robot_model.h"
+#include "duet/training/dstar/trainer.h"
+#include "duet/training/dstar/windows.h"
+#include "duet/training/setup/demonstrations.h"
 #include "duet/training/setup/train_options.h"
-#include "duet/training/setup/training_motions.h"
 #include "duet/training/train_wbc.h"
 
 namespace duet::cli {
@@ -149,6 +155,224 @@ void add_train(CLI::App& app, Session& session) {
                 "a small stand and student stage in minutes; fails (exit 1) where the return does not rise");
   wbc->callback([&session, arguments] { train(session, *arguments); });
   add_train_dstar(*command, session);
+}
+
+// duet train dstar | dp | <ablation>: the learnt policies, and the split of clips that they never see.
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DstarArguments : PolicyTraining {
+  bool smoke = false;
+};
+
+constexpr const char* kRetrieval = "retrieval";
+constexpr int kLibraryWindows = 6000;
+constexpr int kValidationPerTask = 6, kGoldenWindows = 8;
+constexpr double kAgreement = 1e-4;  // between libtorch's plans and those of inference
+
+std::string line(const DstarProgress& progress) {
+  return fmt::format(
+      "step {:>6} of {}, {:>4.0f} windows/s, {} left; loss {:.4f} (action {:.4f}, phase {:.4f}, auxiliary {:.4f}), "
+      "validation {:.4f}, phase accuracy {:.1f} %",
+      progress.step, progress.steps, progress.windows_per_second, format_duration(std::max(0.0, progress.seconds_left)),
+      progress.loss, progress.action, progress.phase, progress.auxiliary, progress.validation,
+      100.0 * progress.phase_accuracy);
+}
+
+struct Stopped {};  // by the user, while demonstrations are made: nothing is kept
+
+bool stop_asked() { return interrupt() != Interrupt::kNone; }
+
+// Made once per folder and kept there: hours of frames take minutes.
+std::shared_ptr<const DemonstrationSet> demonstrations(Session& session, const std::shared_ptr<const RobotModel>& robot,
+                                                       const DemonstrationOptions& options, const std::string& file) {
+  if (!fs::exists(file)) {
+    Progress progress(session.progress());
+    const std::optional<DemonstrationSet> made = make_demonstrations(robot, options, progress, stop_asked);
+    if (!made) throw Stopped();
+    fs::create_directories(fs::path(file).parent_path());
+    save_demonstrations(*made, file);
+  }
+  return std::make_shared<const DemonstrationSet>(load_demonstrations(file, robot->digest, origin_of(options)));
+}
+
+DstarData data_of(Session& session, const DstarArguments& arguments) {
+  DstarData data;
+  data.robot = load_shared_robot();
+  data.language = arguments.language.empty() ? built_in_language() : load_language_table(arguments.language);
+  const fs::path folder = fs::path(arguments.run.folder) / "data";
+  data.train = demonstrations(session, data.robot, arguments.data, (folder / "train.safetensors").string());
+  DemonstrationOptions held = arguments.data;
+  held.seed = kValidationSeed;
+  for (DemonstrationClips& kind : held.clips) kind.per_task = std::min(kind.per_task, kValidationPerTask);
+  held.starts = 1;
+  data.validation = demonstrations(session, data.robot, held, (folder / "validation.safetensors").string());
+  const std::string split =
+      arguments.split.empty() ? share_file("test split", "policies/dstar/test_split.txt") : arguments.split;
+  const std::vector<std::string> digests = load_split(split);
+  check_held_out(*data.train, digests, split);
+  check_held_out(*data.validation, digests, split);
+  return data;
+}
+
+std::string round_file(const DstarRun& run, int round) {
+  return (fs::path(run.folder) / run.name / fmt::format("round-{}.safetensors", round)).string();
+}
+
+// Adds what is seen where the network of now takes the robot.
+void add_round(Session& session, const DstarArguments& arguments, int round, DstarData& data) {
+  DemonstrationOptions options = arguments.data;
+  options.policy = "dstar";
+  options.followed = arguments.round_clips;
+  options.policy_options = {{"network", dstar_network_file(arguments.run)}};
+  if (!arguments.language.empty()) options.policy_options["language"] = arguments.language;
+  const auto more = demonstrations(session, data.robot, options, round_file(arguments.run, round));
+  auto both = std::make_shared<DemonstrationSet>(*data.train);
+  both->append(*more);
+  data.train = std::move(both);
+}
+
+// A small training whose outcome can be checked in minutes.
+void make_small(DstarArguments& arguments) {
+  arguments.data.clips = {{Likeness::kPeople, 12}};
+  arguments.data.starts = 1;
+  arguments.data.engine = "";
+  arguments.rounds = 0;
+  DstarRun& run = arguments.run;
+  run.config.width = 64;
+  run.config.layers = 1;
+  run.config.channels = 64;
+  run.batch = 64;
+  if (run.steps == DstarRun{}.steps) run.steps = 300;
+  run.validate_every = static_cast<int>(std::max(1L, run.steps / 10));  // the first of a network that knows nothing yet
+  run.patience = 0;
+}
+
+// Settles the options that depend on the machine and on other options.
+void settle(DstarArguments& arguments) {
+  arguments.run.threads = arguments.data.threads = arguments.threads.value_or(default_threads());
+  if (arguments.start == TrainingStart::kApproach) return;
+  arguments.data.start = StartMode::kSimToReal;
+  arguments.data.starts = 1;  // they are all the same
+}
+
+// Checks the learnt network as the program will run it.
+void check_network(const Session& session, const DstarData& data, const DstarRun& run) {
+  const std::string file = dstar_network_file(run);
+  const double difference = runner_difference(data, run, file, kGoldenWindows);
+  require(difference <= kAgreement,
+          "{}: plans of inference and of libtorch differ by {:.2e}, expected at "
+          "most {:.0e}",
+          file, difference, kAgreement);
+  note(session, fmt::format("{}: inference agrees with libtorch within {:.1e}", file, difference));
+}
+
+void train(Session& session, DstarArguments& arguments, const std::string& name) {
+  need_dstar_trainer();
+  set_variant(arguments.run, name);
+  if (!arguments.config.empty())
+    arguments.run.config = parse_dstar_config(read_text(arguments.config), arguments.config);
+  if (arguments.smoke) make_small(arguments);
+  DstarData data = data_of(session, arguments);
+  if (!arguments.from.empty()) arguments.run.from = load_dstar_network(arguments.from, *data.robot);
+  double first = -1.0, last = 0.0, accuracy = 0.0, speed = 0.0;
+  const auto report = [&](const DstarProgress& progress) {
+    if (first < 0.0 && progress.validation > 0.0) first = progress.validation;
+    last = progress.validation;
+    accuracy = progress.phase_accuracy;
+    speed = progress.windows_per_second;
+    note(session, line(progress));
+  };
+  const int rounds = arguments.data.engine.empty() ? 0 : arguments.rounds;
+  for (int round = 0; round <= rounds; ++round) {
+    DstarRun part = arguments.run;
+    part.until = part.steps * (round + 1) / (rounds + 1);
+    if (train_dstar(data, part, report, stop_asked) == DstarEnd::kStopped) throw Stopped();
+    if (round < rounds) add_round(session, arguments, round, data);
+  }
+  check_network(session, data, arguments.run);
+  if (arguments.smoke && last >= first) {
+    note(session, fmt::format("smoke test failed: the validation loss went from {:.4f} to {:.4f}, expected it to fall",
+                              first, last));
+    session.exit_code = kExitGate;
+  }
+  const std::string file = dstar_network_file(arguments.run);
+  print(session, fmt::format("{}\n", file),
+        {{"network", file}, {"validation", last}, {"phase_accuracy", accuracy}, {"windows_per_second", speed}});
+}
+
+// No training: windows of the same demonstrations, as they are.
+void make_library(Session& session, DstarArguments& arguments, const std::string& name) {
+  const DstarData data = data_of(session, arguments);
+  const fs::path file = fs::path(arguments.run.folder) / name / "library.safetensors";
+  fs::create_directories(file.parent_path());
+  save_retrieval_library(file.string(),
+                         make_retrieval_library(data.robot, *data.train, kLibraryWindows, arguments.run.seed));
+  print(session, fmt::format("{}\n", file.string()), {{"library", file.string()}});
+}
+
+void train_or_stop(Session& session, DstarArguments& arguments, const std::string& name) {
+  catch_interrupts();
+  settle(arguments);
+  try {
+    name == kRetrieval ? make_library(session, arguments, name) : train(session, arguments, name);
+  } catch (const Stopped&) {
+    note(session, fmt::format("stopped; the same command goes on from what is in '{}'", arguments.run.folder));
+    session.exit_code = interrupt() == Interrupt::kInterrupted ? kExitInterrupted : kExitResumable;
+  }
+}
+
+void add_policy(CLI::App& train_command, Session& session, const std::string& name) {
+  auto arguments = std::make_shared<DstarArguments>();
+  const std::string about =
+      name == "dstar" ? "D-STAR (supplement A.2, A.3.1): demonstrations made here, then supervised training.\n"
+                        "Killed or stopped, the same command goes on from the last checkpoint"
+                      : fmt::format("The variant '{}' of D-STAR, on the same demonstrations", name);
+  CLI::App* command =
+      add_command(train_command, session, name, about, fmt::format("duet train {} --smoke -o runs/smoke", name));
+  add_fields<PolicyTraining>(*command, policy_training_fields(), *arguments, "clips");
+  command->add_flag("--smoke", arguments->smoke,
+                    "a small training in minutes; fails (exit 1) where the validation loss does not fall");
+  command->callback([&session, arguments, name] { train_or_stop(session, *arguments, name); });
+}
+
+void add_pack(CLI::App& train_command, Session& session) {
+  auto from = std::make_shared<std::string>(), to = std::make_shared<std::string>();
+  CLI::App* command =
+      add_command(train_command, session, "pack", "Write a policy's network in half precision, to ship it",
+                  "duet train pack runs/policies/dstar/network.safetensors -o dstar.safetensors");
+  command->add_option("network", *from, "file of a training")->required();
+  command->add_option("-o,--output", *to, "file to write")->required();
+  command->callback([&session, from, to] {
+    const auto robot = load_shared_robot();
+    save_dstar_network(*to, *load_dstar_network(*from, *robot), TensorType::kF16);
+    load_dstar_network(*to, *robot);  // its golden plan is checked
+    print(session, fmt::format("{}: {} bytes\n", *to, fs::file_size(*to)), {{"network", *to}});
+  });
+}
+
+void add_split(CLI::App& train_command, Session& session) {
+  auto file = std::make_shared<std::string>();
+  CLI::App* command =
+      add_command(train_command, session, "split", "Print the test split of a suite: a digest and a name per clip",
+                  "duet train split suites/core.yaml > policies/dstar/test_split.txt");
+  command->add_option("suite", *file, "suite file, or the name of one that ships")->required();
+  command->callback([&session, file] {
+    Progress progress(session.progress());
+    const std::string text = split_text(load_suite(suite_file(*file)), default_threads(), progress);
+    print(session, text, {{"split", text}});
+  });
+}
+
+}  // namespace
+
+void add_train_dstar(CLI::App& train_command, Session& session) {
+  for (const std::string& name : dstar_variants()) add_policy(train_command, session, name);
+  add_policy(train_command, session, kRetrieval);
+  add_pack(train_command, session);
+  add_split(train_command, session);
 }
 
 }  // namespace duet::cli

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/app/benchmarks/parts.h"
-#include "duet/app/benchmarks/timer.h"
+#include "duet/app/benchmarks/benchmark.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
 #include "duet/controllers/wbc_sim/observation.h"

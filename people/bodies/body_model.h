@@ -4,13 +4,27 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "duet/people/bodies/body_kinematics.h"
+#include "duet/core/recording.h"
 
 namespace duet {
+
+// Forward kinematics of the SMPL family's joints. A file's joint rotations are turns against the parent's, from the
+// rest pose (T pose; x to the left, y up, z forward); the root turns about the pelvis at rest, not about the origin:
+// p_pelvis = rest + translation, p_child = p_parent + R_parent (rest_child - rest_parent). Pure functions.
+
+using RestJoints = Eigen::Matrix<double, 3, kSmplJoints>;  // [m], of the model's own axes
+
+// The rotation of an axis-angle vector [rad], unit to 1e-15 for any angle.
+Eigen::Quaterniond rotation_of_vector(const Eigen::Vector3d& axis_angle);
+
+// `rotations`: 24 of one frame, each against its parent's; they become global, R_FJ. `joints` (3, 24) are filled [m].
+void pose_body(const RestJoints& rest, const Eigen::Vector3d& translation, std::span<Eigen::Quaterniond> rotations,
+               PointTracks::Frame joints);
 
 struct BodyModel {
   std::string kind;                   // "SMPL", "SMPL-H", "SMPL-X"; empty: the average person
@@ -25,8 +39,8 @@ struct BodyModel {
 // and found.
 BodyModel load_body_model(const std::string& path);
 
-// A person of 1.70 m with the proportions of duet's synthesis (tasks/synthesis/body.h). Its pelvis rests at the origin,
-// since where a model's pelvis lies is known from its file alone: people of one file are all moved by the same
+// A person of 1.70 m with the proportions of duet's synthesis (tasks/synthesis/figure.h). Its pelvis rests at the
+// origin, since where a model's pelvis lies is known from its file alone: people of one file are all moved by the same
 // 0.2 to 0.4 m along the file's axes.
 BodyModel average_body();
 

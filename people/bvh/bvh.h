@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "duet/core/robot_state.h"
 #include "duet/motion/interaction_clip.h"
 
 namespace duet {
@@ -47,7 +48,7 @@ struct BvhOptions {  // empty = detected; the verdict says what was found and fr
   std::optional<double> rate_hz = {};    // overrides the frame time
   std::optional<bool> drop_t_pose = {};  // an added T pose in frame 0
   double output_rate_hz = 50.0;
-  std::string skeleton = {};  // the user's file of names (motion/layouts/joint_names.h);
+  std::string skeleton = {};  // the user's file of names (motion/layouts/joint_recipes.h);
                               // empty: known namings
 };
 
@@ -62,5 +63,22 @@ struct BvhImport {
 BvhImport import_bvh_pair(const std::string& path_a, const std::string& path_b, Task task,
                           const BvhOptions& options = {});
 BvhImport import_bvh_pair(const Bvh& a, const Bvh& b, Task task, const BvhOptions& options = {});
+
+// Poses of a BVH skeleton, in the file's axes and units. Thread-safe.
+
+// Pose of each joint in its parent at a frame. Rotation channels multiply in
+// file order; a position channel replaces that component of the OFFSET (as
+// Blender and MotionBuilder read it), unless the joint keeps it.
+std::vector<Pose> local_poses(const Bvh& bvh, int frame);
+
+// The same at a time between two frames: slerp of rotations, linear positions. `index` counts frames and may be
+// fractional; exact where it is whole.
+std::vector<Pose> local_poses_at(const Bvh& bvh, double index);
+
+// The posture of the hierarchy itself: offsets only.
+std::vector<Pose> zero_local_poses(const Bvh& bvh);
+
+// Poses in the world from poses in the parents.
+std::vector<Pose> global_poses(const Bvh& bvh, const std::vector<Pose>& local);
 
 }  // namespace duet

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/pose.h"
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
+#include "duet/core/robot_state.h"
 #include "duet/people/bvh/bvh.h"
 
 namespace duet {
@@ -34,17 +34,25 @@ struct BvhSkeleton {
   std::vector<std::string> notes = {};  // what was made, one sentence each
 };
 
-// `names`: the user's file of names (motion/layouts/joint_names.h), "" for known
+// `names`: the user's file of names (motion/layouts/joint_recipes.h), "" for known
 // namings. Throws InputError naming the file, the joint that is missing, the
 // SMPL joint that it is for, and the nearest name.
 BvhSkeleton find_smpl_joints(const Bvh& bvh, const std::string& names = "");
 
 using SmplPositions = Eigen::Matrix<double, 3, kSmplJoints>;
 
-// Positions of the SMPL joints from the poses of the file's joints (bvh_kinematics.h), in the file's axes and units.
+// Positions of the SMPL joints from the poses of the file's joints (bvh.h), in the file's axes and units.
 SmplPositions smpl_positions(const BvhSkeleton& skeleton, const std::vector<Pose>& global);
 
 // Length of the bones from head through pelvis, hip and knee to the ankle, mean of both sides, in file units.
 double stature(const SmplPositions& positions);
+
+// Two people in one BVH file: two ROOTs, or two branches of one hierarchy
+// ("character_A_left_hip"). Thread-safe.
+
+// Person A and person B in the order of the file, each a Bvh of its own with
+// the joints above it. `names` as find_smpl_joints() takes it. Throws
+// InputError naming the file where it does not hold two people.
+std::array<Bvh, 2> two_people_in(const Bvh& bvh, const std::string& names = "");
 
 }  // namespace duet

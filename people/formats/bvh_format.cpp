@@ -10,10 +10,8 @@
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/people/bvh/bvh.h"
-#include "duet/people/bvh/bvh_kinematics.h"
-#include "duet/people/bvh/bvh_people.h"
 #include "duet/people/bvh/bvh_skeleton.h"
-#include "duet/people/people_readers.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 namespace {

@@ -10,7 +10,7 @@
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"
-#include "duet/people/people_readers.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 namespace {

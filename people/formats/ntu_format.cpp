@@ -13,14 +13,10 @@
 #include <map>
 #include <optional>
 
-#include "duet/core/data_file.h"
-#include "duet/core/number.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/split.h"
-#include "duet/core/text.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/people/clip_files.h"
-#include "duet/people/people_readers.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 namespace {

@@ -7,20 +7,12 @@
 #include <map>
 
 #include "duet/archives/zip/zip.h"
-#include "duet/core/data_file.h"
+#include "duet/core/file.h"
 #include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/people/clip_files.h"
-#include "duet/people/formats/amass.h"
-#include "duet/people/formats/gvhmr.h"
 #include "duet/people/formats/inter/inter_x.h"
-#include "duet/people/formats/inter/inter_x_h5.h"
-#include "duet/people/formats/inter/interhuman_raw.h"
-#include "duet/people/formats/motion_rows.h"
-#include "duet/people/formats/video_tracks.h"
-#include "duet/people/people_readers.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 

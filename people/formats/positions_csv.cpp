@@ -10,9 +10,8 @@
 #include <optional>
 
 #include "duet/archives/csv.h"
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 
 namespace duet {
 namespace {

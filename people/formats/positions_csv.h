@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
+#include "duet/core/recording.h"
 
 namespace duet {
 

@@ -7,19 +7,15 @@
 #include <cctype>
 #include <filesystem>
 
-#include "duet/archives/npy/npy_header.h"
+#include "duet/archives/npy/npy.h"
 #include "duet/archives/npy/npz.h"
 #include "duet/archives/zip/zip.h"
-#include "duet/core/data_file.h"
-#include "duet/core/naming_file.h"
-#include "duet/core/no_data.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/motion/people/people_detection.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/people/clip_files.h"
 #include "duet/people/formats/positions_csv.h"
-#include "duet/people/people_readers.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,3 @@
-#include "duet/people/formats/video_tracks.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,14 +6,13 @@
 #include <optional>
 #include <utility>
 
-#include "duet/archives/pickle/joblib.h"
+#include "duet/archives/pickle/pickle_files.h"
 #include "duet/archives/pickle/pickle_machine.h"
-#include "duet/core/data_file.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/people/bodies/body_kinematics.h"
+#include "duet/people/bodies/body_model.h"
 #include "duet/people/body_people.h"
-#include "duet/people/clip_files.h"
+#include "duet/people/people_format.h"
 
 namespace duet {
 namespace {

@@ -4,14 +4,12 @@
 #include <utility>
 
 #include "duet/core/names.h"
-#include "duet/core/open_registry.h"
 #include "duet/core/require.h"
 #include "duet/policies/controls/control_policy.h"
 #include "duet/policies/dstar/dstar_policy.h"
 #include "duet/policies/dstar/retrieval.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/policies/null_policy.h"
-#include "duet/policies/replay_policy.h"
+#include "duet/policies/reference_policies.h"
 
 namespace duet {
 namespace {
@@ -70,8 +68,8 @@ constexpr Entry kPolicies[] = {{"replay", replay_info, of<ReplayPolicy>, no_file
 // A name that is the path of a policy descriptor.
 constexpr Entry kDescriptor = {"", external_info, external_maker, external_files};
 
-// A function of Python (python/plans_binding.cpp), which no list has: runs of it are read and compared wherever they
-// are.
+// A function of Python (python/environment_binding.cpp), which no list has: runs of it are read and compared wherever
+// they are.
 PolicyInfo function_info(const std::string& name) {
   return {name,
           "A function of Python that is called for all waiting episodes at once (duet.evaluate)",

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/arm_role.h"
-#include "duet/core/loaded_file.h"
+#include "duet/core/file.h"
+#include "duet/core/task.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
 

@@ -4,6 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "duet/core/require.h"
+#include "duet/policies/dstar/encoder.h"
+#include "duet/policies/dstar/network.h"
 
 namespace duet {
 namespace {
@@ -154,5 +161,143 @@ void Denoiser::modulate(const Block& block, int step) {
     for (int c = 0; c < kAnchors; ++c) y_[c * channels_ + i] = y_[c * channels_ + i] * (1.0F + scale) + shift;
   }
 }
+
+namespace {
+
+// Nichol and Dhariwal, "Improved denoising diffusion probabilistic models", eq. 17; x in [0, 1].
+double squared_cosine(double x) {
+  constexpr double kOffset = 0.008;
+  const double cosine = std::cos((x + kOffset) / (1.0 + kOffset) * std::numbers::pi / 2.0);
+  return cosine * cosine;
+}
+
+}  // namespace
+
+std::vector<double> squared_cosine_alpha_bar(int steps) {
+  constexpr double kLargestBeta = 0.999;
+  require(steps > 0, "squared_cosine_alpha_bar: expected at least one step");
+  std::vector<double> alpha_bar(static_cast<std::size_t>(steps));
+  double product = 1.0;
+  for (int t = 0; t < steps; ++t) {
+    const double left = squared_cosine((t + 1.0) / steps) / squared_cosine(static_cast<double>(t) / steps);
+    product *= 1.0 - std::min(1.0 - left, kLargestBeta);
+    alpha_bar[static_cast<std::size_t>(t)] = product;
+  }
+  return alpha_bar;
+}
+
+std::vector<int> ddim_steps(int training_steps, int inference_steps) {
+  require(inference_steps > 0 && inference_steps <= training_steps,
+          "ddim_steps: expected from one step of inference to as many as of training");
+  std::vector<int> steps(static_cast<std::size_t>(inference_steps));
+  for (int i = 0; i < inference_steps; ++i) {
+    const double share = inference_steps > 1 ? static_cast<double>(i) / (inference_steps - 1) : 0.0;
+    steps[static_cast<std::size_t>(i)] = static_cast<int>(std::lround((training_steps - 1) * (1.0 - share)));
+  }
+  return steps;
+}
+
+namespace {
+
+constexpr float kFrameClip = 10.0F;  // of a normalised channel
+
+std::shared_ptr<const DstarNetwork> checked(std::shared_ptr<const DstarNetwork> network) {
+  require(network != nullptr, "D-STAR: a runner needs a network");
+  const std::string problem = network_problem(*network);
+  require(problem.empty(), "network of D-STAR: {}", problem);
+  return network;
+}
+
+}  // namespace
+
+struct DstarRunner::Work {
+  explicit Work(std::shared_ptr<const DstarNetwork> given);
+  void encode(const DstarInput& input);
+  void normalise(const DstarFrames& in, DstarFrames& out) const;
+  void denormalise();
+
+  std::shared_ptr<const DstarNetwork> network;  // shared: many episodes run one
+  StreamEncoder long_stream;
+  std::optional<StreamEncoder> short_stream;
+  std::optional<PhaseAttention> phase;
+  std::optional<SpatialReasoning> spatial;
+  Linear temporal, condition1, condition2;
+  Denoiser denoiser;
+  std::vector<float> streams, context, hidden, condition, plan;
+  DstarFrames frames, past;
+  std::span<const float> normalised;
+};
+
+DstarRunner::Work::Work(std::shared_ptr<const DstarNetwork> given)
+    : network(checked(std::move(given))),
+      long_stream(*network, "long", network->config.long_frames),
+      denoiser(*network),
+      plan(kPlanSize) {
+  const DstarConfig& config = network->config;
+  const WeightsOf weights(*network);
+  if (config.short_stream) short_stream.emplace(*network, "short", config.short_frames);
+  if (config.phase_attention) phase.emplace(*network);
+  if (config.spatial_reasoning) spatial.emplace(*network);
+  temporal = weights.linear("temporal");
+  condition1 = weights.linear("condition.1");
+  condition2 = weights.linear("condition.2");
+  streams.resize(static_cast<std::size_t>(temporal.inputs));
+  context.resize(static_cast<std::size_t>(condition1.inputs));
+  hidden.resize(static_cast<std::size_t>(config.condition));
+  condition.resize(hidden.size());
+}
+
+void DstarRunner::Work::normalise(const DstarFrames& in, DstarFrames& out) const {
+  out = (in.colwise() - network->frame_mean).array().colwise() / network->frame_deviation.array();
+  clip({out.data(), static_cast<std::size_t>(out.size())}, kFrameClip);
+}
+
+// The condition g of an input.
+void DstarRunner::Work::encode(const DstarInput& input) {
+  const DstarConfig& config = network->config;
+  normalise(input.features->frames, frames);
+  normalise(input.features->past, past);
+  long_stream.encode(past.data(), streams.data());
+  if (short_stream) short_stream->encode(frames.data(), streams.data() + config.stream);
+  const float* f_temp = context.data();
+  float* next = context.data() + config.temporal;
+  temporal.apply(streams.data(), context.data());
+  if (phase) phase->run(f_temp, next), next += config.phase;
+  if (spatial) spatial->run(*input.features, f_temp, next), next += config.spatial;
+  if (config.language_on) std::ranges::copy(input.language, next);
+  condition1.apply(context.data(), hidden.data());
+  silu(hidden);
+  condition2.apply(hidden.data(), condition.data());
+}
+
+void DstarRunner::Work::denormalise() {
+  for (int i = 0; i < kPlanSize; ++i)
+    plan[static_cast<std::size_t>(i)] =
+        network->plan_mean[i] + network->plan_deviation[i] * normalised[static_cast<std::size_t>(i)];
+}
+
+DstarRunner::DstarRunner(std::shared_ptr<const DstarNetwork> network)
+    : work_(std::make_unique<Work>(std::move(network))) {}
+
+DstarRunner::~DstarRunner() = default;
+
+std::span<const float> DstarRunner::run(const DstarInput& input) {
+  const DstarConfig& config = work_->network->config;
+  require(input.features != nullptr, "D-STAR: expected features, found none");
+  require(input.noise.size() == kPlanSize, "D-STAR: expected 180 numbers of noise");
+  require(!config.language_on || input.language.size() == static_cast<std::size_t>(config.language),
+          "D-STAR: the language embedding has another size than the network's");
+  work_->encode(input);
+  work_->denoiser.condition(work_->condition.data());
+  work_->normalised = work_->denoiser.sample(input.noise);
+  work_->denormalise();
+  return work_->plan;
+}
+
+std::span<const float> DstarRunner::phases() const {
+  return work_->phase ? work_->phase->phases() : std::span<const float>{};
+}
+
+std::span<const float> DstarRunner::normalised_plan() const { return work_->normalised; }
 
 }  // namespace duet

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "duet/policies/dstar/layers.h"
+#include "duet/policies/dstar/encoder.h"
 
 namespace duet {
 

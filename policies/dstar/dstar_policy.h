@@ -2,9 +2,12 @@
 // Policy are: networks of other configurations in the same class.
 #pragma once
 
+#include <array>
+#include <deque>
 #include <memory>
+#include <span>
 
-#include "duet/core/loaded_file.h"
+#include "duet/core/file.h"
 #include "duet/policies/dstar/network.h"
 #include "duet/policies/language.h"
 #include "duet/policies/policy.h"
@@ -33,5 +36,28 @@ std::unique_ptr<Policy> make_dstar_policy(const std::string& name, std::shared_p
 PolicyInfo dstar_info(const std::string& name);
 PolicyMaker dstar_maker(const std::string& name, std::shared_ptr<const RobotModel> robot, const PolicyOptions& options);
 LoadedFiles dstar_files(const std::string& name, const PolicyOptions& options);
+
+// The past that D-STAR's long stream looks back on: frames further apart, kept over an episode, of which an observation
+// only brings the newest. One owner, not thread-safe.
+class PastFrames {
+ public:
+  // `stride`: ticks between the frames, 1 or more.
+  explicit PastFrames(int stride) : stride_(stride) {}
+  void reset() { seen_.clear(); }
+  // Keeps the frames of an observation; what was kept of its ticks or later ones is replaced.
+  void add(const Observation& observation);
+  // kHistoryFrames frames, `stride` ticks apart, the newest last. For a tick that was not seen: the last one before it,
+  // or the first of all. Valid until the next call. Throws std::invalid_argument before the first add.
+  std::span<const ObservationFrame> frames();
+
+ private:
+  struct Seen {
+    int tick;
+    ObservationFrame frame;
+  };
+  int stride_;
+  std::deque<Seen> seen_;  // oldest first
+  std::array<ObservationFrame, kHistoryFrames> frames_;
+};
 
 }  // namespace duet

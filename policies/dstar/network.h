@@ -3,13 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "duet/nn/safetensors.h"
-#include "duet/policies/dstar/config.h"
 #include "duet/policies/dstar/features.h"
 
 namespace duet {
@@ -70,5 +70,20 @@ std::vector<TensorShape> dstar_tensors(const DstarConfig& config);
 // falling.
 std::vector<double> squared_cosine_alpha_bar(int steps);
 std::vector<int> ddim_steps(int training_steps, int inference_steps);
+
+// Whether a network is one: private to policies/dstar/.
+
+// The first thing that is wrong with its configuration, names, normalisers or tensors ("tensor 'x': expected shape (3),
+// found (4)"); "" where it can be evaluated.
+std::string network_problem(const DstarNetwork& network);
+
+std::string shape_words(const std::vector<std::int64_t>& shape);
+
+// A network of random weights: for tests and benchmarks, and what a trainer starts from.
+
+// Weights normal with deviation 1 / sqrt(inputs), scales of norms about 1, biases and positions about 0; normalisers
+// about one. Made for `robot` and the built-in language. Throws std::invalid_argument for a configuration that is
+// refused by parse_dstar_config.
+DstarNetwork random_dstar_network(const DstarConfig& config, const RobotModel& robot, std::uint64_t seed);
 
 }  // namespace duet

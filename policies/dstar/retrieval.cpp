@@ -8,12 +8,12 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "duet/core/field.h"
 #include "duet/core/json.h"
-#include "duet/core/option.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
 #include "duet/core/share.h"
-#include "duet/core/skeleton.h"
-#include "duet/nn/stored_values.h"
+#include "duet/nn/safetensors.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/loaded_file.h"
+#include "duet/core/file.h"
 #include "duet/nn/safetensors.h"
 #include "duet/policies/dstar/features.h"
 #include "duet/policies/policy.h"

@@ -5,9 +5,9 @@
 #include <limits>
 #include <set>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/report/engines/cross_engine_parts.h"
+#include "duet/report/engines/cross_engine.h"
 
 namespace duet {
 namespace {

@@ -7,11 +7,11 @@
 #include <string_view>
 #include <tuple>
 
-#include "duet/report/page/analysis_html.h"
+#include "duet/report/page/html_page.h"
 #include "duet/report/ranking/board.h"
 #include "duet/report/ranking/leaderboard.h"
-#include "duet/report/tables/cells.h"
-#include "duet/report/tables/escape_html.h"
+#include "duet/report/tables/line_plot.h"
+#include "duet/report/tables/text_table.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
 

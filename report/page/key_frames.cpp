@@ -7,7 +7,7 @@
 #include <limits>
 #include <optional>
 
-#include "duet/report/tables/escape_html.h"
+#include "duet/report/tables/line_plot.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,6 @@
 // Key frames of a clip as stick figures: an orthographic side view, in millimetres, at right angles to the line between
 // the two agents and the same for all frames of a clip. The picture of a clip is a file of its own in a data set, too
-// (datasets/clip_picture.h), so that it is drawn here and not by the viewer of pages.
+// (datasets/curation.h), so that it is drawn here and not by the viewer of pages.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,13 +1,13 @@
 // The board answers a reader's first questions: which policy with which controller, how sure, and whether the engine
 // matters. It lists competitors by mean success over engines, the lead of the first and its lift over the best control;
-// beside them, without a rank, the arms that are references (core/arm_role.h). Nothing depends on the order of rows.
+// beside them, without a rank, the arms that are references (core/task.h). Nothing depends on the order of rows.
 #pragma once
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "duet/core/arm_role.h"
+#include "duet/core/task.h"
 #include "duet/report/engines/cross_engine.h"
 #include "duet/report/ranking/contact_table.h"
 #include "duet/report/tables/analysis.h"

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <functional>
 
-#include "duet/core/text.h"
+#include "duet/core/require.h"
 #include "duet/report/ranking/board.h"
 #include "duet/report/ranking/policy_groups.h"
-#include "duet/report/tables/cells.h"
-#include "duet/statistics/by_clip.h"
+#include "duet/report/tables/text_table.h"
+#include "duet/statistics/clustered.h"
 
 namespace duet {
 namespace {

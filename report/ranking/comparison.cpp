@@ -11,8 +11,8 @@
 #include <tuple>
 
 #include "duet/core/require.h"
-#include "duet/rows/groups/distinct_episodes.h"
-#include "duet/statistics/by_clip.h"
+#include "duet/rows/groups/row_groups.h"
+#include "duet/statistics/clustered.h"
 
 namespace duet {
 namespace {

@@ -10,8 +10,7 @@
 #include <set>
 #include <tuple>
 
-#include "duet/core/order_statistics.h"
-#include "duet/rows/groups/distinct_episodes.h"
+#include "duet/core/numbers.h"
 #include "duet/rows/groups/row_groups.h"
 
 namespace duet {

@@ -9,9 +9,8 @@
 #include <set>
 #include <tuple>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
-#include "duet/rows/groups/distinct_episodes.h"
 #include "duet/rows/groups/row_groups.h"
 #include "duet/rows/json_fields.h"
 

@@ -10,9 +10,8 @@
 #include <set>
 
 #include "duet/core/require.h"
-#include "duet/core/text.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 namespace {

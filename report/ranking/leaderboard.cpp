@@ -8,7 +8,6 @@
 #include <tuple>
 
 #include "duet/core/require.h"
-#include "duet/rows/groups/distinct_episodes.h"
 #include "duet/rows/groups/row_groups.h"
 
 namespace duet {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "duet/report/tables/analysis.h"
-#include "duet/report/tables/metric_column.h"
 #include "duet/rows/episode_row.h"
 #include "duet/statistics/statistics.h"
 

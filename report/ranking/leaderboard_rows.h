@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "duet/report/ranking/leaderboard.h"
-#include "duet/report/tables/cells.h"
+#include "duet/report/tables/text_table.h"
 
 namespace duet {
 

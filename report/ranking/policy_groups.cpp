@@ -1,6 +1,6 @@
 #include "duet/report/ranking/policy_groups.h"
 
-#include "duet/rows/groups/distinct_episodes.h"
+#include "duet/rows/groups/row_groups.h"
 
 namespace duet {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <tuple>
 
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/contact_table.h"
 #include "duet/report/ranking/leaderboard_rows.h"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <set>
 
-#include "duet/core/episode_tags.h"
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
+#include "duet/core/task.h"
 #include "duet/report/ranking/policy_groups.h"
 #include "duet/report/studies/studies.h"
 

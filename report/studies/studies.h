@@ -20,7 +20,7 @@ namespace duet {
 Analysis controller_analysis(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
 
 // The cost of perturbations to a policy: success under each beside clean episodes of the same run, paired episode by
-// episode, and as curves over the sizes that rows' tags say (core/episode_tags.h), with the supplement's Table S9
+// episode, and as curves over the sizes that rows' tags say (core/task.h), with the supplement's Table S9
 // beside them. Perturbations of one kind that differ in other values, too, are families of their own: "push (duration:
 // 1, every: 4)". Every engine alone, playback too; the null arm is left out.
 Analysis degradation_analysis(const std::vector<EpisodeRow>& rows, const IntervalOptions& options = {});
@@ -56,7 +56,7 @@ Analysis people_analysis(const std::vector<EpisodeRow>& rows, double level = 0.9
 
 // One method, several trainings: policies to which the suite gives one tag `method` and different tags `seed` are
 // networks of one method that learnt with other seeds. Each training's success, their mean and spread, and every
-// method against every other where both trainings and clips are random effects (statistics/crossed_effects.h): a
+// method against every other where both trainings and clips are random effects (statistics/clustered.h): a
 // difference that another seed would turn round is none. The main arm only. Throws InputError also for two policies
 // that are the same training.
 Analysis training_analysis(const std::vector<EpisodeRow>& rows, double level = 0.95, double margin = 0.05);

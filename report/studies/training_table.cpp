@@ -7,12 +7,12 @@
 #include <map>
 #include <set>
 
-#include "duet/core/episode_tags.h"
 #include "duet/core/require.h"
+#include "duet/core/task.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/policy_groups.h"
 #include "duet/report/studies/studies.h"
-#include "duet/statistics/crossed_effects.h"
+#include "duet/statistics/clustered.h"
 
 namespace duet {
 namespace {

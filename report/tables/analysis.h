@@ -1,5 +1,5 @@
 // The findings of one analysis of a run: estimates, and tables that are pivots of them. It is written here in every
-// form that a report has (Markdown for files and terminals, LaTeX, CSV, JSON; HTML in report/page/analysis_html.h), so
+// form that a report has (Markdown for files and terminals, LaTeX, CSV, JSON; HTML in report/page/html_page.h), so
 // that a new one is a function that returns an Analysis and an entry in a list (report/page/run_analyses.cpp).
 #pragma once
 
@@ -10,7 +10,6 @@
 
 #include "duet/report/tables/estimate.h"
 #include "duet/report/tables/line_plot.h"
-#include "duet/report/tables/pivot.h"
 
 namespace duet {
 
@@ -51,5 +50,10 @@ std::vector<std::pair<std::string, std::string>> analysis_files(const std::vecto
 
 // Each under its name, added to `json`.
 void add_analyses(const std::vector<Analysis>& analyses, nlohmann::json& json);
+
+// How a metric is named in tables; the catalogue of metrics is the caller's.
+struct MetricColumn {
+  std::string name, title, unit, direction;  // direction: "lower", "higher", ""
+};
 
 }  // namespace duet

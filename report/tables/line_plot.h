@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace duet {
@@ -26,5 +27,8 @@ struct LinePlot {
 inline constexpr std::size_t kPlotPoints = 400;
 inline constexpr int kPlotDigits = 5;
 nlohmann::json plot_json(const LinePlot& plot);
+
+// Text within HTML.
+std::string escape_html(std::string_view text);  // also for attribute values in double quotes
 
 }  // namespace duet

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace duet {
@@ -26,6 +28,50 @@ std::shared_ptr<const RobotModel> perturbed_robot(const Perturbation& perturbati
   std::shared_ptr<const RobotModel> changed = robot;
   for (const std::shared_ptr<const RobotPerturbation>& one : perturbation.robot) changed = one->changed(changed);
   return changed;
+}
+
+int perturbed_link(const std::string& name, const RobotModel& robot) {
+  return robot.frames[robot.frame_index(named_link(name, robot))].link;
+}
+
+std::string named_link(const std::string& name, const RobotModel& robot) {
+  return name.empty() ? robot.frames[robot.roles.push_frame].name : name;
+}
+
+Disturbance::Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start,
+                         int steps_per_tick, double dt, std::uint64_t seed)
+    : past_(perturbation.delay_ticks + 1, start),
+      seen_(start),
+      steps_per_tick_(steps_per_tick),
+      late_steps_(static_cast<int>(std::lround(perturbation.latency_ms / 1000.0 / dt))),
+      commands_((late_steps_ + steps_per_tick - 1) / steps_per_tick + 1, robot.default_command(start.q)) {
+  for (const std::shared_ptr<const RobotPerturbation>& one : perturbation.robot)
+    if (std::unique_ptr<RobotAct> begun = one->begin(robot, seed)) acts_.push_back(std::move(begun));
+  view_changes_ = std::ranges::any_of(acts_, [](const auto& one) { return one->changes_the_view(); });
+}
+
+const RobotState& Disturbance::seen(const RobotState& state) {
+  if (past_.size() == 1 && !view_changes_) return state;
+  newest_ = (newest_ + 1) % past_.size();
+  past_[newest_] = state;
+  seen_ = past_[(newest_ + 1) % past_.size()];  // the oldest
+  for (const std::unique_ptr<RobotAct>& one : acts_) one->see(seen_);
+  return seen_;
+}
+
+void Disturbance::send(const JointCommand& command) {
+  latest_ = (latest_ + 1) % commands_.size();
+  commands_[latest_] = command;
+}
+
+// The command sent `age` ticks ago began to act late_steps_ steps after its tick did.
+const JointCommand& Disturbance::in_effect(int step) const {
+  const int age = step >= late_steps_ ? 0 : (late_steps_ - step + steps_per_tick_ - 1) / steps_per_tick_;
+  return commands_[(latest_ + commands_.size() - static_cast<std::size_t>(age)) % commands_.size()];
+}
+
+void Disturbance::act(int tick, Backend& backend) {
+  for (const std::unique_ptr<RobotAct>& one : acts_) one->act(tick, backend);
 }
 
 }  // namespace duet

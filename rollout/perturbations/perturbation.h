@@ -3,19 +3,62 @@
 // value of a suite; strict YAML (docs/file-formats.md, "Perturbations").
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "duet/core/episode_tags.h"
+#include "duet/backends/backend.h"
+#include "duet/core/task.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/yaml_section.h"
-#include "duet/rollout/perturbations/partner_variation.h"
-#include "duet/rollout/perturbations/perception.h"
-#include "duet/rollout/perturbations/robot_perturbation.h"
+#include "duet/rollout/perturbations/partner_perturbation.h"
 
 namespace duet {
+
+// A perturbation of the robot itself: of what its controller measures of it, of its velocity, of its body. One kind is
+// one unit in rollout/kinds, and a row in rollout/perturbations/perturbation_kinds.cpp.
+
+// One at work in one episode. Allocates nothing; not thread-safe.
+class RobotAct {
+ public:
+  RobotAct() = default;
+  RobotAct(const RobotAct&) = delete;
+  RobotAct& operator=(const RobotAct&) = delete;
+  virtual ~RobotAct() = default;
+
+  [[nodiscard]] virtual bool changes_the_view() const { return false; }
+  // Changes the state that the controller sees; called once a tick, if changes_the_view().
+  virtual void see(RobotState&) {}
+  // Acts on the robot before the physics steps of `tick`.
+  virtual void act(int, Backend&) {}
+};
+
+// The values of a kind. A constant: episodes share it.
+class RobotPerturbation {
+ public:
+  virtual ~RobotPerturbation() = default;
+
+  // Names the robot's own link where none is named: what a suite's hash is made of. Null where it names no link.
+  [[nodiscard]] virtual std::shared_ptr<const RobotPerturbation> with_links(const RobotModel&) const { return nullptr; }
+  // Throws std::invalid_argument: a link that the robot lacks (with the nearest and all that it has), values that it
+  // cannot have.
+  virtual void check(const RobotModel&) const {}
+  // The robot that is simulated.
+  [[nodiscard]] virtual std::shared_ptr<const RobotModel> changed(std::shared_ptr<const RobotModel> robot) const {
+    return robot;
+  }
+  // The perturbation's effect during an episode; null where it has none. The robot outlives it.
+  [[nodiscard]] virtual std::unique_ptr<RobotAct> begin(const RobotModel&, std::uint64_t) const { return nullptr; }
+};
+
+// The index of the link that a perturbation names; "" names the card's push_link. Throws std::invalid_argument with the
+// nearest and all known names.
+int perturbed_link(const std::string& name, const RobotModel& robot);
+
+// The name of the card's push_link where `name` is "".
+std::string named_link(const std::string& name, const RobotModel& robot);
 
 inline constexpr const char* kCleanName = "clean";
 
@@ -60,5 +103,37 @@ void check_perturbation(const Perturbation& perturbation, const RobotModel& robo
 // The robot that is simulated: with the added mass, or `robot` itself.
 std::shared_ptr<const RobotModel> perturbed_robot(const Perturbation& perturbation,
                                                   const std::shared_ptr<const RobotModel>& robot);
+
+// A perturbation at work in one episode: between the engine's state and the controller, between the controller's
+// command and the joints, and on the robot. Nothing allocates after construction; not thread-safe.
+class Disturbance {
+ public:
+  // `start` is what the controller sees of the time before the episode, and what the joints hold until the first
+  // command arrives. `steps_per_tick` physics steps of `dt` [s] are one control tick.
+  Disturbance(const Perturbation& perturbation, const RobotModel& robot, const RobotState& start, int steps_per_tick,
+              double dt, std::uint64_t seed);
+
+  // The controller's view at this tick; once per tick. `state` itself without delay and where no act changes it.
+  const RobotState& seen(const RobotState& state);
+  // The command of this tick; once per tick. Copies.
+  void send(const JointCommand& command);
+  // The command that is in effect in a physics step of this tick, counted from 0.
+  [[nodiscard]] const JointCommand& in_effect(int step) const;
+  // Acts on the robot; before the physics steps of `tick`.
+  void act(int tick, Backend& backend);
+
+ private:
+  std::vector<std::unique_ptr<RobotAct>> acts_;
+  bool view_changes_ = false;
+
+  std::vector<RobotState> past_;  // a ring of the last delay_ticks + 1 states
+  std::size_t newest_ = 0;
+  RobotState seen_;
+
+  int steps_per_tick_;
+  int late_steps_;                      // from a command to its effect
+  std::vector<JointCommand> commands_;  // a ring of the latest, newest at latest_
+  std::size_t latest_ = 0;
+};
 
 }  // namespace duet

@@ -102,4 +102,20 @@ PerturbationKind robot_kind(const std::string& name, std::string meaning, const 
       named);
 }
 
+// The kinds of perturbation: one table, from which they are read, written, hashed, listed and documented. A new kind
+// that acts on the robot is a unit in rollout/kinds and a row here.
+const std::vector<PerturbationKind>& perturbation_kind_table();
+
+// Sudden changes of the robot's velocity.
+PerturbationKind kick_kind();
+
+// Mass that the controller does not know.
+PerturbationKind mass_kind();
+
+// Noise of what the controller measures.
+PerturbationKind noise_kind();
+
+// Pushes at a link.
+PerturbationKind push_kind();
+
 }  // namespace duet

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include "build_info.h"
-#include "duet/core/split.h"
+#include "duet/core/require.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>

@@ -6,14 +6,16 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "duet/core/file.h"
 #include "duet/rows/episode_row.h"
-#include "duet/rows/folder/folder_lock.h"
+#include "duet/rows/folder/run_files.h"
 #include "duet/rows/folder/run_info.h"
 #include "duet/rows/folder/run_rows.h"
 #include "duet/rows/row_file.h"
@@ -88,7 +90,7 @@ struct Run {
 
 // Throws InputError: not a run directory, a file of it that is a link (rows/folder/run_files.h), a broken row (file
 // and line), a key that is not the row's, an episode twice with rows that differ, a row of another suite or of another
-// policy or controller under one name, a published run that is not what was published (rows/folder/published.h).
+// policy or controller under one name, a published run that is not what was published (rows/folder/run_directory.h).
 // Lean rows are for tables alone; Run::file has what they lack.
 Run load_run(const std::string& path, RowExtent extent = RowExtent::kWhole);
 
@@ -100,5 +102,21 @@ bool is_partial(const Run& run);
 // "76 of 400 episodes: partial"; "100 of 400 episodes: the part that was asked for"; empty for a whole run and for one
 // that does not say how many episodes it is to have.
 std::string completeness(const Run& run);
+
+// A run that others rely on: its rows without the traces that only plots of single episodes need, and a manifest with
+// the SHA-256 of every file. A run directory like any other to read; what is in it can neither change unnoticed nor
+// grow.
+
+// Additions to the published rows, suite and environment: files of the run, named from its folder, and texts that stand
+// under such a name.
+struct PublishedInputs {
+  std::set<std::string> files = {};
+  std::map<std::string, std::string> texts = {};
+};
+
+// Writes `folder` at once: it is there whole or not at all. Files that the run names by their places on its machine are
+// named from the working folder. Nothing else of the run is copied. Throws InputError for what is no run or a run
+// without rows, for a file that is a link, and where `folder` is there already.
+void publish_run(const std::string& run, const std::string& folder, const PublishedInputs& inputs = {});
 
 }  // namespace duet

@@ -6,7 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "duet/rows/episode_row.h"
 
 namespace duet {
 
@@ -33,7 +36,7 @@ struct RunInfo {
   std::string created_at;                                    // UTC, ISO 8601
   nlohmann::json environment;                                // rows/folder/environment.h
   std::map<std::string, std::string> policies, controllers;  // name -> digest, "" where its files were not there
-  nlohmann::json certificate;   // parity certificate of the engines (report/engines/certificate_table.h), null where
+  nlohmann::json certificate;   // parity certificate of the engines (report/engines/cross_engine.h), null where
                                 // none is attached
   std::optional<RunPlan> plan;  // none: no clip was ready yet, or the run is of a program that kept no plan
 };
@@ -49,5 +52,28 @@ RunInfo read_run_json(const std::string& path);
 // "tiny@1.0.0 (0123456789ab)".
 std::string suite_label(const std::string& suite, const std::string& version, const std::string& hash);
 std::string suite_label(const RunInfo& info);
+
+// Which digest a name in rows stands for. Rows that say "dstar" and were made by two networks are of two policies: they
+// are never in one table, one run or one merge.
+
+class NameDigests {
+ public:
+  // `kind`: "policy"; `where`: for messages. Throws InputError where the name stands for another digest already: both,
+  // and where each was found. An empty digest is one too: of a policy whose files are not there.
+  void add(const std::string& kind, const std::string& name, const std::string& digest, const std::string& where);
+  // Policy, controller and, of an episode that ran in an engine, the engine with its resolved profile.
+  void add(const EpisodeRow& row, const std::string& where);
+  // Adds the policies and controllers of a run.json; one that was absent then may have come since.
+  void add(const RunInfo& info, const std::string& where);
+
+ private:
+  struct Place {
+    std::string digest, where;
+  };
+  std::map<std::pair<std::string, std::string>, Place> places_;  // by kind and name
+};
+
+// "12ab34cd56ef", "absent" for an empty one.
+std::string short_digest(const std::string& digest);
 
 }  // namespace duet

@@ -7,11 +7,10 @@
 #include <utility>
 
 #include "duet/core/file.h"
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/rows/json_fields.h"
 #include "duet/rows/row_file.h"
-#include "duet/rows/row_identity.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,5 @@
 // episodes.jsonl as rows: which of several rows of one episode stands. Rows are only ever appended; equal rows of two
-// processes count once, errors and time-outs give way (rows/row_identity.h).
+// processes count once, errors and time-outs give way (rows/row_file.h).
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "duet/rows/episode_row.h"
-#include "duet/rows/folder/name_digests.h"
-#include "duet/rows/folder/run_info.h"
 #include "duet/core/named_values.h"
+#include "duet/rows/episode_row.h"
+#include "duet/rows/folder/run_info.h"
 
 namespace duet {
 

@@ -16,4 +16,15 @@ void write_database(const std::vector<EpisodeRow>& rows, const std::string& path
 // The columns of the table `episodes` that hold a field of a row; none of a mapping, a list and a trace.
 std::vector<std::string> database_columns(const RowField& field);
 
+// A row's fields for people: what `duet list row-fields` and docs/reference/row-fields.md say.
+
+struct RowFieldInfo {
+  std::string name, type, meaning;    // "sim_s", "number or null", "simulated time [s]"
+  std::vector<std::string> columns;   // of the table `episodes` in results.sqlite
+  std::vector<RowFieldInfo> members;  // of an object, or of each object of a list
+};
+
+// `schema`, then all of them in the order of their table.
+std::vector<RowFieldInfo> row_field_list();
+
 }  // namespace duet

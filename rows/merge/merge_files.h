@@ -13,7 +13,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "duet/core/outcome.h"
+#include "duet/core/task.h"
 
 namespace duet {
 

@@ -15,13 +15,12 @@
 #include <set>
 #include <unordered_set>
 
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
-#include "duet/rows/folder/name_digests.h"
+#include "duet/rows/folder/run_info.h"
 #include "duet/rows/json_fields.h"
 #include "duet/rows/merge/merge_files.h"
-#include "duet/rows/row_identity.h"
-#include "duet/rows/row_scan.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 namespace {

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "duet/rows/folder/run_directory.h"
 #include "duet/rows/folder/run_info.h"
 
 namespace duet {
@@ -48,10 +49,37 @@ struct MergeBudget {
 };
 
 // Writes the rows by engine, controller, perturbation, arm, policy, task, clip and episode to `output`, at once: it is
-// there whole or as it was. The earliest of equal rows stays; errors and time-outs give way (row_identity.h).
+// there whole or as it was. The earliest of equal rows stays; errors and time-outs give way (rows/row_file.h).
 // Where rows differ nothing is written. Throws InputError: a broken row (file and line), one of another suite, a name
 // of two digests; StorageError.
 MergedRows merge_rows(const std::vector<RowSource>& sources, const RunInfo& info, const std::string& output,
                       const MergeBudget& budget = {});
+
+// Several runs of one suite as one: what two people ran, each with a policy of their own, in one table. Rows are united
+// by key; an episode that several runs have, as the null arm's, is there once. The order of the runs does not matter.
+
+struct RunUnion {
+  Run run;             // rows by engine, controller, perturbation, arm, policy, task, clip and episode
+  int folded = 0;      // rows that more than one run has, equal in every field that repeats
+  int superseded = 0;  // errors and time-outs of episodes that have another row
+  std::vector<std::string>
+      conflicts;  // of those that are not equal: the episode, both runs, the fields with both values
+};
+
+// The path, the suite.yaml and the command line are those of the first run, created_at the earliest, the environment
+// the first by its text with the others in `others`. Throws InputError for runs of different suites and for a policy,
+// controller or engine profile of two digests under one name.
+RunUnion unite(const std::vector<Run>& runs);
+
+// The run.json of all together, from what each says, how many rows each has and how many there are in all.
+// Throws InputError for runs of different suites and for a policy or controller of two digests under one name.
+RunInfo united_info(const std::vector<Run>& runs, const std::vector<std::int64_t>& rows_of_each, std::int64_t rows);
+
+// The environments of all, each once, the first by its text with the others in `others`.
+nlohmann::json united_environment(const std::vector<Run>& runs);
+
+// unite() where a conflict is an error: throws InputError with the first and how many there are. Rows of one run alone
+// are moved, and may be lean.
+Run united(std::vector<Run> runs);
 
 }  // namespace duet

@@ -1,5 +1,3 @@
-#include "duet/rows/merge/run_union.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,9 +8,10 @@
 #include <tuple>
 
 #include "duet/core/require.h"
-#include "duet/rows/folder/name_digests.h"
+#include "duet/rows/folder/run_info.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rows/merge/row_merge.h"
+#include "duet/rows/row_file.h"
 
 namespace duet {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 
 namespace duet::synthesis {
 

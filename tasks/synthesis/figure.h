@@ -4,10 +4,41 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <vector>
 
-#include "duet/tasks/synthesis/body.h"
+#include "duet/core/recording.h"
 
 namespace duet::synthesis {
+
+// A body for synthesis: the 24 joints' offsets from their parents in the rest pose (standing, arms out to the sides;
+// x forward, y left, z up), scaled from anthropometric ratios. [m]
+
+// Factors on the mean proportions, 1 = mean.
+struct Proportions {
+  double legs = 1.0;  // the trunk takes up what the legs leave, so that the stature holds
+  double arms = 1.0;
+  double shoulders = 1.0;
+  double hips = 1.0;
+};
+
+struct Body {
+  double height = 0.0;  // stature, top of the head, legs straight
+  std::array<Eigen::Vector3d, kSmplJoints> offset;
+  double thigh = 0.0;
+  double shank = 0.0;
+  double upper_arm = 0.0;
+  double forearm = 0.0;
+  double hand = 0.0;          // wrist to hand joint
+  double torso_radius = 0.0;  // of the capsule round the spine, pelvis to neck
+  double stand_height = 0.0;  // of the pelvis, knees a little bent
+
+  [[nodiscard]] double leg() const { return thigh + shank; }
+  [[nodiscard]] double arm() const { return upper_arm + forearm + hand; }
+  [[nodiscard]] double ankle_height() const;
+  [[nodiscard]] double toe_height() const;
+};
+
+Body make_body(double height, const Proportions& proportions);
 
 struct TorsoPose {
   Eigen::Vector3d pelvis = Eigen::Vector3d::Zero();
@@ -58,5 +89,29 @@ void pose_arm(const Body& body, const ArmPose& arm, int side, Figure& figure);
 inline constexpr double kArmReach = 0.975;
 // Farthest ankle from hip that the legs are let have, in shares of thigh + shank: 2 acos(0.9965) = 9.6 degrees of knee.
 inline constexpr double kLegReach = 0.9965;
+
+// Bodies that a hand cannot pass: capsules round head and trunk, sized as those of the solid partner
+// (robots/human_body.cpp; a test holds the two against each other), and the hand's own.
+
+struct SolidPart {
+  Eigen::Vector3d from, to;  // ends of the axis, in W [m]
+  double radius = 0.0;       // [m]
+};
+
+// The parts of a figure whose torso is posed.
+std::vector<SolidPart> solid_parts(const Body& body, const Figure& figure);
+// The hand of a figure whose arm is posed.
+SolidPart solid_hand(const Body& body, const Figure& figure, int side);
+
+// How deep two parts are in each other [m], negative: how far apart; and the unit vector that takes the first out.
+struct Overlap {
+  double depth = 0.0;
+  Eigen::Vector3d out = Eigen::Vector3d::UnitZ();
+};
+Overlap overlap_of(const SolidPart& part, const SolidPart& other);
+
+// Poses the arm like pose_arm, but so that the hand is on or outside of `partner`: the target goes out until it is.
+void pose_arm_outside(const Body& body, const ArmPose& arm, int side, const std::vector<SolidPart>& partner,
+                      Figure& figure);
 
 }  // namespace duet::synthesis

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/synthesis/synthesis.h"

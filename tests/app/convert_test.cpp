@@ -7,7 +7,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/retarget/sim_to_real.h"
+#include "duet/retarget/solver/pair.h"
 #include "tests/app/program.h"
 #include "tests/formats/known_motion.h"
 #include "tests/motion/people.h"

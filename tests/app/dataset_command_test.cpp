@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/app/program.h"
 

@@ -1,7 +1,5 @@
 // The values that rows hold beside names: from the suite where they are made, and from the run's suite where they are
 // from before there were tags.
-#include "duet/experiment/plan/episode_tags.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -12,7 +10,7 @@
 #include "duet/execution/runner.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/episode.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/report/studies/studies.h"
 #include "tests/experiment/fixtures.h"

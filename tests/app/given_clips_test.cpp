@@ -8,7 +8,7 @@
 #include "duet/execution/runner.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "tests/app/program.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "duet/core/require.h"
-#include "duet/policies/external/child_process.h"
+#include "duet/policies/external/process_policy.h"
 #include "duet/rows/folder/run_directory.h"
 #include "tests/app/program.h"
 

@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "duet/core/file.h"
-#include "duet/core/split.h"
+#include "duet/core/require.h"
 #include "duet/execution/missing_tags.h"
 #include "duet/report/page/run_analyses.h"
 #include "duet/rows/folder/run_directory.h"

@@ -1,5 +1,3 @@
-#include "duet/replay/rating_page.h"
-
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -9,6 +7,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/policies/language.h"
+#include "duet/replay/replay_page.h"
 #include "tests/app/program.h"
 #include "tests/execution/verified_run.h"
 #include "tests/experiment/fixtures.h"

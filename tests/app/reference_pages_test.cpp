@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/parts/training/part.h"
 #include "tests/support.h"

@@ -10,11 +10,10 @@
 #include <map>
 #include <thread>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/execution/runner.h"
 #include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/prepared_clips.h"
 #include "tests/app/program.h"
 #include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"

@@ -6,9 +6,8 @@
 #include "duet/core/file.h"
 #include "duet/core/share.h"
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/training/setup/demonstrations.h"
-#include "duet/training/setup/training_motions.h"
 #include "tests/support.h"
 
 namespace duet {

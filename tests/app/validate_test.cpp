@@ -4,8 +4,7 @@
 #include <limits>
 
 #include "duet/app/certificate.h"
-#include "duet/app/parity_page.h"
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/app/program.h"

@@ -5,7 +5,7 @@
 #include <map>
 
 #include "duet/execution/runner.h"
-#include "duet/experiment/suite/suite_reference.h"
+#include "duet/experiment/suite/suite.h"
 #include "duet/rows/folder/run_directory.h"
 #include "duet/rows/groups/row_groups.h"
 #include "tests/app/program.h"

@@ -1,8 +1,6 @@
-#include "duet/archives/zip/deflate.h"
-
 #include <gtest/gtest.h>
 
-#include "duet/archives/zip/inflate.h"
+#include "duet/archives/zip/zip.h"
 
 namespace duet {
 namespace {

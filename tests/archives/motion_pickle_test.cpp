@@ -1,11 +1,10 @@
-#include "duet/archives/pickle/motion_pickle.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <functional>
 #include <numeric>
 
+#include "duet/archives/pickle/pickle_fields.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/archives/pickle_bytes.h"

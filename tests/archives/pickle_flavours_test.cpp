@@ -4,10 +4,8 @@
 #include <zlib.h>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/archives/pickle/joblib.h"
-#include "duet/archives/pickle/npy_objects.h"
+#include "duet/archives/pickle/pickle_files.h"
 #include "duet/archives/pickle/pickle_machine.h"
-#include "duet/archives/zip/inflate.h"
 #include "duet/archives/zip/zip.h"
 #include "duet/core/require.h"
 #include "tests/archives/pickle_bytes.h"

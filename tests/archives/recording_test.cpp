@@ -8,7 +8,7 @@
 #include "duet/archives/npy/npz.h"
 #include "duet/archives/recording_file.h"
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

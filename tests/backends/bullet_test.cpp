@@ -1,7 +1,7 @@
 // Bullet: drift of a free box, stops of wrists, thrashing, options. Laws of every engine are in engine_*_test.cpp.
 #include <cmath>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "tests/backends/contact_scene.h"
 #include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"

@@ -8,8 +8,8 @@
 #include <optional>
 #include <sstream>
 
-#include "duet/backends/conformance/deviations.h"
-#include "duet/backends/factory.h"
+#include "duet/backends/conformance/conformance.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "tests/support.h"
 

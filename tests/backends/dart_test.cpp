@@ -3,9 +3,9 @@
 #include <cmath>
 #include <fstream>
 
-#include "duet/backends/factory.h"
-#include "duet/backends/implicit_law.h"
-#include "duet/core/random.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
+#include "duet/core/numbers.h"
 #include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

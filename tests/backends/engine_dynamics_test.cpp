@@ -2,8 +2,8 @@
 // and what becomes of absurd torques. Where engines differ, the row of the engine says by how much and why.
 #include <cmath>
 
-#include "duet/backends/factory.h"
-#include "duet/core/random.h"
+#include "duet/backends/engine_module.h"
+#include "duet/core/numbers.h"
 #include "duet/robots/dynamics.h"
 #include "duet/robots/kinematics.h"
 #include "tests/backends/engine_fixture.h"

@@ -1,12 +1,10 @@
-#include "duet/backends/engine_interface.h"
-
 #include <gmock/gmock.h>
 
 #include <cstdlib>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/require.h"
-#include "duet/core/version.h"
+#include "duet/core/share.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
 

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "tests/support.h"
 
 namespace duet::test {

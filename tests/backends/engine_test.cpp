@@ -2,7 +2,7 @@
 #include <cmath>
 #include <thread>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "tests/backends/engine_fixture.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

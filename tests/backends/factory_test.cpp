@@ -1,7 +1,6 @@
-#include "duet/backends/factory.h"
-
 #include <gmock/gmock.h>
 
+#include "duet/backends/engine_module.h"
 #include "duet/core/require.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "duet/backends/scene.h"
+#include "duet/backends/backend.h"
 #include "duet/core/robot_state.h"
 #include "duet/robots/robot_model.h"
 

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "duet/backends/factory.h"
-#include "duet/backends/implicit_law.h"
-#include "duet/core/random.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/physics_backend.h"
+#include "duet/core/numbers.h"
 #include "duet/robots/dynamics.h"
 #include "tests/backends/contact_scene.h"
 #include "tests/backends/engine_fixture.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/robots/kinematics.h"
 #include "tests/backends/contact_scene.h"
 #include "tests/backends/engine_fixture.h"

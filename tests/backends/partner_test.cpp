@@ -1,5 +1,4 @@
-#include "duet/backends/partner.h"
-
+#include "duet/backends/narrow_phase.h"
 #include "tests/support.h"
 
 namespace duet {

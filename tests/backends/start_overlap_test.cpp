@@ -1,9 +1,8 @@
 // A start with bodies inside one another is refused by name, in every engine through Backend's own calls.
-#include "duet/backends/start_overlap.h"
-
 #include <gmock/gmock.h>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
+#include "duet/backends/narrow_phase.h"
 #include "tests/backends/small_robots.h"
 #include "tests/support.h"
 

@@ -16,7 +16,7 @@
 #include "duet/execution/runner.h"
 #include "duet/execution/verification.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rows/row_file.h"
 #include "tests/execution/verified_run.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,6 +1,5 @@
-#include "duet/controllers/contact_forces.h"
-
-#include "duet/core/random.h"
+#include "duet/controllers/vmc.h"
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

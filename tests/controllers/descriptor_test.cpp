@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/controllers/catalogue/published.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/require.h"
 #include "tests/support.h"

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/catalogue/registry.h"
 #include "duet/nn/network.h"
 
 namespace duet::test {

@@ -1,9 +1,8 @@
-#include "duet/controllers/guard.h"
-
 #include <gmock/gmock.h>
 
 #include <limits>
 
+#include "duet/controllers/controller.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/support.h"

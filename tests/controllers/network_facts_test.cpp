@@ -1,11 +1,10 @@
-#include "duet/controllers/network_facts.h"
-
 #include <gmock/gmock.h>
 
-#include "duet/controllers/catalogue/published.h"
+#include "duet/controllers/catalogue/registry.h"
+#include "duet/controllers/descriptor_controller.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/nn/load_network.h"
+#include "duet/nn/catalogue/load_network.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
 #include "tests/backends/g1_scene.h"

@@ -7,9 +7,9 @@
 #include <sstream>
 #include <string>
 
-#include "duet/archives/pickle/motion_pickle.h"
+#include "duet/archives/pickle/pickle_fields.h"
 #include "duet/core/file.h"
-#include "duet/nn/load_network.h"
+#include "duet/nn/catalogue/load_network.h"
 #include "tests/controllers/walk.h"
 #include "tests/support.h"
 

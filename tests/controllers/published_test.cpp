@@ -1,7 +1,5 @@
 // The published controllers with their own networks in MuJoCo, against measurements of their own code
 // (section 7). The networks do not ship: without them nothing here runs.
-#include "duet/controllers/catalogue/published.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/controllers/catalogue/registry.h"

@@ -7,13 +7,13 @@
 #include <cmath>
 #include <functional>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
-#include "duet/core/random.h"
-#include "duet/core/skeleton.h"
+#include "duet/core/numbers.h"
+#include "duet/core/recording.h"
 #include "duet/robots/dynamics.h"
 #include "duet/robots/kinematics.h"
-#include "duet/rollout/control_period.h"
+#include "duet/rollout/world.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/backends/g1_scene.h"
 #include "tests/backends/small_robots.h"

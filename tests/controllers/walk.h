@@ -5,11 +5,11 @@
 #include <cmath>
 #include <functional>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
 #include "duet/core/require.h"
-#include "duet/rollout/control_period.h"
+#include "duet/rollout/world.h"
 #include "tests/controllers/fake_network.h"
 
 namespace duet::test {

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "duet/controllers/wbc_sim/observation.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/controllers/standing.h"
 
 namespace duet {

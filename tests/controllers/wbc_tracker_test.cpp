@@ -5,8 +5,8 @@
 #include <numbers>
 
 #include "duet/controllers/stance.h"
-#include "duet/controllers/wbc_sim/leg_chain.h"
 #include "duet/controllers/wbc_sim/observation.h"
+#include "duet/controllers/wbc_sim/tracker.h"
 #include "duet/robots/kinematics.h"
 #include "tests/controllers/standing.h"
 #include "tests/support.h"

@@ -1,6 +1,6 @@
-#include "duet/core/awake_time.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/core/machine.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,6 @@
-#include "duet/core/instruction_set.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/core/machine.h"
 
 namespace duet {
 namespace {

@@ -1,9 +1,8 @@
-#include "duet/core/memory_left.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "duet/core/file.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 

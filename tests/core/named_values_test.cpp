@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 
 namespace duet {
 namespace {

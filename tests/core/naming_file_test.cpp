@@ -1,5 +1,4 @@
-#include "duet/core/naming_file.h"
-
+#include "duet/core/file.h"
 #include "tests/support.h"
 
 namespace duet {

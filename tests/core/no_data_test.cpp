@@ -1,10 +1,8 @@
-#include "duet/core/no_data.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/core/data_file.h"
+#include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "tests/support.h"
 

@@ -1,6 +1,6 @@
-#include "duet/core/number.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

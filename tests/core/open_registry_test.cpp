@@ -1,8 +1,7 @@
-#include "duet/core/open_registry.h"
-
 #include <atomic>
 #include <thread>
 
+#include "duet/core/names.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,9 +1,8 @@
-#include "duet/core/option.h"
-
 #include <gmock/gmock.h>
 
 #include <stdexcept>
 
+#include "duet/core/field.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,5 +1,3 @@
-#include "duet/core/order_statistics.h"
-
 #include <gmock/gmock.h>
 
 #include <array>
@@ -7,6 +5,7 @@
 #include <limits>
 #include <span>
 
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,10 +1,10 @@
-#include "duet/core/parallel.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+
+#include "duet/core/machine.h"
 
 namespace duet {
 namespace {

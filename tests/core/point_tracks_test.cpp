@@ -1,7 +1,6 @@
-#include "duet/core/point_tracks.h"
-
 #include <numeric>
 
+#include "duet/core/recording.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,9 +1,8 @@
-#include "duet/core/pose.h"
-
 #include <numbers>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/core/robot_state.h"
 #include "tests/support.h"
 
 namespace duet {

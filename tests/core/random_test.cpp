@@ -1,10 +1,9 @@
-#include "duet/core/random.h"
-
 #include <cmath>
 #include <numbers>
 #include <set>
 #include <vector>
 
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

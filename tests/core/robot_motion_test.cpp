@@ -1,8 +1,7 @@
-#include "duet/core/robot_motion.h"
-
 #include <functional>
 #include <limits>
 
+#include "duet/core/recording.h"
 #include "tests/support.h"
 
 namespace duet {

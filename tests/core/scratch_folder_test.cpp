@@ -1,11 +1,10 @@
-#include "duet/core/scratch_folder.h"
-
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
 #include <filesystem>
 
 #include "duet/core/file.h"
+#include "duet/core/file_batch.h"
 #include "tests/support.h"
 
 namespace duet {

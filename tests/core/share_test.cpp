@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "duet/core/build_tree.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
+#include "duet/core/share.h"
 #include "tests/support.h"
 
 namespace duet {

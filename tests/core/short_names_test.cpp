@@ -1,8 +1,6 @@
-#include "duet/core/short_names.h"
-
 #include <gtest/gtest.h>
 
-#include "duet/core/text.h"
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -1,7 +1,7 @@
-#include "duet/core/split.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

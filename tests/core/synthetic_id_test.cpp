@@ -1,6 +1,6 @@
-#include "duet/core/synthetic_id.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/core/names.h"
 
 namespace duet {
 namespace {

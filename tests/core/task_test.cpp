@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "duet/core/outcome.h"
+#include "duet/core/task.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,6 +1,6 @@
-#include "duet/core/text.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/core/require.h"
 
 namespace duet {
 namespace {

@@ -1,8 +1,7 @@
-#include "duet/datasets/labelled/clip_labels.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 #include "tests/support.h"
 
 namespace duet {

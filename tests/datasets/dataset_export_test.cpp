@@ -1,5 +1,3 @@
-#include "duet/datasets/dataset_export.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,7 +6,8 @@
 
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
-#include "duet/datasets/dataset_files.h"
+#include "duet/datasets/dataset.h"
+#include "duet/datasets/dataset_card.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"

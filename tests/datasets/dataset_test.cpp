@@ -15,9 +15,7 @@
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
 #include "duet/datasets/dataset_card.h"
-#include "duet/datasets/dataset_files.h"
-#include "duet/datasets/dataset_folder.h"
-#include "duet/datasets/dataset_tables.h"
+#include "duet/datasets/entry.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
@@ -331,7 +329,7 @@ TEST_F(Dataset, TheCardNamesSourcesTablesAndCautions) {
   EXPECT_EQ(manifest[0]["clip"], "h1");
 }
 
-// The key and the words are those of people/alignment.cpp.
+// The key and the words are those of people/body_people.cpp.
 TEST(DatasetCard, SaysHowManyClipsHaveAnEstimatedSharedFrame) {
   std::vector<DatasetEntry> entries = {{.clip = "a", .status = ClipStatus::kKept},
                                        {.clip = "b", .status = ClipStatus::kKept}};

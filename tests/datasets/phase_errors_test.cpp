@@ -1,9 +1,9 @@
-#include "duet/datasets/phase_errors.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "duet/datasets/annotations.h"
 
 namespace duet {
 namespace {

@@ -1,10 +1,9 @@
-#include "duet/datasets/source_facts.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "duet/core/file.h"
 #include "duet/datasets/curation.h"
+#include "duet/datasets/people_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/datasets/recordings.h"
 #include "tests/support.h"

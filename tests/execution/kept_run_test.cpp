@@ -11,7 +11,6 @@
 #include "duet/execution/run_inputs.h"
 #include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/plan/clips.h"
-#include "duet/experiment/plan/prepared_clips.h"
 #include "tests/execution/verified_run.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"

@@ -7,10 +7,10 @@
 #include <fstream>
 #include <set>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
 #include "tests/execution/staged.h"

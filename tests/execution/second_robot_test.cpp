@@ -2,7 +2,7 @@
 // made for another robot.
 #include <gmock/gmock.h>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
 #include "duet/core/file.h"

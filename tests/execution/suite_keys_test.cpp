@@ -1,5 +1,3 @@
-#include "duet/experiment/suite_file/suite_keys.h"
-
 #include <gmock/gmock.h>
 
 #include <set>
@@ -8,7 +6,8 @@
 #include "duet/execution/experiment.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/suite_file/suite_key.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/policies/scheduler.h"
 #include "tests/experiment/fixtures.h"

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
@@ -13,7 +13,6 @@
 #include "duet/experiment/plan/bodies.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/plan/run_identity.h"
-#include "duet/experiment/plan/trust.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
 #include "tests/execution/staged.h"

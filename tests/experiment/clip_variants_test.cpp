@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "duet/experiment/plan/clips.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "tests/experiment/fixtures.h"
 
 namespace duet {

@@ -1,8 +1,8 @@
-#include "duet/experiment/plan/episode_costs.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "duet/experiment/plan/episode.h"
 
 namespace duet {
 namespace {

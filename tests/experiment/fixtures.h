@@ -7,7 +7,7 @@
 #include "duet/experiment/suite/suite.h"
 #include "duet/motion/paired_motion.h"
 #include "duet/motion/synthesis/synthesis.h"
-#include "duet/retarget/pair.h"
+#include "duet/retarget/solver/pair.h"
 #include "duet/robots/robot_model.h"
 
 namespace duet::test {

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/run_identity.h"

@@ -1,8 +1,8 @@
-#include "duet/experiment/work/progress.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "duet/experiment/work/run_work.h"
 
 namespace duet {
 namespace {

@@ -9,7 +9,7 @@
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/core/file.h"
 #include "duet/core/share.h"
-#include "duet/experiment/suite/suite_names.h"
+#include "duet/experiment/suite/suite.h"
 #include "duet/metrics/contact_limits.h"
 #include "tests/support.h"
 

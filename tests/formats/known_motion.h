@@ -9,7 +9,7 @@
 
 #include "duet/archives/npy/npy.h"
 #include "duet/archives/npy/npz.h"
-#include "duet/formats/file_arrays.h"
+#include "duet/formats/motion_source.h"
 #include "duet/formats/robot_motion_format.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_model.h"

@@ -1,9 +1,8 @@
 // Motions in files have the origin of the robot's URDF, whatever its card calls the pelvis.
-#include "duet/robots/origin.h"
-
 #include <gtest/gtest.h>
 
 #include "duet/formats/robot_motion_format.h"
+#include "duet/robots/robot_model.h"
 #include "tests/robots/moved_t1.h"
 
 namespace duet {

@@ -4,8 +4,8 @@
 #include <numbers>
 
 #include "duet/core/require.h"
+#include "duet/formats/motion_layout.h"
 #include "duet/formats/robot_motion_format.h"
-#include "duet/formats/tree_order.h"
 #include "tests/formats/known_motion.h"
 #include "tests/formats/motion_files.h"
 #include "tests/support.h"

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "duet/formats/link_motion.h"
+#include "duet/formats/motion_support.h"
 #include "duet/formats/robot_motion_format.h"
 #include "tests/archives/pickle_bytes.h"
 #include "tests/formats/known_motion.h"

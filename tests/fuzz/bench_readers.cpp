@@ -4,7 +4,7 @@
 #include "duet/app/certificate.h"
 #include "duet/cluster/attempt.h"
 #include "duet/cluster/shard_plan.h"
-#include "duet/cluster/training_jobs.h"
+#include "duet/cluster/work_shard.h"
 #include "duet/core/file.h"
 #include "duet/experiment/plan/episode.h"
 #include "duet/experiment/suite/profile.h"

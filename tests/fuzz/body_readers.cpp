@@ -1,20 +1,14 @@
 // Containers of other programs (joblib, torch.save, NumPy's objects), and two people as parameters of body models.
 #include <algorithm>
 
-#include "duet/archives/pickle/joblib.h"
-#include "duet/archives/pickle/npy_objects.h"
+#include "duet/archives/pickle/pickle_files.h"
 #include "duet/archives/pickle/pickle_machine.h"
 #include "duet/core/file.h"
 #include "duet/people/bodies/body_model.h"
-#include "duet/people/bodies/torch_tensors.h"
-#include "duet/people/formats/amass.h"
-#include "duet/people/formats/gvhmr.h"
+#include "duet/people/bodies/number_table.h"
 #include "duet/people/formats/inter/inter_x.h"
-#include "duet/people/formats/inter/inter_x_h5.h"
-#include "duet/people/formats/inter/interhuman_raw.h"
-#include "duet/people/formats/motion_rows.h"
-#include "duet/people/formats/video_tracks.h"
 #include "duet/people/hdf5/hdf5.h"
+#include "duet/people/people_format.h"
 #include "tests/fuzz/archive_edit.h"
 #include "tests/fuzz/reader.h"
 #include "tests/people/body_files.h"

@@ -1,9 +1,9 @@
 // Files that controllers are made from: descriptors of networks' inputs and outputs, and the networks of WBC-Sim.
 #include "duet/controllers/descriptor.h"
-#include "duet/controllers/wbc_sim/network.h"
 #include "duet/controllers/wbc_sim/observation.h"
+#include "duet/controllers/wbc_sim/wbc_sim.h"
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
 

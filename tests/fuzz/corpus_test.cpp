@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "tests/deep_json.h"
 #include "tests/fuzz/reader.h"

@@ -1,7 +1,7 @@
 // Files of a data set that a person edits, and those that it keeps of each clip.
 #include "duet/datasets/annotations.h"
 #include "duet/datasets/entry.h"
-#include "duet/datasets/labelled/clip_labels.h"
+#include "duet/datasets/labelled/detector_confusion.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/fuzz/reader.h"
 

@@ -3,9 +3,8 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
-#include "duet/hardware/guard_report.h"
-#include "duet/hardware/log_recording.h"
-#include "duet/hardware/run_log.h"
+#include "duet/hardware/guard/guard_message.h"
+#include "duet/hardware/log/run_log.h"
 #include "tests/fuzz/reader.h"
 #include "tests/hardware/guarded_twin.h"
 

@@ -2,17 +2,17 @@
 #include <cstring>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
-#include "duet/hardware/guard_message.h"
-#include "duet/hardware/homie_stand_in.h"
-#include "duet/hardware/limiter_setup_json.h"
-#include "duet/hardware/odometry_source.h"
-#include "duet/hardware/person_input.h"
-#include "duet/hardware/robot_config.h"
-#include "duet/hardware/run_log.h"
-#include "duet/hardware/sport_rpc.h"
+#include "duet/hardware/executors/sport_executor.h"
+#include "duet/hardware/guard/guard_message.h"
+#include "duet/hardware/guard/person_input.h"
+#include "duet/hardware/guard/robot_connection.h"
+#include "duet/hardware/log/run_log.h"
+#include "duet/hardware/safety/limiter_setup_json.h"
+#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/wire/odometry_source.h"
 #include "tests/fuzz/reader.h"
 
 namespace duet::fuzz {

@@ -2,10 +2,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "duet/archives/pickle/motion_pickle.h"
+#include "duet/archives/pickle/pickle_fields.h"
+#include "duet/motion/carried_object.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/paired_motion.h"
-#include "duet/motion/people/object_shape.h"
 #include "duet/people/bvh/bvh.h"
 #include "duet/people/formats/people_formats.h"
 #include "tests/archives/pickle_bytes.h"

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "duet/archives/zip/zip.h"
-#include "duet/nn/mlp_file.h"
-#include "duet/nn/onnx_network.h"
-#include "duet/nn/torch_script.h"
+#include "duet/nn/mlp.h"
+#include "duet/nn/onnx/onnx_plan.h"
+#include "duet/nn/torch/torch_script.h"
 #include "tests/fuzz/reader.h"
 #include "tests/fuzz/tensor_edit.h"
 

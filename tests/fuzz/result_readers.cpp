@@ -6,9 +6,8 @@
 #include "duet/report/page/training_curves.h"
 #include "duet/report/ranking/golden.h"
 #include "duet/report/ranking/leaderboard.h"
-#include "duet/rows/folder/published.h"
 #include "duet/rows/folder/run_directory.h"
-#include "duet/rows/row_scan.h"
+#include "duet/rows/row_file.h"
 #include "tests/fuzz/reader.h"
 #include "tests/rows/rows.h"
 

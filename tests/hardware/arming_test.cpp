@@ -1,6 +1,6 @@
-#include "duet/hardware/arming.h"
-
 #include <gmock/gmock.h>
+
+#include "duet/hardware/executors/executor.h"
 
 namespace duet {
 namespace {

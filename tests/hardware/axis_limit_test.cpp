@@ -1,10 +1,9 @@
-#include "duet/hardware/axis_limit.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/safety/limits.h"
 
 namespace duet {
 namespace {

@@ -1,11 +1,10 @@
-#include "duet/hardware/body_distance.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <array>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/safety/contact_watch.h"
 #include "duet/robots/kinematics.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"

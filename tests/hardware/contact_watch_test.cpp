@@ -1,4 +1,4 @@
-#include "duet/hardware/contact_watch.h"
+#include "duet/hardware/safety/contact_watch.h"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,6 @@
-#include "duet/hardware/dds_place.h"
-
 #include <gmock/gmock.h>
 
+#include "duet/hardware/wire/robot_wire.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "duet/core/require.h"
-#include "duet/hardware/guard_loop.h"
+#include "duet/hardware/guard/guard_loop.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
 

@@ -1,9 +1,9 @@
-#include "duet/hardware/executor.h"
+#include "duet/hardware/executors/executor.h"
 
 #include <gmock/gmock.h>
 
-#include "duet/hardware/lock_step.h"
-#include "duet/hardware/robot_connection.h"
+#include "duet/hardware/guard/robot_connection.h"
+#include "duet/hardware/twin/lock_step.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/hardware/guarded_twin.h"
 
 namespace duet {

@@ -1,12 +1,12 @@
-#include "duet/hardware/guard_message.h"
+#include "duet/hardware/guard/guard_message.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <vector>
 
-#include "duet/core/random.h"
-#include "duet/hardware/datagram_socket.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/wire/datagram_socket.h"
 #include "tests/support.h"
 
 namespace duet {

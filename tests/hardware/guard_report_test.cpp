@@ -1,12 +1,11 @@
-#include "duet/hardware/guard_report.h"
-
 #include <gmock/gmock.h>
 
 #include <cstring>
 #include <limits>
 #include <thread>
 
-#include "duet/hardware/guard_link.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/guard/guard_message.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 

@@ -34,7 +34,7 @@ GUARD = 'RobotGuard.*:FaultMatrix.*:FaultSweep.*:Executor.*:RobotConnection.*'
 
 # (name, (old, new)) by file and suites.
 EDITS = {
-    ('hardware/limiter.cpp', LIMITER): [
+    ('hardware/safety/limiter.cpp', LIMITER): [
         ('clamp kSize', unless('command.q.size() != setup_.robot->dof()')),
         ('clamp kNotFinite', unless('!std::isfinite(command.stamp) || !is_finite(command.root) || !command.q.allFinite()')),
         ('clamp kStamp', unless('state.has_good && command.stamp <= state.good.stamp')),
@@ -69,7 +69,7 @@ EDITS = {
         ('clamp kSelfCollision',
          unless('next.self < setup_.limits.self_distance && next.self < gaps.self - kNearer')),
     ],
-    ('hardware/axis_limit.cpp', LIMITER): [
+    ('hardware/safety/limits.cpp', LIMITER): [
         ('bounds of a value', choice('clamped(target, bounds.lower, bounds.upper, clamps.value)', 'target')),
         ('bounds of a rate',
          choice('clamped(rate, -rate_bound(before.value, bounds, dt), rate_bound(-before.value, bounds, dt), clamps.rate)',
@@ -81,7 +81,7 @@ EDITS = {
         ('rest before the lower bound',
          choice('std::max(rate, -largest_rate(std::max(before.value - bounds.lower, 0.0), step, dt))', 'rate')),
     ],
-    ('hardware/safety_machine.cpp', MACHINE + ':FaultMatrix*'): [
+    ('hardware/safety/safety_machine.cpp', MACHINE + ':FaultMatrix*'): [
         ('arming lapses (kLapsed)', unless('input.now - memory.since > rules.armed_time')),
         ('time to be ready', choice('input.now - memory.well_since >= rules.ready_time', 'true')),
         ('time of a hold (kHeldTooLong)', choice('input.now - memory.since <= rules.hold_time', 'true')),
@@ -95,12 +95,12 @@ EDITS = {
                                               'true')),
         ('a late planner slows down', choice('planner_share(rules, input.now - input.planner_at)', '1.0')),
     ],
-    ('hardware/safety_signal.cpp', MACHINE + ':FaultMatrix*:FaultSweep*'): [
+    ('hardware/safety/safety_machine.cpp', MACHINE + ':FaultMatrix*:FaultSweep*'): [
         ('value that is no number is the worst', choice('!(value <= damp)', 'value > damp')),
         ('age that is no number is the worst', choice('!(age <= limits.damp)', 'age > limits.damp')),
         ('share of a planner that holds', unless('!(age <= rules.planner.hold)')),
     ],
-    ('hardware/robot_guard.cpp', GUARD): [
+    ('hardware/guard/robot_guard.cpp', GUARD): [
         ('old planner messages', unless('any_planner_ && message.sequence <= planner_.sequence')),
         ('planner messages of another size', unless('message.command.q.size() != kG1Motors')),
         ('refused commands keep no planner alive', choice('!limiter_.refusal(message.command, limiter_state_)', 'true')),
@@ -123,13 +123,13 @@ EDITS = {
         ('release by contact', ('|| status_.contact.release)', '|| (!REMOVED && status_.contact.release))')),
         ('damping is damping', ('if (order.damps)', 'if (!REMOVED && order.damps)')),
     ],
-    ('hardware/low_level_frame.cpp', 'LowStateFrame.*:LowCommandFrame.*:FaultMatrix.*'): [
+    ('hardware/wire/low_level_frame.cpp', 'LowStateFrame.*:LowCommandFrame.*:FaultMatrix.*'): [
         ('checksum of a state', unless('frame.crc != checksum_of(frame)')),
         ('tick of a state', unless('reading.any && static_cast<std::int32_t>(frame.tick - reading.tick) <= 0')),
         ('numbers of a state', unless('!is_finite(frame)')),
         ('orientation that is none', choice('R.norm() > 0.5', 'true')),
     ],
-    ('hardware/arming.cpp', 'Arming*'): [
+    ('hardware/executors/executor.cpp', 'Arming*'): [
         ('arming: allow_motion', unless('!permission.allow_motion')),
         ('arming: name of the robot', unless('permission.robot.empty()')),
         ('arming: network interface', unless('permission.interface.empty() || permission.interface == "auto"')),
@@ -146,13 +146,13 @@ EDITS = {
         ('arming: disk', unless('facts.free_log_bytes < kLeastLogBytes')),
         ('arming: executor that is well', unless('!facts.executor_complaint.empty()')),
     ],
-    ('hardware/executor.cpp', 'Arming*:Executor*'): [
+    ('hardware/executors/executor.cpp', 'Arming*:Executor*'): [
         ('arming: executor of a robot', unless('!twin && kind == ExecutorKind::kTwin')),
         ('arming: a source of odometry', unless('odometry == OdometrySource::kNone')),
         ('arming: odometry of a robot', unless('!twin && odometry == OdometrySource::kTwin')),
         ('arming: odometry of the executor', unless('kind == ExecutorKind::kHomieLcm && odometry == OdometrySource::kVendor')),
     ],
-    ('hardware/homie_executor.cpp', 'HomieExecutor*'): [
+    ('hardware/executors/homie_executor.cpp', 'HomieExecutor*'): [
         ('homie: silent until it is opened', ('if (open_ && ticks_++', 'if ((REMOVED || open_) && ticks_++')),
         ('homie: goodbye', ('if (!open_) return;', 'if (REMOVED || !open_) return;')),
         ('homie: another who steers', ('+ (now_ - steered_at_ < kSteeredFor ? 1 : 0)', '+ (!REMOVED && now_ - steered_at_ < kSteeredFor ? 1 : 0)')),
@@ -160,7 +160,7 @@ EDITS = {
         ('homie: no arms before there are any', ('if (has_arms_) (void)channel_', 'if (REMOVED || has_arms_) (void)channel_')),
         ('homie: damping keeps the arms', ('if (damps) return true;', 'if (!REMOVED && damps) return true;')),
     ],
-    ('hardware/sport_executor.cpp', 'SportExecutor*'): [
+    ('hardware/executors/sport_executor.cpp', 'SportExecutor*'): [
         ('sport: silent until it is opened', ('if (!open_ || state_ == SafetyState::kArmed', 'if ((!REMOVED && !open_) || state_ == SafetyState::kArmed')),
         ('sport: rest at once', unless('stands_still(velocity) && !stands_still(sent_)')),
         ('sport: only a machine that walks is heard',
@@ -170,11 +170,11 @@ EDITS = {
         ('sport: balance is left alone before it moved',
          ('has_arms_ = moved_ = false;', 'has_arms_ = false; moved_ = REMOVED;')),
     ],
-    ('hardware/sport_rpc.cpp', 'SportRpc*'): [
+    ('hardware/executors/sport_executor.cpp', 'SportRpc*'): [
         ('sport: a velocity ends', choice('std::clamp(duration, kShortest, kLongest)', 'duration')),
         ('sport: a velocity is a number', choice('std::isfinite(value) ? std::clamp(value, -kMostVelocity, kMostVelocity) : 0.0', 'value')),
     ],
-    ('hardware/person_input.cpp', 'PersonInput*:PersonTrack*'): [
+    ('hardware/guard/person_input.cpp', 'PersonInput*:PersonTrack*'): [
         ('person: finite', unless('!joints.allFinite()')),
         ('person: far', unless('joints.colwise().norm().maxCoeff() > kFarthestJoint')),
         ('person: bones', unless('(joints.col(j) - joints.col(kSmplParents[static_cast<std::size_t>(j)])).norm() > kLongestBone')),
@@ -184,19 +184,19 @@ EDITS = {
         ('person: length of a message', unless('datagram.size() != sizeof(wire)')),
         ('person: version of a message', unless('wire.version != kPersonVersion || wire.seen > 1')),
     ],
-    ('hardware/odometry_source.cpp', 'ExternalOdometry*'): [
+    ('hardware/wire/odometry_source.cpp', 'ExternalOdometry*'): [
         ('tracker: length of a message', unless('datagram.size() != sizeof(body)')),
         ('tracker: what a message is', unless('body.version != kExternalVersion || body.valid > 1 || !all_finite(body) || !(std::abs(R.norm() - 1.0) < kUnit)')),
         ('tracker: old', unless('any_ && pose.sequence <= last_')),
     ],
-    ('hardware/root_velocity.cpp', 'RootVelocity*'): [
+    ('hardware/guard/walker.cpp', 'RootVelocity*'): [
         ('A.4.3 without odometry', choice('source != OdometrySource::kNone', 'true')),
         ('A.4.3 with old, invalid or endless odometry', unless('!odometry.valid || !is_finite(odometry) || !(age >= 0.0 && age <= most_age)')),
     ],
-    ('hardware/contact_watch.cpp', 'ContactWatch*:RobotGuard*'): [
+    ('hardware/safety/contact_watch.cpp', 'ContactWatch*:RobotGuard*'): [
         ('limit contact_time', ('std::ceil(limits.contact_time / dt', 'std::ceil((REMOVED ? 1000.0 : limits.contact_time) / dt')),
     ],
-    ('hardware/guard_message.cpp', 'GuardMessage*'): [
+    ('hardware/guard/guard_message.cpp', 'GuardMessage*'): [
         ('guard message: version', unless('head.version != kVersion')),
         ('guard message: length', unless('datagram.size() != sizeof(body)')),
     ],
@@ -225,7 +225,7 @@ ELSEWHERE = {'late_share': 'a late planner slows down', 'ready_time': 'time to b
 
 def lines_of_assessment():
     """Each line that worsens an assessment."""
-    path = 'hardware/safety_signal.cpp'
+    path = 'hardware/safety/safety_machine.cpp'
     for line in pathlib.Path(path).read_text().split('\n'):
         if found := re.search(r'(worsen\(all, .*StopCause::(\w+)\);)$', line):
             part = re.search(r'(casing|winding)', line)
@@ -236,9 +236,9 @@ def lines_of_assessment():
 def values():
     """Each number of the envelope, set to what it is when it is missing, at one place that everything passes."""
     limiter = '  const HardwareLimits& limits = setup_.limits;\n  check_executed'
-    yield 'hardware/limiter.cpp', limiter, 'setup_.limits', LAX, LIMITER + ':FaultMatrix*', 'limit'
+    yield 'hardware/safety/limiter.cpp', limiter, 'setup_.limits', LAX, LIMITER + ':FaultMatrix*', 'limit'
     contact = '  bias_.setZero(6 + robot_->dof());\n  still_'
-    yield 'hardware/contact_watch.cpp', contact, 'limits_', LAX_OF_CONTACT, 'ContactWatch*:RobotGuard*', 'limit'
+    yield 'hardware/safety/contact_watch.cpp', contact, 'limits_', LAX_OF_CONTACT, 'ContactWatch*:RobotGuard*', 'limit'
 
 
 def value_guards():
@@ -249,7 +249,7 @@ def value_guards():
 
 
 def rule_guards():
-    path = 'hardware/safety_signal.cpp'
+    path = 'hardware/safety/safety_machine.cpp'
     place = '  Assessment all;\n  assess_clock('
     names = dict(LAX_RULES)
     names.update({f'{signal}.{level}': 1e9 for signal, levels in AGES.items() for level in levels.split()})
@@ -275,11 +275,11 @@ def check_complete(table):
         body = re.search(rf'enum class {enum} {{(.*?)}};', pathlib.Path(path).read_text(), re.S)[1]
         return [n for n in re.findall(r'^\s*(k\w+)', re.sub(r'//.*', '', body), re.M) if n not in without]
 
-    missing += [n for n in enumerators('hardware/clamp_reason.h', 'ClampReason', ()) if not re.search(rf'\b{n}\b', names)]
-    missing += [n for n in enumerators('hardware/safety_signal.h', 'StopCause', ('kNone',)) if not re.search(rf'\b{n}\b', names)]
-    limits = re.findall(r'"(\w+)", &Limits::', pathlib.Path('hardware/limits.cpp').read_text())
+    missing += [n for n in enumerators('hardware/safety/limiter.h', 'ClampReason', ()) if not re.search(rf'\b{n}\b', names)]
+    missing += [n for n in enumerators('hardware/safety/safety_machine.h', 'StopCause', ('kNone',)) if not re.search(rf'\b{n}\b', names)]
+    limits = re.findall(r'"(\w+)", &Limits::', pathlib.Path('hardware/safety/limits.cpp').read_text())
     missing += [n for n in limits if f'limit {n}' not in [g.name for g in table]]
-    rules = re.search(r'struct SafetyRules {(.*?)^};', pathlib.Path('hardware/safety_signal.h').read_text(), re.S | re.M)[1]
+    rules = re.search(r'struct SafetyRules {(.*?)^};', pathlib.Path('hardware/safety/safety_machine.h').read_text(), re.S | re.M)[1]
     rules = re.sub(r'//.*', '', rules)
     for signal in re.findall(r'AgeLimits (\w+)', rules):
         missing += [] if f'rule {signal}.hold' in [g.name for g in table] else [signal]

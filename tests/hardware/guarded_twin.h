@@ -6,9 +6,9 @@
 #include <deque>
 #include <functional>
 
-#include "duet/hardware/frame_checksum.h"
-#include "duet/hardware/robot_guard.h"
-#include "duet/hardware/twin_model.h"
+#include "duet/hardware/guard/robot_guard.h"
+#include "duet/hardware/twin/twin_model.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/limited_robot.h"
 
 namespace duet::test {

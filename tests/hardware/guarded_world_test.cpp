@@ -1,18 +1,17 @@
 // An episode behind the guard: the same loop as in an engine, and every way in which the guard ends it is an outcome.
-#include "duet/hardware/guarded_world.h"
-
 #include <gmock/gmock.h>
 
 #include <filesystem>
 #include <limits>
 
 #include "duet/archives/recording_file.h"
-#include "duet/backends/factory.h"
-#include "duet/core/clock.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/hardware/log_recording.h"
-#include "duet/hardware/twin_in_process.h"
+#include "duet/core/robot_state.h"
+#include "duet/hardware/episodes/guarded_episode.h"
+#include "duet/hardware/log/run_log.h"
+#include "duet/hardware/twin/lock_step.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 

@@ -1,12 +1,12 @@
 // HOMIE's processes as the executor: a stand-in for them on the loopback interface's multicast, as LCM has it.
-#include "duet/hardware/homie_executor.h"
+#include "duet/hardware/executors/homie_executor.h"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
 
 #include <thread>
 
-#include "duet/hardware/homie_stand_in.h"
+#include "duet/hardware/twin/stand_ins.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"
 

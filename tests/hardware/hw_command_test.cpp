@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "duet/core/file.h"
-#include "duet/hardware/dds_place.h"
+#include "duet/hardware/wire/robot_wire.h"
 #include "tests/app/program.h"
 
 namespace duet {

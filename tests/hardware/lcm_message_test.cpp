@@ -1,11 +1,11 @@
-#include "duet/hardware/lcm_message.h"
+#include "duet/hardware/wire/lcm_message.h"
 
 #include <gmock/gmock.h>
 
 #include <cstring>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 
 namespace duet {
 namespace {

@@ -1,12 +1,11 @@
-#include "duet/hardware/leg_odometry.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/hardware/frame_checksum.h"
-#include "duet/hardware/twin_model.h"
+#include "duet/hardware/twin/twin_model.h"
+#include "duet/hardware/wire/low_level_frame.h"
+#include "duet/hardware/wire/odometry_source.h"
 #include "duet/robots/dynamics.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"

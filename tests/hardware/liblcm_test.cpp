@@ -9,8 +9,7 @@
 #include <memory>
 #include <sstream>
 
-#include "duet/hardware/lcm_channel.h"
-#include "duet/hardware/lcm_message.h"
+#include "duet/hardware/wire/lcm_message.h"
 
 namespace duet {
 namespace {

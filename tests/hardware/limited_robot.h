@@ -1,7 +1,7 @@
 // A limiter of the G1's arms with nobody near, or with an adult, for the tests of the safety envelope.
 #pragma once
 
-#include "duet/hardware/limiter.h"
+#include "duet/hardware/safety/limiter.h"
 
 namespace duet::test {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/hardware/limited_robot.h"
 
 namespace duet {

@@ -1,7 +1,7 @@
 // The limiter beside a person.
 #include <gmock/gmock.h>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "tests/hardware/limited_robot.h"
 
 namespace duet {

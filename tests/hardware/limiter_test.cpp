@@ -1,5 +1,5 @@
 // One test for each clamp of the limiter with nobody near; those of a person are in limiter_person_test.cpp.
-#include "duet/hardware/limiter.h"
+#include "duet/hardware/safety/limiter.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "duet/hardware/limits.h"
+#include "duet/hardware/safety/limits.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Golden frames: the bytes and checksums below were packed by another program from the published layout.
-#include "duet/hardware/low_level_frame.h"
+#include "duet/hardware/wire/low_level_frame.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <limits>
 #include <vector>
 
-#include "duet/core/random.h"
-#include "duet/hardware/frame_checksum.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/backends/allocation_count.h"
 
 namespace duet {

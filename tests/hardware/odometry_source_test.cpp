@@ -1,4 +1,4 @@
-#include "duet/hardware/odometry_source.h"
+#include "duet/hardware/wire/odometry_source.h"
 
 #include <gmock/gmock.h>
 

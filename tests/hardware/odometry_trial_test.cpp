@@ -1,6 +1,6 @@
 // Leg odometry of a robot that walks in MuJoCo under WBC-Sim. The bounds are far above what was measured
 // (docs/hardware.md, "Odometry"): they say that it is odometry at all.
-#include "duet/hardware/odometry_trial.h"
+#include "duet/hardware/twin/odometry_trial.h"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // The partner over a socket: message, calibration, age by reception, 50 Hz, and the player that stands in for a camera.
-#include "duet/hardware/person_input.h"
+#include "duet/hardware/guard/person_input.h"
 
 #include <gmock/gmock.h>
 
 #include <limits>
 
 #include "duet/core/file.h"
-#include "duet/hardware/person_player.h"
+#include "duet/hardware/twin/stand_ins.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"

@@ -10,7 +10,7 @@
 #include <memory>
 
 #include "duet/core/file.h"
-#include "duet/hardware/dds_place.h"
+#include "duet/hardware/wire/robot_wire.h"
 #include "tests/hardware/armed_program.h"
 #include "tests/support.h"
 

@@ -1,9 +1,9 @@
-#include "duet/hardware/real_time.h"
-
 #include <gtest/gtest.h>
 #include <sched.h>
 
 #include <thread>
+
+#include "duet/hardware/guard/guard_loop.h"
 
 namespace duet {
 namespace {

@@ -1,8 +1,8 @@
-#include "duet/hardware/remote_control.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
+
+#include "duet/hardware/wire/low_level_frame.h"
 
 namespace duet {
 namespace {

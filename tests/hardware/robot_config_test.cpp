@@ -1,8 +1,7 @@
-#include "duet/hardware/robot_config.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
+#include "duet/hardware/guard/robot_connection.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "duet/hardware/robot_guard.h"
+#include "duet/hardware/guard/robot_guard.h"
 
 #include <gmock/gmock.h>
 

@@ -1,15 +1,14 @@
 // Supplement A.4.3 on a root that lags, is late and is measured with noise: the figures of docs/hardware.md, "Walking
 // to a place".
-#include "duet/hardware/root_velocity.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <deque>
 #include <limits>
 
-#include "duet/core/random.h"
-#include "duet/hardware/axis_limit.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/guard/walker.h"
+#include "duet/hardware/safety/limits.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,4 +1,4 @@
-#include "duet/hardware/run_log.h"
+#include "duet/hardware/log/run_log.h"
 
 #include <gmock/gmock.h>
 

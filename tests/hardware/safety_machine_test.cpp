@@ -1,8 +1,8 @@
-#include "duet/hardware/safety_machine.h"
+#include "duet/hardware/safety/safety_machine.h"
 
 #include <gtest/gtest.h>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/hardware/simulated_safety.h"
 
 namespace duet {

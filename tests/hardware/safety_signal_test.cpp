@@ -1,12 +1,12 @@
 // Each timeout and each threshold by its name, just before and just after it.
-#include "duet/hardware/safety_signal.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <set>
+
+#include "duet/hardware/safety/safety_machine.h"
 
 namespace duet {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "duet/hardware/safety_machine.h"
+#include "duet/hardware/safety/safety_machine.h"
 
 namespace duet::test {
 

@@ -1,13 +1,13 @@
 // The maker's walking as the executor, with a stand-in for its service in memory.
-#include "duet/hardware/sport_executor.h"
+#include "duet/hardware/executors/sport_executor.h"
 
 #include <gmock/gmock.h>
 
 #include <deque>
 #include <limits>
 
-#include "duet/hardware/frame_checksum.h"
-#include "duet/hardware/sport_stand_in.h"
+#include "duet/hardware/twin/stand_ins.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/guarded_twin.h"
 
 namespace duet {

@@ -1,7 +1,6 @@
-#include "duet/hardware/touch_speed.h"
-
 #include <gmock/gmock.h>
 
+#include "duet/hardware/safety/limits.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,8 +1,7 @@
-#include "duet/hardware/twin_fault.h"
-
 #include <gmock/gmock.h>
 
-#include "duet/hardware/frame_checksum.h"
+#include "duet/hardware/twin/twin_operator.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
 

@@ -1,10 +1,10 @@
-#include "duet/hardware/twin_model.h"
+#include "duet/hardware/twin/twin_model.h"
 
 #include <gmock/gmock.h>
 
 #include <cstring>
 
-#include "duet/hardware/frame_checksum.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"
 

@@ -1,15 +1,14 @@
 // The twin with an engine behind it: what the wire commands is all that holds it up.
-#include "duet/hardware/twin_physics.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 #include <cstring>
 #include <limits>
 
-#include "duet/backends/factory.h"
-#include "duet/hardware/frame_checksum.h"
-#include "duet/hardware/twin_operator.h"
+#include "duet/backends/engine_module.h"
+#include "duet/hardware/twin/twin_model.h"
+#include "duet/hardware/twin/twin_operator.h"
+#include "duet/hardware/wire/low_level_frame.h"
 #include "tests/backends/engine_names.h"
 #include "tests/hardware/limited_robot.h"
 #include "tests/support.h"

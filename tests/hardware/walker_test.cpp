@@ -1,13 +1,13 @@
 // A walking controller in the guard, the twin's body in an engine: the whole loop but for the wire between them.
-#include "duet/hardware/walker.h"
+#include "duet/hardware/guard/walker.h"
 
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/core/clock.h"
-#include "duet/hardware/guarded_world.h"
-#include "duet/hardware/twin_in_process.h"
+#include "duet/core/robot_state.h"
+#include "duet/hardware/episodes/guarded_episode.h"
+#include "duet/hardware/twin/lock_step.h"
 #include "tests/backends/engine_names.h"
 #include "tests/hardware/guarded_twin.h"
 #include "tests/support.h"

@@ -46,8 +46,8 @@ refused() {  # refused FILE LINE WORDS: with this line in the file the check say
   printf '%s\n' "$kept" >"$scratch/tree/$1"
 }
 "$scratch/tree/cmake/check_layers.sh" >/dev/null || fail "./run layers refuses the tree as it is"
-refused scoring/scoring.h '#include "duet/hardware/limits.h"' 'scoring may not include hardware'
-refused parts/data/convert.h '#include "duet/hardware/limits.h"' 'parts/data may not include hardware'
+refused scoring/scoring.h '#include "duet/hardware/safety/limits.h"' 'scoring may not include hardware'
+refused parts/data/convert.h '#include "duet/hardware/safety/limits.h"' 'parts/data may not include hardware'
 refused app/program.cpp '#include "duet/parts/robot/part.h"' 'app may not include parts/robot'
 refused cmake/rooms.txt 'statistics: core hardware' 'statistics (cluster) may not include hardware (robot)'
 echo "border: the part $part is built and passes its tests against the installed core"

@@ -1,6 +1,6 @@
-#include "duet/io/frame_history.h"
-
 #include <gmock/gmock.h>
+
+#include "duet/io/observation.h"
 
 namespace duet {
 namespace {

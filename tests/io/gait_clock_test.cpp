@@ -1,9 +1,9 @@
-#include "duet/io/gait_clock.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "duet/io/channel.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,6 @@
-#include "duet/io/joint_binding.h"
-
 #include <gmock/gmock.h>
+
+#include "duet/io/channel.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,6 @@
-#include "duet/io/layout.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/io/bound_network.h"
 
 namespace duet {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/metrics/detector.h"
 
 namespace duet::test {

@@ -88,7 +88,7 @@ TEST(ContactSafety, ResultMayBeAskedForAtAnyTime) {
       const ContactSafetyResult now = asked.result();
       EXPECT_EQ(region(now, "chest").transient_contacts, 1);
       ASSERT_EQ(now.events.size(), 1u);
-      EXPECT_NEAR(now.events[0].duration, 101 * 0.002, kRounding);
+      EXPECT_NEAR(now.events[0].duration_s, 101 * 0.002, kRounding);
     }
   }
   EXPECT_EQ(contact_forces(asked.result()), contact_forces(left_alone.result()));

@@ -1,5 +1,3 @@
-#include "duet/metrics/detector_catalogue.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "duet/metrics/detector_catalogue.h"
+#include "duet/metrics/detector.h"
 #include "tests/metrics/acting.h"
 #include "tests/support.h"
 

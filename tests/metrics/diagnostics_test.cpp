@@ -7,8 +7,8 @@
 #include <numbers>
 #include <set>
 
-#include "duet/core/random.h"
-#include "duet/metrics/spectrum.h"
+#include "duet/core/numbers.h"
+#include "duet/metrics/diagnostics.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,10 +1,9 @@
-#include "duet/metrics/grounding.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
+#include "duet/metrics/locomotion.h"
 #include "duet/motion/interaction_clip.h"
 
 namespace duet {

@@ -1,10 +1,9 @@
-#include "duet/metrics/interaction_statistics.h"
-
 #include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "duet/metrics/clip_statistics.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "duet/metrics/differences.h"
 #include "duet/metrics/retargeting.h"
+#include "duet/metrics/track_checks.h"
 #include "tests/metrics/points.h"
 #include "tests/support.h"
 

@@ -1,10 +1,9 @@
-#include "duet/metrics/object_metrics.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
+#include "duet/metrics/retargeting.h"
 #include "duet/robots/kinematics.h"
 #include "tests/support.h"
 

@@ -1,11 +1,10 @@
-#include "duet/metrics/onset.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
+#include "duet/metrics/interaction.h"
 #include "duet/robots/kinematics.h"
 
 namespace duet {

@@ -4,8 +4,8 @@
 #include <Eigen/Geometry>
 #include <functional>
 
-#include "duet/core/point_tracks.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/core/recording.h"
 
 namespace duet::test {
 

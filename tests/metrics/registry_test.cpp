@@ -1,11 +1,10 @@
 // Metrics that a program adds. Each test ends its own process: what is added stays.
-#include "duet/metrics/registry.h"
-
 #include <gmock/gmock.h>
 
 #include <cstdlib>
 
 #include "duet/core/require.h"
+#include "duet/metrics/catalogue.h"
 #include "duet/metrics/retargeting.h"
 #include "tests/metrics/points.h"
 #include "tests/support.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "duet/metrics/catalogue.h"
 #include "duet/metrics/detector.h"
 #include "duet/robots/kinematics.h"

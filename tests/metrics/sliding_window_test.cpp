@@ -1,9 +1,9 @@
-#include "duet/metrics/sliding_window.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <vector>
+
+#include "duet/metrics/contact_safety.h"
 
 namespace duet {
 namespace {

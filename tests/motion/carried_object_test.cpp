@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "duet/core/require.h"
-#include "duet/motion/clip_digest.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/motion/paired_motion.h"
 #include "tests/motion/npz_edit.h"

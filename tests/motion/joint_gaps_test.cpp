@@ -1,10 +1,9 @@
-#include "duet/motion/people/joint_gaps.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/motion/layouts/joint_layout.h"
+#include "duet/motion/people/source_clip.h"
 
 namespace duet {
 namespace {

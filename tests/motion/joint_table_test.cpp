@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "duet/core/file.h"
-#include "duet/tasks/synthesis/body.h"
+#include "duet/tasks/synthesis/figure.h"
 
 namespace duet {
 namespace {

@@ -1,5 +1,3 @@
-#include "duet/motion/people/object_shape.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>

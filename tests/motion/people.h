@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "duet/core/pose.h"
+#include "duet/core/robot_state.h"
 #include "duet/motion/interaction_clip.h"
 
 namespace duet::test {

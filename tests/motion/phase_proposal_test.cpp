@@ -1,11 +1,10 @@
-#include "duet/motion/phase_proposal.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <numbers>
 
 #include "duet/core/require.h"
+#include "duet/motion/interaction_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"

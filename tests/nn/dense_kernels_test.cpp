@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 
 namespace duet {
 namespace {

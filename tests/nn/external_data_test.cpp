@@ -1,6 +1,4 @@
 // Numbers of an ONNX file that lie in files beside it.
-#include "duet/nn/external_data.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <onnx/onnx_pb.h>
@@ -9,7 +7,8 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/nn/load_network.h"
+#include "duet/nn/catalogue/load_network.h"
+#include "duet/nn/onnx/onnx_model.h"
 #include "tests/nn/evaluate.h"
 #include "tests/nn/onnx_writer.h"
 #include "tests/support.h"

@@ -1,4 +1,4 @@
-#include "duet/nn/onnx_model.h"
+#include "duet/nn/onnx/onnx_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

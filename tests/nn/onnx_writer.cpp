@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "duet/core/require.h"
-#include "duet/nn/onnx_network.h"
+#include "duet/nn/onnx/onnx_plan.h"
 #include "tests/nn/evaluate.h"
 #include "tests/support.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "duet/nn/network.h"
-#include "duet/nn/onnx_model.h"
+#include "duet/nn/onnx/onnx_model.h"
 
 namespace onnx {
 class ModelProto;

@@ -1,4 +1,4 @@
-#include "duet/nn/torch_script.h"
+#include "duet/nn/torch/torch_script.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include "duet/archives/zip/zip.h"
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/nn/load_network.h"
+#include "duet/nn/catalogue/load_network.h"
 #include "duet/nn/network.h"
 #include "tests/nn/evaluate.h"
 #include "tests/nn/onnx_writer.h"

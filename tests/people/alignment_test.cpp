@@ -1,10 +1,9 @@
-#include "duet/people/alignment.h"
-
 #include <gmock/gmock.h>
 
-#include "duet/core/pose.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/motion/synthesis/synthesis.h"
+#include "duet/people/body_people.h"
 #include "tests/support.h"
 
 namespace duet {

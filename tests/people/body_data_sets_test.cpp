@@ -6,11 +6,8 @@
 #include "duet/core/require.h"
 #include "duet/motion/people/source_clip.h"
 #include "duet/people/bodies/body_model.h"
-#include "duet/people/formats/amass.h"
 #include "duet/people/formats/inter/inter_x.h"
-#include "duet/people/formats/inter/inter_x_h5.h"
-#include "duet/people/formats/inter/interhuman_raw.h"
-#include "duet/people/formats/video_tracks.h"
+#include "duet/people/people_format.h"
 #include "tests/people/body_files.h"
 #include "tests/support.h"
 

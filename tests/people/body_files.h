@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "duet/archives/npy/npz.h"
-#include "duet/core/skeleton.h"
-#include "duet/people/bodies/body_kinematics.h"
+#include "duet/core/recording.h"
+#include "duet/people/bodies/body_model.h"
 #include "tests/archives/hdf5_bytes.h"
 #include "tests/archives/pickle_bytes.h"
 #include "tests/archives/torch_bytes.h"
@@ -70,7 +70,7 @@ struct PosedBody {
   std::vector<Eigen::Matrix3d> rotations;  // T * 24
 };
 
-// By homogeneous transforms from each joint to the root and back: not the way of body_kinematics.cpp.
+// By homogeneous transforms from each joint to the root and back: not the way of body_model.cpp.
 inline PosedBody posed(const BodyParameters& body, const RestJoints& rest) {
   PosedBody out;
   const auto matrix = [](const double* v) {

@@ -9,7 +9,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/people/bvh/bvh.h"
-#include "duet/people/bvh/bvh_people.h"
+#include "duet/people/bvh/bvh_skeleton.h"
 #include "tests/people/bvh_text.h"
 #include "tests/support.h"
 

@@ -6,7 +6,7 @@
 
 #include "duet/core/file.h"
 #include "duet/core/require.h"
-#include "duet/people/bvh/bvh_kinematics.h"
+#include "duet/people/bvh/bvh.h"
 #include "tests/people/bvh_text.h"
 #include "tests/support.h"
 

@@ -9,14 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "duet/people/formats/amass.h"
-#include "duet/people/formats/gvhmr.h"
 #include "duet/people/formats/inter/inter_x.h"
-#include "duet/people/formats/inter/inter_x_h5.h"
-#include "duet/people/formats/inter/interhuman_raw.h"
-#include "duet/people/formats/motion_rows.h"
 #include "duet/people/formats/people_formats.h"
-#include "duet/people/formats/video_tracks.h"
+#include "duet/people/people_format.h"
 #include "tests/people/body_files.h"
 #include "tests/people/body_model_files.h"
 

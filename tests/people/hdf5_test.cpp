@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "tests/archives/hdf5_bytes.h"
 #include "tests/support.h"

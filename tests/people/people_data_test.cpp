@@ -9,7 +9,7 @@
 
 #include "duet/core/digest.h"
 #include "duet/core/file.h"
-#include "duet/core/order_statistics.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
 #include "duet/motion/plausibility.h"

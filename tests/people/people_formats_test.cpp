@@ -8,7 +8,7 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/motion/people/people_files.h"
-#include "duet/people/formats/inter/inter_x_actions.h"
+#include "duet/people/formats/inter/inter_x.h"
 #include "tests/motion/people_files.h"
 #include "tests/support.h"
 

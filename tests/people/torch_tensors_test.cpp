@@ -1,11 +1,10 @@
-#include "duet/people/bodies/torch_tensors.h"
-
 #include <gmock/gmock.h>
 
 #include <functional>
 
 #include "duet/archives/zip/zip.h"
 #include "duet/core/require.h"
+#include "duet/people/bodies/number_table.h"
 #include "tests/archives/torch_bytes.h"
 #include "tests/support.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "duet/core/require.h"
-#include "duet/policies/dstar/config.h"
+#include "duet/policies/dstar/features.h"
 #include "duet/policies/dstar/network.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/policies/dstar/random_network.h"
+#include "duet/policies/dstar/network.h"
 #include "tests/policies/fixtures.h"
 
 namespace duet::test {

@@ -7,10 +7,10 @@
 #include <functional>
 #include <limits>
 
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
 #include "duet/policies/catalogue/registry.h"
-#include "duet/policies/observation_history.h"
+#include "duet/policies/policy.h"
 #include "duet/policies/scheduler.h"
 #include "tests/policies/dstar_fixtures.h"
 #include "tests/support.h"

@@ -8,7 +8,6 @@
 
 #include "duet/core/require.h"
 #include "duet/policies/external/message.h"
-#include "duet/policies/external/message_socket.h"
 #include "tests/deep_json.h"
 #include "tests/policies/external_fixtures.h"
 #include "tests/support.h"

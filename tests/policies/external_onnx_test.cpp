@@ -7,7 +7,6 @@
 #include "duet/policies/dstar/features.h"
 #include "duet/policies/external/channel_values.h"
 #include "duet/policies/external/external_policy.h"
-#include "duet/policies/external/plan_decoder.h"
 #include "duet/policies/scheduler.h"
 #include "tests/nn/onnx_writer.h"
 #include "tests/policies/external_fixtures.h"

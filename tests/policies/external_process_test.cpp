@@ -10,8 +10,8 @@
 
 #include "duet/core/require.h"
 #include "duet/policies/catalogue/registry.h"
-#include "duet/policies/external/child_process.h"
 #include "duet/policies/external/external_policy.h"
+#include "duet/policies/external/process_policy.h"
 #include "duet/robots/kinematics.h"
 #include "tests/policies/process_fixtures.h"
 

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <vector>
 
-#include "duet/core/random.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/numbers.h"
+#include "duet/core/recording.h"
 #include "duet/policies/policy.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/roles.h"

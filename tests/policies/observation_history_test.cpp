@@ -1,5 +1,4 @@
-#include "duet/policies/observation_history.h"
-
+#include "duet/policies/policy.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 

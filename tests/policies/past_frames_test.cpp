@@ -1,11 +1,10 @@
-#include "duet/policies/dstar/past_frames.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "duet/policies/observation_history.h"
+#include "duet/policies/dstar/dstar_policy.h"
+#include "duet/policies/policy.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <thread>
 
-#include "duet/policies/null_policy.h"
+#include "duet/policies/reference_policies.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 

@@ -11,8 +11,8 @@
 #include "duet/core/file.h"
 #include "duet/core/require.h"
 #include "duet/policies/catalogue/registry.h"
-#include "duet/policies/external/child_process.h"
 #include "duet/policies/external/external_policy.h"
+#include "duet/policies/external/process_policy.h"
 #include "tests/policies/external_fixtures.h"
 
 namespace duet::test {

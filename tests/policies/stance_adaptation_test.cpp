@@ -1,6 +1,5 @@
 // StartMode::kAct: for controllers that cannot walk.
 #include "duet/policies/phase_adaptation.h"
-#include "duet/policies/torso_orientation.h"
 #include "duet/robots/roles.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"

@@ -1,5 +1,4 @@
-#include "duet/policies/torso_orientation.h"
-
+#include "duet/policies/phase_adaptation.h"
 #include "tests/policies/fixtures.h"
 #include "tests/support.h"
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "duet/report/page/analysis_html.h"
+#include "duet/report/page/html_page.h"
 
 namespace duet {
 namespace {

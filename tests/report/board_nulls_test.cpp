@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/report/ranking/board.h"
-#include "duet/statistics/by_clip.h"
+#include "duet/statistics/clustered.h"
 #include "tests/rows/rows.h"
 
 namespace duet {

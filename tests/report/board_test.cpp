@@ -6,7 +6,7 @@
 
 #include "duet/report/page/html_report.h"
 #include "duet/report/ranking/leaderboard.h"
-#include "duet/statistics/by_clip.h"
+#include "duet/statistics/clustered.h"
 #include "tests/rows/rows.h"
 
 namespace duet {

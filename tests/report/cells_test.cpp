@@ -1,5 +1,3 @@
-#include "duet/report/tables/cells.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>

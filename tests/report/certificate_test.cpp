@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "duet/report/engines/certificate_table.h"
+#include "duet/report/engines/cross_engine.h"
 
 namespace duet {
 namespace {

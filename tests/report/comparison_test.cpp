@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "duet/core/require.h"
-#include "duet/statistics/by_clip.h"
+#include "duet/statistics/clustered.h"
 #include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"

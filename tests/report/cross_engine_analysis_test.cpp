@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "duet/report/engines/cross_engine.h"
-#include "duet/report/page/engine_plot.h"
+#include "duet/report/page/run_analyses.h"
 #include "tests/report/estimates.h"
 #include "tests/rows/rows.h"
 

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "duet/core/require.h"
-#include "duet/report/engines/cross_engine_parts.h"
+#include "duet/report/engines/cross_engine.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

@@ -1,6 +1,5 @@
 // When the same episode in two engines parts: frame, points, falls, quartiles.
 #include "duet/report/engines/cross_engine.h"
-#include "duet/report/engines/cross_engine_parts.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

@@ -6,10 +6,10 @@
 #include <limits>
 #include <regex>
 
-#include "duet/report/page/foot_plots.h"
 #include "duet/report/page/key_frames.h"
 #include "duet/report/page/run_analyses.h"
-#include "duet/report/tables/escape_html.h"
+#include "duet/report/page/training_curves.h"
+#include "duet/report/tables/line_plot.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

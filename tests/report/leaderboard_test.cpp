@@ -130,7 +130,11 @@ TEST(Leaderboard, WhatDidNotEndWellFailsAndIsShown) {
        {Outcome::kOk, Outcome::kFell, Outcome::kDiverged, Outcome::kTimedOut, Outcome::kError, Outcome::kUnsupported}) {
     rows.push_back(episode("replay", "hug", static_cast<int>(rows.size()), true));
     rows.back().outcome = outcome;
-    rows.back().verdicts = {Verdict{{.success = true}, "robot", "strict"}};
+    Verdict verdict;
+    verdict.success = true;
+    verdict.version = "robot";
+    verdict.thresholds = "strict";
+    rows.back().verdicts = {verdict};
   }
   rows.push_back(episode("replay", "hug", 6, true));
   rows.back().success.reset();

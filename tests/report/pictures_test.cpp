@@ -7,8 +7,8 @@
 
 #include "duet/core/file.h"
 #include "duet/report/engines/cross_engine.h"
-#include "duet/report/page/engine_plot.h"
 #include "duet/report/page/key_frames.h"
+#include "duet/report/page/run_analyses.h"
 #include "tests/rows/rows.h"
 
 namespace duet {

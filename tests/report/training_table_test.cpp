@@ -5,7 +5,7 @@
 
 #include "duet/core/require.h"
 #include "duet/report/studies/studies.h"
-#include "duet/statistics/crossed_effects.h"
+#include "duet/statistics/clustered.h"
 #include "tests/report/estimates.h"
 #include "tests/report/policy_rows.h"
 #include "tests/support.h"

@@ -1,7 +1,6 @@
-#include "duet/retarget/contact_keypoints.h"
-
 #include <gmock/gmock.h>
 
+#include "duet/retarget/options.h"
 #include "duet/retarget/pair_chain.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"

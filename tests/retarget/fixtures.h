@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "duet/motion/interaction_clip.h"
 #include "duet/robots/robot_model.h"
 

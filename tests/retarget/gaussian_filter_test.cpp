@@ -1,8 +1,8 @@
-#include "duet/retarget/gaussian_filter.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "duet/retarget/solver/pair.h"
 
 namespace duet {
 namespace {

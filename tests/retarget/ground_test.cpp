@@ -5,13 +5,13 @@
 #include <thread>
 #include <vector>
 
-#include "duet/motion/foot_contact.h"
+#include "duet/motion/human_motion.h"
 #include "duet/motion/synthesis/synthesis.h"
-#include "duet/retarget/body_spheres.h"
-#include "duet/retarget/leg_pose.h"
-#include "duet/retarget/pair.h"
-#include "duet/retarget/pair_solver.h"
-#include "duet/retarget/upright_chain.h"
+#include "duet/retarget/ground_plan.h"
+#include "duet/retarget/pair_chain.h"
+#include "duet/retarget/pair_terms.h"
+#include "duet/retarget/solver/pair.h"
+#include "duet/retarget/solver/pair_solver.h"
 #include "duet/robots/human_body.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/roles.h"

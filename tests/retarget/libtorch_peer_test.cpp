@@ -1,9 +1,7 @@
-#include "duet/retarget/libtorch_peer.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/retarget/pair_solver.h"
+#include "duet/retarget/solver/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

@@ -1,13 +1,12 @@
 // Carried objects and weighted keypoints in PAIR: closed form, slope, the SIMD kernels against the double reference,
 // and what retargeting gains by them.
-#include "duet/retarget/object_term.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/retarget/pair.h"
-#include "duet/retarget/pair_solver.h"
+#include "duet/retarget/pair_terms.h"
+#include "duet/retarget/solver/pair.h"
+#include "duet/retarget/solver/pair_solver.h"
 #include "duet/robots/kinematics.h"
 #include "tests/retarget/fixtures.h"
 

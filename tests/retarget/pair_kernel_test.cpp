@@ -4,8 +4,6 @@
 // moving the data of the double reference by 1e-7 m changes its own result by 1e-6 to 3e-4 of the objective. Agreement
 // of the gradients is therefore tested with a large epsilon, where the descent is smooth, to rounding; that of the
 // paper's schedule to what its own sensitivity allows.
-#include "duet/retarget/pair_kernel.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -13,8 +11,9 @@
 #include <thread>
 
 #include "duet/core/require.h"
-#include "duet/retarget/pair.h"
-#include "duet/retarget/pair_solver.h"
+#include "duet/retarget/solver/lane_problem.h"
+#include "duet/retarget/solver/pair.h"
+#include "duet/retarget/solver/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

@@ -1,7 +1,6 @@
-#include "duet/retarget/pair_objective.h"
-
 #include <gtest/gtest.h>
 
+#include "duet/retarget/pair_problem.h"
 #include "tests/retarget/fixtures.h"
 
 namespace duet {

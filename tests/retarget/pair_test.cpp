@@ -1,4 +1,4 @@
-#include "duet/retarget/pair.h"
+#include "duet/retarget/solver/pair.h"
 
 #include <gmock/gmock.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "duet/core/require.h"
-#include "duet/retarget/pair_solver.h"
+#include "duet/retarget/solver/pair_solver.h"
 #include "tests/retarget/fixtures.h"
 #include "tests/support.h"
 

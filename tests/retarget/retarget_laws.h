@@ -8,9 +8,9 @@
 #include <string>
 #include <utility>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "duet/motion/interaction_clip.h"
-#include "duet/retarget/pair.h"
+#include "duet/retarget/solver/pair.h"
 #include "duet/robots/robot_model.h"
 #include "duet/robots/roles.h"
 

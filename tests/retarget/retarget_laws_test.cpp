@@ -7,10 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/metrics/grounding.h"
+#include "duet/metrics/locomotion.h"
 #include "duet/motion/synthesis/synthesis.h"
-#include "duet/retarget/joint_speeds.h"
-#include "duet/retarget/pair.h"
+#include "duet/retarget/solver/pair.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/roles.h"
 #include "tests/retarget/fixtures.h"

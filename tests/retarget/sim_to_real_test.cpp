@@ -1,11 +1,10 @@
-#include "duet/retarget/sim_to_real.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "duet/retarget/solver/pair.h"
 #include "duet/robots/roles.h"
 #include "tests/motion/people.h"
 #include "tests/support.h"

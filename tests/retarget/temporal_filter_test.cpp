@@ -1,6 +1,6 @@
-#include "duet/retarget/temporal_filter.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/retarget/solver/lbfgs.h"
 
 namespace duet {
 namespace {

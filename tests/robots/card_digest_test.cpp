@@ -1,5 +1,4 @@
-#include "duet/robots/card_digest.h"
-
+#include "duet/robots/card.h"
 #include "duet/robots/robot_cards.h"
 #include "tests/robots/fixtures.h"
 

@@ -1,5 +1,5 @@
 // Cards that extend others.
-#include "duet/robots/card_reader.h"
+#include "duet/robots/card.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -1,5 +1,4 @@
-#include "duet/robots/card_roles.h"
-
+#include "duet/robots/card.h"
 #include "duet/robots/roles.h"
 #include "tests/robots/fixtures.h"
 

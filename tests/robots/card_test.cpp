@@ -1,4 +1,5 @@
-#include "duet/robots/card_reader.h"
+#include "duet/robots/card.h"
+
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/core/require.h"
 #include "duet/robots/robot_model.h"
 #include "tests/support.h"

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <map>
 
-#include "duet/archives/pickle/motion_pickle.h"
-#include "duet/core/skeleton.h"
+#include "duet/archives/pickle/pickle_fields.h"
+#include "duet/core/recording.h"
 #include "duet/robots/kinematics.h"
 #include "duet/robots/urdf.h"
 #include "tests/robots/fixtures.h"

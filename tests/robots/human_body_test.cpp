@@ -4,7 +4,7 @@
 #include <map>
 #include <set>
 
-#include "duet/core/skeleton.h"
+#include "duet/core/recording.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -1,9 +1,8 @@
-#include "duet/robots/joint_map.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "duet/robots/roles.h"
 #include "tests/robots/fixtures.h"
 
 namespace duet {

@@ -1,7 +1,6 @@
-#include "duet/robots/origin.h"
-
 #include "duet/robots/kinematics.h"
 #include "duet/robots/robot_cards.h"
+#include "duet/robots/robot_model.h"
 #include "tests/robots/fixtures.h"
 #include "tests/robots/moved_t1.h"
 

@@ -1,6 +1,6 @@
-#include "duet/robots/phase_primitives.h"
-
 #include <gtest/gtest.h>
+
+#include "duet/robots/roles.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,4 @@
 // The factor of a humanoid's mass matrix against a dense one.
-#include "duet/robots/tree_factor.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>

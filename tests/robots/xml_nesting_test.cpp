@@ -1,5 +1,3 @@
-#include "duet/robots/xml_nesting.h"
-
 #include "duet/robots/urdf.h"
 #include "tests/robots/fixtures.h"
 

@@ -1,8 +1,7 @@
-#include "duet/robots/yaml_fields.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
+#include "duet/robots/yaml_section.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
-#include "duet/robots/yaml_range.h"
+#include "duet/robots/yaml_section.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -1,10 +1,9 @@
-#include "duet/rollout/perturbations/disturbance.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "duet/experiment/suite/suite.h"
+#include "duet/rollout/perturbations/perturbation.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/experiment/fixtures.h"
 

@@ -1,16 +1,15 @@
-#include "duet/rollout/perturbations/partner_variation.h"
-
 #include <gmock/gmock.h>
 
 #include <numbers>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
-#include "duet/core/pose.h"
 #include "duet/core/require.h"
+#include "duet/core/robot_state.h"
 #include "duet/execution/runner.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/rollout/act_episode.h"
+#include "duet/rollout/perturbations/partner_perturbation.h"
 #include "duet/rollout/perturbations/perturbation.h"
 #include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"

@@ -1,10 +1,9 @@
-#include "duet/rollout/perturbations/perception.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "duet/core/require.h"
+#include "duet/rollout/perturbations/partner_perturbation.h"
 #include "duet/rollout/perturbations/perturbation.h"
 #include "tests/backends/allocation_count.h"
 #include "tests/experiment/fixtures.h"

@@ -1,10 +1,8 @@
-#include "duet/rollout/play_back.h"
-
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "duet/rollout/kinematic_follower.h"
+#include "duet/rollout/world.h"
 #include "tests/backends/small_robots.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"
@@ -57,7 +55,7 @@ TEST(Playback, RecordsTheMotionAsItIs) {
 }
 
 // The robot stands on the first frame already, so that its first step is the second frame's; a first step has no
-// velocity (play_back.h), later ones have that of the frames.
+// velocity (world.h), later ones have that of the frames.
 TEST(Playback, TakesItsFirstStepToTheSecondFrame) {
   const Parts parts;
   const PointTracks nobody;

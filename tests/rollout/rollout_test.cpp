@@ -3,7 +3,7 @@
 #include <chrono>
 #include <thread>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/execution/runner.h"
 #include "duet/experiment/suite/profile.h"

@@ -1,10 +1,9 @@
-#include "duet/rows/groups/distinct_episodes.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/report/ranking/policy_groups.h"
+#include "duet/rows/groups/row_groups.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

@@ -1,5 +1,3 @@
-#include "duet/rows/folder/published.h"
-
 #include <gmock/gmock.h>
 
 #include <filesystem>

@@ -4,10 +4,9 @@
 #include <set>
 
 #include "duet/rows/episode_row.h"
-#include "duet/rows/groups/row_field_list.h"
+#include "duet/rows/groups/database.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/row_identity.h"
-#include "duet/rows/row_scan.h"
+#include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
 
 namespace duet {

@@ -9,11 +9,11 @@
 #include <fstream>
 
 #include "duet/core/file.h"
-#include "duet/report/page/foot_plots.h"
 #include "duet/report/page/run_analyses.h"
+#include "duet/report/page/training_curves.h"
 #include "duet/rows/json_fields.h"
-#include "duet/rows/merge/run_union.h"
-#include "duet/rows/row_scan.h"
+#include "duet/rows/merge/row_merge.h"
+#include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

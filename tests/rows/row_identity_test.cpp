@@ -1,9 +1,8 @@
-#include "duet/rows/row_identity.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
+#include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
 
 namespace duet {

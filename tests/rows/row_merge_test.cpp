@@ -9,7 +9,7 @@
 #include <map>
 
 #include "duet/core/file.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/rows/json_fields.h"
 #include "tests/file_size_limit.h"
 #include "tests/rows/rows.h"

@@ -1,9 +1,7 @@
-#include "duet/rows/row_scan.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/rows/json_fields.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rows/row_file.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

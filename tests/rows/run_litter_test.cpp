@@ -1,11 +1,10 @@
-#include "duet/rows/folder/run_litter.h"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <filesystem>
 
 #include "duet/core/file.h"
+#include "duet/rows/folder/run_files.h"
 #include "tests/support.h"
 
 namespace duet {

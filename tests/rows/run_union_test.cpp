@@ -1,8 +1,7 @@
-#include "duet/rows/merge/run_union.h"
-
 #include <gmock/gmock.h>
 
 #include "duet/core/require.h"
+#include "duet/rows/merge/row_merge.h"
 #include "tests/rows/rows.h"
 #include "tests/support.h"
 

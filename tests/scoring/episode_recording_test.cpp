@@ -1,5 +1,3 @@
-#include "duet/scoring/episode_recording.h"
-
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -9,8 +7,9 @@
 #include "duet/execution/runner.h"
 #include "duet/experiment/suite/profile.h"
 #include "duet/metrics/catalogue.h"
-#include "duet/rollout/play_back.h"
-#include "duet/rows/row_identity.h"
+#include "duet/rollout/world.h"
+#include "duet/rows/row_file.h"
+#include "duet/scoring/scoring.h"
 #include "tests/execution/staged.h"
 #include "tests/experiment/fixtures.h"
 #include "tests/support.h"

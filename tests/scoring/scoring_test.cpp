@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/execution/runner.h"
 #include "duet/policies/catalogue/registry.h"

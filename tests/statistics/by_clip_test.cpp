@@ -1,10 +1,9 @@
-#include "duet/statistics/by_clip.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/statistics/clustered.h"
 #include "tests/support.h"
 
 namespace duet {

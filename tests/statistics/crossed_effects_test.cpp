@@ -1,5 +1,3 @@
-#include "duet/statistics/crossed_effects.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,7 +5,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/statistics/clustered.h"
 
 namespace duet {
 namespace {

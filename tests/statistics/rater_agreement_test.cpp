@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

@@ -7,8 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include "duet/core/order_statistics.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "tests/support.h"
 
 namespace duet {

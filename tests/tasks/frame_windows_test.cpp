@@ -1,8 +1,8 @@
-#include "duet/tasks/rules/frame_windows.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
+
+#include "duet/tasks/rules/evidence.h"
 
 namespace duet {
 namespace {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "duet/tasks/synthesis/draws.h"
+#include "duet/tasks/synthesis/act.h"
 
 namespace duet::synthesis {
 namespace {

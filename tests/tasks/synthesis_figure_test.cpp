@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/tasks/synthesis/figure.h"
 #include "tests/support.h"
 

@@ -2,8 +2,8 @@
 
 #include "duet/motion/synthesis/synthesis.h"
 #include "duet/robots/human_body.h"
+#include "duet/tasks/synthesis/figure.h"
 #include "duet/tasks/synthesis/performer.h"
-#include "duet/tasks/synthesis/solid.h"
 
 namespace duet::synthesis {
 namespace {

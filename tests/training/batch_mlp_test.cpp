@@ -1,10 +1,8 @@
-#include "duet/training/batch_mlp.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "duet/training/normaliser.h"
+#include "duet/training/agent.h"
 
 namespace duet {
 namespace {

@@ -1,9 +1,9 @@
-#include "duet/training/clipped_objective.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "duet/training/ppo.h"
 
 namespace duet {
 namespace {

@@ -4,11 +4,10 @@
 #include <filesystem>
 
 #include "duet/core/file.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
 #include "duet/policies/language.h"
 #include "duet/training/dstar/demonstrations.h"
-#include "duet/training/dstar/log.h"
 #include "duet/training/dstar/trainer.h"
 #include "duet/training/dstar/windows.h"
 #include "tests/support.h"

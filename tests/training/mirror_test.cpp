@@ -1,9 +1,8 @@
-#include "duet/training/mirror.h"
-
 #include <gtest/gtest.h>
 
 #include "duet/controllers/wbc_sim/observation.h"
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
+#include "duet/training/wbc_task.h"
 #include "tests/training/fixtures.h"
 
 namespace duet {

@@ -1,8 +1,7 @@
-#include "duet/rollout/reference_stream.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "duet/rollout/reference_source.h"
 #include "duet/training/wbc_task.h"
 #include "tests/support.h"
 #include "tests/training/fixtures.h"

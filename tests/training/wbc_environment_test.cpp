@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "duet/core/clock.h"
+#include "duet/core/robot_state.h"
 #include "tests/training/fixtures.h"
 
 namespace duet {

@@ -9,10 +9,9 @@
 
 #include "duet/core/file.h"
 #include "duet/core/json.h"
+#include "duet/core/recording.h"
 #include "duet/core/require.h"
-#include "duet/core/skeleton.h"
-#include "duet/core/text.h"
-#include "duet/nn/stored_values.h"
+#include "duet/nn/safetensors.h"
 
 namespace duet {
 namespace {

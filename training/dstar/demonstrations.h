@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/point_tracks.h"
-#include "duet/core/robot_motion.h"
+#include "duet/core/recording.h"
 #include "duet/core/robot_state.h"
 #include "duet/core/task.h"
 

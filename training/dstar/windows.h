@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "duet/core/random.h"
+#include "duet/core/numbers.h"
 #include "duet/policies/dstar/features.h"
+#include "duet/policies/dstar/retrieval.h"
 #include "duet/training/dstar/demonstrations.h"
 
 namespace duet {
@@ -90,5 +91,11 @@ struct WindowStatistics {
   Eigen::VectorXf frame_mean, frame_deviation, plan_mean, plan_deviation;
 };
 WindowStatistics window_statistics(WindowMaker& maker, const std::vector<Window>& windows, std::uint64_t seed);
+
+// The library of `retrieval`: windows of demonstrations as they are.
+
+// `windows` of them, drawn evenly from the set. Throws std::invalid_argument for a set without a window.
+RetrievalLibrary make_retrieval_library(const std::shared_ptr<const RobotModel>& robot, const DemonstrationSet& set,
+                                        int windows, std::uint64_t seed);
 
 }  // namespace duet

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <optional>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/controllers/controller.h"
-#include "duet/core/parallel.h"
-#include "duet/core/random.h"
+#include "duet/core/machine.h"
+#include "duet/core/numbers.h"
 #include "duet/experiment/plan/clips.h"
-#include "duet/motion/clip_digest.h"
+#include "duet/motion/paired_motion.h"
 #include "duet/policies/catalogue/registry.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/rollout/act_episode.h"
@@ -170,6 +170,16 @@ std::string split_text(const Suite& suite, int threads, Progress& progress) {
   for (const PairedMotion& clip : prepare_clips(suite, *robot, threads, progress))
     text += fmt::format("{}  {}\n", clip_digest(clip), clip.clip_id);
   return text;
+}
+
+std::vector<RobotMotion> training_motions(const RobotModel& robot, int per_task, int threads, Progress& progress) {
+  std::vector<RobotMotion> motions;
+  for (const PairedMotion& clip : synthetic_clips(robot, {}, {kPaperTasks.begin(), kPaperTasks.end()}, per_task,
+                                                  kTrainingSeed, threads, progress)) {
+    const AdaptationOptions options{.start = StartMode::kApproach};
+    motions.push_back(adapt_by_phase(clip.robot, clip.phases, robot, options, kTrainingSeed + motions.size()).motion);
+  }
+  return motions;
 }
 
 }  // namespace duet

@@ -8,10 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "duet/core/recording.h"
 #include "duet/experiment/suite/suite.h"
-#include "duet/experiment/work/progress.h"
+#include "duet/experiment/work/run_work.h"
 #include "duet/policies/phase_adaptation.h"
 #include "duet/policies/policy.h"
+#include "duet/robots/robot_model.h"
 #include "duet/training/dstar/demonstrations.h"
 
 namespace duet {
@@ -52,5 +54,12 @@ std::optional<DemonstrationSet> make_demonstrations(const std::shared_ptr<const 
 
 // "digest  clip_id" of every clip of a suite, with a first line that says which: the content of a test split.
 std::string split_text(const Suite& suite, int threads, Progress& progress);
+
+// Motions for a controller to learn on: synthesised clips of the six tasks through PAIR, with the approach of A.4.4.
+// No suite that ships draws its clips from this seed (a test of ShippedSuites).
+
+inline constexpr std::uint64_t kTrainingSeed = 770001;
+
+std::vector<RobotMotion> training_motions(const RobotModel& robot, int per_task, int threads, Progress& progress);
 
 }  // namespace duet

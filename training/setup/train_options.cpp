@@ -9,10 +9,8 @@
 #include <sstream>
 
 #include "duet/core/names.h"
-#include "duet/core/number.h"
 #include "duet/core/require.h"
-#include "duet/core/text.h"
-#include "duet/experiment/suite/suite_names.h"
+#include "duet/experiment/suite/suite.h"
 
 namespace duet {
 namespace {

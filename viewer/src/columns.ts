@@ -1,5 +1,5 @@
 // The numbers of a page: blocks of columns, 16 bits a value, second differences, low bytes before high ones
-// (replay/replay_columns.h).
+// (replay/replay_header.h).
 
 export interface Block {
   at: number; // first byte

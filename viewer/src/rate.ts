@@ -1,5 +1,5 @@
 // The rating page: one episode at a time, what the robot was asked to do, and three answers. Nothing says which policy or
-// engine it is or how it was judged (replay/rating_page.h).
+// engine it is or how it was judged (replay/replay_page.h).
 import './rate.css';
 import {Answer, Answers} from './answers';
 import {Camera, steer} from './camera';

@@ -5,14 +5,14 @@
 
 #include "duet/app/command.h"
 #include "duet/app/retarget_comparison.h"
-#include "duet/core/naming_file.h"
-#include "duet/core/parallel.h"
+#include "duet/core/file.h"
+#include "duet/core/machine.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/shell_word.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/motion/plausibility.h"
-#include "duet/retarget/pair.h"
 #include "duet/retarget/pair_chain.h"
+#include "duet/retarget/solver/pair.h"
 
 namespace duet::cli {
 namespace {

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "duet/app/part.h"
-#include "duet/core/naming_file.h"
-#include "duet/core/parallel.h"
+#include "duet/core/file.h"
+#include "duet/core/machine.h"
 #include "duet/core/require.h"
 #include "duet/experiment/plan/clips.h"
 #include "duet/scoring/motion_scores.h"

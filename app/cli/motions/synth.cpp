@@ -4,13 +4,13 @@
 
 #include <filesystem>
 
-#include "duet/app/cli/field_options.h"
+#include "duet/app/cli/arguments.h"
 #include "duet/app/command.h"
-#include "duet/app/synth_options.h"
+#include "duet/app/option_sections.h"
 #include "duet/core/digest.h"
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
+#include "duet/core/names.h"
 #include "duet/core/require.h"
-#include "duet/core/shell_word.h"
 #include "duet/motion/people/tracked_clip.h"
 #include "duet/motion/synthesis/synthesis.h"
 

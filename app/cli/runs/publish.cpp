@@ -4,10 +4,9 @@
 #include "duet/app/cli/run_notes.h"
 #include "duet/app/command.h"
 #include "duet/core/file.h"
-#include "duet/core/shell_word.h"
+#include "duet/core/names.h"
 #include "duet/execution/run_inputs.h"
 #include "duet/experiment/suite/suite.h"
-#include "duet/rows/folder/published.h"
 #include "duet/rows/folder/run_directory.h"
 
 namespace duet::cli {

@@ -9,18 +9,16 @@
 #include "duet/app/cli/run_notes.h"
 #include "duet/app/command.h"
 #include "duet/core/file_batch.h"
+#include "duet/core/machine.h"
 #include "duet/core/names.h"
-#include "duet/core/parallel.h"
 #include "duet/core/require.h"
-#include "duet/core/shell_word.h"
 #include "duet/execution/story.h"
-#include "duet/replay/report_replays.h"
-#include "duet/report/page/engine_plot.h"
+#include "duet/replay/replay_page.h"
 #include "duet/report/page/html_report.h"
 #include "duet/report/page/run_analyses.h"
 #include "duet/report/ranking/comparison.h"
 #include "duet/rows/groups/database.h"
-#include "duet/rows/merge/run_union.h"
+#include "duet/rows/merge/row_merge.h"
 
 namespace duet::cli {
 namespace {

@@ -7,8 +7,7 @@
 
 #include "duet/app/certificate.h"
 #include "duet/app/command.h"
-#include "duet/app/parity_page.h"
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/core/file_batch.h"
 #include "duet/core/require.h"
 #include "duet/experiment/suite/profile.h"

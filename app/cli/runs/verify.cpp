@@ -4,7 +4,7 @@
 #include <random>
 
 #include "duet/app/command.h"
-#include "duet/core/parallel.h"
+#include "duet/core/machine.h"
 #include "duet/execution/verification.h"
 #include "duet/experiment/plan/shipped_suites.h"
 #include "duet/rows/folder/environment.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "duet/backends/factory.h"
+#include "duet/backends/engine_module.h"
 #include "duet/controllers/catalogue/registry.h"
 #include "duet/rollout/rollout.h"
 

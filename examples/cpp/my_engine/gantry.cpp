@@ -12,7 +12,6 @@
 
 #include "duet/backends/engine_module.h"
 #include "duet/backends/physics_backend.h"
-#include "duet/backends/thread_clock.h"
 #include "duet/robots/dynamics.h"
 
 namespace {
@@ -49,7 +48,7 @@ class GantryBackend final : public duet::PhysicsBackend {
   void place() override { hold_pelvis(); }
   void do_kick(const Eigen::Vector3d&) override {}  // the gantry holds the pelvis
 
-  // M a = u - b + Q with the law u implicit in the step, as duet's own adapters take it (backends/implicit_law.h); a
+  // M a = u - b + Q with the law u implicit in the step, as duet's own adapters take it (backends/physics_backend.h); a
   // joint whose torque would pass its effort gets just that. Allocates nothing.
   duet::Outcome advance(const duet::JointCommand& command) override {
     const double dt = scene().dt;

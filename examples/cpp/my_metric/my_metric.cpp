@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "duet/metrics/registry.h"
+#include "duet/metrics/catalogue.h"
 #include "duet/robots/kinematics.h"
 
 namespace {

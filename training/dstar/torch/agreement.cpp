@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "duet/training/dstar/torch/blas.h"
-#include "duet/training/dstar/torch/units.h"
+#include "duet/training/dstar/torch/model.h"
 #include "duet/training/dstar/trainer.h"
 
 namespace duet {

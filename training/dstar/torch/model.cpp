@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "duet/core/numbers.h"
 
 namespace duet {
 namespace {
@@ -159,6 +162,130 @@ torch::Tensor sample(const DstarConfig& config, const Weights& weights, const to
     x = std::sqrt(next) * x0 + std::sqrt(1.0 - next) * eps;
   }
   return x;
+}
+
+namespace {
+
+constexpr float kInputClip = 10.0F;
+
+torch::Tensor vector_tensor(const Eigen::VectorXf& v) {
+  return torch::from_blob(const_cast<float*>(v.data()), {v.size()}).clone();
+}
+
+}  // namespace
+
+torch::Tensor view(Eigen::MatrixXf& matrix, at::IntArrayRef shape) { return torch::from_blob(matrix.data(), shape); }
+
+torch::Tensor normal_noise(at::IntArrayRef shape, Random& random) {
+  torch::Tensor noise = torch::empty(shape);
+  auto* out = noise.data_ptr<float>();
+  std::generate(out, out + noise.numel(), [&] { return static_cast<float>(random.normal()); });
+  return noise;
+}
+
+Units::Units(const WindowStatistics& statistics, const LanguageEncoder& encoder)
+    : frame_mean_(vector_tensor(statistics.frame_mean)),
+      frame_deviation_(vector_tensor(statistics.frame_deviation)),
+      mean_(vector_tensor(statistics.plan_mean).view({kAnchors, kAnchorSize})),
+      deviation_(vector_tensor(statistics.plan_deviation).view({kAnchors, kAnchorSize})) {
+  for (const Task task : kPaperTasks) {
+    std::vector<std::vector<float>> rows = {encoder.embed(task_prompt(task))};
+    for (const std::string_view text : task_paraphrases(task)) rows.push_back(encoder.embed(text));
+    prompts_.push_back(std::move(rows));
+  }
+}
+
+torch::Tensor Units::frames(Eigen::MatrixXf& raw) const {
+  const torch::Tensor frames = view(raw, {raw.cols(), kHistoryFrames, kFrameSize});
+  return ((frames - frame_mean_) / frame_deviation_).clamp(-kInputClip, kInputClip);
+}
+
+torch::Tensor Units::language(const WindowBatch& batch) const {
+  const auto size = static_cast<std::int64_t>(prompts_[0][0].size());
+  torch::Tensor rows = torch::empty({batch.size, size});
+  for (int i = 0; i < batch.size; ++i) {
+    const std::vector<float>& row = prompts_[batch.task[i]][batch.prompt[i] + 1];
+    std::copy(row.begin(), row.end(), rows.data_ptr<float>() + size * i);
+  }
+  return rows;
+}
+
+ModelInput Units::input(WindowBatch& batch) const {
+  return {frames(batch.frames),
+          frames(batch.past),
+          view(batch.position, {batch.size, kPositionSize}),
+          view(batch.distance, {batch.size, kRelations}),
+          view(batch.orientation, {batch.size, kOrientationSize}),
+          language(batch)};
+}
+
+namespace {
+
+constexpr double kPositionBound = 0.05, kBranchShare = 0.3;
+
+double bound_of(const TensorShape& shape) {
+  if (shape.name.ends_with("position")) return kPositionBound;
+  const double inputs = static_cast<double>(WeightBlock::count(shape)) / static_cast<double>(shape.shape[0]);
+  const bool last = shape.name.ends_with("conv2.weight") || shape.name.ends_with("film_condition.weight") ||
+                    shape.name.ends_with("film_step.weight");
+  return (last ? kBranchShare : 1.0) * std::sqrt(1.5 / inputs);
+}
+
+}  // namespace
+
+WeightBlock::WeightBlock(const DstarConfig& config) : shapes_(dstar_tensors(config)) {
+  std::size_t size = 0;
+  for (const TensorShape& shape : shapes_) size += count(shape);
+  values_.assign(size, 0.0F);
+}
+
+std::size_t WeightBlock::count(const TensorShape& shape) {
+  std::size_t n = 1;
+  for (const std::int64_t d : shape.shape) n *= static_cast<std::size_t>(d);
+  return n;
+}
+
+Weights WeightBlock::views(bool learn) {
+  Weights weights;
+  float* at = values_.data();
+  for (const TensorShape& shape : shapes_) {
+    torch::Tensor view = torch::from_blob(at, shape.shape, torch::kFloat32);
+    weights[shape.name] = learn ? view.requires_grad_(true) : view;
+    at += count(shape);
+  }
+  return weights;
+}
+
+std::map<std::string, duet::Tensor> WeightBlock::tensors() const {
+  std::map<std::string, duet::Tensor> result;
+  const float* at = values_.data();
+  for (const TensorShape& shape : shapes_) {
+    result[shape.name] = {shape.shape, {at, at + count(shape)}};
+    at += count(shape);
+  }
+  return result;
+}
+
+void WeightBlock::assign(const std::map<std::string, duet::Tensor>& tensors) {
+  float* at = values_.data();
+  for (const TensorShape& shape : shapes_) at = std::ranges::copy(tensors.at(shape.name).values, at).out;
+}
+
+void WeightBlock::initialise(std::uint64_t seed) {
+  Random random(seed, stream_key({"dstar weights"}));
+  float* at = values_.data();
+  for (const TensorShape& shape : shapes_) {
+    float* const end = at + count(shape);
+    if (shape.name.ends_with(".bias")) {
+      std::fill(at, end, 0.0F);
+    } else if (shape.name.find("norm") != std::string::npos) {
+      std::fill(at, end, 1.0F);
+    } else {
+      const double bound = bound_of(shape);
+      std::generate(at, end, [&] { return static_cast<float>(random.uniform(-bound, bound)); });
+    }
+    at = end;
+  }
 }
 
 }  // namespace duet

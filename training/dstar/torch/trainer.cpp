@@ -9,12 +9,11 @@
 
 #include "duet/core/require.h"
 #include "duet/nn/dense_kernels.h"
-#include "duet/training/checkpoint.h"
-#include "duet/training/dstar/log.h"
+#include "duet/training/agent.h"
 #include "duet/training/dstar/torch/blas.h"
 #include "duet/training/dstar/torch/losses.h"
-#include "duet/training/dstar/torch/units.h"
-#include "duet/training/dstar/torch/weight_block.h"
+#include "duet/training/dstar/torch/model.h"
+#include "duet/training/dstar/trainer.h"
 #include "duet/training/threads.h"
 
 namespace duet {

@@ -1,0 +1,217 @@
+#include "duet/backends/engine_module.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+
+#include "duet/core/names.h"
+#include "duet/core/require.h"
+#include "duet/core/share.h"
+
+namespace duet {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array kEngines = {"mujoco", "bullet", "ode", "simbody", "dart"};
+constexpr std::string_view kPrefix = "duet_", kSuffix = ".so";
+
+// "a:b" -> a, b.
+std::vector<fs::path> folders_of(std::string_view list) {
+  std::vector<fs::path> folders;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t end = std::min(list.find(':', begin), list.size());
+    if (end > begin) folders.emplace_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return folders;
+}
+
+// The first folder of duet's own modules that is there: an installed program looks into no other.
+std::vector<fs::path> module_folders() {
+  if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0') return folders_of(set);
+  std::error_code error;
+  std::vector<fs::path> places = {fs::read_symlink("/proc/self/exe", error).parent_path() / "engines"};
+  for (const std::string& prefix : installed_prefixes()) places.push_back(fs::path(prefix) / DUET_INSTALLED_ENGINES);
+  for (const fs::path& place : places)
+    if (fs::is_directory(place, error)) return {place};
+  static const std::optional<BuildTree> built_in = build_tree_of(program_file());
+  if (built_in) return {fs::path(built_in->build) / "engines"};
+  return {};
+}
+
+struct Loaded {
+  const EngineModule* module = nullptr;
+  std::string reason;  // where null
+};
+
+std::string last_error() {
+  const char* error = dlerror();
+  return error == nullptr ? "unknown error of the dynamic linker" : error;
+}
+
+Loaded load_file(const std::string& name, const fs::path& file) {
+  void* handle = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) return {nullptr, last_error()};
+  const auto entry = reinterpret_cast<const EngineModule* (*)()>(dlsym(handle, "duet_engine_module"));
+  if (entry == nullptr) return {nullptr, last_error()};
+  const EngineModule* module = entry();
+  if (module->interface != engine_interface())
+    return {nullptr,
+            fmt::format("{} was compiled against other types (interface {:016x}, duet {} has {:016x}): compile "
+                        "it again with the headers and the compiler flags of this duet",
+                        file.string(), module->interface, duet_version(), engine_interface())};
+  if (name != module->name) return {nullptr, fmt::format("its module names itself '{}'", module->name)};
+  return {module, ""};
+}
+
+Loaded load(const std::string& name) {
+  const std::string file = fmt::format("{}{}{}", kPrefix, name, kSuffix);
+  for (const fs::path& folder : module_folders()) {
+    std::error_code error;
+    if (fs::exists(folder / file, error)) return load_file(name, folder / file);
+  }
+  if (const char* set = std::getenv("DUET_ENGINES"); set != nullptr && *set != '\0')
+    return {nullptr,
+            fmt::format("no {} in the folders of DUET_ENGINES ('{}'), which take the place of duet's own", file, set)};
+  return {nullptr, fmt::format("{} was not built (its development files were missing, or it was left out)", file)};
+}
+
+const Loaded& loaded(const std::string& name) {
+  static std::mutex mutex;
+  static std::map<std::string, Loaded> modules;
+  const std::lock_guard lock(mutex);
+  const auto [entry, is_new] = modules.try_emplace(name);
+  if (is_new) entry->second = load(name);
+  return entry->second;
+}
+
+// Names of engines: the benchmark's, then what else has a module.
+std::vector<std::string> engine_names() {
+  std::vector<std::string> names(kEngines.begin(), kEngines.end());
+  std::vector<std::string> others;
+  for (const fs::path& folder : module_folders()) {
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      std::string name = entry.path().filename().string();
+      if (!name.starts_with(kPrefix) || !name.ends_with(kSuffix)) continue;
+      name = name.substr(kPrefix.size(), name.size() - kPrefix.size() - kSuffix.size());
+      if (std::find(names.begin(), names.end(), name) == names.end()) others.push_back(name);
+    }
+  }
+  std::sort(others.begin(), others.end());
+  others.erase(std::unique(others.begin(), others.end()), others.end());
+  names.insert(names.end(), others.begin(), others.end());
+  return names;
+}
+
+void check_name(const std::string& engine) {
+  const std::vector<std::string> names = engine_names();
+  require(std::find(names.begin(), names.end(), engine) != names.end(), unknown_name_message("engine", engine, names));
+}
+
+}  // namespace
+
+std::vector<EngineInfo> engines() {
+  std::vector<EngineInfo> infos;
+  for (const std::string& name : engine_names()) {
+    const Loaded& engine = loaded(name);
+    const bool available = engine.module != nullptr;
+    infos.push_back({.name = name,
+                     .available = available,
+                     .version = available ? engine.module->version() : "",
+                     .reason = engine.reason});
+  }
+  return infos;
+}
+
+const EngineModule& engine_module(const std::string& engine) {
+  check_name(engine);
+  const Loaded& entry = loaded(engine);
+  if (entry.module == nullptr) throw MissingError(fmt::format("engine '{}' is absent: {}", engine, entry.reason));
+  return *entry.module;
+}
+
+const EngineModule* find_engine_module(const std::string& engine) {
+  const std::vector<std::string> names = engine_names();
+  return std::ranges::find(names, engine) == names.end() ? nullptr : loaded(engine).module;
+}
+
+std::unique_ptr<Backend> make_backend(const std::string& engine, const Scene& scene) {
+  const EngineModule& module = engine_module(engine);
+  check_options(engine, scene.options, module.options);
+  return module.make(scene);
+}
+
+namespace {
+
+const EngineOption& find(std::span<const EngineOption> known, std::string_view name) {
+  for (const EngineOption& option : known)
+    if (option.name == name) return option;
+  throw std::logic_error(fmt::format("no engine option '{}'", name));
+}
+
+std::string value_of(const EngineOptions& options, const EngineOption& option) {
+  const auto set = options.find(option.name);
+  return set == options.end() ? option.value : set->second;
+}
+
+void check_value(std::string_view engine, const EngineOption& option, const std::string& text) {
+  if (!option.choices.empty()) {
+    require(std::find(option.choices.begin(), option.choices.end(), text) != option.choices.end(),
+            "{}: {} is '{}', expected one of {}", engine, option.name, text, fmt::join(option.choices, ", "));
+    return;
+  }
+  const double value = parse_number(text).value_or(std::nan(""));
+  const bool fits = value >= option.low && value <= option.high && (!option.whole || value == std::floor(value));
+  require(fits, "{}: {} is '{}', expected a {}number from {} to {}", engine, option.name, text,
+          option.whole ? "whole " : "", option.low, option.high);
+}
+
+}  // namespace
+
+EngineOption number_option(std::string name, double value, double low, double high, std::string meaning) {
+  return {std::move(name), fmt::format("{}", value), {}, low, high, false, std::move(meaning)};
+}
+
+EngineOption integer_option(std::string name, int value, int low, int high, std::string meaning) {
+  return {std::move(name),   fmt::format("{}", value), {}, static_cast<double>(low), static_cast<double>(high), true,
+          std::move(meaning)};
+}
+
+EngineOption choice_option(std::string name, std::vector<std::string> choices, std::string meaning) {
+  std::string first = choices.front();
+  return {std::move(name), std::move(first), std::move(choices), 0.0, 0.0, false, std::move(meaning)};
+}
+
+void check_options(std::string_view engine, const EngineOptions& options, std::span<const EngineOption> known) {
+  std::vector<std::string> names;
+  for (const EngineOption& option : known) names.push_back(option.name);
+  for (const auto& [name, value] : options) {
+    const auto option = std::find(names.begin(), names.end(), name);
+    require(option != names.end(), unknown_name_message(fmt::format("option of {}", engine), name, names));
+    check_value(engine, known[option - names.begin()], value);
+  }
+}
+
+double option_number(const EngineOptions& options, std::span<const EngineOption> known, std::string_view name) {
+  return parse_number(value_of(options, find(known, name))).value_or(std::nan(""));
+}
+
+int option_integer(const EngineOptions& options, std::span<const EngineOption> known, std::string_view name) {
+  return static_cast<int>(option_number(options, known, name));
+}
+
+std::string option_choice(const EngineOptions& options, std::span<const EngineOption> known, std::string_view name) {
+  return value_of(options, find(known, name));
+}
+
+}  // namespace duet

@@ -1,0 +1,274 @@
+#include "duet/hardware/episodes/guarded_episode.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/core/robot_state.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/robots/robot_cards.h"
+#include "duet/rows/groups/row_groups.h"
+#include "duet/rows/json_fields.h"
+
+namespace duet {
+namespace {
+
+constexpr double kRest = 0.2;  // that it is told to stand for after an episode [s]
+
+GuardedEpisode guarded_episode(const RolloutSetup& setup, const RobotModel& robot, const GuardedOptions& options,
+                               const PointTracks& partner) {
+  GuardedEpisode episode;
+  episode.limits = options.config.limits;
+  episode.steps_from = options.steps_from;
+  for (const std::vector<int>& arm : robot.roles.arms)
+    episode.joints.insert(episode.joints.end(), arm.begin(), arm.end());
+  episode.act_begin = setup.reference.phases.act_begin;
+  episode.act_end = setup.reference.phases.act_end;
+  episode.watch = options.watch;
+  if (options.config.twin) episode.person = partner_of_clip(partner);  // a robot's camera speaks for itself
+  return episode;
+}
+
+Rollout roll_out_guarded(const RolloutSetup& setup, const std::shared_ptr<const RobotModel>& robot, Policy& policy,
+                         GuardLink& link, const GuardedOptions& options, GuardedRun& run) {
+  GuardedEpisode episode = guarded_episode(setup, *robot, options, episode_partner(setup).joints);
+  run.executed = executed_mask(*robot, episode.joints, true);
+  GuardedWorld world(std::move(episode), robot, link);
+  Rollout rollout = roll_out(setup, world, policy, options.engine);
+  run.interrupted = std::exchange(rollout.interrupted, false);
+  run.clamps = world.clamps();
+  run.held_ticks = world.held_ticks();
+  run.guard_seconds = world.report().now - world.began_at();
+  run.missed_reports = world.missed_reports();
+  if (!options.recording.empty()) save_logged_run(rollout.recording, run.executed, options.recording);
+  world.rest(kRest);
+  return rollout;
+}
+
+std::string share_text(long k, long n, const Interval& interval) {
+  return fmt::format("{} of {} = {:.1f} % [{:.1f}, {:.1f}]", k, n, n > 0 ? 100.0 * static_cast<double>(k) / n : 0.0,
+                     100.0 * interval.low, 100.0 * interval.high);
+}
+
+}  // namespace
+
+GuardedRun run_guarded_episode(const Experiment& experiment, const EpisodeSpec& spec, GuardLink& link,
+                               const GuardedOptions& options) {
+  GuardedRun run;
+  const auto in_world = [&](const RolloutSetup& setup, Policy& policy) {
+    return roll_out_guarded(setup, spec.body->robot, policy, link, options, run);
+  };
+  run.row = experiment.run(spec, {.stop_asked = options.stop_asked, .engine = options.engine, .world = in_world});
+  return run;
+}
+
+PairedSuccess paired_success(const PairedEpisodes& episodes) {
+  require(episodes.simulated.size() == episodes.guarded.size(),
+          "paired episodes: expected as many rows of both, found {} and {}", episodes.simulated.size(),
+          episodes.guarded.size());
+  PairedSuccess result;
+  result.n = static_cast<long>(episodes.simulated.size());
+  EpisodePairs pairs;
+  for (std::size_t i = 0; i < episodes.simulated.size(); ++i) {
+    pairs.add(episodes.guarded[i], episodes.simulated[i]);
+    const bool a = episodes.simulated[i].success.value_or(false), b = episodes.guarded[i].success.value_or(false);
+    result.simulated += a ? 1 : 0;
+    result.guarded += b ? 1 : 0;
+    ++(a ? (b ? result.both : result.only_simulated) : (b ? result.only_guarded : result.neither));
+  }
+  result.simulated_95 = wilson(result.simulated, result.n);
+  result.guarded_95 = wilson(result.guarded, result.n);
+  result.difference_95 = newcombe_paired(result.both, result.only_guarded, result.only_simulated, result.neither);
+  if (result.n > 0) result.p = pairs.p();
+  result.clips = pairs.clips();
+  const double share = result.n > 0 ? static_cast<double>(result.guarded) / static_cast<double>(result.n) : 0.0;
+  result.inside = share >= result.simulated_95.low && share <= result.simulated_95.high;
+  return result;
+}
+
+std::string paired_text(const PairedSuccess& success, const std::string& simulated, const std::string& guarded) {
+  return fmt::format(
+      "{:<24} {}\n{:<24} {}\nthe same episodes: both {}, only {} {}, only {} {}, neither {}\ndifference {:+.1f} points "
+      "[{:.1f}, {:.1f}] (Newcombe, paired), exact test by clip over {} clips p = {:.3f}; {} lies {} the interval of {}",
+      simulated, share_text(success.simulated, success.n, success.simulated_95), guarded,
+      share_text(success.guarded, success.n, success.guarded_95), success.both, simulated, success.only_simulated,
+      guarded, success.only_guarded, success.neither,
+      success.n > 0 ? 100.0 * static_cast<double>(success.guarded - success.simulated) / success.n : 0.0,
+      100.0 * success.difference_95.low, 100.0 * success.difference_95.high, success.clips, success.p, guarded,
+      success.inside ? "inside" : "outside", simulated);
+}
+
+nlohmann::json paired_json(const PairedSuccess& success) {
+  const auto interval = [](const Interval& values) { return nlohmann::json{values.low, values.high}; };
+  return {{"n", success.n},
+          {"simulated", success.simulated},
+          {"guarded", success.guarded},
+          {"both", success.both},
+          {"only_simulated", success.only_simulated},
+          {"only_guarded", success.only_guarded},
+          {"neither", success.neither},
+          {"simulated_95", interval(success.simulated_95)},
+          {"guarded_95", interval(success.guarded_95)},
+          {"difference_95", interval(success.difference_95)},
+          {"clips", success.clips},
+          {"p", success.p},
+          {"inside", success.inside}};
+}
+
+Suite suite_of_clip(const std::string& clip, const std::string& policy, const std::string& start,
+                    const std::string& controller) {
+  const std::string file = std::filesystem::absolute(clip).lexically_normal().string();
+  const nlohmann::json quoted = file;  // JSON's strings are YAML's
+  std::vector<std::string_view> tasks;
+  for (const Task task : all_tasks()) tasks.push_back(to_string(task));
+  return parse_suite(
+      fmt::format("schema: duet.suite/1\nname: hw-run\nversion: 1.0.0\nclips: {{files: [{}]}}\ntasks: [{}]\nengines: "
+                  "[playback]\ncontrollers: [{}]\npolicies: [{}]\nrobot: {}\nstart: {}\nnull_arm: false\n",
+                  dumped(quoted), fmt::join(tasks, ", "), controller, policy, default_robot(), start),
+      "hw-run.yaml");
+}
+
+namespace {
+
+constexpr int kPersonRate = 30;  // [Hz]
+
+// Whether a picture of 30 in a second falls into this tick.
+bool sees_at(int tick) { return tick == 0 || tick * kPersonRate / 50 != (tick - 1) * kPersonRate / 50; }
+
+std::string place_of(const GuardReport& report) {
+  return fmt::format("{} ({})", safety_state_name(report.state), stop_cause_name(report.cause));
+}
+
+}  // namespace
+
+PartnerSource partner_of_clip(PointTracks partner) {
+  return [partner = std::move(partner)](int tick, HumanJoints& joints) {
+    if (partner.empty() || !sees_at(tick)) return false;
+    joints = partner_joints(partner, tick);
+    return true;
+  };
+}
+
+GuardedWorld::GuardedWorld(GuardedEpisode episode, std::shared_ptr<const RobotModel> robot, GuardLink& link)
+    : episode_(std::move(episode)),
+      robot_(std::move(robot)),
+      link_(link),
+      velocity_(episode_.odometry, episode_.limits, episode_.steps_from),
+      fall_(robot_->fall) {
+  message_to_guard_.command.q = robot_->neutral;
+  target_ = robot_->neutral;
+  state_ = robot_->standing_state();
+  // Above whatever a planner before this one has sent.
+  person_.sequence = message_to_guard_.sequence = static_cast<std::uint64_t>(monotonic_seconds() * 1e6);
+}
+
+bool GuardedWorld::next() {
+  const std::uint64_t before = report_.tick;
+  if (!link_.next(report_)) {
+    message_ = fmt::format("{} has gone: no report in {} s", link_.name(), link_.patience());
+    return false;
+  }
+  if (report_.state != last_state_ && episode_.watch) episode_.watch(report_);
+  last_state_ = report_.state;
+  if (before > 0 && report_.tick > before) missed_ += static_cast<int>((report_.tick - before) / kReportEvery) - 1;
+  return true;
+}
+
+void GuardedWorld::plan(const VelocityCommand& root, const Eigen::VectorXd& q, bool acting) {
+  ++message_to_guard_.sequence;
+  message_to_guard_.command.stamp = report_.now;
+  message_to_guard_.command.root = root;
+  message_to_guard_.command.q = q;
+  message_to_guard_.acting = acting;
+  (void)link_.send(message_to_guard_);
+}
+
+void GuardedWorld::begin(const RobotState& start) {
+  if (!next()) throw std::runtime_error(message_);
+  const double asked_at = report_.now;
+  message_to_guard_.goal.reset();
+  while (report_.state != SafetyState::kRun) {
+    if (report_.state >= SafetyState::kHold || report_.now - asked_at > episode_.most_wait)
+      throw std::runtime_error(fmt::format("{} does not run: it is at {} after {:.1f} s", link_.name(),
+                                           place_of(report_), report_.now - asked_at));
+    lay_world(start.X_WB);
+    show_person(0);
+    plan({0.0, 0.0, 0.0, episode_.limits.height}, robot_->neutral, false);
+    if (!next()) throw std::runtime_error(message_);
+  }
+  lay_world(start.X_WB);
+  velocity_.reset();
+  missed_ = 0;
+  began_at_ = report_.now;
+  clamps_before_ = report_.clamps;
+  take_state();
+}
+
+void GuardedWorld::lay_world(const Pose& start) {
+  const Pose& X_OB = report_.robot.X_WB;
+  yaw_OE_ = yaw_of(X_OB.R) - yaw_of(start.R);
+  p_OE_ = X_OB.p - yaw_rotation(yaw_OE_) * start.p;
+  p_OE_.z() = 0.0;
+}
+
+Pose GuardedWorld::to_odometry(const Pose& X_EB) const {
+  const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
+  return {R_OE * X_EB.R, p_OE_ + R_OE * X_EB.p};
+}
+
+void GuardedWorld::take_state() {
+  const Eigen::Quaterniond R_EO = yaw_rotation(-yaw_OE_);
+  state_ = report_.robot;
+  state_.X_WB = {R_EO * report_.robot.X_WB.R, R_EO * (report_.robot.X_WB.p - p_OE_)};
+  state_.v_WB = R_EO * report_.robot.v_WB;
+  for (std::size_t k = 0; k < kClampReasons; ++k) clamps_[k] = report_.clamps[k] - clamps_before_[k];
+}
+
+void GuardedWorld::show_person(int tick) {
+  HumanJoints joints;
+  if (!episode_.person || !episode_.person(tick, joints)) return;
+  const Eigen::Quaterniond R_OE = yaw_rotation(yaw_OE_);
+  for (int j = 0; j < joints.cols(); ++j) person_.joints.col(j) = p_OE_ + R_OE * joints.col(j);
+  ++person_.sequence;
+  (void)link_.send(person_);
+}
+
+// The guard gets what the reference asks for; what it makes of it is in its next report.
+const Eigen::VectorXd& GuardedWorld::target(const Reference& reference) {
+  const Reference goal{to_odometry(reference.X_WB), reference.q};
+  const OdometrySample odometry{report_.robot.X_WB, report_.robot.v_WB, report_.odometry_at, report_.odometry};
+  const VelocityCommand root = velocity_.update(odometry, goal, report_.now);
+  show_person(tick_);
+  message_to_guard_.goal = goal.X_WB;
+  plan(root, reference.q, tick_ >= episode_.act_begin && tick_ < episode_.act_end);
+  target_ = report_.q_target;
+  for (const int joint : episode_.joints) target_[joint] = reference.q[joint];
+  return target_;
+}
+
+Outcome GuardedWorld::advance(int tick, const PointTracks&, Deadline&) {
+  tick_ = tick + 1;
+  if (!next()) return Outcome::kError;
+  take_state();
+  if (report_.state == SafetyState::kHold) ++held_ticks_;
+  if (has_fallen(state_, fall_)) return Outcome::kFell;
+  if (report_.state == SafetyState::kRun || report_.state == SafetyState::kHold) return Outcome::kOk;
+  message_ = fmt::format("{} ended the run at {:.2f} s: {}", link_.name(), (tick + 1) * kTick, place_of(report_));
+  return Outcome::kError;
+}
+
+void GuardedWorld::rest(double seconds) {
+  const double end = report_.now + seconds;
+  message_to_guard_.goal.reset();
+  while (report_.now < end) {
+    show_person(tick_);
+    plan({0.0, 0.0, 0.0, episode_.limits.height}, robot_->neutral, false);
+    if (!next()) return;
+  }
+}
+
+}  // namespace duet

@@ -1,0 +1,143 @@
+// An episode of a suite over a robot behind its guard, and what came of many of them beside the same episodes in the
+// simulator: success with intervals and a paired test.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "duet/execution/experiment.h"
+#include "duet/experiment/plan/episode.h"
+#include "duet/hardware/guard/guard_loop.h"
+#include "duet/hardware/guard/robot_connection.h"
+#include "duet/hardware/guard/walker.h"
+#include "duet/hardware/log/run_log.h"
+#include "duet/rollout/rollout.h"
+#include "duet/statistics/statistics.h"
+
+namespace duet {
+
+// A robot behind its guard as the world of an episode (rollout/world.h): the reference's root becomes a velocity by the
+// law of supplement A.4.3, its joints targets, both go to the guard, and what the guard reports is the state. The world
+// is laid so that the episode's start is where the robot stands. One owner, one thread.
+
+// Where the person's joints are, in the frame of the episode, at a tick of it [m]; false where nobody sees them now.
+using PartnerSource = std::function<bool(int tick, HumanJoints& joints)>;
+// A person who is where the clip has them, as an estimator sees them 30 times a second.
+PartnerSource partner_of_clip(PointTracks partner);
+
+struct GuardedEpisode {
+  OdometrySource odometry = OdometrySource::kTwin;
+  HardwareLimits limits;
+  double steps_from = 0.0;         // of the walking controller: RootVelocity
+  std::vector<int> joints;         // that the guard's limiter moves: what is executed of the reference beside the root
+  int act_begin = 0, act_end = 0;  // ticks in which the task's parts may touch
+  PartnerSource person = {};       // empty: the guard hears of nobody
+  double most_wait = 30.0;         // for the guard to run, by its clock [s]
+  std::function<void(const GuardReport&)> watch = {};  // of each change of state, for displays
+};
+
+class GuardedWorld final : public World {
+ public:
+  // Throws as RootVelocity does. Refers to the link.
+  GuardedWorld(GuardedEpisode episode, std::shared_ptr<const RobotModel> robot, GuardLink& link);
+
+  // Plans to stand until the guard runs. Throws std::runtime_error, with what the guard is at, where it does not in
+  // most_wait of its time, and where it has gone.
+  void begin(const RobotState& start) override;
+  [[nodiscard]] const RobotState& state() const override { return state_; }
+  // The targets that are sent; for the executed joints those that are asked for, before the limiter.
+  const Eigen::VectorXd& target(const Reference& reference) override;
+  // A guard that has gone or ended the run is kError, a robot that fell kFell; while it holds, the episode goes on.
+  Outcome advance(int tick, const PointTracks& partner, Deadline& deadline) override;
+  [[nodiscard]] std::string message() const override { return message_; }
+
+  // Plans to stand for so long after the episode [s]; then whoever is next may have the robot.
+  void rest(double seconds);
+
+  // Counts over the episode's ticks.
+  [[nodiscard]] int held_ticks() const { return held_ticks_; }  // the guard held
+  [[nodiscard]] const ClampCounts& clamps() const { return clamps_; }
+  [[nodiscard]] int missed_reports() const { return missed_; }         // that were lost between two
+  [[nodiscard]] double began_at() const { return began_at_; }          // by the guard's clock [s]
+  [[nodiscard]] const GuardReport& report() const { return report_; }  // the last
+
+ private:
+  bool next();
+  void plan(const VelocityCommand& root, const Eigen::VectorXd& q, bool acting);
+  void show_person(int tick);
+  void take_state();
+  void lay_world(const Pose& start);
+  [[nodiscard]] Pose to_odometry(const Pose& X_EB) const;
+
+  GuardedEpisode episode_;
+  std::shared_ptr<const RobotModel> robot_;
+  GuardLink& link_;
+  RootVelocity velocity_;
+  FallRule fall_;
+  // Pose of the episode's frame E in odometry's frame O: a turn about z and a shift on the ground.
+  double yaw_OE_ = 0.0;
+  Eigen::Vector3d p_OE_ = Eigen::Vector3d::Zero();
+  RobotState state_;  // frame E
+  GuardReport report_;
+  PlannerMessage message_to_guard_;
+  PersonMessage person_;
+  Eigen::VectorXd target_;
+  int tick_ = 0;
+  SafetyState last_state_ = SafetyState::kOffline;
+  ClampCounts clamps_before_{}, clamps_{};
+  int held_ticks_ = 0, missed_ = 0;
+  double began_at_ = 0.0;
+  std::string message_;
+};
+
+struct GuardedOptions {
+  RobotConfig config;
+  double steps_from = 0.0;  // of the walking controller [m/s]
+  std::string engine;       // that stands in the row: "twin"
+  std::string recording;    // path of the recording to make (NPZ); empty: none
+  std::function<void(const GuardReport&)> watch = {};
+  std::function<bool()> stop_asked = {};
+};
+
+struct GuardedRun {
+  EpisodeRow row;
+  ExecutedMask executed;
+  ClampCounts clamps{};
+  int held_ticks = 0;        // in which the guard held
+  int missed_reports = 0;    // of the guard, that were lost on their way
+  double guard_seconds = 0;  // of the episode, by the guard's clock [s]
+  bool interrupted = false;  // by stop_asked: the row is no result
+};
+
+// The episode through `link`, scored as the suite scores. Whatever ends it is an outcome; a guard that does not run is
+// `error` with what it is at. Throws StorageError where the recording cannot be written.
+GuardedRun run_guarded_episode(const Experiment& experiment, const EpisodeSpec& spec, GuardLink& link,
+                               const GuardedOptions& options);
+
+// The same episodes in two worlds, one row each.
+struct PairedEpisodes {
+  std::vector<EpisodeRow> simulated, guarded;
+};
+
+struct PairedSuccess {
+  long n = 0, simulated = 0, guarded = 0;
+  long both = 0, only_simulated = 0, only_guarded = 0, neither = 0;
+  Interval simulated_95, guarded_95;  // Wilson
+  Interval difference_95;             // guarded - simulated, Newcombe, paired
+  long clips = 0;
+  double p = 1.0;       // sign_flip_exact by clip, as on the board
+  bool inside = false;  // the guarded share lies in the simulator's interval
+};
+// Throws std::invalid_argument for lists of different lengths.
+PairedSuccess paired_success(const PairedEpisodes& episodes);
+std::string paired_text(const PairedSuccess& success, const std::string& simulated, const std::string& guarded);
+nlohmann::json paired_json(const PairedSuccess& success);
+
+// A suite of one clip for a robot: `policy` leads from `start` ("act", "approach", ...). Throws as parse_suite.
+Suite suite_of_clip(const std::string& clip, const std::string& policy, const std::string& start,
+                    const std::string& controller);
+
+}  // namespace duet

@@ -1,0 +1,107 @@
+// The maker's own walking as the executor: velocities that end by themselves go to its service, arm targets to its arm
+// topic, whose weight rises slowly. Its balance stays its own. This is not HOMIE, and says so. One owner, one thread.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "duet/controllers/root_conversion.h"
+#include "duet/hardware/executors/executor.h"
+
+namespace duet {
+
+// Calls of the maker's service "sport": numbers, and JSON in a string. Facts: docs/hardware.md,
+// "Executors". Pure functions; thread-safe.
+
+enum class SportCall : std::int64_t {
+  kGetFsm = 7001,  // the state of the maker's own machine; read only
+  kSetFsm = 7101,
+  kSetVelocity = 7105,
+};
+// States of the maker's machine.
+inline constexpr int kFsmDamp = 1, kFsmStart = 500, kFsmWaistStart = 501, kFsmRun = 801;
+[[nodiscard]] bool fsm_walks(int fsm);
+
+struct RpcRequest {
+  std::int64_t id = 0;  // ours; a response has the same
+  SportCall call = SportCall::kGetFsm;
+  std::array<char, 96> parameter{};  // JSON, ended by 0
+};
+// A velocity that ends by itself after `duration` [s]: 0.1 to 0.5, whatever is asked. No allocation.
+RpcRequest velocity_request(std::int64_t id, const VelocityCommand& velocity, double duration);
+RpcRequest fsm_request(std::int64_t id, int fsm);
+RpcRequest read_request(std::int64_t id, SportCall call);
+
+struct RpcResponse {
+  std::int64_t id = 0, api = 0;
+  std::int32_t code = 0;  // 0: done
+  std::string data;       // JSON
+};
+// The number of {"data": N}; none for anything else.
+std::optional<int> fsm_of(std::string_view data);
+// An order to a service; none for a parameter that is not of its call.
+struct SportOrder {
+  VelocityCommand velocity;
+  double duration = 0.0;  // [s]
+  int fsm = -1;
+};
+std::optional<SportOrder> order_of(SportCall call, std::string_view parameter);
+
+// The topics of the maker's services, as a client sees them; hardware/dds/ has them over DDS.
+class SportWire {
+ public:
+  virtual ~SportWire() = default;
+  // The next response that has arrived; false where there is none.
+  virtual bool take(RpcResponse& response) = 0;
+  virtual bool request(const RpcRequest& request) = 0;
+  // How many others write the arm topic now.
+  virtual int arm_writers() = 0;
+  virtual void open_arms() = 0;
+  virtual void close_arms() = 0;
+  virtual bool write_arms(const LowCommandFrame& frame) = 0;
+};
+
+class SportExecutor final : public Executor {
+ public:
+  // `period` of the guard's ticks [s].
+  SportExecutor(SportWire& wire, double period);
+  ~SportExecutor() override;
+
+  void poll(double now) override;
+  // The time of the last answer that its machine walks.
+  [[nodiscard]] double heard_at() const override { return heard_at_; }
+  [[nodiscard]] bool answers() const override { return true; }
+  [[nodiscard]] std::string complaint() const override;
+  // The maker's own controller may write the low-level topic; the arm topic is ours alone.
+  int foreign_writers(int) override { return wire_.arm_writers(); }
+  void open() override;
+  void close() override;
+  [[nodiscard]] bool is_open() const override { return open_; }
+  bool write(const LowCommandFrame& frame) override;
+  void send(const VelocityCommand& velocity) override;
+  // Once it has moved, damping and a fault ask the service to damp, until it says that it does.
+  void enter(SafetyState state) override;
+
+  [[nodiscard]] double arm_weight() const { return weight_; }  // 0 to 1
+
+ private:
+  void hear(const RpcResponse& response, double now);
+  [[nodiscard]] bool every(double seconds) const;
+
+  SportWire& wire_;
+  double period_;
+  LowCommandFrame frame_{};
+  VelocityCommand sent_;
+  SafetyState state_ = SafetyState::kOffline;
+  std::int64_t next_id_ = 1;
+  bool open_ = false, has_arms_ = false, moved_ = false;
+  double weight_ = 0.0, heard_at_ = kNever, asked_at_ = kNever;
+  int fsm_ = -1;  // -1: not known
+  std::int32_t last_refusal_ = 0;
+  long ticks_ = 0;
+};
+
+}  // namespace duet

@@ -1,0 +1,164 @@
+#include "duet/hardware/guard/robot_connection.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "duet/core/file.h"
+#include "duet/core/require.h"
+#include "duet/robots/human_body.h"
+#include "duet/robots/yaml_section.h"
+
+namespace duet {
+
+double RobotConnection::executor_heard(double now) {
+  executor_.poll(now);
+  return executor_.answers() ? executor_.heard_at() : kNever;
+}
+
+bool RobotConnection::take(LowStateFrame& frame) {
+  if (!wire_.take(frame)) return false;
+  if (odometry_ != nullptr) odometry_->see(frame);
+  return true;
+}
+
+namespace {
+
+constexpr const char* kRobotSchema = "duet.robot/1";
+// Gains of arms beside a person: the maker's example for its arm topic.
+constexpr double kArmStiffness = 60.0, kArmDamping = 1.5;
+
+// Bones of an adult of 1.75 m, where nobody measured: pelvis to head, legs and arms [m].
+constexpr std::array<double, 24> kAdultBones = {0.12, 0.11, 0.11,  0.12,  0.40, 0.40, 0.13,  0.42,
+                                                0.42, 0.06, 0.135, 0.135, 0.20, 0.14, 0.14,  0.10,
+                                                0.11, 0.11, 0.29,  0.29,  0.25, 0.25, 0.085, 0.085};
+
+void read_limits(const std::string& file, const YAML::Node& node, HardwareLimits& limits) {
+  read_fields(YamlSection(file, node, "limits", field_keys(hardware_limit_fields())), hardware_limit_fields(), limits);
+}
+
+void read_touches(const YamlSection& top, std::vector<TouchPair>& touches) {
+  for (const YAML::Node& node : top.items("touches")) {
+    if (!node.IsSequence() || node.size() != 2 || !node[0].IsScalar() || !node[1].IsScalar())
+      top.fail(node.Mark().line + 1,
+               fmt::format("'touches': expected [part of the robot, part of a person], found {}", describe(node)));
+    touches.push_back({node[0].Scalar(), node[1].Scalar()});
+  }
+}
+
+int whole_number(const YamlSection& top, const char* key) {
+  constexpr double kMost = 1e6;
+  const double number = top.number(key);
+  if (number != std::floor(number) || std::abs(number) > kMost)
+    top.fail(top.line(key), fmt::format("'{}': expected a whole number, found {}", key, number));
+  return static_cast<int>(number);
+}
+
+// The place of the key's value in a table of names.
+template <std::size_t N>
+std::size_t choice(const YamlSection& top, const char* key, const std::array<std::string_view, N>& names) {
+  const std::string text = top.text(key);
+  const auto found = std::ranges::find(names, text);
+  if (found == names.end())
+    top.fail(top.line(key), fmt::format("'{}': expected {}, found '{}'", key, fmt::join(names, ", "), shown(text)));
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+// A robot without a word of odometry has none.
+void read_executor(const YamlSection& top, RobotConfig& config) {
+  config.odometry = config.twin ? OdometrySource::kTwin : OdometrySource::kNone;
+  if (top.has("executor")) config.executor = static_cast<ExecutorKind>(choice(top, "executor", kExecutorNames));
+  if (top.has("odometry")) config.odometry = static_cast<OdometrySource>(choice(top, "odometry", kOdometryNames));
+}
+
+void read_lcm(const std::string& file, const YAML::Node& node, LcmPlace& place) {
+  const YamlSection section(file, node, "lcm", {"group", "port", "interface", "hops"});
+  const auto whole = [&](const char* key, int low, int high, int fallback) {
+    const std::optional<double> number = section.optional_number(key);
+    if (!number) return fallback;
+    if (*number != std::floor(*number) || *number < low || *number > high)
+      section.fail(section.line(key), fmt::format("'{}': expected {} to {}, found {}", key, low, high, *number));
+    return static_cast<int>(*number);
+  };
+  if (section.has("group")) place.group = section.text("group");
+  place.port = whole("port", 1, 65535, place.port);
+  place.hops = whole("hops", 0, 255, place.hops);
+  if (section.has("interface")) place.interface = section.text("interface");
+}
+
+void read_camera(const std::string& file, const YAML::Node& node, RobotConfig& config) {
+  const YamlSection section(file, node, "camera", {"position", "quat_wxyz"});
+  constexpr double kFarthest = 2.0;  // of a camera from the base [m]
+  config.X_BC.p = section.vector3("position");
+  if (config.X_BC.p.norm() > kFarthest)
+    section.fail(section.line("position"), fmt::format("'position': expected at most {} m from the base, found {}",
+                                                       kFarthest, config.X_BC.p.norm()));
+  const std::vector<YAML::Node> items = section.items("quat_wxyz");
+  Eigen::Vector4d quat_wxyz = Eigen::Vector4d::Zero();
+  for (std::size_t k = 0; k < std::min<std::size_t>(items.size(), 4); ++k)
+    if (!items[k].IsScalar() || !YAML::convert<double>::decode(items[k], quat_wxyz[static_cast<Eigen::Index>(k)]))
+      section.fail(section.line("quat_wxyz"), "'quat_wxyz': expected 4 numbers, found others");
+  if (items.size() != 4 || !(std::abs(quat_wxyz.norm() - 1.0) < 1e-3))
+    section.fail(section.line("quat_wxyz"), "'quat_wxyz': expected a unit quaternion w, x, y, z, found another");
+  config.X_BC.R = Eigen::Quaterniond(quat_wxyz[0], quat_wxyz[1], quat_wxyz[2], quat_wxyz[3]).normalized();
+  config.has_camera = true;
+}
+
+}  // namespace
+
+RobotConfig parse_robot_config(const std::string& text, const std::string& file) {
+  const YamlSection top(file, parse_yaml(text, file), "robot",
+                        {"schema", "robot", "interface", "domain", "mode_machine", "allow_motion", "twin", "person",
+                         "limits", "touches", "contact_limits", "executor", "odometry", "lcm", "camera"});
+  if (const std::string schema = top.text("schema"); schema != kRobotSchema)
+    top.fail(top.line("schema"), fmt::format("'schema': expected '{}', found '{}'", kRobotSchema, schema));
+  RobotConfig config;
+  config.permission = {.allow_motion = top.flag_or("allow_motion", false),
+                       .robot = top.text("robot"),
+                       .interface = top.text("interface"),
+                       .domain = whole_number(top, "domain"),
+                       .mode_machine = whole_number(top, "mode_machine")};
+  config.twin = top.flag_or("twin", false);
+  config.person = top.flag_or("person", true);
+  if (top.has("contact_limits")) config.contact_limits = top.text("contact_limits");
+  if (top.has("limits")) read_limits(file, top.node("limits"), config.limits);
+  read_touches(top, config.touches);
+  read_executor(top, config);
+  if (top.has("lcm")) read_lcm(file, top.node("lcm"), config.lcm);
+  if (top.has("camera")) read_camera(file, top.node("camera"), config);
+  try {
+    config.twin ? check_twin_place(config.place()) : check_place(config.place());
+  } catch (const std::invalid_argument& error) {
+    top.fail(top.line("domain"), error.what());
+  }
+  return config;
+}
+
+RobotConfig read_robot_config(const std::string& path) { return parse_robot_config(read_text(path), path); }
+
+GuardSetup guard_setup(const RobotConfig& config, bool dry_run) {
+  GuardSetup setup;
+  LimiterSetup& limiter = setup.limiter;
+  limiter.robot = load_shared_robot();
+  limiter.limits = config.limits;
+  for (const std::vector<int>& arm : limiter.robot->roles.arms)
+    limiter.executed.joints.insert(limiter.executed.joints.end(), arm.begin(), arm.end());
+  limiter.executed.kp.setConstant(limiter.robot->dof(), kArmStiffness);
+  limiter.executed.kd.setConstant(limiter.robot->dof(), kArmDamping);
+  limiter.person = config.person;
+  limiter.human = make_human_body(kAdultBones);
+  limiter.contact_limits =
+      load_contact_limits(config.contact_limits.empty() ? default_contact_limits_path() : config.contact_limits);
+  limiter.touches = config.touches;
+  setup.mode_machine = config.permission.mode_machine;
+  setup.stance = limiter.robot->default_command(limiter.robot->neutral);
+  setup.dry_run = dry_run;
+  setup.has_battery = true;
+  setup.executor = config.executor;
+  setup.odometry = config.odometry;
+  setup.rules.executor_answers = !dry_run && config.executor != ExecutorKind::kTwin;
+  return setup;
+}
+
+}  // namespace duet

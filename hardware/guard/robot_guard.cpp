@@ -1,0 +1,307 @@
+#include "duet/hardware/guard/robot_guard.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "duet/core/require.h"
+
+namespace duet {
+namespace {
+
+// Keys of the remote control.
+constexpr RemoteKey kDeadMan = RemoteKey::kR1, kStandUp = RemoteKey::kStart, kRun = RemoteKey::kA;
+// Looking for other writers takes longer than a tick should: ten times a second.
+constexpr double kWritersPeriod = 0.1;
+// Angle from the stance at which the robot counts as standing [rad].
+constexpr double kStanding = 0.05;
+constexpr double kWalkerPeriod = 0.02;  // [s]
+// Faster than anybody moves a joint of theirs: a jump of the estimate [m/s].
+constexpr double kPersonJump = 10.0;
+// A joint's measured angle may be beyond its limit by this: play and zero error [rad].
+constexpr double kLimitSlack = 0.02;
+
+ContactWatch contact_watch(const LimiterSetup& setup) {
+  const double force = setup.person ? least_touch_force(setup.touches, setup.contact_limits) : 0.0;
+  return {setup.robot, setup.limits, force, setup.dt};
+}
+
+const GuardSetup& checked(const GuardSetup& setup) {
+  require(setup.limiter.robot != nullptr, "guard: expected a robot, found none");
+  require(setup.limiter.robot->dof() == kG1Motors, "guard: expected a robot of {} joints, found {}", kG1Motors,
+          setup.limiter.robot->dof());
+  for (const Eigen::VectorXd* values : {&setup.stance.q_target, &setup.stance.kp, &setup.stance.kd})
+    require(values->size() == kG1Motors && values->allFinite(),
+            "guard: expected a stance of {} finite targets and gains, found another", kG1Motors);
+  return setup;
+}
+
+// The bounds of the way to the stance: those of an arm, from wherever the joint is.
+AxisBounds stance_bounds(const Limiter& limiter, int joint) {
+  AxisBounds bounds = limiter.joint_bounds(joint);
+  const RobotJoint& limits = limiter.setup().robot->joints[joint];
+  bounds.lower = limits.lower;
+  bounds.upper = limits.upper;
+  return bounds;
+}
+
+}  // namespace
+
+RobotGuard::RobotGuard(const GuardSetup& setup, FrameTransport& transport, VelocitySink& velocity)
+    : setup_(checked(setup)),
+      transport_(transport),
+      velocity_(velocity),
+      limiter_(setup_.limiter),
+      contact_(contact_watch(setup_.limiter)) {
+  setup_.rules.person_present = setup_.limiter.person;
+  setup_.stance.tau_ff.setZero(kG1Motors);
+  limiter_state_ = limiter_.start(setup_.limiter.robot->standing_state());
+  input_.state = measured_ = setup_.limiter.robot->standing_state();
+  joints_ = setup_.stance;
+  stance_.resize(kG1Motors);
+  planner_.command.q.setZero(kG1Motors);
+  status_.limited.q.setZero(kG1Motors);
+  status_.limited.kp = status_.limited.kd = status_.restart_q = status_.limited.q;
+  next_.period = setup_.limiter.dt;
+}
+
+void RobotGuard::receive(const PlannerMessage& message, double now) {
+  if (message.command.q.size() != kG1Motors) {
+    count(status_.clamps, ClampReason::kSize);
+    return;
+  }
+  const bool taken = planner_order_.takes(message.sequence, now);
+  count_streams();
+  if (!taken) return;
+  // A command that the limiter refuses does not keep the planner alive: the last good command grows old.
+  if (!limiter_.refusal(message.command, limiter_state_)) next_.planner_at = now;
+  planner_ = message;
+  planner_is_new_ = true;
+}
+
+// A pose that is not finite, or in which somebody jumped, is dropped: the one before grows old.
+void RobotGuard::receive(const PersonMessage& message, double now) {
+  const bool first = next_.person_at == kNever;
+  const double passed = std::max(now - next_.person_at, setup_.limiter.dt);
+  const double moved = first ? 0.0 : (message.joints - person_.joints).colwise().norm().maxCoeff();
+  if (!message.joints.allFinite() || moved > 0.1 + kPersonJump * passed) {
+    ++status_.bad_messages;
+    return;
+  }
+  const bool taken = person_order_.takes(message.sequence, now);
+  count_streams();
+  if (!taken) return;
+  person_speed_ = first ? 0.0 : (message.joints.col(0) - person_.joints.col(0)).norm() / passed;
+  person_ = message;
+  next_.person_at = now;
+  count_streams();
+}
+
+void RobotGuard::receive(const OdometrySample& sample) {
+  const bool finite = sample.X_WB.p.allFinite() && sample.v_WB.allFinite() && sample.X_WB.R.coeffs().allFinite();
+  if (!sample.valid || !finite) return;
+  if (odometry_.valid) {
+    const double step = (sample.X_WB.p - odometry_.X_WB.p).head<2>().norm();
+    next_.odometry_step = std::max(next_.odometry_step, step);
+  }
+  odometry_ = sample;
+  next_.odometry_at = sample.at;
+  count_streams();
+}
+
+void RobotGuard::count_streams() {
+  status_.old_messages = planner_order_.old() + person_order_.old();
+  status_.restarts =
+      planner_order_.restarts() + person_order_.restarts() + person_.sender_restarts + odometry_.sender_restarts;
+}
+
+void RobotGuard::receive(const BatteryReading& battery, double now) {
+  battery_ = battery;
+  battery_at_ = now;
+}
+
+void RobotGuard::arm() { armed_ = !setup_.dry_run; }
+
+void RobotGuard::tick(double now) {
+  next_.now = now;
+  read_states(now);
+  read_operator(now);
+  check_robot();
+  next_.arm = armed_;
+  safety_ = next_safety(setup_.rules, safety_, next_);
+  armed_ = false;
+  status_.order = safety_order(setup_.rules, safety_, next_);
+  status_.input = next_;
+  command(now);
+  send();
+  status_.safety = safety_;
+  ++status_.ticks;
+  next_.odometry_step = 0.0;
+}
+
+void RobotGuard::read_states(double now) {
+  next_.bad_states = 0;
+  status_.took_state = false;
+  while (transport_.take(status_.state_frame)) {
+    status_.took_state = true;
+    switch (read_state(status_.state_frame, reading_)) {
+      case FrameFault::kNone:
+        ++status_.states;
+        next_.state_at = now;
+        continue;
+      case FrameFault::kChecksum:
+        ++status_.checksum_faults;
+        break;
+      case FrameFault::kTick:
+        ++status_.tick_faults;
+        break;
+      case FrameFault::kNotFinite:
+        ++status_.number_faults;
+        break;
+    }
+    ++next_.bad_states;
+  }
+}
+
+// Reads the remote control, which counts only while states arrive that carry it.
+void RobotGuard::read_operator(double now) {
+  const bool fresh = next_.state_at == now && reading_.remote.heard;
+  if (fresh) next_.remote_at = now;
+  if (fresh && reading_.remote.holds(kDeadMan)) next_.dead_man_at = now;
+  next_.stop_key = stop_asked_ || (fresh && reading_.remote.asks_to_stop());
+  stop_asked_ = false;
+  next_.stand = fresh && reading_.remote.holds(kStandUp);
+  next_.run = fresh && reading_.remote.holds(kRun);
+}
+
+void RobotGuard::check_robot() {
+  next_.health = reading_.health;
+  if (setup_.has_battery)
+    next_.health.charge =
+        next_.now - battery_at_ <= kBatteryAge ? battery_.charge : std::numeric_limits<double>::quiet_NaN();
+  next_.health.mode_is_expected =
+      !reading_.any || (reading_.mode_pr == kPitchRollMode && reading_.mode_machine == setup_.mode_machine);
+  const RobotModel& robot = *setup_.limiter.robot;
+  for (int j = 0; j < kG1Motors; ++j) {
+    const double q = reading_.state.q[j];
+    if (q < robot.joints[j].lower - kLimitSlack || q > robot.joints[j].upper + kLimitSlack)
+      next_.health.joints_in_range = false;
+  }
+  if (ticks_to_writers_-- <= 0) {
+    ticks_to_writers_ = static_cast<int>(kWritersPeriod / setup_.limiter.dt);
+    next_.foreign_writer = transport_.foreign_writers() > 0;
+  }
+  next_.hands_clear = hands_are_clear();
+}
+
+bool RobotGuard::hands_are_clear() const {
+  if (!setup_.limiter.person || next_.person_at == kNever) return true;
+  const BodyGaps& gaps = limiter_.gaps();
+  const double nearest = std::min(gaps.touch, gaps.person + setup_.limiter.limits.pose_uncertainty);
+  return nearest > setup_.limiter.limits.reserve;
+}
+
+// Every joint to its stance, from where it was measured when the robot was told to stand.
+void RobotGuard::follow_stance() {
+  if (safety_.since == next_.now)
+    for (int j = 0; j < kG1Motors; ++j) stance_[j] = {reading_.state.q[j], 0.0};
+  AxisClamps clamps;
+  next_.stands = true;
+  for (int j = 0; j < kG1Motors; ++j) {
+    const double target = setup_.stance.q_target[j];
+    stance_[j] = follow(target, stance_[j], stance_bounds(limiter_, j), setup_.limiter.dt, clamps);
+    next_.stands = next_.stands && std::abs(stance_[j].value - target) < kStanding;
+    joints_.q_target[j] = stance_[j].value;
+  }
+  joints_.kp = setup_.stance.kp;
+  joints_.kd = setup_.stance.kd;
+}
+
+void RobotGuard::command(double now) {
+  status_.contact = contact_.update(reading_.state, reading_.tau);
+  input_.state.q = reading_.state.q;
+  input_.state.v = reading_.state.v;
+  input_.state.w_WB_B = reading_.state.w_WB_B;
+  input_.state.X_WB = {odometry_.X_WB.R, odometry_.X_WB.p};
+  input_.state.v_WB = odometry_.v_WB;
+  measured_ = input_.state;
+  const Eigen::Quaterniond& tilted = reading_.state.X_WB.R;
+  measured_.X_WB.R = yaw_rotation(yaw_of(odometry_.X_WB.R) - yaw_of(tilted)) * tilted;
+  input_.odometry = level_of(now - next_.odometry_at, setup_.rules.odometry) < StopLevel::kHold;
+  const bool person = level_of(now - next_.person_at, setup_.rules.person) < StopLevel::kHold;
+  input_.person = person ? &person_.joints : nullptr;
+  input_.person_speed = person_speed_;
+  input_.acting = planner_.acting;
+  input_.share = status_.order.share;
+  const bool planned = safety_.state == SafetyState::kRun || safety_.state == SafetyState::kHold;
+  input_.release = planned && (status_.order.opens || status_.contact.release);
+  if (status_.order.stands) follow_stance();
+  restart_limiter(planned);
+  status_.received = planner_is_new_;
+  const MotionCommand* received = planner_is_new_ ? &planner_.command : nullptr;
+  limiter_.tick(received, input_, limiter_state_, status_.limited, status_.clamps);
+  planner_is_new_ = false;
+  walk(planned);
+  if (!planned) return;
+  for (const int joint : setup_.limiter.executed.joints) {
+    joints_.q_target[joint] = status_.limited.q[joint];
+    joints_.kp[joint] = status_.limited.kp[joint];
+    joints_.kd[joint] = status_.limited.kd[joint];
+  }
+}
+
+// Runs from when it stands until it is damped, 50 times a second; the velocity has passed the limiter.
+void RobotGuard::walk(bool planned) {
+  const bool was_walking = walks_;
+  walks_ = walker_ != nullptr && (planned || (status_.order.stands && next_.stands));
+  if (!walks_) return;
+  if (!was_walking) {
+    walker_->begin(measured_);
+    ticks_to_step_ = 0;
+  }
+  if (ticks_to_step_-- > 0) return keep_walking();
+  ticks_to_step_ = static_cast<int>(std::lround(kWalkerPeriod / setup_.limiter.dt)) - 1;
+  const VelocityCommand stand{0.0, 0.0, 0.0, setup_.limiter.limits.height};
+  walker_joints_ = &walker_->update(measured_, planned ? status_.limited.root : stand, joints_.q_target);
+  keep_walking();
+}
+
+// The stance is written anew every tick: what the walker said last stands.
+void RobotGuard::keep_walking() {
+  for (int joint = 0; joint < kG1Motors; ++joint) {
+    if (limiter_.executes(joint)) continue;
+    joints_.q_target[joint] = walker_joints_->q_target[joint];
+    joints_.kp[joint] = walker_joints_->kp[joint];
+    joints_.kd[joint] = walker_joints_->kd[joint];
+    joints_.tau_ff[joint] = walker_joints_->tau_ff[joint];
+  }
+}
+
+// Planned motion begins where the stance was sent; before it, the limiter only watches.
+void RobotGuard::restart_limiter(bool planned) {
+  status_.restarted = !planned || !was_planned_;
+  was_planned_ = planned;
+  if (!status_.restarted) return;
+  status_.restart_q = planned ? joints_.q_target : reading_.state.q;
+  limiter_.restart(status_.restart_q, limiter_state_);
+}
+
+void RobotGuard::send() {
+  status_.sent = false;
+  velocity_.enter(safety_.state);
+  const SafetyOrder& order = status_.order;
+  if (!order.writes || setup_.dry_run) {
+    if (transport_.has_writer()) transport_.close_writer();
+    return;
+  }
+  if (!transport_.has_writer()) transport_.open_writer();
+  const auto machine = static_cast<std::uint8_t>(setup_.mode_machine);
+  if (order.damps)
+    build_damping(kDampingGain, machine, status_.frame);
+  else
+    build_command(joints_, machine, status_.frame);
+  status_.sent = transport_.write(status_.frame);
+  velocity_.send(was_planned_ ? status_.limited.root : VelocityCommand{0.0, 0.0, 0.0, setup_.limiter.limits.height});
+}
+
+}  // namespace duet

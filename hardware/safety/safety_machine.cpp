@@ -1,0 +1,244 @@
+#include "duet/hardware/safety/safety_machine.h"
+
+#include <algorithm>
+#include <array>
+
+namespace duet {
+namespace {
+
+constexpr std::array<std::string_view, kSafetyStates> kStateNames = {"offline", "listen", "ready", "armed", "stand",
+                                                                     "run",     "hold",   "damp",  "fault"};
+
+void enter(SafetyState state, StopCause cause, double now, SafetyMemory& memory) {
+  memory.state = state;
+  memory.cause = cause;
+  memory.since = now;
+}
+
+void listen(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
+  const std::string_view missing = missing_for_arming(rules, memory, input);
+  const bool well = missing.empty();
+  if (!well) {
+    memory.well_since = kNever;
+    memory.missing = missing;
+  }
+  if (well && memory.well_since == kNever) memory.well_since = input.now;
+  const bool ready = well && input.now - memory.well_since >= rules.ready_time;
+  if (memory.state == SafetyState::kListen && ready) enter(SafetyState::kReady, StopCause::kNone, input.now, memory);
+  if (memory.state == SafetyState::kReady && !ready) enter(SafetyState::kListen, StopCause::kNone, input.now, memory);
+  if (memory.state == SafetyState::kReady && input.arm) enter(SafetyState::kArmed, StopCause::kNone, input.now, memory);
+}
+
+// Whether the signals have ended the state.
+bool stopped(const SafetyRules& rules, const SafetyInput& input, bool moving, SafetyMemory& memory) {
+  const Assessment found = assess(rules, input, memory.bad, memory.last_now, moving);
+  if (found.level == StopLevel::kDamp)
+    enter(SafetyState::kDamp, found.cause, input.now, memory);
+  else if (found.level == StopLevel::kHold)
+    enter(SafetyState::kHold, found.cause, input.now, memory);
+  return found.level >= StopLevel::kHold;
+}
+
+// Damped already: what would hold anything else ends the arming.
+void wait_armed(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
+  const Assessment found = assess(rules, input, memory.bad, memory.last_now, false);
+  if (found.level >= StopLevel::kHold) return enter(SafetyState::kDamp, found.cause, input.now, memory);
+  if (input.now - memory.since > rules.armed_time)
+    return enter(SafetyState::kDamp, StopCause::kLapsed, input.now, memory);
+  if (input.stand) enter(SafetyState::kStand, StopCause::kNone, input.now, memory);
+}
+
+void stand(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
+  if (stopped(rules, input, false, memory)) return;
+  const bool well = assess(rules, input, memory.bad, memory.last_now, true).level < StopLevel::kHold;
+  if (input.run && input.stands && well) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
+}
+
+// Whether a hold may still end in running.
+bool may_return(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
+  return memory.cause == StopCause::kPlannerAge && input.now - memory.since <= rules.hold_time &&
+         level_of(input.now - input.planner_at, rules.planner) < StopLevel::kDamp;
+}
+
+// Back to running only where nothing but the planner was late, and not for long. Everything else ends in damping, once
+// the hands are off the person.
+void hold(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
+  const Assessment found = assess(rules, input, memory.bad, memory.last_now, true);
+  if (found.level == StopLevel::kDamp && found.cause != StopCause::kPlannerAge)
+    return enter(SafetyState::kDamp, found.cause, input.now, memory);
+  if (found.level >= StopLevel::kHold && found.cause != StopCause::kPlannerAge) memory.cause = found.cause;
+  if (may_return(rules, memory, input)) {
+    if (found.level < StopLevel::kHold) enter(SafetyState::kRun, StopCause::kNone, input.now, memory);
+    return;
+  }
+  if (!input.hands_clear) return;
+  const bool late_planner = memory.cause == StopCause::kPlannerAge;
+  enter(SafetyState::kDamp, late_planner ? StopCause::kHeldTooLong : memory.cause, input.now, memory);
+}
+
+// A stop that the operator asked for, or an arming that lapsed, may be followed by another arming; nothing else.
+void damp(const SafetyRules& rules, const SafetyInput& input, SafetyMemory& memory) {
+  const bool asked_for = memory.cause == StopCause::kStopKey || memory.cause == StopCause::kLapsed;
+  const Assessment found = assess(rules, input, memory.bad, memory.last_now, false);
+  if (asked_for && found.level == StopLevel::kDamp && found.cause != StopCause::kStopKey) memory.cause = found.cause;
+  if (input.now - memory.since < rules.damp_time) return;
+  const bool again = memory.cause == StopCause::kStopKey || memory.cause == StopCause::kLapsed;
+  memory.well_since = kNever;
+  enter(again ? SafetyState::kListen : SafetyState::kFault, memory.cause, input.now, memory);
+}
+
+}  // namespace
+
+std::string_view safety_state_name(SafetyState state) { return kStateNames[static_cast<std::size_t>(state)]; }
+
+std::string_view missing_for_arming(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
+  const Assessment found = assess(rules, input, memory.bad, memory.last_now, false);
+  if (found.level >= StopLevel::kHold) return stop_cause_name(found.cause);
+  if (!input.health.joints_in_range) return "joints_in_range";
+  return "";
+}
+
+SafetyMemory next_safety(const SafetyRules& rules, const SafetyMemory& before, const SafetyInput& input) {
+  SafetyMemory memory = before;
+  note_bad_states(input.bad_states, input.now, memory.bad);
+  switch (before.state) {
+    case SafetyState::kOffline:
+      if (input.state_at != kNever) enter(SafetyState::kListen, StopCause::kNone, input.now, memory);
+      break;
+    case SafetyState::kListen:
+    case SafetyState::kReady:
+      listen(rules, input, memory);
+      break;
+    case SafetyState::kArmed:
+      wait_armed(rules, input, memory);
+      break;
+    case SafetyState::kStand:
+      stand(rules, input, memory);
+      break;
+    case SafetyState::kRun:
+      stopped(rules, input, true, memory);
+      break;
+    case SafetyState::kHold:
+      hold(rules, input, memory);
+      break;
+    case SafetyState::kDamp:
+      damp(rules, input, memory);
+      break;
+    case SafetyState::kFault:
+      break;
+  }
+  memory.last_now = input.now;
+  return memory;
+}
+
+SafetyOrder safety_order(const SafetyRules& rules, const SafetyMemory& memory, const SafetyInput& input) {
+  SafetyOrder order;
+  order.writes = memory.state >= SafetyState::kArmed;
+  order.damps =
+      memory.state == SafetyState::kArmed || memory.state == SafetyState::kDamp || memory.state == SafetyState::kFault;
+  order.stands = memory.state == SafetyState::kStand;
+  if (memory.state == SafetyState::kRun) order.share = planner_share(rules, input.now - input.planner_at);
+  order.opens = memory.state == SafetyState::kHold && !may_return(rules, memory, input);
+  return order;
+}
+
+namespace {
+
+constexpr std::array<std::string_view, kStopCauses> kCauseNames = {
+    "none",           "state_age",  "bad_states",  "planner_age",   "person_age",  "odometry_age",
+    "odometry_jump",  "remote_age", "dead_man",    "loop_late",     "clock",       "tilt",
+    "joint_speed",    "gyro",       "temperature", "charge",        "motor_error", "mode",
+    "foreign_writer", "stop_key",   "lapsed",      "held_too_long", "executor_age"};
+
+StopLevel above(double value, double hold, double damp) {
+  // Written so that a value that is not a number is the worst.
+  if (!(value <= damp)) return StopLevel::kDamp;
+  return value > hold ? StopLevel::kHold : StopLevel::kFine;
+}
+
+StopLevel damp_if(bool wrong) { return wrong ? StopLevel::kDamp : StopLevel::kFine; }
+StopLevel hold_if(bool wrong) { return wrong ? StopLevel::kHold : StopLevel::kFine; }
+
+void worsen(Assessment& all, StopLevel level, StopCause cause) {
+  if (level > all.level) all = {level, cause};
+}
+
+int since(const BadStates& bad, double from) {
+  return static_cast<int>(std::ranges::count_if(bad.at, [from](double at) { return at >= from; }));
+}
+
+StopLevel level_of_bad_states(const SafetyRules& rules, const BadStates& bad, double now) {
+  if (since(bad, now - rules.damp_bad_time) >= rules.damp_bad_states) return StopLevel::kDamp;
+  if (since(bad, now - rules.hold_bad_time) >= rules.hold_bad_states) return StopLevel::kHold;
+  return since(bad, now - rules.damp_bad_time) > 0 ? StopLevel::kWarn : StopLevel::kFine;
+}
+
+void assess_clock(const SafetyRules& rules, const SafetyInput& input, double last_now, Assessment& all) {
+  if (last_now == kNever) return;
+  worsen(all, damp_if(!(input.now >= last_now)), StopCause::kClock);
+  worsen(all, level_of(input.now - last_now - input.period, rules.loop), StopCause::kLoopLate);
+}
+
+void assess_robot(const SafetyRules& rules, const SafetyInput& input, const BadStates& bad, Assessment& all) {
+  const RobotHealth& health = input.health;
+  worsen(all, level_of(input.now - input.state_at, rules.state), StopCause::kStateAge);
+  worsen(all, level_of_bad_states(rules, bad, input.now), StopCause::kBadStates);
+  worsen(all, above(health.tilt, rules.hold_tilt, rules.damp_tilt), StopCause::kTilt);
+  worsen(all, damp_if(!(health.joint_speed <= rules.joint_speed)), StopCause::kJointSpeed);
+  worsen(all, damp_if(!(health.gyro <= rules.gyro)), StopCause::kGyro);
+  worsen(all, above(health.casing, rules.hold_casing, rules.damp_casing), StopCause::kTemperature);
+  worsen(all, above(health.winding, rules.hold_winding, rules.damp_winding), StopCause::kTemperature);
+  worsen(all, hold_if(!(health.charge >= rules.charge)), StopCause::kCharge);
+  worsen(all, damp_if(health.motor_error), StopCause::kMotorError);
+  worsen(all, damp_if(!health.mode_is_expected), StopCause::kMode);
+}
+
+void assess_motion(const SafetyRules& rules, const SafetyInput& input, Assessment& all) {
+  const double now = input.now;
+  if (rules.person_present) worsen(all, level_of(now - input.person_at, rules.person), StopCause::kPersonAge);
+  if (rules.walks) {
+    worsen(all, level_of(now - input.odometry_at, rules.odometry), StopCause::kOdometryAge);
+    worsen(all, hold_if(!(input.odometry_step <= rules.odometry_jump)), StopCause::kOdometryJump);
+  }
+  worsen(all, level_of(now - input.dead_man_at, rules.remote), StopCause::kDeadMan);
+  worsen(all, level_of(now - input.planner_at, rules.planner), StopCause::kPlannerAge);
+}
+
+}  // namespace
+
+std::string_view stop_cause_name(StopCause cause) { return kCauseNames[static_cast<std::size_t>(cause)]; }
+
+void note_bad_states(int count, double now, BadStates& bad) {
+  for (int k = 0; k < std::min(count, static_cast<int>(BadStates::kKept)); ++k) {
+    std::rotate(bad.at.begin(), bad.at.end() - 1, bad.at.end());
+    bad.at.front() = now;
+  }
+}
+
+StopLevel level_of(double age, const AgeLimits& limits) {
+  if (!(age <= limits.damp)) return StopLevel::kDamp;
+  if (age > limits.hold) return StopLevel::kHold;
+  return age > limits.warn ? StopLevel::kWarn : StopLevel::kFine;
+}
+
+Assessment assess(const SafetyRules& rules, const SafetyInput& input, const BadStates& bad, double last_now,
+                  bool moving) {
+  Assessment all;
+  assess_clock(rules, input, last_now, all);
+  assess_robot(rules, input, bad, all);
+  worsen(all, level_of(input.now - input.remote_at, rules.remote), StopCause::kRemoteAge);
+  worsen(all, hold_if(input.foreign_writer), StopCause::kForeignWriter);
+  if (rules.executor_answers)
+    worsen(all, level_of(input.now - input.executor_at, rules.executor), StopCause::kExecutorAge);
+  worsen(all, damp_if(input.stop_key), StopCause::kStopKey);
+  if (moving) assess_motion(rules, input, all);
+  return all;
+}
+
+double planner_share(const SafetyRules& rules, double age) {
+  if (!(age <= rules.planner.hold)) return 0.0;
+  if (age <= rules.planner.warn) return 1.0;
+  return rules.late_share * (rules.planner.hold - age) / (rules.planner.hold - rules.planner.warn);
+}
+
+}  // namespace duet

@@ -1,0 +1,145 @@
+// A stand-in for the robot at its wire: joints that follow their gains, a root that follows a velocity with lag, delay
+// and drift, the remote control. It has no gait and does not fall: it proves protocols, not walking. With an engine
+// (TwinOptions::engine) its body is simulated instead: what the wire commands is all that holds it up. The same seed
+// and calls give the same frames. One owner, one thread.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "duet/backends/backend.h"
+#include "duet/controllers/root_conversion.h"
+#include "duet/core/numbers.h"
+#include "duet/hardware/wire/low_level_frame.h"
+#include "duet/hardware/wire/robot_wire.h"
+#include "duet/robots/kinematics.h"
+#include "duet/robots/robot_model.h"
+
+namespace duet {
+
+// The twin's body in an engine of backends/: the wire's commands are the motors' law there, and what the sensors of the
+// robot would read comes back. It hangs on a rope until somebody lets it down: a robot that is limp or damped lies on
+// the floor otherwise. One owner, one thread.
+class TwinPhysics {
+ public:
+  // Standing in the neutral pose at the origin, the rope taut. Throws as make_backend.
+  TwinPhysics(const std::string& engine, std::shared_ptr<const RobotModel> robot, double dt);
+
+  // One step of `dt` under the motors' law kp (q* - q) + kd (dq* - v) + tau; a motor whose mode is not 1 gives nothing.
+  // The frame's numbers are finite and its gains not below 0. A twin that has diverged stays where it was.
+  void step(const LowCommandFrame& command);
+
+  // How much of the rope is in use: 1 holds it where it hung when that was last 0, 0 is slack.
+  void hang(double share);
+  [[nodiscard]] double hanging() const { return hanging_; }
+
+  [[nodiscard]] const RobotState& state() const { return backend_->state(); }
+  [[nodiscard]] const Eigen::VectorXd& torques() const { return backend_->torques(); }
+  // The reading of an accelerometer in the base [m/s^2], frame B.
+  [[nodiscard]] Eigen::Vector3d specific_force() const;
+  [[nodiscard]] bool diverged() const { return diverged_; }
+  [[nodiscard]] double dt() const { return backend_->scene().dt; }
+
+ private:
+  void pull();
+
+  std::shared_ptr<const RobotModel> robot_;
+  std::unique_ptr<Backend> backend_;
+  Kinematics kinematics_;
+  JointCommand command_;
+  Eigen::MatrixXd jacobian_;
+  int hook_ = 0;                         // the link that the rope is at
+  Eigen::Vector3d anchor_W_, v_before_;  // of the rope [m]; of the base before the last step [m/s]
+  double hanging_ = 1.0;
+  bool diverged_ = false;
+};
+
+struct TwinOptions {
+  double lag = 0.35;                // of the root's speed [s]
+  double delay = 0.1;               // of its command [s]
+  double drift = 0.0;               // of odometry [m/s]
+  double place_noise = 0.0;         // of odometry, standard deviation [m]
+  double speed_noise = 0.0;         // [m/s]
+  double joint_noise = 0.0;         // of the measured angles [rad]
+  double joint_speed_noise = 0.0;   // [rad/s]
+  double gyro_noise = 0.0;          // [rad/s]
+  double acceleration_noise = 0.0;  // [m/s^2]
+  double tilt_noise = 0.0;          // of the IMU's orientation, about its x and y [rad]
+  int mode_machine = 5;
+  std::uint64_t seed = 1;
+  std::string engine =
+      {};  // of backends/ that simulates its body; empty: the first-order one. Steps are then kTwinPeriod
+};
+
+inline constexpr double kTwinPeriod = 0.002;  // of states and of an engine's steps [s]
+
+// Conditions that a script may change.
+struct TwinCondition {
+  double casing = 35.0, winding = 40.0;  // [degrees C]
+  double roll = 0.0;                     // of the base [rad]
+  double joint_speed = 0.0;              // added to a joint's reported speed [rad/s]
+  double gyro = 0.0;                     // added to the reported rate [rad/s]
+  double charge = 90.0;                  // of the battery [%]
+  bool motor_error = false;
+  int mode_pr = 0;
+  int mode_machine_offset = 0;
+};
+
+class TwinModel {
+ public:
+  // Throws std::invalid_argument for a robot without the G1's motors, and for an option that is negative or not finite;
+  // as make_backend for an engine.
+  TwinModel(std::shared_ptr<const RobotModel> robot, const TwinOptions& options);
+
+  // A frame with a wrong checksum, for another robot, with numbers that are not finite or gains below 0 is counted and
+  // not obeyed.
+  void obey(const LowCommandFrame& frame);
+  void obey(const VelocityCommand& velocity) { asked_ = velocity; }
+  // Throws std::invalid_argument for another dt than the engine's.
+  void step(double dt);
+  void write_state(LowStateFrame& frame);  // with the next tick
+  [[nodiscard]] OdometrySample odometry(double now);
+
+  RemoteControl remote{.heard = true};
+  TwinCondition condition;
+  [[nodiscard]] const RobotModel& robot() const { return *robot_; }
+  [[nodiscard]] const Eigen::VectorXd& q() const { return q_; }
+  [[nodiscard]] const Pose& root() const { return X_WB_; }
+  [[nodiscard]] double time() const { return time_; }              // stepped so far [s]
+  [[nodiscard]] TwinPhysics* physics() { return physics_.get(); }  // null: first-order
+  [[nodiscard]] double root_speed() const { return v_WB_.head<2>().norm(); }
+  [[nodiscard]] std::uint32_t tick() const { return tick_; }  // of the last state written
+  [[nodiscard]] long refused_frames() const { return refused_; }
+  [[nodiscard]] long obeyed_frames() const { return obeyed_; }
+  [[nodiscard]] const LowCommandFrame& last_command() const { return command_; }
+
+ private:
+  void step_joints(double dt);
+  void step_root(double dt);
+  void step_body(double dt);
+  void write_imu(ImuFrame& imu);
+
+  std::shared_ptr<const RobotModel> robot_;
+  TwinOptions options_;
+  Random random_;
+  Eigen::VectorXd q_, v_, tau_;
+  Pose X_WB_;
+  Eigen::Vector3d v_WB_ = Eigen::Vector3d::Zero();           // [m/s]
+  Eigen::Vector3d w_WB_B_ = Eigen::Vector3d::Zero();         // [rad/s]
+  Eigen::Vector3d specific_force_B_ = {0.0, 0.0, kGravity};  // [m/s^2]
+  Eigen::Vector2d speed_ = Eigen::Vector2d::Zero();          // asked for and lagging, in the heading frame [m/s]
+  double yaw_rate_ = 0.0, drifted_ = 0.0, time_ = 0.0;
+  std::unique_ptr<TwinPhysics> physics_;
+  VelocityCommand asked_;
+  struct LateCommand {
+    double at;
+    VelocityCommand velocity;
+  };
+  std::deque<LateCommand> late_;
+  LowCommandFrame command_{};
+  std::uint32_t tick_ = 0;
+  long refused_ = 0, obeyed_ = 0;
+};
+
+}  // namespace duet

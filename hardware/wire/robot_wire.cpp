@@ -1,0 +1,36 @@
+#include "duet/hardware/wire/robot_wire.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "duet/core/require.h"
+
+namespace duet {
+namespace {
+
+constexpr std::size_t kMostInterface = 15;  // characters, as the kernel has it
+
+bool is_name(const std::string& interface) {
+  return !interface.empty() && interface.size() <= kMostInterface &&
+         std::ranges::all_of(interface, [](unsigned char c) {
+           return std::isalnum(c) != 0 || c == '.' || c == '_' || c == '-' || c == '@' || c == ':';
+         });
+}
+
+}  // namespace
+
+void check_place(const DdsPlace& place) {
+  require(place.domain >= 0 && place.domain <= kLastTwinDomain, "domain of DDS: expected 0 to {}, found {}",
+          kLastTwinDomain, place.domain);
+  require(is_name(place.interface) && place.interface != "auto",
+          "network interface: expected the name of one (not 'auto'), found '{}'", shown(place.interface));
+}
+
+void check_twin_place(const DdsPlace& place) {
+  check_place(place);
+  require(place.domain >= kFirstTwinDomain && place.interface == "lo",
+          "twin: expected a domain from {} to {} on 'lo', found {} on '{}'", kFirstTwinDomain, kLastTwinDomain,
+          place.domain, place.interface);
+}
+
+}  // namespace duet

@@ -1,8 +1,0 @@
-// The two people of a clip.
-#pragma once
-
-namespace duet {
-
-enum class Person { kA, kB };
-
-}  // namespace duet

@@ -1,0 +1,36 @@
+// The status of a guard, as `duet hw` prints it: for the screen, and as JSON.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "duet/app/command.h"
+#include "duet/hardware/guard/robot_guard.h"
+
+namespace duet::cli {
+
+nlohmann::json status_json(const RobotGuard& guard);
+// `seconds`: for which it has listened.
+std::string status_text(const RobotGuard& guard, double seconds);
+
+// Asks the system for real-time priority, for this thread and those that it makes from now on, and says what came of
+// it.
+std::string real_time_text();
+
+// duet hw episodes: a suite's episodes over the twin beside the same in the simulator. duet hw run --clip: one episode
+// through a guard that is there. duet hw recording: a run's log as a recording.
+
+void add_hardware_episodes(CLI::App& hardware, Session& session);
+
+// Arguments of `duet hw run` for an episode of a clip.
+struct ClipEpisodeArguments {
+  std::string clip, config, policy = "replay", start = "act", walker = "homie", recording;
+};
+void add_clip_options(CLI::App& command, ClipEpisodeArguments& arguments);
+void run_clip_episode(Session& session, const ClipEpisodeArguments& arguments, const std::string& socket);
+
+// `duet hw play-partner`: a clip in the place of a camera.
+void add_play_partner(CLI::App& hardware, Session& session);
+
+}  // namespace duet::cli
