@@ -204,7 +204,8 @@ std::vector<PolicyLine> lines_of(const std::map<PolicyKey, Estimates>& estimates
   }
   std::vector<PolicyLine> list;
   for (auto& [key, line] : lines) {
-    std::ranges::stable_partition(line.engines, [](const auto& engine) { return is_physics(engine.first); });
+    std::stable_partition(line.engines.begin(), line.engines.end(),
+                          [](const auto& engine) { return is_physics(engine.first); });
     line.keys.engine = line.keys.task = kOverall;
     line.keys.perturbation = kClean;
     list.push_back(std::move(line));
@@ -348,7 +349,8 @@ std::vector<std::string> engines_in(const std::map<PolicyKey, Estimates>& polici
   std::vector<std::string> engines;
   for (const auto& [key, estimates] : policies)
     if (engines.empty() || engines.back() != key.engine) engines.push_back(key.engine);
-  std::ranges::stable_partition(engines, [](const std::string& engine) { return engine != kPlaybackEngine; });
+  std::stable_partition(engines.begin(), engines.end(),
+                        [](const std::string& engine) { return engine != kPlaybackEngine; });
   return engines;
 }
 

@@ -223,7 +223,7 @@ std::vector<PivotRow> rows_of(const Estimates& estimates, const std::vector<RowL
     if (is_new) rows.push_back({.estimates = {}, .by_of = by_of});
     rows[place->second].estimates.push_back(&estimate);
   }
-  std::ranges::stable_partition(rows, [](const PivotRow& row) { return !is_papers(row.keys()); });
+  std::stable_partition(rows.begin(), rows.end(), [](const PivotRow& row) { return !is_papers(row.keys()); });
   return rows;
 }
 
