@@ -213,7 +213,7 @@ void Experiment::simulate(const EpisodeSpec& spec, const EpisodeOverrides& overr
   rules.feet = setup.foot_trace;
   score_rollout(rollout, setup, rules, *spec.body->robot, row);
   if (!keeps(row, overrides)) return;
-  save_episode_recording({rollout.recording, KeptEpisode{row, std::move(rules), act_source(rollout.recording, setup)}},
+  save_episode_recording({rollout.recording, KeptEpisode{row, rules, act_source(rollout.recording, setup)}},
                          trajectory_path(overrides.trajectories, row));
 }
 

@@ -71,7 +71,7 @@ LedEpisode::~LedEpisode() {
     return;
   }
   if (thread_.joinable()) thread_.detach();
-  static_cast<void>(new std::shared_ptr<PlanQueue>(std::move(queue_)));
+  static_cast<void>(new (std::nothrow) std::shared_ptr<PlanQueue>(std::move(queue_)));
 }
 
 void LedEpisode::require_same_process() const {

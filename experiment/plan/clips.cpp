@@ -440,6 +440,7 @@ void use_clips(const std::vector<std::string>& paths, Suite& suite) {
 
 std::vector<std::string> find_clip_files(const std::vector<std::string>& paths) {
   std::vector<std::string> places;
+  places.reserve(paths.size());
   for (const std::string& path : paths) places.push_back(is_dataset(path) ? people_folder(path) : path);
   return find_motion_files(places);
 }

@@ -129,6 +129,7 @@ TitledTable metric_table(const std::vector<std::pair<std::string, std::map<std::
                          const std::vector<MetricColumn>& columns) {
   TitledTable titled{.table = {.header = {"Metric"}}};
   std::vector<std::string> names;
+  names.reserve(columns.size());
   for (const MetricColumn& column : columns) names.push_back(column.name);
   for (const auto& [head, values] : sets) {
     titled.table.header.push_back(head);
@@ -148,8 +149,10 @@ std::string retargeting_section(const ReportContent& content) {
   if (content.retargeting.empty()) return "";
   std::vector<std::pair<std::string, std::map<std::string, double>>> sets;
   std::vector<std::pair<int, std::string>> tasks;
+  tasks.reserve(content.retargeting.size());
   for (const auto& [task, values] : content.retargeting) tasks.emplace_back(task_rank(task), task);
   std::ranges::sort(tasks);
+  sets.reserve(tasks.size());
   for (const auto& [rank, task] : tasks)
     sets.emplace_back(task == "all" ? "All tasks" : task_title(task), content.retargeting.at(task));
   TitledTable titled = metric_table(sets, content.columns);

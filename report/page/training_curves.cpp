@@ -27,7 +27,7 @@ bool is_level(const std::vector<double>& values) {
 }
 
 std::vector<std::string> read_header(const CsvReader& row) {
-  const std::vector<std::string> columns(row.fields().begin(), row.fields().end());
+  std::vector<std::string> columns(row.fields().begin(), row.fields().end());
   if (columns.size() < 2) row.fail(fmt::format("expected two or more columns, found {}", columns.size()));
   for (std::size_t i = 0; i < columns.size(); ++i) {
     if (columns[i].empty()) row.fail(fmt::format("column {} has no name", i + 1));

@@ -106,7 +106,7 @@ void add_success(const std::vector<PerturbedEpisodes>& perturbations, double lev
 }
 
 // Finished: points by x, with the names of families.
-std::vector<DegradationCurve> finished(const PolicyKey& key, CurvesOfPolicy curves) {
+std::vector<DegradationCurve> finished(const PolicyKey& key, CurvesOfPolicy&& curves) {
   std::map<std::string, std::set<std::string>> besides;
   for (const auto& [name, curve] : curves) besides[name[0]].insert(name[2]);
   std::vector<DegradationCurve> list;

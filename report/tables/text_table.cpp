@@ -227,6 +227,7 @@ TitledTable with_columns(TitledTable titled, const std::vector<std::string>& col
   if (kept.size() == table.label_columns) return titled;
   const auto cut = [&](const std::vector<std::string>& cells) {
     std::vector<std::string> some;
+    some.reserve(kept.size());
     for (const std::size_t i : kept) some.push_back(cells[i]);
     return some;
   };
