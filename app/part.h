@@ -1,5 +1,6 @@
-// What a part (docs/architecture.md, "Parts") adds to the program: commands, lists, benchmarks. The program knows the
-// names of all that parts may add and their place in its help, so that it can say which part a missing one belongs to.
+// The additions of a part (docs/architecture.md, "Parts") to the program: commands, lists, benchmarks. The program
+// knows the names of all that parts may add and their place in its help, so that it can say which part a missing one
+// belongs to.
 #pragma once
 
 #include <functional>
@@ -28,7 +29,7 @@ struct Finding {
   std::string detail;
 };
 
-// What a command of the core was given, for a part that adds options to it.
+// The words that a command of the core was given, for a part that adds options to it.
 struct GivenWords {
   std::vector<std::string> words;
   bool each = false;
@@ -51,7 +52,7 @@ struct Part {
 // The parts of this program; it sets them before it reads its command line.
 std::vector<Part>& parts();
 
-// What a part has under a name in one of the tables above; null where no part has it.
+// The entry of a part under a name in one of the tables above; null where no part has it.
 template <typename Table>
 typename Table::mapped_type in_parts(Table Part::*table, const std::string& name) {
   for (const Part& part : parts())

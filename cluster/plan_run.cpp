@@ -215,7 +215,7 @@ RunPart part_of(const Run& head) {
   return head.info.plan && head.info.plan->parts.size() == 1 ? head.info.plan->parts.front() : RunPart();
 }
 
-// What of a head's suite is planned; the other policies and controllers need not be on this machine.
+// The part of a head's suite that is planned; the other policies and controllers need not be on this machine.
 ExperimentOptions planned_options(const Run& head) {
   ExperimentOptions options = only(part_of(head), parse_suite(head.info.suite_yaml, head.path + "/suite.yaml"));
   options.part = part_of(head);

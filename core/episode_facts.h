@@ -1,4 +1,4 @@
-// What happened in an episode, declared once: the parts that measure it return it, and the episode's row keeps it.
+// The facts of an episode, declared once: the parts that measure them return them, and the episode's row keeps them.
 #pragma once
 
 #include <limits>
@@ -43,7 +43,7 @@ struct ContactFacts {
   double windowed_mean_n = 0.0;  // largest mean over the window of the measurement, 0.1 s [N]
 };
 
-// What a detector finds in a motion.
+// The findings of a detector in a motion.
 struct DetectorFacts {
   bool success = false;
   NamedFlags parts;     // the printed sub-conditions by name

@@ -1,5 +1,5 @@
 // A suite that is set up on this machine: what it says, its identity, the robots, controllers and policies that were
-// loaded for it, and the plan of its episodes. Whoever runs episodes runs them here: `duet run`, the workers of a
+// loaded for it, and the plan of its episodes. All episodes run here: `duet run`, the workers of a
 // cluster, `duet verify`, Python, and a robot behind its guard.
 #pragma once
 
@@ -38,7 +38,7 @@ struct ExperimentOptions {
 // Leaves out of loading what the suite has beside `chosen`.
 ExperimentOptions only(const RunPart& chosen, const Suite& suite);
 
-// What a run of an episode does otherwise than its spec says.
+// The differences of a run of an episode from its spec.
 struct EpisodeOverrides {
   PolicyMaker policy = {};                // leads in the place of the suite's own
   std::function<bool()> stop_asked = {};  // empty: signals alone stop it

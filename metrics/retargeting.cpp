@@ -22,7 +22,7 @@ struct ScoredTracks {
   std::vector<int> hands;                                            // left, right
 };
 
-// What is scored, wherever it comes from.
+// The motion that is scored, wherever it comes from.
 struct ScoredMotion {
   ScoredMotion(const PairedMotion& motion)  // NOLINT(google-explicit-constructor): the same parts
       : robot(motion.robot),

@@ -17,8 +17,8 @@
 
 namespace duet {
 
-// What an episode is made of. It points at the suite's own parts and at what this machine has loaded of them, so that
-// nothing is looked up by name while it runs; Experiment (execution/experiment.h) owns both.
+// The parts that an episode is made of. It points at the suite's own parts and at what this machine has loaded of them,
+// so that nothing is looked up by name while it runs; Experiment (execution/experiment.h) owns both.
 struct EpisodeSpec {
   const PairedMotion* clip = nullptr;
   std::string engine;

@@ -100,7 +100,7 @@ std::string limits(const Interval& interval, double scale, int digits) {
   return fmt::format("[{:.{}f}, {:.{}f}]", scale * interval.low + 0.0, digits, scale * interval.high + 0.0, digits);
 }
 
-// Of the items `of`: the mean and swaps; how far they can be relied on.
+// The mean and the swaps of the items `of`, and how far they can be relied on.
 std::vector<std::string> rank_sentences(const CrossEngine& result, const std::string& of) {
   const auto named = [&](const char* name) -> const Estimate& {
     return *find_estimate(result.ranks, {.engine = kAllEngines, .of = of, .name = name});

@@ -20,7 +20,7 @@ constexpr std::string_view kPrefix = "human.";
 constexpr std::string_view kPeak = ".peak_n";
 constexpr double kNoForce = std::numeric_limits<double>::quiet_NaN();
 
-// What rows call a force of a region, and its estimate.
+// The name that rows give a force of a region, and its estimate.
 struct ContactForce {
   const char *ending, *name, *unit;
 };

@@ -14,7 +14,7 @@ namespace duet {
 
 inline constexpr const char* kAnyRegion = "any";  // the whole body
 
-// Of each controller and policy the engines, and "all" of them together, where an episode counts once per engine; `of`
+// The engines of each controller and policy, and "all" of them together, where an episode counts once per engine; `of`
 // is the region: `touched` and `over` a limit (a ratio above 1), of the episodes with a solid partner, touched or not;
 // and over the episodes that touched it the median of peak forces and the largest of all others (NaN where there is
 // none): `peak`, `quasi_static` (held for more than 0.5 s), `transient` (within the first 0.5 s of a contact),

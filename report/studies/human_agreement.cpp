@@ -166,7 +166,7 @@ TitledTable raters_table(const Estimates& estimates, const std::vector<Rater>& r
   return titled;
 }
 
-// Of each detector two estimates for each rater, two for the majority, sensitivity and specificity follow one another.
+// Each detector has two estimates for each rater, two for the majority; sensitivity and specificity follow one another.
 TitledTable detectors_table(const Estimates& estimates, const std::vector<std::string>& detectors,
                             const std::vector<Rater>& raters, const HumanAgreement& agreement) {
   TitledTable titled{.title = "Detectors with raters", .table = {.header = {"Detector"}}};
